@@ -1,0 +1,140 @@
+//! Photographs: loading, smoothing, interpolation.
+
+use std::path::Path;
+
+pub use image::{GrayImage, RgbImage};
+use image::{ImageBuffer, Luma};
+
+/// A grey image of real values in 0 … 255.
+pub type FloatImage = ImageBuffer<Luma<f32>, Vec<f32>>;
+
+/// A photograph: the grey values that the estimators work on, and its colours where it has any.
+#[derive(Clone, Debug)]
+pub struct Photo {
+    /// Grey values.
+    pub gray: GrayImage,
+    /// Colours, for display only; `None` for a grey camera.
+    pub color: Option<RgbImage>,
+}
+
+impl Photo {
+    /// A photo with colours; its grey values are their luma (Rec. 709).
+    pub fn from_color(color: RgbImage) -> Self {
+        Self {
+            gray: image::imageops::grayscale(&color),
+            color: Some(color),
+        }
+    }
+
+    /// A photo of a grey camera.
+    pub fn from_gray(gray: GrayImage) -> Self {
+        Self { gray, color: None }
+    }
+
+    /// Reads an image file of any supported format; the content decides, not the file's name.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is not an image.
+    pub fn read(path: &Path) -> image::ImageResult<Self> {
+        let image = image::ImageReader::open(path)?
+            .with_guessed_format()?
+            .decode()?;
+        Ok(if image.color().has_color() {
+            Self::from_color(image.into_rgb8())
+        } else {
+            Self::from_gray(image.into_luma8())
+        })
+    }
+
+    /// Width and height \[px\].
+    pub fn dimensions(&self) -> (u32, u32) {
+        self.gray.dimensions()
+    }
+}
+
+/// The image convolved with a Gaussian of `sigma` \[px\]; `sigma` 0 returns it as it is.
+pub fn gaussian_smoothed(image: &GrayImage, sigma: f64) -> FloatImage {
+    let float = FloatImage::from_fn(image.width(), image.height(), |x, y| {
+        Luma([f32::from(image.get_pixel(x, y).0[0])])
+    });
+    if sigma <= 0.0 || image.width() == 0 || image.height() == 0 {
+        return float;
+    }
+    image::imageops::blur(&float, sigma as f32)
+}
+
+/// The grey value between pixels by cubic convolution (Catmull-Rom, a = −0.5), clamped to 0 … 255.
+///
+/// Beyond the border the outermost pixel is repeated. This is the paper's interpolation f of
+/// appendix B, "generation of synthetic views".
+pub fn cubic_interpolated(image: &GrayImage, x: f32, y: f32) -> f32 {
+    let (left, top) = (x.floor(), y.floor());
+    let weights_x = catmull_rom_weights(x - left);
+    let weights_y = catmull_rom_weights(y - top);
+    let (last_x, last_y) = (image.width() as i32 - 1, image.height() as i32 - 1);
+    let mut value = 0.0;
+    for (row, weight_y) in weights_y.iter().enumerate() {
+        let v = (top as i32 - 1 + row as i32).clamp(0, last_y) as u32;
+        for (column, weight_x) in weights_x.iter().enumerate() {
+            let u = (left as i32 - 1 + column as i32).clamp(0, last_x) as u32;
+            value += weight_x * weight_y * f32::from(image.get_pixel(u, v).0[0]);
+        }
+    }
+    value.clamp(0.0, 255.0)
+}
+
+/// Weights of the four samples at −1, 0, 1, 2 for a position `t` in 0 … 1 (Keys 1981, a = −0.5).
+fn catmull_rom_weights(t: f32) -> [f32; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        -0.5 * t + t2 - 0.5 * t3,
+        1.0 - 2.5 * t2 + 1.5 * t3,
+        0.5 * t + 2.0 * t2 - 1.5 * t3,
+        -0.5 * t2 + 0.5 * t3,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn smoothing_keeps_a_constant_and_spreads_a_dot_like_a_gaussian() {
+        let constant = GrayImage::from_pixel(31, 21, Luma([200]));
+        for pixel in gaussian_smoothed(&constant, 1.5).pixels() {
+            assert!((pixel.0[0] - 200.0).abs() < 0.01, "{pixel:?}");
+        }
+        let mut dot = GrayImage::new(31, 31);
+        dot.put_pixel(15, 15, Luma([255]));
+        let smooth = gaussian_smoothed(&dot, 1.5);
+        let sum: f32 = smooth.pixels().map(|p| p.0[0]).sum();
+        assert!((sum - 255.0).abs() < 0.5, "{sum}");
+        let ratio = smooth.get_pixel(17, 15).0[0] / smooth.get_pixel(15, 15).0[0];
+        let expected = (-4.0_f32 / (2.0 * 1.5 * 1.5)).exp();
+        assert!((ratio - expected).abs() < 0.01, "{ratio} {expected}");
+    }
+
+    #[test]
+    fn cubic_interpolation_reproduces_a_ramp_and_the_pixels_themselves() {
+        let ramp = GrayImage::from_fn(12, 9, |x, y| Luma([(10 * x + 5 * y) as u8]));
+        assert_eq!(cubic_interpolated(&ramp, 4.0, 3.0), 55.0);
+        let between = cubic_interpolated(&ramp, 4.25, 3.5);
+        assert!((between - (42.5 + 17.5)).abs() < 1e-4, "{between}");
+    }
+
+    proptest! {
+        #[test]
+        fn catmull_rom_weights_are_a_partition_of_one(t in 0.0_f32..1.0) {
+            let sum: f32 = catmull_rom_weights(t).iter().sum();
+            prop_assert!((sum - 1.0).abs() < 1e-6);
+        }
+
+        #[test]
+        fn cubic_interpolation_stays_in_range_anywhere(x in -20.0_f32..40.0, y in -20.0_f32..40.0) {
+            let checks = GrayImage::from_fn(9, 7, |x, y| Luma([if (x + y) % 2 == 0 { 0 } else { 255 }]));
+            let value = cubic_interpolated(&checks, x, y);
+            prop_assert!((0.0..=255.0).contains(&value));
+        }
+    }
+}

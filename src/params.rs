@@ -1,0 +1,450 @@
+//! Every parameter, described once: name, unit, range, meaning.
+//!
+//! A struct of parameters describes itself to a [`ParamVisitor`]; the table of `posescope params`,
+//! `--set`, the configuration file and the app's sliders all follow from that description.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use crate::cost::{MutualInformationParams, PhotometricParams};
+use crate::estimator::FeatureParams;
+use crate::features::SurfParams;
+use crate::grid::GridParams;
+use crate::render::RenderParams;
+
+/// What a parameter is called, measured in and good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct About {
+    /// The name within its group.
+    pub name: &'static str,
+    /// The unit, empty for a pure number.
+    pub unit: &'static str,
+    /// One phrase.
+    pub help: &'static str,
+}
+
+/// A parameter that takes one of a few names.
+pub trait Choice {
+    /// All names, in the order in which they are offered.
+    fn names(&self) -> &'static [&'static str];
+    /// The position of the present one.
+    fn index(&self) -> usize;
+    /// Chooses the one at `index`, which is below `names().len()`.
+    fn choose(&mut self, index: usize);
+}
+
+/// Something that walks over parameters: a list, a setter, a panel of sliders.
+pub trait ParamVisitor {
+    /// A real number.
+    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>);
+    /// A whole number.
+    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>);
+    /// Yes or no.
+    fn flag(&mut self, about: About, value: &mut bool);
+    /// One of a few names.
+    fn choice(&mut self, about: About, value: &mut dyn Choice);
+}
+
+/// A struct that shows its parameters to a visitor, in a fixed order.
+pub trait Describe {
+    /// Shows each parameter once.
+    fn visit(&mut self, visitor: &mut dyn ParamVisitor);
+}
+
+/// All parameters of all estimators, by group.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Params {
+    /// `surf`: detector and descriptor.
+    pub surf: SurfParams,
+    /// `fb`: matching, depth lift, consensus, acceptance.
+    pub fb: FeatureParams,
+    /// `render`: colouring and splatting.
+    pub render: RenderParams,
+    /// `grid`: the coarse-to-fine search of the direct methods.
+    pub grid: GridParams,
+    /// `pm`: the photometric cost.
+    pub pm: PhotometricParams,
+    /// `mi`: the mutual-information cost.
+    pub mi: MutualInformationParams,
+}
+
+/// The value of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// A real number.
+    Number(f64),
+    /// A whole number.
+    Count(usize),
+    /// Yes or no.
+    Flag(bool),
+    /// One of a few names.
+    Choice(&'static str),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Count(count) => write!(f, "{count}"),
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Choice(name) => f.write_str(name),
+        }
+    }
+}
+
+/// What a parameter accepts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Domain {
+    /// Real numbers from … to.
+    Number(RangeInclusive<f64>),
+    /// Whole numbers from … to.
+    Count(RangeInclusive<usize>),
+    /// `true` or `false`.
+    Flag,
+    /// One of these names.
+    Choice(&'static [&'static str]),
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(range) => write!(f, "{} … {}", range.start(), range.end()),
+            Self::Count(range) => write!(f, "{} … {}", range.start(), range.end()),
+            Self::Flag => f.write_str("true | false"),
+            Self::Choice(names) => f.write_str(&names.join(" | ")),
+        }
+    }
+}
+
+/// One row of the table of parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Described {
+    /// `group.name`.
+    pub key: String,
+    /// Unit and meaning.
+    pub about: About,
+    /// The present value.
+    pub value: Value,
+    /// What it accepts.
+    pub domain: Domain,
+}
+
+/// Why a parameter could not be set.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParamError {
+    /// No parameter has this key.
+    #[error("there is no parameter `{key}`{}; `posescope params` lists all", hint(.nearest))]
+    Unknown {
+        /// The key as given.
+        key: String,
+        /// The key that resembles it most, if any does.
+        nearest: Option<String>,
+    },
+    /// The value is not of the parameter's kind or outside its range.
+    #[error("`{key}` takes {expected}, not `{given}`")]
+    BadValue {
+        /// The parameter.
+        key: String,
+        /// What it accepts.
+        expected: String,
+        /// What was given.
+        given: String,
+    },
+    /// An assignment without `=`.
+    #[error("`{0}` is not an assignment; write for example `fb.ratio=0.7`")]
+    NotAnAssignment(String),
+    /// The configuration is not TOML, or not made of groups.
+    #[error("{0}")]
+    Syntax(String),
+}
+
+fn hint(nearest: &Option<String>) -> String {
+    match nearest {
+        Some(key) => format!(" (did you mean `{key}`?)"),
+        None => String::new(),
+    }
+}
+
+impl Params {
+    /// Shows every parameter of every group to `visitor`; `group` is told before each group.
+    pub fn visit_groups(&mut self, mut visit: impl FnMut(&'static str, &mut dyn Describe)) {
+        visit("surf", &mut self.surf);
+        visit("fb", &mut self.fb);
+        visit("render", &mut self.render);
+        visit("grid", &mut self.grid);
+        visit("pm", &mut self.pm);
+        visit("mi", &mut self.mi);
+    }
+
+    /// All parameters with their present values.
+    pub fn list(&self) -> Vec<Described> {
+        let mut lister = Lister::default();
+        self.clone().visit_groups(|group, params| {
+            lister.group = group;
+            params.visit(&mut lister);
+        });
+        lister.rows
+    }
+
+    /// Sets one parameter from text, as `--set` does: `fb.ratio=0.7`.
+    ///
+    /// # Errors
+    /// [`ParamError`] with what was expected.
+    pub fn assign(&mut self, assignment: &str) -> Result<(), ParamError> {
+        let Some((key, value)) = assignment.split_once('=') else {
+            return Err(ParamError::NotAnAssignment(assignment.to_owned()));
+        };
+        self.set(key.trim(), value.trim())
+    }
+
+    /// Sets the parameter `key` (`group.name`) from text.
+    ///
+    /// # Errors
+    /// [`ParamError`] with what was expected.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), ParamError> {
+        let (wanted_group, name) = key.split_once('.').unwrap_or(("", key));
+        let mut setter = Setter {
+            name,
+            text: value,
+            outcome: None,
+        };
+        self.visit_groups(|group, params| {
+            if group == wanted_group {
+                params.visit(&mut setter);
+            }
+        });
+        match setter.outcome {
+            Some(Ok(())) => Ok(()),
+            Some(Err(expected)) => Err(ParamError::BadValue {
+                key: key.to_owned(),
+                expected: expected.to_string(),
+                given: value.to_owned(),
+            }),
+            None => Err(ParamError::Unknown {
+                key: key.to_owned(),
+                nearest: self.nearest_key(key),
+            }),
+        }
+    }
+
+    /// Sets parameters from a configuration: TOML with one table per group.
+    ///
+    /// # Errors
+    /// [`ParamError`] for the first key that cannot be set.
+    pub fn merge_toml(&mut self, text: &str) -> Result<(), ParamError> {
+        let table: toml::Table = text
+            .parse()
+            .map_err(|error: toml::de::Error| ParamError::Syntax(error.to_string()))?;
+        for (group, entries) in &table {
+            let Some(entries) = entries.as_table() else {
+                return Err(ParamError::Syntax(format!(
+                    "`{group}` stands outside a group; parameters live in tables such as [fb]"
+                )));
+            };
+            for (name, value) in entries {
+                let text = match value {
+                    toml::Value::String(text) => text.clone(),
+                    other => other.to_string(),
+                };
+                self.set(&format!("{group}.{name}"), &text)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The configuration that [`Self::merge_toml`] reads back to these parameters.
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        let mut group = String::new();
+        for row in self.list() {
+            let (row_group, name) = row.key.split_once('.').unwrap_or(("", &row.key));
+            if row_group != group {
+                if !group.is_empty() {
+                    text.push('\n');
+                }
+                text.push_str(&format!("[{row_group}]\n"));
+                group = row_group.to_owned();
+            }
+            let value = match row.value {
+                Value::Choice(choice) => format!("{choice:?}"),
+                Value::Number(number) => format!("{number:?}"),
+                other => other.to_string(),
+            };
+            text.push_str(&format!("{name} = {value}\n"));
+        }
+        text
+    }
+
+    /// The assignments that turn the defaults into these parameters.
+    pub fn changes(&self) -> Vec<String> {
+        let defaults = Self::default().list();
+        self.list()
+            .into_iter()
+            .zip(defaults)
+            .filter(|(row, default)| row.value != default.value)
+            .map(|(row, _)| format!("{}={}", row.key, row.value))
+            .collect()
+    }
+
+    /// The key that shares most letters, in order, with a mistyped one.
+    fn nearest_key(&self, key: &str) -> Option<String> {
+        let name_of = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
+        self.list()
+            .into_iter()
+            .map(|row| {
+                let whole = strsim::jaro_winkler(&row.key, key);
+                let name = strsim::jaro_winkler(&name_of(&row.key), &name_of(key));
+                (whole.max(name), row.key)
+            })
+            .filter(|(similarity, _)| *similarity > 0.8)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, key)| key)
+    }
+}
+
+#[derive(Default)]
+struct Lister {
+    group: &'static str,
+    rows: Vec<Described>,
+}
+
+impl Lister {
+    fn push(&mut self, about: About, value: Value, domain: Domain) {
+        self.rows.push(Described {
+            key: format!("{}.{}", self.group, about.name),
+            about,
+            value,
+            domain,
+        });
+    }
+}
+
+impl ParamVisitor for Lister {
+    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
+        self.push(about, Value::Number(*value), Domain::Number(range));
+    }
+    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
+        self.push(about, Value::Count(*value), Domain::Count(range));
+    }
+    fn flag(&mut self, about: About, value: &mut bool) {
+        self.push(about, Value::Flag(*value), Domain::Flag);
+    }
+    fn choice(&mut self, about: About, value: &mut dyn Choice) {
+        let names = value.names();
+        self.push(
+            about,
+            Value::Choice(names[value.index()]),
+            Domain::Choice(names),
+        );
+    }
+}
+
+/// Sets the parameter `name` of the group it is shown.
+struct Setter<'a> {
+    name: &'a str,
+    text: &'a str,
+    outcome: Option<Result<(), Domain>>,
+}
+
+impl Setter<'_> {
+    fn set<T>(&mut self, about: About, parsed: Option<T>, domain: Domain, place: &mut T) {
+        if about.name == self.name {
+            self.outcome = Some(match parsed {
+                Some(value) => {
+                    *place = value;
+                    Ok(())
+                }
+                None => Err(domain),
+            });
+        }
+    }
+}
+
+impl ParamVisitor for Setter<'_> {
+    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
+        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
+        self.set(about, parsed, Domain::Number(range), value);
+    }
+    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
+        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
+        self.set(about, parsed, Domain::Count(range), value);
+    }
+    fn flag(&mut self, about: About, value: &mut bool) {
+        self.set(about, self.text.parse().ok(), Domain::Flag, value);
+    }
+    fn choice(&mut self, about: About, value: &mut dyn Choice) {
+        let names = value.names();
+        let mut index = value.index();
+        let parsed = names.iter().position(|name| *name == self.text);
+        self.set(about, parsed, Domain::Choice(names), &mut index);
+        value.choose(index);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_can_be_set_to_its_own_value_and_every_key_is_unique() {
+        let mut params = Params::default();
+        let rows = params.list();
+        for row in &rows {
+            params
+                .set(&row.key, &row.value.to_string())
+                .unwrap_or_else(|error| panic!("{error}"));
+            assert!(!row.about.help.is_empty(), "{} needs a help text", row.key);
+        }
+        assert_eq!(params, Params::default());
+        let mut keys: Vec<_> = rows.iter().map(|row| &row.key).collect();
+        keys.sort();
+        keys.dedup();
+        assert_eq!(keys.len(), rows.len());
+    }
+
+    #[test]
+    fn the_written_configuration_reads_back() {
+        let mut params = Params::default();
+        params.assign("fb.ratio=0.7").expect("a good value");
+        params.assign("fb.accept=paper").expect("a good value");
+        params.assign("surf.upright = false").expect("a good value");
+        params.assign("mi.bins=32").expect("a good value");
+        let mut read = Params::default();
+        read.merge_toml(&params.to_toml()).expect("own output");
+        assert_eq!(read, params);
+        assert_eq!(
+            params.changes(),
+            [
+                "surf.upright=false",
+                "fb.ratio=0.7",
+                "fb.accept=paper",
+                "mi.bins=32"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_wrong_assignment_says_what_is_expected() {
+        let mut params = Params::default();
+        let message = |outcome: Result<(), ParamError>| outcome.expect_err("wrong").to_string();
+        assert_eq!(
+            message(params.assign("fb.ratio=1.7")),
+            "`fb.ratio` takes 0.1 … 1, not `1.7`"
+        );
+        assert_eq!(
+            message(params.assign("fb.ratoi=0.7")),
+            "there is no parameter `fb.ratoi` (did you mean `fb.ratio`?); `posescope params` lists all"
+        );
+        assert_eq!(
+            message(params.assign("fb.accept=never")),
+            "`fb.accept` takes consensus | paper, not `never`"
+        );
+        assert_eq!(
+            message(params.assign("fb.ratio")),
+            "`fb.ratio` is not an assignment; write for example `fb.ratio=0.7`"
+        );
+        assert!(message(params.merge_toml("ratio = 1")).contains("outside a group"));
+        assert!(message(params.merge_toml("[fb\n")).contains("line 1"));
+        assert_eq!(params, Params::default());
+    }
+}
