@@ -1,0 +1,321 @@
+//! Responses of the box-filter Hessian (sections 3.2 and 3.3).
+
+use rayon::prelude::*;
+
+use super::integral::IntegralImage;
+
+/// Weight of Dxy against Dxx and Dyy in the determinant (section 3.2, equations 3 and 4).
+///
+/// The paper finds 0.9 for the filters of size 9, all divided by the same number. Here each is
+/// divided so that it is exact on quadratic images, where Dxx of size 9 is 135 times the
+/// derivative and Dxy 144 times: 0.9 × 144 / 135. The filters of other sizes are magnified copies,
+/// so it holds for them too. Anything from 0.9 to 1.05 finds as many blobs again.
+const MIXED_WEIGHT: f32 = 0.96;
+
+/// The three filters of one size, approximating second derivatives of a Gaussian (figure 2).
+///
+/// Dxx is three lobes side by side weighted 1, −2, 1, each `lobe` px wide; Dyy is the same,
+/// upright; Dxy is four square lobes in the corners. All dimensions are odd, to have a central
+/// pixel, and otherwise keep the proportions of the filters of size 9. If instead the lobes of Dxx
+/// stretched to 2 `lobe` − 1 and the gaps of Dxy stayed at 1 px, as in common implementations, the
+/// share of blobs found again in images turned by 15° and enlarged 1.3 times would fall from 0.68
+/// to 0.65.
+#[derive(Clone, Copy)]
+pub(super) struct BoxFilter {
+    /// Width of a lobe, odd.
+    lobe: usize,
+    /// Length of the lobes of Dxx and Dyy on either side of the central pixel.
+    half_length: usize,
+    /// Width of the gap between the lobes of Dxy on either side of the central pixel.
+    half_gap: usize,
+}
+
+impl BoxFilter {
+    pub(super) fn new(lobe: usize) -> Self {
+        Self {
+            lobe,
+            // Length 5/3 and gap 1/3 of the lobe, to the nearest odd number.
+            half_length: 5 * lobe / 6,
+            half_gap: lobe / 6,
+        }
+    }
+
+    /// Width of a lobe \[px\], a third of the filter's size.
+    pub(super) fn lobe(&self) -> usize {
+        self.lobe
+    }
+
+    /// Distance from the central pixel to the filter's edge pixels \[px\].
+    pub(super) fn margin(&self) -> usize {
+        3 * self.lobe / 2
+    }
+
+    /// Standard deviation of the Gaussian \[px\]: 1.2 for size 9 (section 3.3).
+    pub(super) fn scale(&self) -> f32 {
+        1.2 / 3.0 * self.lobe as f32
+    }
+
+    /// The trace of the Hessian at a pixel, up to a positive factor.
+    pub(super) fn laplacian(&self, integral: &IntegralImage, x: usize, y: usize) -> i64 {
+        let (length, middle, whole) = (self.half_length, self.lobe / 2, self.margin());
+        let sum = |dx: usize, dy: usize| {
+            i64::from(integral.box_sum(x - dx, y - dy, x + dx + 1, y + dy + 1))
+        };
+        // The middle lobe's weight −2 is the weight of the whole less 3.
+        let dxx = sum(whole, length) - 3 * sum(middle, length);
+        let dyy = sum(length, whole) - 3 * sum(length, middle);
+        dxx + dyy
+    }
+
+    /// The determinants of the Hessians along row `y`, from the first pixel where the filter fits.
+    fn determinants(
+        &self,
+        integral: &IntegralImage,
+        y: usize,
+        buffers: &mut Buffers,
+        determinants: &mut [f32],
+    ) {
+        let count = determinants.len();
+        let x = self.margin();
+        // Table entries `offset` pixels before and after the central pixel, for the whole row.
+        let before = |row: usize, offset: usize| &integral.row(row)[x - offset..][..count];
+        let after = |row: usize, offset: usize| &integral.row(row)[x + 1 + offset..][..count];
+        let [dxx, dyy, dxy] = buffers.resized(count);
+
+        let (length, middle, whole) = (self.half_length, self.lobe / 2, self.margin());
+        let edges = [y - length, y + length + 1].map(|row| {
+            let (left, right) = (before(row, middle), after(row, middle));
+            [before(row, whole), left, right, after(row, whole)]
+        });
+        second_difference(edges, dxx);
+
+        let rows = [y - whole, y - middle, y + middle + 1, y + whole + 1];
+        let edges = [
+            rows.map(|row| before(row, length)),
+            rows.map(|row| after(row, length)),
+        ];
+        second_difference(edges, dyy);
+
+        let (near, far) = (self.half_gap, self.half_gap + self.lobe);
+        let rows = [y - far, y - near, y + near + 1, y + far + 1];
+        let edges = rows.map(|row| {
+            let (left, right) = (before(row, near), after(row, near));
+            [before(row, far), left, right, after(row, far)]
+        });
+        mixed_difference(edges, dxy);
+
+        // On the images x²/2 and xy, whose derivatives are 1, the sums are lobe² times the numbers
+        // divided by: what remains is normalised for scale.
+        let lobe_area = self.lobe * (2 * self.half_length + 1);
+        let second = 1.0 / lobe_area as f32;
+        let centre_distance = self.lobe + 2 * self.half_gap + 1;
+        let mixed = MIXED_WEIGHT / (centre_distance * centre_distance) as f32;
+        for (i, determinant) in determinants.iter_mut().enumerate() {
+            let (xx, yy) = (second * dxx[i] as f32, second * dyy[i] as f32);
+            let xy = mixed * dxy[i] as f32;
+            *determinant = xx * yy - xy * xy;
+        }
+    }
+}
+
+/// Box sums of one row of pixels, kept from row to row for their memory.
+#[derive(Default)]
+struct Buffers {
+    sums: [Vec<i32>; 3],
+}
+
+impl Buffers {
+    fn resized(&mut self, count: usize) -> [&mut [i32]; 3] {
+        self.sums.each_mut().map(|sums| {
+            sums.resize(count, 0);
+            sums.as_mut_slice()
+        })
+    }
+}
+
+/// Sums over three boxes side by side, weighted 1, −2, 1: the four edges of the boxes in two rows
+/// of the integral image, or in two columns.
+fn second_difference(edges: [[&[u32]; 4]; 2], sums: &mut [i32]) {
+    let count = sums.len();
+    let [[a0, a1, a2, a3], [b0, b1, b2, b3]] = edges;
+    // Slices of one known length spare the loop its bounds checks, and let it use vectors.
+    let (a0, a1, a2, a3) = (&a0[..count], &a1[..count], &a2[..count], &a3[..count]);
+    let (b0, b1, b2, b3) = (&b0[..count], &b1[..count], &b2[..count], &b3[..count]);
+    for i in 0..count {
+        let upper = a3[i].wrapping_sub(a0[i]);
+        let lower = b3[i].wrapping_sub(b0[i]);
+        let whole = lower.wrapping_sub(upper);
+        let upper = a2[i].wrapping_sub(a1[i]);
+        let lower = b2[i].wrapping_sub(b1[i]);
+        let middle = lower.wrapping_sub(upper);
+        // The middle weight −2 is the weight of the whole less 3.
+        sums[i] = whole.wrapping_sub(middle.wrapping_mul(3)) as i32;
+    }
+}
+
+/// Sums over the upper left and lower right of four boxes, less those over the other two: the four
+/// edges of the boxes in four rows of the integral image.
+fn mixed_difference(edges: [[&[u32]; 4]; 4], sums: &mut [i32]) {
+    let count = sums.len();
+    sums.fill(0);
+    for ([e0, e1, e2, e3], sign) in edges.into_iter().zip([1, -1, -1, 1]) {
+        let (e0, e1, e2, e3) = (&e0[..count], &e1[..count], &e2[..count], &e3[..count]);
+        for i in 0..count {
+            let left = e1[i].wrapping_sub(e0[i]);
+            let right = e3[i].wrapping_sub(e2[i]);
+            let difference = right.wrapping_sub(left) as i32;
+            sums[i] = sums[i].wrapping_add(difference.wrapping_mul(sign));
+        }
+    }
+}
+
+/// The responses of one filter, sampled on a grid whose first sample is pixel (0, 0).
+pub(super) struct Layer {
+    /// The filter.
+    pub(super) filter: BoxFilter,
+    /// Distance between samples \[px\].
+    pub(super) step: usize,
+    columns: usize,
+    /// Row by row; 0 where the filter leaves the image.
+    responses: Vec<f32>,
+}
+
+impl Layer {
+    pub(super) fn new(integral: &IntegralImage, filter: BoxFilter, step: usize) -> Self {
+        let (width, height) = (integral.width(), integral.height());
+        let columns = width.div_ceil(step);
+        let mut responses = vec![0.0; columns * height.div_ceil(step)];
+        let margin = filter.margin();
+        let first = margin.next_multiple_of(step);
+        let dense_count = width.saturating_sub(2 * margin);
+        let rows = if dense_count > 0 {
+            margin..height.saturating_sub(margin)
+        } else {
+            0..0
+        };
+        responses
+            .par_chunks_exact_mut(columns)
+            .enumerate()
+            .map(|(row, samples)| (row * step, samples))
+            .filter(|(y, _)| rows.contains(y))
+            .for_each_init(
+                || (Buffers::default(), vec![0.0; dense_count]),
+                |(buffers, dense), (y, samples)| {
+                    // Every pixel of the row, even if few are kept: vectors make up for it.
+                    filter.determinants(integral, y, buffers, dense);
+                    let kept = dense.iter().skip(first - margin).step_by(step);
+                    for (sample, &determinant) in samples[first / step..].iter_mut().zip(kept) {
+                        *sample = determinant;
+                    }
+                },
+            );
+        Self {
+            filter,
+            step,
+            columns,
+            responses,
+        }
+    }
+
+    /// The same responses at every `step`-th pixel, a multiple of this layer's step.
+    pub(super) fn decimated(&self, step: usize) -> Self {
+        let stride = step / self.step;
+        let rows = self.responses.chunks_exact(self.columns).step_by(stride);
+        Self {
+            filter: self.filter,
+            step,
+            columns: self.columns.div_ceil(stride),
+            responses: rows
+                .flat_map(|row| row.iter().step_by(stride).copied())
+                .collect(),
+        }
+    }
+
+    /// The determinant of the Hessian at a sample.
+    #[inline]
+    pub(super) fn at(&self, column: usize, row: usize) -> f32 {
+        self.responses[row * self.columns + column]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{GrayImage, Luma};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The responses to `value(x, y)`, taken about the middle of a 99 × 99 image.
+    fn layer(lobe: usize, value: impl Fn(i32, i32) -> i32) -> Layer {
+        let image = GrayImage::from_fn(99, 99, |x, y| {
+            let value = value(x as i32 - 49, y as i32 - 49);
+            Luma([u8::try_from(value).expect("a grey value")])
+        });
+        Layer::new(&IntegralImage::new(&image), BoxFilter::new(lobe), 1)
+    }
+
+    #[test]
+    fn filters_of_size_9_are_those_of_the_paper() {
+        let filter = BoxFilter::new(3);
+        assert_eq!(filter.margin(), 4);
+        assert_eq!(2 * filter.half_length + 1, 5);
+        assert_eq!(2 * filter.half_gap + 1, 1);
+        assert_eq!(filter.scale(), 1.2);
+    }
+
+    #[test]
+    fn determinants_are_exact_on_quadratic_images() {
+        let bowl = |x: i32, y: i32| (x * x + y * y).min(255);
+        let saddle = |x: i32, y: i32| (128 + x * y).clamp(0, 255);
+        for lobe in [3, 5, 7, 9] {
+            let squared = (lobe * lobe) as f32;
+            let determinant = layer(lobe, bowl).at(49, 49);
+            assert!((determinant / (2.0 * squared).powi(2) - 1.0).abs() < 1e-5);
+            let determinant = layer(lobe, saddle).at(49, 49);
+            assert!((determinant / (MIXED_WEIGHT * squared).powi(2) + 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn slopes_and_straight_edges_have_no_response() {
+        let slope = layer(5, |x, y| 128 + x + y);
+        let edge = layer(5, |x, _| if x > 3 { 200 } else { 20 });
+        for at in 30..70 {
+            assert_eq!(slope.at(at, 49), 0.0);
+            assert_eq!(edge.at(at, 49), 0.0);
+        }
+    }
+
+    #[test]
+    fn dark_blobs_have_a_positive_laplacian() {
+        let image = |inside, outside| {
+            GrayImage::from_fn(21, 21, |x, y| {
+                let near = x.abs_diff(10).pow(2) + y.abs_diff(10).pow(2) < 12;
+                Luma([if near { inside } else { outside }])
+            })
+        };
+        let laplacian = |image| BoxFilter::new(5).laplacian(&IntegralImage::new(&image), 10, 10);
+        assert!(laplacian(image(20, 90)) > 0);
+        assert!(laplacian(image(90, 20)) < 0);
+    }
+
+    proptest! {
+        #[test]
+        fn coarser_samples_are_a_subset(
+            pixels in prop::collection::vec(any::<u8>(), 40 * 31),
+            step in 1usize..6,
+        ) {
+            let image = GrayImage::from_raw(40, 31, pixels).expect("a full image");
+            let integral = IntegralImage::new(&image);
+            let dense = Layer::new(&integral, BoxFilter::new(5), 1);
+            let direct = Layer::new(&integral, BoxFilter::new(5), step);
+            let decimated = dense.decimated(step);
+            prop_assert_eq!(&direct.responses, &decimated.responses);
+            for row in 0..31usize.div_ceil(step) {
+                for column in 0..40usize.div_ceil(step) {
+                    prop_assert_eq!(direct.at(column, row), dense.at(column * step, row * step));
+                }
+            }
+        }
+    }
+}
