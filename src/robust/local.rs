@@ -1,0 +1,75 @@
+//! Local optimisation: from the pose of three points to the pose of all that agree with it.
+
+use super::consensus::Hypothesis;
+use super::likelihood::Likelihood;
+use super::mlesac::MlesacParams;
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+use crate::solver::{Correspondence, Refinement, refine};
+
+/// Refinements of one hypothesis at most, each on the inliers of the one before. The likelihood
+/// must rise each time, so there is no going round in circles.
+const MAX_ROUNDS: usize = 10;
+
+/// A hypothesis after [`settle`].
+#[derive(Clone, Copy)]
+pub(super) struct Settled {
+    pub(super) hypothesis: Hypothesis,
+    /// The refinement that ended at its pose.
+    pub(super) refinement: Option<Refinement>,
+}
+
+/// Refines a hypothesis on its inliers, and again on the inliers of the refined pose, for as long
+/// as the likelihood of all correspondences rises.
+pub(super) fn settle(
+    hypothesis: Hypothesis,
+    correspondences: &[Correspondence],
+    intrinsics: &Intrinsics,
+    params: &MlesacParams,
+    likelihood: &mut Likelihood,
+) -> Settled {
+    let mut settled = Settled {
+        hypothesis,
+        refinement: None,
+    };
+    for _ in 0..MAX_ROUNDS {
+        let Hypothesis { pose, score: old } = settled.hypothesis;
+        let residuals_px = residuals(correspondences, intrinsics, &pose);
+        let agreeing: Vec<_> = inliers(&residuals_px, params.inlier_threshold_px)
+            .map(|i| correspondences[i])
+            .collect();
+        let refinement = refine(&agreeing, intrinsics, &pose, params.loss);
+        let new = likelihood.score(&refinement.pose);
+        if new.log_likelihood > old.log_likelihood {
+            settled.hypothesis = Hypothesis {
+                pose: refinement.pose,
+                score: new,
+            };
+            settled.refinement = Some(refinement);
+        } else {
+            break;
+        }
+    }
+    settled
+}
+
+/// Reprojection error of every correspondence; infinite behind the camera \[px\].
+pub(super) fn residuals(
+    correspondences: &[Correspondence],
+    intrinsics: &Intrinsics,
+    pose: &Pose,
+) -> Vec<f64> {
+    correspondences
+        .iter()
+        .map(|Correspondence { pixel, point }| {
+            intrinsics
+                .project(&(pose * point))
+                .map_or(f64::INFINITY, |seen| (seen - pixel).norm())
+        })
+        .collect()
+}
+
+/// Indices of the residuals within the threshold, ascending.
+pub(super) fn inliers(residuals_px: &[f64], threshold_px: f64) -> impl Iterator<Item = usize> {
+    (0..residuals_px.len()).filter(move |&i| residuals_px[i] <= threshold_px)
+}

@@ -1,0 +1,27 @@
+//! Pose from correspondences: the minimal solver and the non-linear refinement.
+//!
+//! | file | problem | method |
+//! |---|---|---|
+//! | [`p3p()`] | three bearings, three points, up to four poses | two conics met by a line pair (Ding et al. 2023) |
+//! | [`refine()`] | pixels and points, one pose near the answer | Levenberg–Marquardt on a robust reprojection error |
+//! | [`Loss`] | how much may a large residual say? | Huber, Cauchy |
+
+mod conic;
+mod loss;
+pub mod p3p;
+pub mod refine;
+
+pub use loss::Loss;
+pub use p3p::{MAX_SOLUTIONS, p3p};
+pub use refine::{Refinement, refine};
+
+use nalgebra::{Point2, Point3};
+
+/// A pixel and the 3-D point that is believed to be seen there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correspondence {
+    /// Where the point is seen \[px\].
+    pub pixel: Point2<f64>,
+    /// The point \[m\], in the frame that the pose maps to the camera.
+    pub point: Point3<f64>,
+}

@@ -1,0 +1,337 @@
+//! Non-linear refinement of a pose: Levenberg–Marquardt on the reprojection error.
+
+use nalgebra::{
+    Matrix2x3, Matrix2x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector2, Vector6,
+};
+
+use super::Correspondence;
+use super::loss::Loss;
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+
+/// Steps tried, taken or not, before the refinement gives up. From the pose of a three-point
+/// sample with 1 px of noise, five or six are usual.
+const MAX_STEPS: usize = 30;
+
+/// First damping factor. The start is close: nearly a Gauss–Newton step.
+const FIRST_LAMBDA: f64 = 1e-4;
+
+/// The damping at which not even a tiny step downhill lowers the cost.
+const MAX_LAMBDA: f64 = 1e10;
+
+/// A step that lowers the cost by less than this fraction is the last.
+const MIN_DECREASE: f64 = 1e-9;
+
+/// Why the refinement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Termination {
+    /// The last step lowered the cost by a negligible fraction.
+    Converged,
+    /// No step lowers the cost: a minimum to working precision, or a plateau.
+    NoDecrease,
+    /// The limit of steps was reached.
+    StepLimit,
+    /// No cost at the start: a point behind the camera or a number that is not finite.
+    Unusable,
+}
+
+/// The outcome of [`refine`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// The refined pose `camera_from_points`.
+    pub pose: Pose,
+    /// Mean loss at the start \[px²\].
+    pub cost_before: f64,
+    /// Mean loss at [`Self::pose`] \[px²\], never above the one before.
+    pub cost_after: f64,
+    /// Steps tried.
+    pub steps: usize,
+    /// Why it ended.
+    pub termination: Termination,
+}
+
+/// Minimises the mean of `loss(|π(T X) − x|²)` over the pose `T = camera_from_points`, from `start`.
+///
+/// Levenberg–Marquardt with the damping on the diagonal of the normal equations (Marquardt 1963)
+/// and the loss as weights (see [`Loss`]). A step must keep all points in front of the camera. A
+/// pose that the points do not determine (fewer than three, or on a line) stays near its start
+/// along what is left open.
+pub fn refine(
+    correspondences: &[Correspondence],
+    intrinsics: &Intrinsics,
+    start: &Pose,
+    loss: Loss,
+) -> Refinement {
+    let cost_before = cost(correspondences, intrinsics, start, loss);
+    let mut refinement = Refinement {
+        pose: *start,
+        cost_before,
+        cost_after: cost_before,
+        steps: 0,
+        termination: Termination::StepLimit,
+    };
+    if !cost_before.is_finite() {
+        refinement.termination = Termination::Unusable;
+        return refinement;
+    }
+    let mut lambda = FIRST_LAMBDA;
+    let mut normal = NormalEquations::at(correspondences, intrinsics, start, loss);
+    while refinement.steps < MAX_STEPS {
+        refinement.steps += 1;
+        let (old, mut new) = (refinement.cost_after, f64::NAN);
+        if let Some(twist) = normal.damped_step(lambda) {
+            let pose = moved(&refinement.pose, &twist);
+            new = cost(correspondences, intrinsics, &pose, loss);
+            // NaN loses.
+            if new < old {
+                refinement.pose = pose;
+                refinement.cost_after = new;
+            }
+        }
+        if new < old {
+            if old - new < MIN_DECREASE * old {
+                refinement.termination = Termination::Converged;
+                break;
+            }
+            lambda *= 0.1;
+            normal = NormalEquations::at(correspondences, intrinsics, &refinement.pose, loss);
+        } else if lambda < MAX_LAMBDA {
+            lambda *= 10.0;
+        } else {
+            refinement.termination = Termination::NoDecrease;
+            break;
+        }
+    }
+    refinement
+}
+
+/// The pose after a twist in the camera frame: rotation \[rad\] first, translation \[m\] second.
+fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
+    let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(0).into_owned());
+    let translation = Translation3::from(twist.fixed_rows::<3>(3).into_owned());
+    Pose::from_parts(translation, rotation) * pose
+}
+
+/// Mean loss \[px²\]; infinite where a point is not in front of the camera.
+fn cost(
+    correspondences: &[Correspondence],
+    intrinsics: &Intrinsics,
+    pose: &Pose,
+    loss: Loss,
+) -> f64 {
+    let sum: f64 = correspondences
+        .iter()
+        .map(|Correspondence { pixel, point }| {
+            intrinsics
+                .project(&(pose * point))
+                .map_or(f64::INFINITY, |seen| {
+                    loss.rho((seen - pixel).norm_squared())
+                })
+        })
+        .sum();
+    sum / correspondences.len() as f64
+}
+
+/// `H ξ = −g` for the twist ξ, with `H = Σ w JᵀJ` and `g = Σ w Jᵀr`.
+struct NormalEquations {
+    hessian: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+impl NormalEquations {
+    fn at(
+        correspondences: &[Correspondence],
+        intrinsics: &Intrinsics,
+        pose: &Pose,
+        loss: Loss,
+    ) -> Self {
+        let mut hessian = Matrix6::zeros();
+        let mut gradient = Vector6::zeros();
+        for Correspondence { pixel, point } in correspondences {
+            let seen = pose * point;
+            let Some(projected) = intrinsics.project(&seen) else {
+                continue;
+            };
+            let residual: Vector2<f64> = projected - pixel;
+            let jacobian = residual_jacobian(intrinsics, &seen);
+            let weight = loss.weight(residual.norm_squared());
+            hessian += jacobian.tr_mul(&(jacobian * weight));
+            gradient += jacobian.tr_mul(&(residual * weight));
+        }
+        Self { hessian, gradient }
+    }
+
+    /// The step for a damping factor; `None` where the damped matrix is not positive definite.
+    fn damped_step(&self, lambda: f64) -> Option<Vector6<f64>> {
+        let damping = Matrix6::from_diagonal(&(self.hessian.diagonal() * lambda));
+        let factor = (self.hessian + damping).cholesky()?;
+        Some(-factor.solve(&self.gradient))
+    }
+}
+
+/// Derivative of the pixel of `seen` (camera frame, in front) by a twist in the camera frame
+/// \[px/rad, px/m\].
+///
+/// The twist moves the point by `ω × p + v`, and `∂π/∂p = [f/z, −f p/z²]` per image axis.
+fn residual_jacobian(intrinsics: &Intrinsics, seen: &Point3<f64>) -> Matrix2x6<f64> {
+    let inverse_depth = seen.z.recip();
+    let (du, dv) = (intrinsics.fx * inverse_depth, intrinsics.fy * inverse_depth);
+    let by_point = Matrix2x3::new(
+        du,
+        0.0,
+        -du * seen.x * inverse_depth,
+        0.0,
+        dv,
+        -dv * seen.y * inverse_depth,
+    );
+    let mut jacobian = Matrix2x6::zeros();
+    jacobian
+        .fixed_columns_mut::<3>(0)
+        .copy_from(&(by_point * -seen.coords.cross_matrix()));
+    jacobian.fixed_columns_mut::<3>(3).copy_from(&by_point);
+    jacobian
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point2, Vector3};
+
+    const KITTI: Intrinsics = Intrinsics {
+        fx: 718.856,
+        fy: 700.0,
+        cx: 607.1928,
+        cy: 185.2157,
+        width: 1241,
+        height: 376,
+    };
+
+    fn truth() -> Pose {
+        Pose::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.1, -0.2, 0.05))
+    }
+
+    /// Six points in front of the camera, seen without noise from [`truth`].
+    fn scene() -> Vec<Correspondence> {
+        [
+            (-3.0, -1.0, 8.0),
+            (2.0, 1.0, 6.0),
+            (4.0, -2.0, 15.0),
+            (-5.0, 1.5, 20.0),
+            (0.5, 0.5, 5.0),
+            (1.0, -1.0, 30.0),
+        ]
+        .map(|(x, y, z)| {
+            let point = Point3::new(x, y, z);
+            let pixel = KITTI.project(&(truth() * point)).expect("in front");
+            Correspondence { pixel, point }
+        })
+        .to_vec()
+    }
+
+    fn start() -> Pose {
+        moved(&truth(), &Vector6::new(0.02, -0.03, 0.01, 0.3, -0.2, 0.4))
+    }
+
+    #[test]
+    fn the_residual_jacobian_matches_central_differences() {
+        for Correspondence { point, .. } in scene() {
+            let analytic = residual_jacobian(&KITTI, &(truth() * point));
+            for k in 0..6 {
+                let step = Vector6::ith(k, 1e-6);
+                let pixel = |twist| KITTI.project(&(moved(&truth(), &twist) * point));
+                let (ahead, behind) = (pixel(step).expect("seen"), pixel(-step).expect("seen"));
+                let numeric = (ahead - behind) / 2e-6;
+                assert!((numeric - analytic.column(k)).amax() < 1e-5, "column {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_gradient_of_each_loss_matches_central_differences_of_the_cost() {
+        // Residuals of tens of pixels: beyond the kink of the Huber loss.
+        let scene = scene();
+        for loss in [Loss::Squared, Loss::Huber(1.5), Loss::Cauchy(20.0)] {
+            let normal = NormalEquations::at(&scene, &KITTI, &start(), loss);
+            for k in 0..6 {
+                let step = Vector6::ith(k, 1e-6);
+                let at = |twist| cost(&scene, &KITTI, &moved(&start(), &twist), loss);
+                // The cost is the mean of ρ(r²) with the derivative 2 w Jᵀr.
+                let numeric = (at(step) - at(-step)) / 2e-6 * scene.len() as f64 / 2.0;
+                let error = (numeric - normal.gradient[k]).abs();
+                assert!(
+                    error < 1e-5 * normal.gradient.amax(),
+                    "{loss:?} {k}: {error}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exact_pixels_lead_back_to_the_truth() {
+        for loss in [Loss::Squared, Loss::Huber(1.5), Loss::Cauchy(2.0)] {
+            let refined = refine(&scene(), &KITTI, &start(), loss);
+            assert!(refined.cost_after < 1e-12, "{refined:?}");
+            let error = refined.pose.inverse() * truth();
+            assert!(
+                error.translation.vector.norm() < 1e-6,
+                "{loss:?}: {refined:?}"
+            );
+            assert!(refined.cost_after < refined.cost_before);
+        }
+    }
+
+    #[test]
+    fn a_robust_loss_shrugs_off_a_false_match_that_least_squares_believes() {
+        let mut scene = scene();
+        scene[3].pixel += Vector2::new(60.0, -40.0);
+        let error = |loss| {
+            let pose = refine(&scene, &KITTI, &truth(), loss).pose;
+            (pose.inverse().translation.vector - truth().inverse().translation.vector).norm()
+        };
+        assert!(error(Loss::Cauchy(1.0)) < 0.01);
+        assert!(error(Loss::Squared) > 0.1);
+    }
+
+    #[test]
+    fn a_point_behind_the_camera_or_a_nan_makes_the_start_unusable() {
+        let behind = Correspondence {
+            pixel: Point2::new(600.0, 180.0),
+            point: Point3::new(0.0, 0.0, -50.0),
+        };
+        let nan = Correspondence {
+            pixel: Point2::new(f64::NAN, 0.0),
+            ..scene()[0]
+        };
+        for bad in [behind, nan] {
+            let mut scene = scene();
+            scene.push(bad);
+            let refined = refine(&scene, &KITTI, &start(), Loss::Squared);
+            assert_eq!(refined.termination, Termination::Unusable);
+            assert_eq!(refined.pose, start());
+        }
+        let nothing = refine(&[], &KITTI, &start(), Loss::Squared);
+        assert_eq!(nothing.termination, Termination::Unusable);
+    }
+
+    #[test]
+    fn points_that_leave_the_pose_open_do_not_upset_it() {
+        let on_a_line: Vec<_> = (0..10)
+            .map(|i| {
+                let point = Point3::new(0.0, 0.0, 5.0 + f64::from(i));
+                let pixel = KITTI.project(&(truth() * point)).expect("in front");
+                Correspondence { pixel, point }
+            })
+            .collect();
+        for subset in [&on_a_line[..], &scene()[..1], &scene()[..2]] {
+            let refined = refine(subset, &KITTI, &start(), Loss::Huber(1.5));
+            assert!(
+                refined
+                    .pose
+                    .to_homogeneous()
+                    .iter()
+                    .all(|entry| entry.is_finite())
+            );
+            assert!(refined.cost_after <= refined.cost_before);
+        }
+    }
+}
