@@ -1,0 +1,160 @@
+//! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
+
+use super::{Cost, Explanation, IntensityPair};
+use crate::params::{About, Describe, ParamVisitor};
+
+/// Parameters of the photometric cost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotometricParams {
+    /// Standard deviation of the Gaussian that smooths the query \[px\].
+    pub sigma_px: f64,
+    /// The power of E in the weighted mean: 1 averages the squared differences E; 2 is the paper's
+    /// literal formula, which squares E once more.
+    pub power: usize,
+}
+
+impl Default for PhotometricParams {
+    fn default() -> Self {
+        Self {
+            sigma_px: 1.5,
+            power: 1,
+        }
+    }
+}
+
+impl Describe for PhotometricParams {
+    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
+        visitor.number(
+            About {
+                name: "sigma",
+                unit: "px",
+                help: "Gaussian smoothing of the query",
+            },
+            &mut self.sigma_px,
+            0.0..=20.0,
+        );
+        visitor.count(
+            About {
+                name: "power",
+                unit: "",
+                help: "power of the squared difference in the mean; 2 is the paper's literal formula",
+            },
+            &mut self.power,
+            1..=2,
+        );
+    }
+}
+
+/// RSE(I_Q, I_S) = 1/λ Σ w E^power with E = (I_Q − I_S)², w = 1 where E ≤ median(E), λ = Σ w.
+#[derive(Clone, Debug)]
+pub struct Photometric {
+    params: PhotometricParams,
+}
+
+/// Which pixels the photometric cost counted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotometricWeights {
+    /// θ, the median of E \[grey values²\].
+    pub threshold: f32,
+    /// Per pair, whether E ≤ θ.
+    pub counted: Vec<bool>,
+}
+
+impl Photometric {
+    /// The cost with these parameters.
+    pub fn new(params: &PhotometricParams) -> Self {
+        Self {
+            params: params.clone(),
+        }
+    }
+}
+
+fn squared_difference(pair: &IntensityPair) -> f32 {
+    let difference = pair.query - pair.synthetic;
+    difference * difference
+}
+
+/// The lower median; `None` of nothing. Leaves `values` partly sorted, which is why it takes time
+/// linear in their number.
+fn median(values: &mut [f32]) -> Option<f32> {
+    let middle = values.len().checked_sub(1)? / 2;
+    let (_, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
+    Some(*median)
+}
+
+impl Cost for Photometric {
+    fn query_smoothing_px(&self) -> f64 {
+        self.params.sigma_px
+    }
+
+    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
+        let mut errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
+        let threshold = median(&mut errors)?;
+        let mut sum = 0.0;
+        let mut counted = 0_u32;
+        for error in pairs.iter().map(squared_difference) {
+            if error <= threshold {
+                sum += f64::from(error).powi(self.params.power as i32);
+                counted += 1;
+            }
+        }
+        Some(sum / f64::from(counted))
+    }
+
+    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
+        let mut errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
+        let threshold = median(&mut errors)?;
+        Some(Explanation::Photometric(PhotometricWeights {
+            threshold,
+            counted: pairs
+                .iter()
+                .map(|pair| squared_difference(pair) <= threshold)
+                .collect(),
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_differences(differences: &[f32]) -> Vec<IntensityPair> {
+        differences
+            .iter()
+            .map(|&d| IntensityPair {
+                query: 100.0 + d,
+                synthetic: 100.0,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_worse_half_does_not_count() {
+        let pairs = with_differences(&[1.0, -2.0, 3.0, 50.0, -90.0]);
+        let cost = Photometric::new(&PhotometricParams::default());
+        let expected = (1.0 + 4.0 + 9.0) / 3.0;
+        assert_eq!(cost.evaluate(&pairs), Some(expected));
+        let Some(Explanation::Photometric(weights)) = cost.explain(&pairs) else {
+            panic!("the photometric cost explains itself");
+        };
+        assert_eq!(weights.threshold, 9.0);
+        assert_eq!(weights.counted, [true, true, true, false, false]);
+    }
+
+    #[test]
+    fn the_literal_formula_squares_once_more() {
+        let pairs = with_differences(&[1.0, 2.0, 3.0]);
+        let cost = Photometric::new(&PhotometricParams {
+            power: 2,
+            ..Default::default()
+        });
+        assert_eq!(cost.evaluate(&pairs), Some((1.0 + 16.0) / 2.0));
+    }
+
+    #[test]
+    fn a_brighter_query_costs_the_square_of_the_shift() {
+        let pairs = with_differences(&[7.0; 100]);
+        let cost = Photometric::new(&PhotometricParams::default());
+        assert_eq!(cost.evaluate(&pairs), Some(49.0));
+    }
+}

@@ -1,0 +1,433 @@
+//! The coarse-to-fine search grid of the direct methods (paper, appendix B, "coarse-to-fine grid
+//! search").
+//!
+//! The grid is centred on the reference camera and uses its axes: right (x) and forward (z), then
+//! yaw about its up axis (−y). Height, pitch and roll stay the reference's.
+
+use nalgebra::{Translation3, Vector3};
+
+use crate::geometry::{Pose, yaw};
+use crate::params::{About, Describe, ParamVisitor};
+use crate::render::Score;
+
+/// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridParams {
+    /// Step of the coarse positions \[m\].
+    pub coarse_step_m: f64,
+    /// Half width of the square of fine positions \[m\].
+    pub fine_range_m: f64,
+    /// Step of the fine positions \[m\].
+    pub fine_step_m: f64,
+    /// Half range of the coarse yaw angles \[°\].
+    pub yaw_range_deg: f64,
+    /// Step of the coarse yaw angles \[°\].
+    pub yaw_step_deg: f64,
+    /// Half range of the fine yaw angles \[°\].
+    pub yaw_fine_range_deg: f64,
+    /// Step of the fine yaw angles \[°\].
+    pub yaw_fine_step_deg: f64,
+    /// How often position and yaw are searched, one after the other; the paper does it once.
+    pub rounds: usize,
+    /// A hypothesis that covers fewer pixels than this share of those covered at the reference pose
+    /// has no say.
+    ///
+    /// Fewer pixels make lower costs: without a floor both costs have their global minimum where
+    /// less than 1 % is covered. At 0.15 and above the right basin is cut off when the query is
+    /// 8 to 10 m ahead.
+    pub coverage_floor: f64,
+}
+
+impl Default for GridParams {
+    fn default() -> Self {
+        Self {
+            coarse_step_m: 1.0,
+            fine_range_m: 1.0,
+            fine_step_m: 0.2,
+            yaw_range_deg: 10.0,
+            yaw_step_deg: 1.0,
+            yaw_fine_range_deg: 1.0,
+            yaw_fine_step_deg: 0.1,
+            rounds: 1,
+            coverage_floor: 0.05,
+        }
+    }
+}
+
+impl Describe for GridParams {
+    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
+        let about = |name, unit, help| About { name, unit, help };
+        visitor.number(
+            about("coarse_step", "m", "step of the coarse positions"),
+            &mut self.coarse_step_m,
+            0.05..=10.0,
+        );
+        visitor.number(
+            about("fine_range", "m", "half width of the fine positions"),
+            &mut self.fine_range_m,
+            0.0..=10.0,
+        );
+        visitor.number(
+            about("fine_step", "m", "step of the fine positions"),
+            &mut self.fine_step_m,
+            0.01..=5.0,
+        );
+        visitor.number(
+            about("yaw_range", "°", "half range of the coarse yaw angles"),
+            &mut self.yaw_range_deg,
+            0.0..=180.0,
+        );
+        visitor.number(
+            about("yaw_step", "°", "step of the coarse yaw angles"),
+            &mut self.yaw_step_deg,
+            0.05..=45.0,
+        );
+        visitor.number(
+            about("yaw_fine_range", "°", "half range of the fine yaw angles"),
+            &mut self.yaw_fine_range_deg,
+            0.0..=45.0,
+        );
+        visitor.number(
+            about("yaw_fine_step", "°", "step of the fine yaw angles"),
+            &mut self.yaw_fine_step_deg,
+            0.01..=10.0,
+        );
+        visitor.count(
+            about(
+                "rounds",
+                "",
+                "how often position and yaw are searched in turn",
+            ),
+            &mut self.rounds,
+            1..=10,
+        );
+        visitor.number(
+            about(
+                "coverage_floor",
+                "",
+                "least coverage of a hypothesis, as a share of that at the reference pose",
+            ),
+            &mut self.coverage_floor,
+            0.0..=1.0,
+        );
+    }
+}
+
+/// Where a camera is, seen from the reference camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Offset {
+    /// To the reference camera's right \[m\].
+    pub right_m: f64,
+    /// To its front \[m\].
+    pub forward_m: f64,
+    /// About its up axis, positive to the left \[rad\].
+    pub yaw_rad: f64,
+}
+
+impl Offset {
+    /// The camera's pose in the reference camera's frame.
+    pub fn reference_from_camera(&self) -> Pose {
+        Pose::from_parts(
+            Translation3::from(Vector3::new(self.right_m, 0.0, self.forward_m)),
+            yaw(self.yaw_rad),
+        )
+    }
+}
+
+/// The four parts of one round of the search, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Phase {
+    /// All positions within the uncertainty radius.
+    PositionCoarse,
+    /// Positions around the coarse minimum.
+    PositionFine,
+    /// Yaw angles at the fine position.
+    YawCoarse,
+    /// Yaw angles around the coarse yaw.
+    YawFine,
+}
+
+impl Phase {
+    /// The order of the search.
+    pub const ALL: [Self; 4] = [
+        Self::PositionCoarse,
+        Self::PositionFine,
+        Self::YawCoarse,
+        Self::YawFine,
+    ];
+
+    /// Whether this phase turns the camera rather than moves it.
+    pub fn is_yaw(self) -> bool {
+        matches!(self, Self::YawCoarse | Self::YawFine)
+    }
+
+    /// The name that people read.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PositionCoarse => "position, coarse",
+            Self::PositionFine => "position, fine",
+            Self::YawCoarse => "yaw, coarse",
+            Self::YawFine => "yaw, fine",
+        }
+    }
+}
+
+/// The hypotheses of one phase: a regular lattice of offsets around a centre.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lattice {
+    /// The phase it belongs to.
+    pub phase: Phase,
+    /// Hypotheses along right, or along yaw.
+    pub columns: usize,
+    /// Hypotheses along forward; 1 for yaw.
+    pub rows: usize,
+    /// Distance of neighbours \[m, or rad for yaw\].
+    pub step: f64,
+    /// The offset in the middle.
+    pub centre: Offset,
+    /// Positions farther from the reference than this are left out \[m\].
+    reach_m: f64,
+}
+
+impl Lattice {
+    /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].
+    pub fn new(phase: Phase, centre: Offset, radius_m: f64, params: &GridParams) -> Self {
+        let (half_range, step) = match phase {
+            Phase::PositionCoarse => (radius_m, params.coarse_step_m),
+            Phase::PositionFine => (params.fine_range_m, params.fine_step_m),
+            Phase::YawCoarse => (
+                params.yaw_range_deg.to_radians(),
+                params.yaw_step_deg.to_radians(),
+            ),
+            Phase::YawFine => (
+                params.yaw_fine_range_deg.to_radians(),
+                params.yaw_fine_step_deg.to_radians(),
+            ),
+        };
+        // The tolerance keeps 1.0 / 0.2 from becoming 4 steps.
+        let steps = (half_range / step + 1e-9).floor().max(0.0) as usize;
+        let side = 2 * steps + 1;
+        Self {
+            phase,
+            columns: side,
+            rows: if phase.is_yaw() { 1 } else { side },
+            step,
+            centre,
+            reach_m: match phase {
+                Phase::PositionCoarse => radius_m,
+                _ => f64::INFINITY,
+            },
+        }
+    }
+
+    /// Number of cells, those left out included.
+    pub fn cells(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// The offset of a cell, in scan order (left to right, then forward); `None` where it lies
+    /// outside the uncertainty radius.
+    pub fn offset(&self, cell: usize) -> Option<Offset> {
+        let along = |index: usize, count: usize| (index as f64 - (count / 2) as f64) * self.step;
+        let (row, column) = (cell / self.columns, cell % self.columns);
+        let mut offset = self.centre;
+        if self.phase.is_yaw() {
+            offset.yaw_rad += along(column, self.columns);
+            return Some(offset);
+        }
+        let (right, forward) = (along(column, self.columns), along(row, self.rows));
+        if right.hypot(forward) > self.reach_m + 1e-9 {
+            return None;
+        }
+        offset.right_m += right;
+        offset.forward_m += forward;
+        Some(offset)
+    }
+
+    /// The cells that are hypotheses, with their offsets, in scan order.
+    pub fn hypotheses(&self) -> impl Iterator<Item = (usize, Offset)> + '_ {
+        (0..self.cells()).filter_map(|cell| Some((cell, self.offset(cell)?)))
+    }
+}
+
+/// A lattice after scoring: the cost surface and the coverage surface.
+#[derive(Clone, Debug)]
+pub struct ScoredLattice {
+    /// Where the scores belong.
+    pub lattice: Lattice,
+    /// One per cell; `None` where the cell is no hypothesis.
+    pub scores: Vec<Option<Score>>,
+    /// Pixels that a hypothesis must cover to have a say.
+    pub least_covered: u32,
+}
+
+impl ScoredLattice {
+    /// The cost of a cell, if the cell may win.
+    pub fn eligible_cost(&self, cell: usize) -> Option<f64> {
+        self.scores[cell]?.eligible_cost(self.least_covered)
+    }
+
+    /// The cell of least cost; of equal ones the first in scan order.
+    pub fn minimum(&self) -> Option<usize> {
+        let mut best: Option<(usize, f64)> = None;
+        for cell in 0..self.scores.len() {
+            if let Some(cost) = self.eligible_cost(cell)
+                && best.is_none_or(|(_, least)| cost < least)
+            {
+                best = Some((cell, cost));
+            }
+        }
+        best.map(|(cell, _)| cell)
+    }
+
+    /// The one cost of all eligible cells and their number, where there are several and nothing
+    /// tells them apart.
+    pub fn flat_cost(&self) -> Option<(f64, usize)> {
+        let mut costs = (0..self.scores.len()).filter_map(|cell| self.eligible_cost(cell));
+        let first = costs.next()?;
+        let mut count = 1;
+        for cost in costs {
+            if cost != first {
+                return None;
+            }
+            count += 1;
+        }
+        (count > 1).then_some((first, count))
+    }
+
+    /// The cells that are lower than each of their neighbours, best first.
+    ///
+    /// A cell at the rim of the lattice counts: it may be the foot of a basin outside.
+    pub fn local_minima(&self) -> Vec<(usize, f64)> {
+        let mut minima: Vec<(usize, f64)> = (0..self.scores.len())
+            .filter_map(|cell| Some((cell, self.eligible_cost(cell)?)))
+            .filter(|&(cell, cost)| {
+                self.neighbours(cell).all(|neighbour| {
+                    self.eligible_cost(neighbour)
+                        .is_none_or(|other| cost < other || (cost == other && cell < neighbour))
+                })
+            })
+            .collect();
+        minima.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+        minima
+    }
+
+    fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
+        let Lattice { columns, rows, .. } = self.lattice;
+        let (row, column) = (cell / columns, cell % columns);
+        (row.saturating_sub(1)..(row + 2).min(rows)).flat_map(move |r| {
+            (column.saturating_sub(1)..(column + 2).min(columns))
+                .map(move |c| r * columns + c)
+                .filter(move |&other| other != cell)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    #[test]
+    fn the_fine_lattice_reaches_both_ends_and_contains_its_centre() {
+        let centre = Offset {
+            right_m: 3.0,
+            forward_m: -2.0,
+            yaw_rad: 0.0,
+        };
+        let lattice = Lattice::new(Phase::PositionFine, centre, 10.0, &GridParams::default());
+        assert_eq!((lattice.columns, lattice.rows), (11, 11));
+        assert_eq!(lattice.offset(60), Some(centre));
+        let first = lattice.offset(0).expect("inside");
+        assert!((first.right_m - 2.0).abs() < 1e-9 && (first.forward_m + 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn coarse_positions_fill_the_disc_and_no_more() {
+        let params = GridParams::default();
+        let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 2.0, &params);
+        assert_eq!(lattice.cells(), 25);
+        assert_eq!(lattice.hypotheses().count(), 13);
+    }
+
+    #[test]
+    fn yaw_angles_are_centred_and_symmetric() {
+        let params = GridParams::default();
+        let lattice = Lattice::new(Phase::YawCoarse, Offset::default(), 5.0, &params);
+        let yaws: Vec<_> = lattice.hypotheses().map(|(_, o)| o.yaw_rad).collect();
+        assert_eq!(yaws.len(), 21);
+        assert!((yaws[0] + 10_f64.to_radians()).abs() < 1e-12);
+        assert_eq!(yaws[10], 0.0);
+    }
+
+    #[test]
+    fn a_camera_ahead_sees_a_point_nearer_and_one_turned_left_sees_it_to_the_right() {
+        let point = Point3::new(0.0, 0.0, 10.0);
+        let camera = |offset: Offset| offset.reference_from_camera().inverse() * point;
+        let ahead = camera(Offset {
+            forward_m: 4.0,
+            ..Default::default()
+        });
+        assert!((ahead.z - 6.0).abs() < 1e-12);
+        let left = camera(Offset {
+            yaw_rad: 0.1,
+            ..Default::default()
+        });
+        assert!(left.x > 0.0);
+    }
+
+    fn scored(costs: &[Option<f64>], covered: u32, columns: usize) -> ScoredLattice {
+        let mut lattice = Lattice::new(
+            Phase::YawCoarse,
+            Offset::default(),
+            1.0,
+            &GridParams::default(),
+        );
+        lattice.columns = columns;
+        lattice.rows = costs.len() / columns;
+        ScoredLattice {
+            lattice,
+            scores: costs
+                .iter()
+                .map(|&cost| Some(Score { cost, covered }))
+                .collect(),
+            least_covered: 10,
+        }
+    }
+
+    #[test]
+    fn the_first_of_equal_minima_wins_and_nan_never_does() {
+        let surface = scored(&[Some(f64::NAN), Some(2.0), Some(1.0), Some(1.0)], 20, 4);
+        assert_eq!(surface.minimum(), Some(2));
+        let all_nan = scored(&[Some(f64::NAN), None], 20, 2);
+        assert_eq!(all_nan.minimum(), None);
+    }
+
+    #[test]
+    fn a_hypothesis_below_the_coverage_floor_cannot_win() {
+        let mut surface = scored(&[Some(1.0), Some(2.0)], 20, 2);
+        surface.scores[0] = Some(Score {
+            cost: Some(1.0),
+            covered: 9,
+        });
+        assert_eq!(surface.minimum(), Some(1));
+    }
+
+    #[test]
+    fn a_surface_is_flat_only_if_several_costs_are_all_equal() {
+        assert_eq!(
+            scored(&[Some(2.0), None, Some(2.0)], 20, 3).flat_cost(),
+            Some((2.0, 2))
+        );
+        assert_eq!(scored(&[Some(2.0), Some(2.1)], 20, 2).flat_cost(), None);
+        assert_eq!(scored(&[Some(2.0), None], 20, 2).flat_cost(), None);
+    }
+
+    #[test]
+    fn local_minima_are_ranked_and_a_plateau_counts_once() {
+        let costs = [3.0, 1.0, 3.0, 3.0, 0.5, 0.5, 3.0, 2.0].map(Some);
+        let surface = scored(&costs, 20, 8);
+        let cells: Vec<_> = surface.local_minima().into_iter().map(|m| m.0).collect();
+        assert_eq!(cells, [4, 1, 7]);
+    }
+}

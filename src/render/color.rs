@@ -1,0 +1,186 @@
+//! Colouring the cloud by the reference photo.
+
+use nalgebra::Point3;
+
+use super::RenderParams;
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use crate::image::{GrayImage, cubic_interpolated};
+
+/// A point of the cloud with the grey value that the reference photo gives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColoredPoint {
+    /// Position in the reference camera's frame \[m\].
+    pub position: Point3<f32>,
+    /// Grey value, 0 … 255.
+    pub intensity: f32,
+}
+
+/// How many points of a cloud were coloured, and why the others were not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ColoringCounts {
+    /// Points that have a grey value.
+    pub colored: usize,
+    /// Points behind the reference camera or outside its image.
+    pub outside: usize,
+    /// Points in the image, but behind a nearer surface.
+    pub occluded: usize,
+}
+
+/// The points of a cloud that the reference photo shows.
+#[derive(Clone, Debug, Default)]
+pub struct ColoredCloud {
+    /// The coloured points, in the order of the scan.
+    pub points: Vec<ColoredPoint>,
+    /// What became of the scan's points.
+    pub counts: ColoringCounts,
+}
+
+/// Gives each point that the reference camera sees the photo's grey value at its projection, by
+/// cubic convolution. The others get none, so they are not part of the result.
+///
+/// A scanner beside the camera also hits what the camera cannot see. Such a point would take the
+/// colour of the surface before it; a small depth buffer leaves it out.
+pub fn color_cloud(
+    cloud: &Cloud,
+    photo: &GrayImage,
+    intrinsics: &Intrinsics,
+    params: &RenderParams,
+) -> ColoredCloud {
+    let in_view: Vec<Projected> = cloud
+        .points
+        .iter()
+        .filter_map(|&position| Projected::new(position, intrinsics))
+        .collect();
+    let hidden_beyond = params
+        .visibility
+        .then(|| HorizonMap::new(&in_view, intrinsics, params));
+    let points: Vec<ColoredPoint> = in_view
+        .iter()
+        .filter(|point| hidden_beyond.as_ref().is_none_or(|map| map.shows(point)))
+        .map(|point| ColoredPoint {
+            position: point.position,
+            intensity: cubic_interpolated(photo, point.u, point.v),
+        })
+        .collect();
+    let counts = ColoringCounts {
+        colored: points.len(),
+        outside: cloud.len() - in_view.len(),
+        occluded: in_view.len() - points.len(),
+    };
+    ColoredCloud { points, counts }
+}
+
+/// A point that projects into the image.
+struct Projected {
+    position: Point3<f32>,
+    u: f32,
+    v: f32,
+}
+
+impl Projected {
+    fn new(position: Point3<f32>, intrinsics: &Intrinsics) -> Option<Self> {
+        let pixel = intrinsics.project(&position.cast())?;
+        intrinsics.contains(&pixel).then_some(Self {
+            position,
+            u: pixel.x as f32,
+            v: pixel.y as f32,
+        })
+    }
+}
+
+/// Per pixel, the depth beyond which a point is hidden \[m\].
+struct HorizonMap {
+    width: usize,
+    height: usize,
+    hidden_beyond: Vec<f32>,
+}
+
+impl HorizonMap {
+    fn new(points: &[Projected], intrinsics: &Intrinsics, params: &RenderParams) -> Self {
+        let mut map = Self {
+            width: intrinsics.width as usize,
+            height: intrinsics.height as usize,
+            hidden_beyond: vec![f32::INFINITY; (intrinsics.width * intrinsics.height) as usize],
+        };
+        let reach = params.visibility_window_px / 2;
+        for point in points {
+            let horizon = point.position.z * (1.0 + params.visibility_margin as f32);
+            let (x, y) = map.nearest_pixel(point);
+            for row in y.saturating_sub(reach)..(y + reach + 1).min(map.height) {
+                for column in x.saturating_sub(reach)..(x + reach + 1).min(map.width) {
+                    let cell = &mut map.hidden_beyond[row * map.width + column];
+                    *cell = cell.min(horizon);
+                }
+            }
+        }
+        map
+    }
+
+    fn shows(&self, point: &Projected) -> bool {
+        let (x, y) = self.nearest_pixel(point);
+        point.position.z <= self.hidden_beyond[y * self.width + x]
+    }
+
+    fn nearest_pixel(&self, point: &Projected) -> (usize, usize) {
+        let x = (point.u.round().max(0.0) as usize).min(self.width - 1);
+        let y = (point.v.round().max(0.0) as usize).min(self.height - 1);
+        (x, y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::image::Luma;
+
+    fn small_camera() -> Intrinsics {
+        Intrinsics {
+            fx: 10.0,
+            fy: 10.0,
+            cx: 4.0,
+            cy: 3.0,
+            width: 9,
+            height: 7,
+        }
+    }
+
+    fn photo() -> GrayImage {
+        GrayImage::from_fn(9, 7, |x, y| Luma([(20 * x + y) as u8]))
+    }
+
+    #[test]
+    fn a_point_takes_the_value_of_its_own_pixel() {
+        let cloud = Cloud {
+            points: vec![Point3::new(0.2, -0.1, 1.0)],
+        };
+        let colored = color_cloud(&cloud, &photo(), &small_camera(), &RenderParams::default());
+        assert_eq!(colored.points[0].intensity, 122.0);
+    }
+
+    #[test]
+    fn what_is_behind_beside_or_hidden_gets_no_colour_and_is_counted() {
+        let cloud = Cloud {
+            points: vec![
+                Point3::new(0.0, 0.0, 2.0),
+                Point3::new(0.0, 0.0, 5.0),
+                Point3::new(0.0, 0.0, 2.1),
+                Point3::new(0.0, 0.0, -2.0),
+                Point3::new(9.0, 0.0, 2.0),
+            ],
+        };
+        let mut params = RenderParams::default();
+        let colored = color_cloud(&cloud, &photo(), &small_camera(), &params);
+        let expected = ColoringCounts {
+            colored: 2,
+            outside: 2,
+            occluded: 1,
+        };
+        assert_eq!(colored.counts, expected);
+
+        params.visibility = false;
+        let colored = color_cloud(&cloud, &photo(), &small_camera(), &params);
+        assert_eq!(colored.counts.occluded, 0);
+        assert_eq!(colored.points.len(), 3);
+    }
+}

@@ -1,0 +1,99 @@
+//! Scoring many hypotheses of the direct methods at once.
+
+use rayon::prelude::*;
+
+use super::{ColoredPoint, Rasterizer, SplattedPixel, SyntheticView};
+use crate::camera::Intrinsics;
+use crate::cost::{Cost, IntensityPair};
+use crate::geometry::Pose;
+use crate::image::FloatImage;
+
+/// What a hypothesis is worth. The support always comes with the cost, because a mean over whatever
+/// is left in view rewards looking away.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// The cost over the covered pixels; `None` where they decide nothing.
+    pub cost: Option<f64>,
+    /// Number of covered pixels.
+    pub covered: u32,
+}
+
+impl Score {
+    /// The cost, if at least `least_covered` pixels support it and it is a number.
+    pub fn eligible_cost(&self, least_covered: u32) -> Option<f64> {
+        self.cost
+            .filter(|cost| self.covered >= least_covered && !cost.is_nan())
+    }
+}
+
+/// Renders the coloured cloud for a hypothesis and compares it with the query.
+pub struct Scorer<'a> {
+    points: &'a [ColoredPoint],
+    query: FloatImage,
+    intrinsics: Intrinsics,
+    splat_px: usize,
+    cost: &'a dyn Cost,
+}
+
+impl<'a> Scorer<'a> {
+    /// A scorer for one query. `query` is smoothed as the cost wants it and has the size that
+    /// `intrinsics` says.
+    pub fn new(
+        points: &'a [ColoredPoint],
+        query: FloatImage,
+        intrinsics: &Intrinsics,
+        splat_px: usize,
+        cost: &'a dyn Cost,
+    ) -> Self {
+        Self {
+            points,
+            query,
+            intrinsics: *intrinsics,
+            splat_px,
+            cost,
+        }
+    }
+
+    /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
+    pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+        reference_from_camera
+            .par_iter()
+            .map_init(
+                || (self.rasterizer(), Vec::new()),
+                |(rasterizer, pairs), pose| {
+                    let pixels = rasterizer.splat(self.points, &pose.inverse());
+                    pairs.clear();
+                    pairs.extend(self.pair_up(pixels));
+                    Score {
+                        cost: self.cost.evaluate(pairs),
+                        covered: pairs.len() as u32,
+                    }
+                },
+            )
+            .collect()
+    }
+
+    /// The synthetic view of one camera and what it is compared with, pixel by pixel.
+    pub fn view(&self, reference_from_camera: &Pose) -> (SyntheticView, Vec<IntensityPair>) {
+        let view = self
+            .rasterizer()
+            .view(self.points, &reference_from_camera.inverse());
+        let pairs = self.pair_up(&view.pixels).collect();
+        (view, pairs)
+    }
+
+    fn rasterizer(&self) -> Rasterizer {
+        Rasterizer::new(&self.intrinsics, self.splat_px)
+    }
+
+    fn pair_up<'p>(
+        &self,
+        pixels: &'p [SplattedPixel],
+    ) -> impl Iterator<Item = IntensityPair> + use<'_, 'p, 'a> {
+        let query: &[f32] = &self.query;
+        pixels.iter().map(move |pixel| IntensityPair {
+            query: query[pixel.index as usize],
+            synthetic: pixel.intensity,
+        })
+    }
+}
