@@ -1,0 +1,107 @@
+//! Why a query could not be localised.
+
+/// A typed reason with its evidence. In statistics it counts as an infinite error.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// A photo shows hardly any texture.
+    #[error(
+        "too few features: {query} in the query, {reference} in the reference, at least 4 are needed"
+    )]
+    TooFewFeatures {
+        /// Keypoints of the query photo.
+        query: usize,
+        /// Keypoints of the reference photo.
+        reference: usize,
+    },
+    /// Fewer than four matches survived the ratio test and uniqueness.
+    #[error(
+        "too few matches: {unique} unique of {keypoints} query features, at least 4 are needed"
+    )]
+    TooFewMatches {
+        /// Mutually best matches.
+        unique: usize,
+        /// Query keypoints.
+        keypoints: usize,
+    },
+    /// Fewer than four matches have a depth.
+    #[error("too few matches have a LiDAR depth: {with_depth} of {unique}, at least 4 are needed")]
+    TooFewDepths {
+        /// Matches with a 3-D point.
+        with_depth: usize,
+        /// Mutually best matches.
+        unique: usize,
+    },
+    /// No hypothesis is consistent with four correspondences.
+    #[error(
+        "no pose is consistent with 4 of the {correspondences} correspondences \
+         (best {best_inliers}, after {trials} trials)"
+    )]
+    NoConsensus {
+        /// Correspondences tried.
+        correspondences: usize,
+        /// Support of the best hypothesis.
+        best_inliers: usize,
+        /// Hypotheses tried.
+        trials: usize,
+    },
+    /// The consensus is one that chance gives as well.
+    #[error(
+        "{inliers} of {correspondences} correspondences agree on a pose, which chance explains; \
+         {needed} are needed"
+    )]
+    ChanceConsensus {
+        /// Inliers of the returned pose.
+        inliers: usize,
+        /// Correspondences tried.
+        correspondences: usize,
+        /// Inliers that would be accepted.
+        needed: usize,
+    },
+    /// The pose is farther from the reference than the query can be.
+    #[error(
+        "the consensus pose is {distance_m:.1} m from the reference, \
+         outside the uncertainty radius of {radius_m:.1} m"
+    )]
+    OutsideRadius {
+        /// Distance of the pose from the reference \[m\].
+        distance_m: f64,
+        /// The problem's uncertainty radius \[m\].
+        radius_m: f64,
+    },
+    /// The reference camera sees no point of its cloud.
+    #[error("none of the cloud's {points} points is in view of the reference camera")]
+    NothingInView {
+        /// Points of the cloud.
+        points: usize,
+    },
+    /// No hypothesis has a cost: nothing covered enough, or the images are constant there.
+    #[error("none of {hypotheses} hypotheses could be compared with the query")]
+    NothingComparable {
+        /// Hypotheses scored.
+        hypotheses: usize,
+    },
+    /// Every hypothesis costs the same, so none is better than another.
+    #[error("the cost is {cost:.4} at each of {hypotheses} hypotheses: nothing tells them apart")]
+    FlatCost {
+        /// The one cost.
+        cost: f64,
+        /// Hypotheses that could be compared with the query.
+        hypotheses: usize,
+    },
+}
+
+impl Failure {
+    /// The code of the reason in results.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NothingInView { .. } => "R1",
+            Self::TooFewFeatures { .. } => "R2",
+            Self::TooFewMatches { .. }
+            | Self::NoConsensus { .. }
+            | Self::ChanceConsensus { .. } => "R3",
+            Self::TooFewDepths { .. } => "R4",
+            Self::OutsideRadius { .. } => "R5",
+            Self::NothingComparable { .. } | Self::FlatCost { .. } => "D5",
+        }
+    }
+}
