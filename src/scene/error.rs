@@ -1,0 +1,104 @@
+//! What can be wrong with a scene: one clear line each, with file, place and what was expected.
+
+use std::io;
+use std::path::PathBuf;
+
+/// A scene that cannot be used as asked.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// Neither a folder nor a built-in scene.
+    #[error("{argument}: no such file or folder, and not the name of a built-in scene (street)")]
+    NotFound {
+        /// The scene argument.
+        argument: String,
+    },
+    /// A folder of no known layout.
+    #[error("{argument}: not recognised as any of the formats {known}; --format names one")]
+    NotRecognized {
+        /// The scene argument.
+        argument: String,
+        /// Names of all formats.
+        known: String,
+    },
+    /// `--format` with an unknown name.
+    #[error("there is no scene format `{format}`; there are {known}")]
+    UnknownFormat {
+        /// As given.
+        format: String,
+        /// Names of all formats.
+        known: String,
+    },
+    /// The street in a condition that it does not have.
+    #[error("{argument}: there is no such condition of the street; there are {known}")]
+    UnknownCondition {
+        /// The scene argument.
+        argument: String,
+        /// Names of all conditions.
+        known: String,
+    },
+    /// A file that cannot be opened or read.
+    #[error("{}: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// An image that cannot be decoded.
+    #[error("{}: {source}", .path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder says.
+        source: image::ImageError,
+    },
+    /// A file whose content is not what its format asks for.
+    #[error("{}: {expected}", .path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What was expected and what was found.
+        expected: String,
+    },
+    /// A line of a text file that is not what its format asks for.
+    #[error("{}:{line}: {expected}", .path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// From 1.
+        line: usize,
+        /// What was expected and what was found.
+        expected: String,
+    },
+    /// No frame of this name.
+    #[error("{scene}: no frame `{frame}`; frames: {known}")]
+    UnknownFrame {
+        /// The scene's name.
+        scene: String,
+        /// As given.
+        frame: String,
+        /// Which frames there are.
+        known: String,
+    },
+    /// A frame without a pose cannot be a reference.
+    #[error("{scene}: frame {frame} has no pose, so it cannot be a reference")]
+    NoPose {
+        /// The scene's name.
+        scene: String,
+        /// The frame.
+        frame: String,
+    },
+    /// A frame without a cloud cannot be a reference.
+    #[error(
+        "{}: frame {frame} has no scan, so it cannot be a reference; {hint}",
+        .path.display()
+    )]
+    NoCloud {
+        /// Where the scan should be.
+        path: PathBuf,
+        /// The frame.
+        frame: String,
+        /// Which frames have one.
+        hint: String,
+    },
+}

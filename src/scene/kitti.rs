@@ -1,0 +1,450 @@
+//! KITTI odometry: `image_0|image_2`, `velodyne`, `calib.txt`, `times.txt`, and the poses in
+//! `../../poses/NN.txt` or in `poses.txt` beside the images.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, Vector3};
+
+use super::{Entry, Scene, SceneError};
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use crate::geometry::{Pose, matrix_from_pose, pose_from_matrix};
+use crate::image::Photo;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "kitti",
+    about: "KITTI odometry: a folder sequences/NN, or one camera of it, sequences/NN/image_2",
+    recognizes: |argument| {
+        split_camera(Path::new(argument))
+            .0
+            .join("calib.txt")
+            .is_file()
+    },
+    open: |argument| Ok(Box::new(KittiOdometry::open(Path::new(argument))?)),
+};
+
+/// The cameras, in the order in which one is chosen when the folder has several.
+const CAMERAS: [&str; 4] = ["image_0", "image_2", "image_1", "image_3"];
+
+/// A sequence of the KITTI odometry benchmark. Frames may have gaps.
+pub struct KittiOdometry {
+    name: String,
+    folder: PathBuf,
+    camera: String,
+    frames: Vec<String>,
+    intrinsics: Intrinsics,
+    /// The camera's frame from the rectified camera 0, which poses and `Tr` speak of.
+    camera_from_camera0: Pose,
+    camera0_from_velodyne: Option<Matrix3x4<f64>>,
+    /// By frame number.
+    poses: Vec<Pose>,
+    /// By frame number.
+    times_s: Vec<f64>,
+}
+
+/// The sequence folder, and the camera if the path names one.
+fn split_camera(path: &Path) -> (&Path, Option<&str>) {
+    let last = path.file_name().and_then(|name| name.to_str());
+    match (last, path.parent()) {
+        (Some(name), Some(parent)) if CAMERAS.contains(&name) => (parent, Some(name)),
+        _ => (path, None),
+    }
+}
+
+impl KittiOdometry {
+    /// Opens a sequence folder, or one of its image folders for that camera.
+    ///
+    /// # Errors
+    /// [`SceneError`] with file, line and what was expected.
+    pub fn open(path: &Path) -> Result<Self, SceneError> {
+        let (folder, wanted_camera) = split_camera(path);
+        let camera = match wanted_camera {
+            Some(camera) => camera,
+            None => CAMERAS
+                .into_iter()
+                .find(|camera| folder.join(camera).is_dir())
+                .ok_or_else(|| SceneError::Content {
+                    path: folder.to_owned(),
+                    expected: "an image folder expected (image_0, image_2, …), none found"
+                        .to_owned(),
+                })?,
+        };
+        let images = folder.join(camera);
+        let frames = frame_names(&images)?;
+        let (width, height) = {
+            let first = images.join(format!("{}.png", frames[0]));
+            image::image_dimensions(&first).map_err(|source| SceneError::Image {
+                path: first,
+                source,
+            })?
+        };
+        let calibration = Calibration::read(&folder.join("calib.txt"))?;
+        let projection = calibration.projection(&camera.replace("image_", "P"))?;
+        let (intrinsics, camera_from_camera0) =
+            split_projection(&projection, width, height, &calibration.path)?;
+
+        let sequence = folder
+            .canonicalize()
+            .unwrap_or_else(|_| folder.to_owned())
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let last_frame = frame_number(&frames[frames.len() - 1]);
+        let poses = read_poses(folder, &sequence, last_frame)?;
+        let times_s = read_times(&folder.join("times.txt"), last_frame)?;
+        Ok(Self {
+            name: match wanted_camera {
+                Some(camera) => format!("kitti/{sequence}/{camera}"),
+                None => format!("kitti/{sequence}"),
+            },
+            folder: folder.to_owned(),
+            camera: camera.to_owned(),
+            frames,
+            intrinsics,
+            camera_from_camera0,
+            camera0_from_velodyne: calibration.matrix("Tr").copied(),
+            poses,
+            times_s,
+        })
+    }
+
+    fn scan_path(&self, frame: usize) -> PathBuf {
+        self.folder
+            .join("velodyne")
+            .join(format!("{}.bin", self.frames[frame]))
+    }
+
+    fn frames_with_cloud(&self) -> String {
+        let with: Vec<&str> = (0..self.frames.len())
+            .filter(|&frame| self.has_cloud(frame))
+            .map(|frame| self.frames[frame].as_str())
+            .collect();
+        match with.as_slice() {
+            [] => "no frame of this sequence has one".to_owned(),
+            [only] => format!("frame {only} has one"),
+            [first, .., last] => format!("{} frames have one: {first} … {last}", with.len()),
+        }
+    }
+}
+
+impl Scene for KittiOdometry {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn frames(&self) -> &[String] {
+        &self.frames
+    }
+
+    fn intrinsics(&self) -> Intrinsics {
+        self.intrinsics
+    }
+
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        let world_from_camera0 = self.poses.get(frame_number(&self.frames[frame]))?;
+        Some(world_from_camera0 * self.camera_from_camera0.inverse())
+    }
+
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.times_s.get(frame_number(&self.frames[frame])).copied()
+    }
+
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.camera0_from_velodyne.is_some() && self.scan_path(frame).is_file()
+    }
+
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        let path = self
+            .folder
+            .join(&self.camera)
+            .join(format!("{}.png", self.frames[frame]));
+        let photo = Photo::read(&path).map_err(|source| SceneError::Image {
+            path: path.clone(),
+            source,
+        })?;
+        let (width, height) = photo.dimensions();
+        let Intrinsics {
+            width: expected_width,
+            height: expected_height,
+            ..
+        } = self.intrinsics;
+        if (width, height) != (expected_width, expected_height) {
+            return Err(SceneError::Content {
+                path,
+                expected: format!(
+                    "{expected_width}x{expected_height} pixels expected as in the first image, \
+                     {width}x{height} found"
+                ),
+            });
+        }
+        Ok(photo)
+    }
+
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        let path = self.scan_path(frame);
+        let Some(camera0_from_velodyne) = self.camera0_from_velodyne else {
+            return Err(SceneError::Content {
+                path: self.folder.join("calib.txt"),
+                expected: "a line `Tr:` expected (camera 0 from Velodyne), none found; \
+                           without it no frame can be a reference"
+                    .to_owned(),
+            });
+        };
+        if !path.is_file() {
+            return Err(SceneError::NoCloud {
+                frame: self.frames[frame].clone(),
+                hint: self.frames_with_cloud(),
+                path,
+            });
+        }
+        let camera_from_velodyne = matrix_from_pose(&self.camera_from_camera0)
+            .fixed_columns::<3>(0)
+            * camera0_from_velodyne
+            + Matrix3x4::from_columns(&[
+                Vector3::zeros(),
+                Vector3::zeros(),
+                Vector3::zeros(),
+                self.camera_from_camera0.translation.vector,
+            ]);
+        read_scan(&path, &camera_from_velodyne)
+    }
+}
+
+/// Frame names are numbers; the listing made sure.
+fn frame_number(name: &str) -> usize {
+    name.parse().unwrap_or(usize::MAX)
+}
+
+/// Names of the PNG files whose name is a number, in numeric order.
+fn frame_names(images: &Path) -> Result<Vec<String>, SceneError> {
+    let io = |source| SceneError::Io {
+        path: images.to_owned(),
+        source,
+    };
+    let mut by_number = BTreeMap::new();
+    for entry in std::fs::read_dir(images).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let is_png = path.extension().is_some_and(|extension| extension == "png");
+        if let Some(stem) = path.file_stem().and_then(|stem| stem.to_str())
+            && let Ok(number) = stem.parse::<usize>()
+            && is_png
+        {
+            by_number.insert(number, stem.to_owned());
+        }
+    }
+    if by_number.is_empty() {
+        return Err(SceneError::Content {
+            path: images.to_owned(),
+            expected: "images NNNNNN.png expected, none found".to_owned(),
+        });
+    }
+    Ok(by_number.into_values().collect())
+}
+
+/// The matrices of `calib.txt`, by label.
+struct Calibration {
+    path: PathBuf,
+    matrices: BTreeMap<String, Matrix3x4<f64>>,
+}
+
+impl Calibration {
+    fn read(path: &Path) -> Result<Self, SceneError> {
+        let mut matrices = BTreeMap::new();
+        for (index, line) in read_text(path)?.lines().enumerate() {
+            let Some((label, numbers)) = line.split_once(':') else {
+                continue;
+            };
+            let matrix = parse_matrix(numbers).map_err(|expected| SceneError::Line {
+                path: path.to_owned(),
+                line: index + 1,
+                expected,
+            })?;
+            matrices.insert(label.trim().to_owned(), matrix);
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            matrices,
+        })
+    }
+
+    fn matrix(&self, label: &str) -> Option<&Matrix3x4<f64>> {
+        self.matrices.get(label)
+    }
+
+    fn projection(&self, label: &str) -> Result<Matrix3x4<f64>, SceneError> {
+        self.matrix(label)
+            .copied()
+            .ok_or_else(|| SceneError::Content {
+                path: self.path.clone(),
+                expected: format!("a line `{label}:` expected (projection matrix), none found"),
+            })
+    }
+}
+
+/// P = K [I | t]: the intrinsics and the transform from camera 0.
+fn split_projection(
+    projection: &Matrix3x4<f64>,
+    width: u32,
+    height: u32,
+    path: &Path,
+) -> Result<(Intrinsics, Pose), SceneError> {
+    let k: Matrix3<f64> = projection.fixed_columns::<3>(0).into_owned();
+    let inverse = k
+        .try_inverse()
+        .filter(|_| k[(0, 0)] > 0.0 && k[(1, 1)] > 0.0);
+    let Some(inverse) = inverse else {
+        return Err(SceneError::Content {
+            path: path.to_owned(),
+            expected: "a projection matrix with positive focal lengths expected".to_owned(),
+        });
+    };
+    let intrinsics = Intrinsics {
+        fx: k[(0, 0)],
+        fy: k[(1, 1)],
+        cx: k[(0, 2)],
+        cy: k[(1, 2)],
+        width,
+        height,
+    };
+    let translation: Vector3<f64> = inverse * projection.column(3);
+    let camera_from_camera0 = Pose::from_parts(
+        Translation3::from(translation),
+        nalgebra::UnitQuaternion::identity(),
+    );
+    Ok((intrinsics, camera_from_camera0))
+}
+
+/// Poses by frame number; none where the sequence has no pose file.
+fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Vec<Pose>, SceneError> {
+    let candidates = [
+        folder.join("poses.txt"),
+        folder.join("../../poses").join(format!("{sequence}.txt")),
+    ];
+    let Some(path) = candidates.into_iter().find(|path| path.is_file()) else {
+        log::warn!(
+            "{}: no pose file, so no frame can be a reference and nothing has an error",
+            folder.display()
+        );
+        return Ok(Vec::new());
+    };
+    let mut poses = Vec::new();
+    for (index, line) in read_text(&path)?.lines().enumerate() {
+        if line.trim().is_empty() {
+            continue;
+        }
+        let pose = parse_matrix(line)
+            .and_then(|matrix| pose_from_matrix(&matrix).map_err(|error| error.to_string()))
+            .map_err(|expected| SceneError::Line {
+                path: path.clone(),
+                line: index + 1,
+                expected,
+            })?;
+        poses.push(pose);
+    }
+    expect_rows(poses.len(), last, &path, "poses")?;
+    Ok(poses)
+}
+
+/// Times by frame number \[s\]; none where the sequence has no `times.txt`.
+fn read_times(path: &Path, last: usize) -> Result<Vec<f64>, SceneError> {
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let mut times = Vec::new();
+    for (index, line) in read_text(path)?.lines().enumerate() {
+        let time = line.trim().parse().map_err(|_| SceneError::Line {
+            path: path.to_owned(),
+            line: index + 1,
+            expected: format!("a time in seconds expected, `{}` found", line.trim()),
+        })?;
+        times.push(time);
+    }
+    expect_rows(times.len(), last, path, "times")?;
+    Ok(times)
+}
+
+fn expect_rows(found: usize, last: usize, path: &Path, what: &str) -> Result<(), SceneError> {
+    if found > last {
+        return Ok(());
+    }
+    Err(SceneError::Content {
+        path: path.to_owned(),
+        expected: format!(
+            "{what} up to frame {last} expected (line {}), {found} lines found",
+            last + 1
+        ),
+    })
+}
+
+/// Twelve numbers, row by row.
+fn parse_matrix(text: &str) -> Result<Matrix3x4<f64>, String> {
+    let mut numbers = Vec::with_capacity(12);
+    for word in text.split_whitespace() {
+        let number: f64 = word
+            .parse()
+            .map_err(|_| format!("a number expected, `{word}` found"))?;
+        numbers.push(number);
+    }
+    if numbers.len() != 12 {
+        return Err(format!("12 numbers expected, {} found", numbers.len()));
+    }
+    if !numbers.iter().all(|number| number.is_finite()) {
+        return Err("finite numbers expected".to_owned());
+    }
+    Ok(Matrix3x4::from_row_slice(&numbers))
+}
+
+/// A scan: little-endian `f32` x, y, z, reflectance.
+fn read_scan(path: &Path, camera_from_velodyne: &Matrix3x4<f64>) -> Result<Cloud, SceneError> {
+    const BYTES_PER_POINT: usize = 16;
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    let content = |expected| SceneError::Content {
+        path: path.to_owned(),
+        expected,
+    };
+    if bytes.is_empty() {
+        return Err(content("points expected, the scan is empty".to_owned()));
+    }
+    if bytes.len() % BYTES_PER_POINT != 0 {
+        return Err(content(format!(
+            "whole points of {BYTES_PER_POINT} bytes expected, {} bytes found; the file is cut off",
+            bytes.len()
+        )));
+    }
+    let mut points = Vec::with_capacity(bytes.len() / BYTES_PER_POINT);
+    for (index, record) in bytes.chunks_exact(BYTES_PER_POINT).enumerate() {
+        let coordinate = |axis: usize| {
+            let at = 4 * axis;
+            f64::from(f32::from_le_bytes([
+                record[at],
+                record[at + 1],
+                record[at + 2],
+                record[at + 3],
+            ]))
+        };
+        let point = Point3::new(coordinate(0), coordinate(1), coordinate(2));
+        if !point.iter().all(|value| value.is_finite()) {
+            return Err(content(format!(
+                "finite coordinates expected, point {index} (byte {}) is {}, {}, {}",
+                index * BYTES_PER_POINT,
+                point.x,
+                point.y,
+                point.z
+            )));
+        }
+        let in_camera = camera_from_velodyne * point.to_homogeneous();
+        points.push(Point3::from(in_camera).cast());
+    }
+    Ok(Cloud { points })
+}
+
+fn read_text(path: &Path) -> Result<String, SceneError> {
+    std::fs::read_to_string(path).map_err(|source| SceneError::Io {
+        path: path.to_owned(),
+        source,
+    })
+}

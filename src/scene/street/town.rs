@@ -1,0 +1,202 @@
+//! The town: all its solids, the ground, and what a ray sees of them.
+
+use nalgebra::{Point2, Point3, Vector2, Vector3};
+
+use super::box_tree::BoxTree;
+use super::frame::Ray;
+use super::furniture;
+use super::ground::{self, GroundContact};
+use super::houses;
+use super::material::{Appearance, Solid};
+use super::network::Network;
+use super::noise::Footprint;
+use super::plot::Builder;
+use super::shade::ContactShade;
+use super::shape::{Contact, Part};
+
+/// Beyond this, there is only sky \[m\].
+const FAR: f64 = 500.0;
+/// A ray that goes through a hole goes on this much farther \[m\].
+const PAST_HOLE: f64 = 1e-4;
+
+/// The street network with everything on it.
+#[derive(Debug)]
+pub(super) struct Town {
+    /// The streets.
+    pub(super) network: Network,
+    solids: Vec<Solid>,
+    tree: BoxTree,
+    shade: ContactShade,
+    seed: u32,
+}
+
+/// What a ray met.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Target {
+    /// The ground.
+    Ground(GroundContact),
+    /// A solid.
+    Solid(u32, Contact),
+}
+
+/// The first surface on a ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sight {
+    /// Along the ray \[m\].
+    pub(super) distance: f64,
+    /// Where it is.
+    pub(super) point: Point3<f64>,
+    /// Its outward normal.
+    pub(super) normal: Vector3<f64>,
+    target: Target,
+}
+
+/// A piece of surface without edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Face {
+    /// The carriageway.
+    Road,
+    /// The side of a kerb.
+    Kerb,
+    /// Pavements and the land beyond.
+    Land,
+    /// A part of a solid.
+    Solid(u32, Part),
+}
+
+impl Sight {
+    /// The piece of surface that is seen.
+    pub(super) fn face(&self) -> Face {
+        match &self.target {
+            Target::Ground(contact) => match &contact.place {
+                _ if contact.normal.y < 0.5 => Face::Kerb,
+                Some(place) if place.from_kerb < 0.0 => Face::Road,
+                _ => Face::Land,
+            },
+            Target::Solid(index, contact) => Face::Solid(*index, contact.part),
+        }
+    }
+}
+
+impl Town {
+    /// The town of a seed, with the cars and leaves of a traversal.
+    pub(super) fn new(seed: u64, traversal: u32) -> Self {
+        let network = Network::new(seed);
+        let mut builder = Builder::new(&network, seed);
+        houses::build(&mut builder);
+        furniture::place(&mut builder, traversal);
+        furniture::park_cars(&mut builder, traversal);
+        let (solids, blots) = builder.finish();
+        let boxes: Vec<_> = solids.iter().map(|solid| solid.shape.bounds()).collect();
+        Self {
+            tree: BoxTree::new(&boxes),
+            shade: ContactShade::new(blots),
+            solids,
+            network,
+            seed: super::noise::mix(seed as u32 ^ (seed >> 32) as u32),
+        }
+    }
+
+    /// The first surface on a ray farther than `from`.
+    pub(super) fn look(&self, ray: &Ray, from: f64) -> Option<Sight> {
+        let mut best: Option<(u32, Contact)> = None;
+        let mut limit = FAR;
+        self.tree.traverse(ray, limit, |index| {
+            if let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit) {
+                limit = contact.distance;
+                best = Some((index, contact));
+            }
+            limit
+        });
+        self.on_ground(ray, limit)
+            .or_else(|| best.map(|(index, contact)| on_solid(ray, index, contact)))
+    }
+
+    /// What a ray sees that passes very near to one that saw `face`: that face, most probably,
+    /// which is much quicker to find than the first of all surfaces.
+    pub(super) fn look_again(&self, ray: &Ray, face: Face) -> Option<Sight> {
+        let seen = match face {
+            Face::Solid(index, _) => self
+                .meet(&self.solids[index as usize], ray, 0.0, FAR)
+                .map(|contact| on_solid(ray, index, contact)),
+            Face::Road | Face::Kerb | Face::Land => self.on_ground(ray, FAR),
+        };
+        seen.or_else(|| self.look(ray, 0.0))
+    }
+
+    fn on_ground(&self, ray: &Ray, limit: f64) -> Option<Sight> {
+        ground::meet(&self.network, ray, limit).map(|contact| Sight {
+            distance: contact.distance,
+            point: ray.at(contact.distance),
+            normal: contact.normal,
+            target: Target::Ground(contact),
+        })
+    }
+
+    /// The first contact with a solid that is not with a hole of it.
+    fn meet(&self, solid: &Solid, ray: &Ray, mut from: f64, to: f64) -> Option<Contact> {
+        loop {
+            let contact = solid.shape.meet(ray, from, to)?;
+            if !solid.has_hole(&contact, ray) {
+                return Some(contact);
+            }
+            from = contact.distance + PAST_HOLE;
+        }
+    }
+
+    /// How a surface looks to a pixel that is `pixel` radians wide.
+    pub(super) fn appearance(&self, sight: &Sight, ray: &Ray, pixel: f64) -> Appearance {
+        let footprint = footprint(sight, ray, pixel);
+        match &sight.target {
+            Target::Ground(contact) => {
+                ground::appearance(&self.network, contact, &sight.point, &footprint, self.seed)
+            }
+            Target::Solid(index, contact) => {
+                self.solids[*index as usize].appearance(contact, &sight.point, &footprint)
+            }
+        }
+    }
+
+    /// The share of the light of the surroundings that reaches a surface.
+    pub(super) fn openness(&self, sight: &Sight) -> f64 {
+        let low = sight.point.y < 0.6;
+        match &sight.target {
+            Target::Ground(_) => self
+                .shade
+                .openness(Point2::new(sight.point.x, sight.point.z)),
+            Target::Solid(..) if low => 0.55 + 0.75 * sight.point.y.max(0.0),
+            Target::Solid(..) => 1.0,
+        }
+    }
+}
+
+fn on_solid(ray: &Ray, index: u32, contact: Contact) -> Sight {
+    Sight {
+        distance: contact.distance,
+        point: ray.at(contact.distance),
+        normal: contact.normal,
+        target: Target::Solid(index, contact),
+    }
+}
+
+/// The part of the surface that a pixel covers: a disc across the ray, projected along the ray.
+fn footprint(sight: &Sight, ray: &Ray, pixel: f64) -> Footprint {
+    /// Cosine below which the footprint grows no more.
+    const GRAZING: f64 = 0.02;
+    let normal = sight.normal;
+    let cosine = ray.direction.dot(&normal).abs().max(GRAZING);
+    let across = Vector3::new(normal.z, 0.0, -normal.x)
+        .try_normalize(1e-6)
+        .unwrap_or_else(Vector3::x);
+    let up = normal.cross(&across);
+    let width = sight.distance * pixel;
+    let extent = |axis: &Vector3<f64>| {
+        let slant = ray.direction.dot(axis) / cosine;
+        width * (1.0 + slant * slant).sqrt()
+    };
+    Footprint {
+        along: Vector2::new(extent(&across), extent(&up)),
+        minor: width,
+        major: width / cosine,
+    }
+}
