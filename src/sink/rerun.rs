@@ -1,0 +1,28 @@
+//! Recordings for the Rerun viewer.
+//!
+//! A [`Recorder`] is a [`Sink`](crate::trace::Sink): it puts what an estimator tells into a
+//! recording that a stock viewer opens well laid out. [`entities`] lists what is where.
+//!
+//! Two recordings of the same run are equal under `rerun rrd compare --unordered`, and a run that is
+//! killed leaves a readable recording of everything up to the last view or stage.
+
+mod blueprint;
+mod colors;
+mod direct;
+pub mod entities;
+mod feature;
+mod file;
+mod images;
+mod layout;
+mod narration;
+mod place;
+mod recorder;
+mod report;
+mod scene;
+mod stream;
+mod surface;
+mod targets;
+mod viewer;
+
+pub use recorder::Recorder;
+pub use targets::{Identity, RecordError, Targets};

@@ -1,0 +1,222 @@
+//! How a stock viewer lays a recording out: a row per method, beside the world.
+
+use rerun::SeriesLines;
+use rerun::blueprint::components::{Corner2D, Eye3DKind};
+use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGrid3D, PlotLegend};
+
+use super::layout::{self, Node, View};
+use super::stream::Stream;
+use super::{colors, entities};
+use crate::event::{FeatureState, Method};
+use crate::problem::Problem;
+
+/// Sends the layout for a run with these methods. The eyes stand where the first reference does.
+pub(super) fn send(stream: &mut Stream, methods: &[Method], first: &Problem) {
+    let root = root(methods, &Eyes(first));
+    stream.send_layout(|id, recording| layout::send(&root, id, recording));
+}
+
+/// Names and colours of what is plotted.
+pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
+    let names = |names: &[&str]| SeriesLines::new().with_names(names.iter().copied());
+    if shows(methods, Method::Feature) {
+        let best = names(&["best inliers"]);
+        stream.log_static(entities::RANSAC_BEST, &best);
+    }
+    for method in [Method::Photometric, Method::MutualInformation] {
+        if shows(methods, method) {
+            let best = names(&["best cost"]).with_colors([colors::color(colors::ESTIMATE)]);
+            stream.log_static(&entities::direct(method, "best"), &best);
+        }
+    }
+    if shows(methods, Method::MutualInformation) {
+        let entropies = names(&["H(query)", "H(synthetic)", "H(both)"]);
+        let path = entities::direct(Method::MutualInformation, "entropy");
+        stream.log_static(&path, &entropies);
+    }
+}
+
+/// Whether anything of this method can be in the recording; the hybrid tells FB's and MI's stories.
+fn shows(methods: &[Method], method: Method) -> bool {
+    let by_hybrid = matches!(method, Method::Feature | Method::MutualInformation);
+    methods.contains(&method) || by_hybrid && methods.contains(&Method::Hybrid)
+}
+
+/// The world and the words on the left, a row per method on the right.
+fn root(methods: &[Method], eyes: &Eyes<'_>) -> Node {
+    let words = Node::Tabs(vec![
+        View::new("TextDocument", "Report", entities::REPORT).into(),
+        View::new("TextLog", "Log", entities::LOG).into(),
+        View::new("StateTimeline", "Stages", "stage").into(),
+    ]);
+    let left = Node::Column(vec![(3.0, overview(eyes).into()), (2.0, words)]);
+    let mut rows = Vec::new();
+    if shows(methods, Method::Feature) {
+        rows.push((1.0, feature_row()));
+    }
+    let direct: Vec<Node> = [Method::Photometric, Method::MutualInformation]
+        .into_iter()
+        .filter(|&method| shows(methods, method))
+        .map(|method| direct_row(method, eyes))
+        .collect();
+    // Three rows would leave too little height for the photos.
+    if rows.is_empty() {
+        rows.extend(direct.into_iter().map(|row| (1.0, row)));
+    } else if !direct.is_empty() {
+        rows.push((1.2, Node::Tabs(direct)));
+    }
+    row("posescope", vec![(2.0, left), (3.0, Node::Column(rows))])
+}
+
+fn overview(eyes: &Eyes<'_>) -> View {
+    View::new("3D", "World", "/")
+        // The maps of PM and MI lie in the same place: each has a view of its own.
+        .of([
+            "+ /world/**",
+            "- /world/search/**",
+            "- /world/correspondences/outlier/**",
+        ])
+        .with("EyeControls3D", eyes.behind())
+        .with("LineGrid3D", LineGrid3D::new().with_visible(false))
+}
+
+fn feature_row() -> Node {
+    let keypoints = View::new("2D", "Query", "query");
+    let photo = View::new("2D", "Matches (query above reference)", "fb/matches/0").of([
+        "+ $origin/**".to_owned(),
+        format!("- $origin/{}/**", FeatureState::NAMES[0]),
+        format!("- $origin/{}/**", FeatureState::NAMES[1]),
+    ]);
+    let numbers = Node::Tabs(vec![
+        plot("RANSAC best", entities::RANSAC_BEST).into(),
+        plot("RANSAC inliers (timeline eval)", entities::RANSAC_INLIERS).into(),
+        plot(
+            "RANSAC log likelihood (timeline eval)",
+            entities::RANSAC_LIKELIHOOD,
+        )
+        .into(),
+    ]);
+    let funnel = Node::Tabs(vec![
+        View::new("TextDocument", "Funnel", entities::FUNNEL_TABLE).into(),
+        View::new("BarChart", "Funnel chart", entities::FUNNEL).into(),
+    ]);
+    row(
+        "FB",
+        vec![
+            (3.0, Node::Tabs(vec![photo.into(), keypoints.into()])),
+            (2.0, Node::Column(vec![(1.0, numbers), (1.0, funnel)])),
+        ],
+    )
+}
+
+fn direct_row(method: Method, eyes: &Eyes<'_>) -> Node {
+    let name = method.name().to_uppercase();
+    let image = |what: &str, part: &str| -> Node {
+        View::new(
+            "2D",
+            format!("{name} {what}"),
+            entities::direct(method, part),
+        )
+        .into()
+    };
+    let query: Node = View::new("2D", "Query", entities::QUERY_IMAGE).into();
+    let comparison = match method {
+        Method::Photometric => Node::Tabs(vec![
+            image("residual", "residual"),
+            image("weights", "weights"),
+        ]),
+        _ => Node::Tabs(vec![
+            image(
+                "joint histogram (right: synthetic, up: query)",
+                "joint_histogram",
+            ),
+            plot(
+                format!("{name} entropy"),
+                entities::direct(method, "entropy"),
+            )
+            .into(),
+        ]),
+    };
+    let views = Node::Tabs(vec![image("synthetic", "synthetic"), query]);
+    let maps = Node::Tabs(vec![
+        map(method, "cost", eyes).into(),
+        View::new(
+            "BarChart",
+            format!("{name} yaw [°]"),
+            entities::yaw_curve(method),
+        )
+        .into(),
+        map(method, "coverage", eyes).into(),
+        plot(format!("{name} best"), entities::direct(method, "best")).into(),
+        plot(
+            format!("{name} cost (timeline eval)"),
+            entities::direct(method, "cost"),
+        )
+        .into(),
+    ]);
+    row(
+        &name,
+        vec![
+            (3.0, Node::Column(vec![(1.0, views), (1.0, comparison)])),
+            (2.0, maps),
+        ],
+    )
+}
+
+fn row(name: &str, children: Vec<(f32, Node)>) -> Node {
+    Node::Row {
+        name: name.to_owned(),
+        children,
+    }
+}
+
+/// A surface of the grid search, seen from above.
+fn map(method: Method, part: &str, eyes: &Eyes<'_>) -> View {
+    let name = format!("{} {part}", method.name().to_uppercase());
+    View::new("3D", name, "/")
+        .of([
+            format!("+ /{}/**", entities::search(method, part)),
+            format!("+ /{}", entities::search(method, "path")),
+            format!("+ /{}/label", entities::reference(0)),
+            format!("+ /{}/label", entities::estimate(method)),
+            format!("+ /{}/label", entities::truth()),
+        ])
+        .with("EyeControls3D", eyes.above())
+        .with("LineGrid3D", LineGrid3D::new().with_visible(false))
+}
+
+fn plot(name: impl Into<String>, origin: impl Into<String>) -> View {
+    View::new("TimeSeries", name, origin).with(
+        "PlotLegend",
+        PlotLegend::new().with_corner(Corner2D::LeftBottom),
+    )
+}
+
+/// Points of view, fixed to the first reference camera.
+struct Eyes<'a>(&'a Problem);
+
+impl Eyes<'_> {
+    /// Looks over the reference camera's shoulder.
+    fn behind(&self) -> EyeControls3D {
+        self.at([-2.0, -5.0, -9.0], [0.0, 0.0, 10.0], [0.0, -1.0, 0.0])
+    }
+
+    /// Looks down on the whole disc of the search, with ahead upwards.
+    fn above(&self) -> EyeControls3D {
+        let height = 2.2 * self.0.uncertainty_radius_m;
+        self.at([0.0, -height, -0.01], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    }
+
+    /// Coordinates in the reference camera's frame; its centre is the drawn origin.
+    fn at(&self, position: [f64; 3], target: [f64; 3], up: [f64; 3]) -> EyeControls3D {
+        let rotation = self.0.reference.world_from_camera.rotation;
+        let world = |v: [f64; 3]| -> [f32; 3] {
+            (rotation * nalgebra::Vector3::from(v)).cast::<f32>().into()
+        };
+        EyeControls3D::new()
+            .with_kind(Eye3DKind::Orbital)
+            .with_position(world(position))
+            .with_look_target(world(target))
+            .with_eye_up(world(up))
+    }
+}

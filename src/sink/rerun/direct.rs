@@ -1,0 +1,100 @@
+//! What PM and MI tell: synthetic views, and what the cost made of them.
+
+use rerun::Scalars;
+
+use super::entities;
+use super::images;
+use super::place::Place;
+use super::stream::Stream;
+use super::surface::{self, CostRange};
+use crate::cost::Explanation;
+use crate::event::{Event, PhaseSearched, PoseScored, ViewRendered};
+use crate::grid::{Offset, Phase};
+
+/// What a direct method told so far, as far as later events refer to it.
+#[derive(Default)]
+pub(super) struct DirectStory {
+    /// The best-so-far offsets.
+    path: Vec<Offset>,
+    /// The costs that have the ends of the colour map.
+    range: Option<CostRange>,
+    costs: Vec<(i64, f64)>,
+    coverages: Vec<(i64, f64)>,
+}
+
+impl DirectStory {
+    /// Records one event; `evals` is the number of evaluations of earlier runs.
+    pub(super) fn tell(
+        &mut self,
+        event: &Event,
+        evals: i64,
+        place: &Place<'_>,
+        stream: &mut Stream,
+    ) {
+        match event {
+            Event::PoseScored(scored) => self.scored(scored, evals),
+            Event::ViewRendered(view) => {
+                stream.set_eval(Some(evals + view.evaluation as i64));
+                self.rendered(view, place, stream);
+                stream.set_eval(None);
+            }
+            Event::PhaseSearched(searched) => self.searched(searched, place, stream),
+            _ => {}
+        }
+    }
+
+    fn scored(&mut self, event: &PoseScored, evals: i64) {
+        let eval = evals + event.evaluation as i64;
+        if let Some(cost) = event.score.cost {
+            self.costs.push((eval, cost));
+        }
+        self.coverages.push((eval, event.coverage));
+    }
+
+    fn rendered(&mut self, event: &ViewRendered, place: &Place<'_>, stream: &mut Stream) {
+        let path = |part| entities::direct(place.method, part);
+        let ViewRendered { view, pairs, .. } = event;
+        stream.log_image(&path("synthetic"), images::synthetic(view));
+        match event.explanation.as_deref() {
+            Some(Explanation::Photometric(weights)) => {
+                stream.log_image(&path("residual"), images::residual(view, pairs));
+                stream.log_image(&path("weights"), images::weights(view, weights));
+            }
+            Some(Explanation::MutualInformation(histogram)) => {
+                stream.log_image(&path("joint_histogram"), images::joint_histogram(histogram));
+                let entropies = [
+                    histogram.query_entropy,
+                    histogram.synthetic_entropy,
+                    histogram.joint_entropy,
+                ];
+                stream.log(&path("entropy"), &Scalars::new(entropies));
+            }
+            None => {}
+        }
+        if let Some(cost) = event.score.cost {
+            stream.log(&path("best"), &Scalars::single(cost));
+        }
+        self.path.push(event.offset);
+        surface::log_path(stream, &self.path, place);
+    }
+
+    fn searched(&mut self, event: &PhaseSearched, place: &Place<'_>, stream: &mut Stream) {
+        let surface = &event.surface;
+        match surface.lattice.phase {
+            Phase::PositionCoarse | Phase::PositionFine => {
+                // The fine lattice in the colours of the coarse one, so that both can be compared.
+                let range = match self.range {
+                    Some(range) => Some(range),
+                    None => CostRange::of(surface),
+                };
+                self.range = range;
+                surface::log_maps(stream, surface, range.unwrap_or_default(), place);
+            }
+            Phase::YawCoarse | Phase::YawFine => surface::log_yaw(stream, surface, place),
+        }
+        stream.log_scalars(&entities::direct(place.method, "cost"), &self.costs);
+        stream.log_scalars(&entities::direct(place.method, "coverage"), &self.coverages);
+        self.costs.clear();
+        self.coverages.clear();
+    }
+}

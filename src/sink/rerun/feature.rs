@@ -1,0 +1,260 @@
+//! What FB tells: keypoints, matches, RANSAC, funnel, rays.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocument};
+
+use super::colors::{self, Rgb};
+use super::entities::{self, UNDECIDED};
+use super::images;
+use super::place::Place;
+use super::scene::log_rays;
+use super::stream::Stream;
+use crate::event::{
+    DepthsLifted, Event, FeatureState, FeaturesDetected, HypothesisTried, LiftedMatch, Side,
+};
+use crate::features::{Features, Match, MatchVerdict};
+use crate::geometry::Pose;
+
+/// What FB told so far, as far as later events refer to it.
+#[derive(Default)]
+pub(super) struct FeatureStory {
+    query: Arc<Features>,
+    reference: Arc<Features>,
+    decisions: Arc<[Option<Match>]>,
+    lifted: Arc<[LiftedMatch]>,
+    reference_from_query: Option<Pose>,
+    /// The row of the canvas at which the reference photo begins.
+    canvas_top: u32,
+    likelihoods: Vec<(i64, f64)>,
+    inliers: Vec<(i64, f64)>,
+}
+
+impl FeatureStory {
+    /// Records one event; `evals` is the number of trials of earlier runs.
+    pub(super) fn tell(
+        &mut self,
+        event: &Event,
+        evals: i64,
+        place: &Place<'_>,
+        stream: &mut Stream,
+    ) {
+        match event {
+            Event::FeaturesDetected(detected) => self.detected(detected, place, stream),
+            Event::MatchesDecided(decided) => {
+                self.decisions = Arc::clone(&decided.decisions);
+                self.canvas(place, stream);
+                self.undecided(place, stream);
+            }
+            Event::DepthsLifted(DepthsLifted { matches }) => self.lifted = Arc::clone(matches),
+            Event::HypothesisTried(tried) => self.tried(tried, evals, stream),
+            Event::PoseRefined(refined) => {
+                self.reference_from_query = Some(refined.reference_from_query);
+            }
+            Event::FeaturesClassified(classified) => {
+                self.classified(&classified.states, place, stream);
+            }
+            _ => {}
+        }
+    }
+
+    /// Records the trials, which are kept until a stage is over.
+    pub(super) fn tell_trials(&mut self, stream: &mut Stream) {
+        stream.log_scalars(entities::RANSAC_LIKELIHOOD, &self.likelihoods);
+        stream.log_scalars(entities::RANSAC_INLIERS, &self.inliers);
+        self.likelihoods.clear();
+        self.inliers.clear();
+    }
+
+    fn detected(&mut self, event: &FeaturesDetected, place: &Place<'_>, stream: &mut Stream) {
+        let FeaturesDetected { side, features } = event;
+        match side {
+            Side::Query => self.query = Arc::clone(features),
+            Side::Reference => self.reference = Arc::clone(features),
+        }
+        let pixels = features
+            .keypoints
+            .iter()
+            .map(|keypoint| shown([keypoint.x, keypoint.y]));
+        let points = Points2D::new(pixels)
+            .with_radii(features.keypoints.iter().map(|keypoint| keypoint.scale))
+            .with_colors([colors::color(colors::UNDECIDED)]);
+        stream.log(&entities::detected(*side, place.reference), &points);
+    }
+
+    fn canvas(&mut self, place: &Place<'_>, stream: &mut Stream) {
+        let problem = place.problem;
+        let (canvas, top) = images::stacked(&problem.query.photo, &problem.reference.photo);
+        self.canvas_top = top;
+        stream.log_image(&entities::matches(place.reference), canvas);
+    }
+
+    fn undecided(&self, place: &Place<'_>, stream: &mut Stream) {
+        let matches: Vec<usize> = self
+            .decisions
+            .iter()
+            .flatten()
+            .filter(|decision| decision.verdict == MatchVerdict::Candidate)
+            .map(|decision| decision.query)
+            .collect();
+        let lines = self.lines(&matches, colors::UNDECIDED);
+        stream.log(
+            &entities::matches_in_state(place.reference, UNDECIDED),
+            &lines,
+        );
+    }
+
+    /// From query keypoints, by index, to their nearest reference keypoints.
+    fn lines(&self, members: &[usize], color: Rgb) -> LineStrips2D {
+        let ends = members.iter().filter_map(|&query| {
+            let from = self.query.keypoints.get(query)?;
+            let decision = self.decisions.get(query)?.as_ref()?;
+            let to = self.reference.keypoints.get(decision.reference)?;
+            let below = to.y + self.canvas_top as f32;
+            Some([shown([from.x, from.y]), shown([to.x, below])])
+        });
+        LineStrips2D::new(ends)
+            .with_colors([colors::color(color)])
+            .with_radii([Radius::new_ui_points(0.75)])
+    }
+
+    fn tried(&mut self, event: &HypothesisTried, evals: i64, stream: &mut Stream) {
+        let trial = &event.trial;
+        let eval = evals + trial.index as i64;
+        if let Some(hypothesis) = &trial.hypothesis {
+            let score = &hypothesis.score;
+            self.likelihoods.push((eval, score.log_likelihood));
+            self.inliers.push((eval, score.inliers as f64));
+        }
+        if let (true, Some(best)) = (trial.is_best, &trial.best) {
+            stream.set_eval(Some(eval));
+            let inliers = Scalars::single(best.score.inliers as f64);
+            stream.log(entities::RANSAC_BEST, &inliers);
+            stream.set_eval(None);
+        }
+    }
+
+    fn classified(&self, states: &[FeatureState], place: &Place<'_>, stream: &mut Stream) {
+        stream.log(entities::QUERY_DETECTED, &Clear::flat());
+        stream.log(
+            &entities::matches_in_state(place.reference, UNDECIDED),
+            &Clear::flat(),
+        );
+        for (index, name) in FeatureState::NAMES.into_iter().enumerate() {
+            let members: Vec<usize> = (0..states.len())
+                .filter(|&query| states[query].index() == index)
+                .collect();
+            let color = colors::STATES[index];
+            let points = self.points(&members, states, color);
+            stream.log(&entities::query_keypoints(name), &points);
+            let lines = self.lines(&members, color);
+            stream.log(&entities::matches_in_state(place.reference, name), &lines);
+        }
+        self.funnel(states, stream);
+        self.rays(states, place, stream);
+    }
+
+    /// Keypoints in one state, with the number that decided it on the label.
+    fn points(&self, members: &[usize], states: &[FeatureState], color: Rgb) -> Points2D {
+        let pixels = members.iter().filter_map(|&query| {
+            let keypoint = self.query.keypoints.get(query)?;
+            Some(shown([keypoint.x, keypoint.y]))
+        });
+        Points2D::new(pixels)
+            .with_colors([colors::color(color)])
+            .with_radii([Radius::new_ui_points(3.0)])
+            .with_labels(members.iter().map(|&query| decided_by(&states[query])))
+            .with_show_labels(false)
+    }
+
+    fn funnel(&self, states: &[FeatureState], stream: &mut Stream) {
+        let rows = funnel(states);
+        let counts: Vec<u64> = rows.iter().map(|(_, count)| *count as u64).collect();
+        stream.log(entities::FUNNEL, &BarChart::new(counts));
+        let mut table = "| features | count |\n|:--|--:|\n".to_owned();
+        for (name, count) in rows {
+            table.push_str(&format!("| {name} | {count} |\n"));
+        }
+        stream.log(entities::FUNNEL_TABLE, &TextDocument::from_markdown(table));
+    }
+
+    fn rays(&self, states: &[FeatureState], place: &Place<'_>, stream: &mut Stream) {
+        let Some(pose) = &self.reference_from_query else {
+            return;
+        };
+        let centre = Point3::from(pose.translation.vector);
+        for name in ["inlier", "outlier"] {
+            let members = self.lifted.iter().filter(|lifted| {
+                states
+                    .get(lifted.query)
+                    .is_some_and(|state| state.name() == name)
+            });
+            let points: Vec<Point3<f64>> = members.filter_map(|lifted| lifted.point).collect();
+            let color = if name == "inlier" {
+                colors::TRUTH
+            } else {
+                colors::ESTIMATE
+            };
+            let path = entities::correspondences(name);
+            log_rays(
+                stream,
+                &path,
+                place.problem,
+                place.origin,
+                &centre,
+                &points,
+                color,
+            );
+        }
+    }
+}
+
+/// How many features passed each step: each state is where some of them stopped.
+fn funnel(states: &[FeatureState]) -> [(&'static str, usize); 5] {
+    let at_least = |index: usize| states.iter().filter(|state| state.index() >= index).count();
+    [
+        ("detected in the query", at_least(0)),
+        ("passed the ratio test", at_least(1)),
+        ("unique", at_least(2)),
+        ("with a depth", at_least(3)),
+        ("inliers", at_least(4)),
+    ]
+}
+
+/// The state's deciding number, in words.
+fn decided_by(state: &FeatureState) -> String {
+    match state {
+        FeatureState::RatioFailed { ratio } => format!("ratio {ratio:.2}"),
+        FeatureState::NotUnique { rival } => format!("nearer to query feature {rival}"),
+        FeatureState::NoDepth { distance_px } => format!("LiDAR {distance_px:.1} px away"),
+        FeatureState::Outlier { residual_px } if residual_px.is_infinite() => {
+            "no pose explains it".to_owned()
+        }
+        FeatureState::Outlier { residual_px } | FeatureState::Inlier { residual_px } => {
+            format!("residual {residual_px:.1} px")
+        }
+    }
+}
+
+/// Rerun's pixel (0, 0) is the corner of the image, ours the centre of its first pixel.
+fn shown([x, y]: [f32; 2]) -> [f32; 2] {
+    [x + 0.5, y + 0.5]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_funnel_counts_every_feature_once_and_never_widens() {
+        let states = [
+            FeatureState::RatioFailed { ratio: 0.95 },
+            FeatureState::NotUnique { rival: 3 },
+            FeatureState::Inlier { residual_px: 0.4 },
+            FeatureState::Outlier { residual_px: 9.0 },
+            FeatureState::NoDepth { distance_px: 7.0 },
+        ];
+        assert_eq!(funnel(&states).map(|row| row.1), [5, 4, 3, 2, 1]);
+    }
+}

@@ -1,0 +1,219 @@
+//! A small language for blueprints: containers and views with their properties.
+//!
+//! Rerun's own blueprint types lack view properties, such as where the eye of a 3-D view is, and
+//! draw their ids at random.
+
+use rerun::blueprint::components::{
+    ColumnShare, ContainerKind, IncludedContent, LoopMode, PanelState, PlayState, QueryExpression,
+    RootContainer, RowShare, TimelineName, ViewClass,
+};
+use rerun::components::Name;
+use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents,
+    ViewportBlueprint,
+};
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::entities::{APPLICATION_ID, STEP_TIMELINE};
+
+/// What a panel shows.
+pub(super) struct View {
+    class: &'static str,
+    name: String,
+    origin: String,
+    contents: Vec<String>,
+    properties: Vec<(&'static str, Box<dyn AsComponents>)>,
+}
+
+impl View {
+    /// Everything at and below `origin`.
+    pub(super) fn new(
+        class: &'static str,
+        name: impl Into<String>,
+        origin: impl Into<String>,
+    ) -> Self {
+        Self {
+            class,
+            name: name.into(),
+            origin: origin.into(),
+            contents: vec!["$origin/**".to_owned()],
+            properties: Vec::new(),
+        }
+    }
+
+    /// Instead of everything, what these expressions say (`+ /world/**`, `- /world/search/**`).
+    pub(super) fn of(mut self, contents: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.contents = contents.into_iter().map(Into::into).collect();
+        self
+    }
+
+    /// With a property of the view; `name` is that of the archetype.
+    pub(super) fn with(
+        mut self,
+        name: &'static str,
+        property: impl AsComponents + 'static,
+    ) -> Self {
+        self.properties.push((name, Box::new(property)));
+        self
+    }
+}
+
+/// A part of the layout.
+pub(super) enum Node {
+    /// Beside each other, with their shares of the width.
+    Row {
+        /// What a tab calls it.
+        name: String,
+        /// From left to right.
+        children: Vec<(f32, Node)>,
+    },
+    /// Above each other, with their shares of the height.
+    Column(Vec<(f32, Node)>),
+    /// One at a time, the first one shown.
+    Tabs(Vec<Node>),
+    /// A single view.
+    View(Box<View>),
+}
+
+impl From<View> for Node {
+    fn from(view: View) -> Self {
+        Self::View(Box::new(view))
+    }
+}
+
+/// Sends a layout along with a recording, with the time panel on `step`, at the end of the run.
+pub(super) fn send(
+    root: &Node,
+    recording_id: &str,
+    recording: &RecordingStream,
+) -> RecordingStreamResult<()> {
+    let (stream, storage) = RecordingStreamBuilder::new(APPLICATION_ID)
+        .recording_id(format!("{recording_id}-blueprint"))
+        .blueprint()
+        .memory()?;
+    stream.set_time_sequence("blueprint", 0);
+    let path = log_node(&stream, root, "root")?;
+    let viewport = ViewportBlueprint::new()
+        .with_root_container(RootContainer(id(&path).to_be_bytes().into()))
+        .with_auto_layout(false)
+        .with_auto_views(false);
+    stream.log("viewport", &viewport)?;
+    let time_panel = TimePanelBlueprint::new()
+        .with_state(PanelState::Expanded)
+        .with_timeline(TimelineName::from(STEP_TIMELINE))
+        .with_play_state(PlayState::Following)
+        .with_loop_mode(LoopMode::Off);
+    stream.log("time_panel", &time_panel)?;
+    for panel in ["blueprint_panel", "selection_panel"] {
+        stream.log(
+            panel,
+            &PanelBlueprint::new().with_state(PanelState::Collapsed),
+        )?;
+    }
+    if let Some(info) = stream.store_info() {
+        let activation = BlueprintActivationCommand {
+            blueprint_id: info.store_id,
+            make_active: true,
+            make_default: true,
+        };
+        recording.send_blueprint(storage.take(), activation);
+    }
+    Ok(())
+}
+
+/// Logs a node and what it holds; `place` says where in the tree it is. Returns its name there.
+fn log_node(stream: &RecordingStream, node: &Node, place: &str) -> RecordingStreamResult<String> {
+    let (kind, children): (_, Vec<(f32, &Node)>) = match node {
+        Node::View(view) => {
+            log_view(stream, view, place)?;
+            return Ok(place.to_owned());
+        }
+        Node::Row { children, .. } => (ContainerKind::Horizontal, shares(children)),
+        Node::Column(children) => (ContainerKind::Vertical, shares(children)),
+        Node::Tabs(children) => (
+            ContainerKind::Tabs,
+            children.iter().map(|child| (1.0, child)).collect(),
+        ),
+    };
+    let mut contents = Vec::new();
+    for (index, (_, child)) in children.iter().enumerate() {
+        let name = log_node(stream, child, &format!("{place}/{index}"))?;
+        contents.push(IncludedContent(path_of(child, &name).as_str().into()));
+    }
+    let shares: Vec<f32> = children.iter().map(|(share, _)| *share).collect();
+    let container = match kind {
+        ContainerKind::Vertical => ContainerBlueprint::new(kind)
+            .with_row_shares(shares.into_iter().map(|share| RowShare(share.into()))),
+        _ => ContainerBlueprint::new(kind)
+            .with_col_shares(shares.into_iter().map(|share| ColumnShare(share.into()))),
+    };
+    let container = match node {
+        Node::Row { name, .. } => container.with_display_name(Name(name.as_str().into())),
+        _ => container,
+    };
+    stream.log(path_of(node, place), &container.with_contents(contents))?;
+    Ok(place.to_owned())
+}
+
+fn shares(children: &[(f32, Node)]) -> Vec<(f32, &Node)> {
+    children
+        .iter()
+        .map(|(share, child)| (*share, child))
+        .collect()
+}
+
+fn log_view(stream: &RecordingStream, view: &View, place: &str) -> RecordingStreamResult<()> {
+    let View {
+        class,
+        name,
+        origin,
+        contents,
+        properties,
+    } = view;
+    let path = view_path(place);
+    let expressions = contents
+        .iter()
+        .map(|line| QueryExpression(line.as_str().into()));
+    stream.log(
+        format!("{path}/ViewContents"),
+        &ViewContents::new(expressions),
+    )?;
+    let blueprint = ViewBlueprint::new(ViewClass((*class).into()))
+        .with_display_name(Name(name.as_str().into()))
+        .with_space_origin(origin.as_str());
+    stream.log(path.as_str(), &blueprint)?;
+    for (name, property) in properties {
+        stream.log(format!("{path}/{name}"), property.as_ref())?;
+    }
+    Ok(())
+}
+
+fn path_of(node: &Node, place: &str) -> String {
+    match node {
+        Node::View(_) => view_path(place),
+        _ => format!("container/{}", uuid(place)),
+    }
+}
+
+fn view_path(place: &str) -> String {
+    format!("view/{}", uuid(place))
+}
+
+/// The same layout has the same ids in every recording.
+fn id(place: &str) -> u128 {
+    xxh3_128(place.as_bytes())
+}
+
+fn uuid(place: &str) -> String {
+    let hex = format!("{:032x}", id(place));
+    let parts = [
+        &hex[..8],
+        &hex[8..12],
+        &hex[12..16],
+        &hex[16..20],
+        &hex[20..],
+    ];
+    parts.join("-")
+}

@@ -1,0 +1,141 @@
+//! Decisions in words, for the log of a recording.
+
+use crate::event::{Event, MinimumAssessed, Moment, Side, Stage, ViewRendered};
+use crate::features::MatchVerdict;
+use crate::grid::Offset;
+
+/// One sentence for an event that is a decision; `None` for the others.
+pub(super) fn sentence(event: &Event) -> Option<String> {
+    Some(match event {
+        Event::FeaturesDetected(event) => {
+            let side = match event.side {
+                Side::Query => "query",
+                Side::Reference => "reference",
+            };
+            format!("{} keypoints in the {side}", event.features.keypoints.len())
+        }
+        Event::MatchesDecided(event) => {
+            let [mut kept, mut ambiguous, mut rivalled] = [0; 3];
+            for decision in event.decisions.iter().flatten() {
+                *match decision.verdict {
+                    MatchVerdict::Candidate => &mut kept,
+                    MatchVerdict::Ambiguous => &mut ambiguous,
+                    MatchVerdict::NotUnique { .. } => &mut rivalled,
+                } += 1;
+            }
+            format!("{kept} matches; {ambiguous} failed the ratio test, {rivalled} were not unique")
+        }
+        Event::ProjectedCloud(event) => format!(
+            "{} of the cloud's {} points are in the reference's view",
+            event.in_view, event.points
+        ),
+        Event::DepthsLifted(event) => format!(
+            "{} of {} matches have a depth",
+            event
+                .matches
+                .iter()
+                .filter(|lifted| lifted.point.is_some())
+                .count(),
+            event.matches.len()
+        ),
+        Event::HypothesisTried(event) if event.trial.is_best => {
+            let score = event.trial.best?.score;
+            format!(
+                "trial {}: new best with {} inliers, log likelihood {:.1}; {} trials needed",
+                event.trial.index, score.inliers, score.log_likelihood, event.trial.trials_needed
+            )
+        }
+        Event::PoseRefined(event) => format!(
+            "refined: {} of {} correspondences are inliers, after {} trials",
+            event.inliers, event.correspondences, event.trials
+        ),
+        Event::ConsensusJudged(event) => format!(
+            "{}: {} inliers, {} needed, log10 of false alarms {:.1}, {:.2} m from the reference",
+            if event.accepted {
+                "accepted"
+            } else {
+                "refused"
+            },
+            event.acceptance.inliers,
+            event
+                .acceptance
+                .needed
+                .map_or("more than all".to_owned(), |needed| needed.to_string()),
+            event.acceptance.log10_nfa,
+            event.distance_m
+        ),
+        Event::FeaturesClassified(event) => {
+            format!(
+                "the states of all {} query keypoints are known",
+                event.states.len()
+            )
+        }
+        Event::CloudColored(event) => {
+            let counts = &event.cloud.counts;
+            format!(
+                "{} points coloured, {} outside the photo, {} occluded",
+                counts.colored, counts.outside, counts.occluded
+            )
+        }
+        Event::ViewRendered(event) => rendered(event),
+        Event::PhaseSearched(event) => {
+            let phase = event.surface.lattice.phase.name();
+            match &event.best {
+                Some(best) => format!("{phase}: the least cost is at {}", at(best)),
+                None => format!("{phase}: no hypothesis has a cost"),
+            }
+        }
+        Event::MinimumAssessed(event) => assessed(event),
+        Event::BranchTaken(event) => {
+            format!("takes the pose of {}: {}", event.method.name(), event.why)
+        }
+        Event::HypothesisTried(_)
+        | Event::PoseScored(_)
+        | Event::StageStarted(_)
+        | Event::StageEnded(_) => return None,
+    })
+}
+
+/// The stages around an event, outermost first.
+pub(super) fn stages(open: &[Stage]) -> String {
+    let names: Vec<&str> = open.iter().map(|stage| stage.name()).collect();
+    names.join(" › ")
+}
+
+fn rendered(event: &ViewRendered) -> String {
+    let what = match event.moment {
+        Moment::Start => "at the reference",
+        Moment::NewBest => "new best",
+        Moment::End => "result",
+    };
+    format!(
+        "{what}: cost {} over {} pixels, {}",
+        cost(event.score.cost),
+        event.score.covered,
+        at(&event.offset)
+    )
+}
+
+fn assessed(event: &MinimumAssessed) -> String {
+    format!(
+        "cost {} at the minimum; {} at the reference, {} with shuffled pixels, {} at the \
+         second-best minimum",
+        cost(Some(event.best)),
+        cost(event.initial),
+        cost(event.shuffled),
+        cost(event.runner_up)
+    )
+}
+
+fn cost(cost: Option<f64>) -> String {
+    cost.map_or("none".to_owned(), |cost| format!("{cost:.4}"))
+}
+
+fn at(offset: &Offset) -> String {
+    format!(
+        "{:.2} m right, {:.2} m ahead, {:.2}° left",
+        offset.right_m,
+        offset.forward_m,
+        offset.yaw_rad.to_degrees()
+    )
+}

@@ -1,0 +1,17 @@
+//! What an event is about.
+
+use super::scene::Origin;
+use crate::event::Method;
+use crate::problem::Problem;
+
+/// The surroundings of an event.
+pub(super) struct Place<'a> {
+    /// Position of the reference among those of the query.
+    pub(super) reference: usize,
+    /// The problem being solved.
+    pub(super) problem: &'a Problem,
+    /// The estimator that tells; inside the hybrid the one that it runs.
+    pub(super) method: Method,
+    /// What is drawn at (0, 0, 0).
+    pub(super) origin: Origin,
+}

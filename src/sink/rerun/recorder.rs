@@ -1,0 +1,370 @@
+//! The recorder: a sink that puts a run into a recording.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use nalgebra::Matrix3x4;
+use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
+
+use super::direct::DirectStory;
+use super::feature::FeatureStory;
+use super::place::Place;
+use super::scene::{self, Camera, Origin};
+use super::stream::Stream;
+use super::{Identity, RecordError, Targets, blueprint, colors, entities, narration, report};
+use crate::evaluate::{QueryResult, Status};
+use crate::event::{Event, Kind, KindSet, Method, Stage};
+use crate::geometry::{Pose, pose_from_matrix};
+use crate::params::Params;
+use crate::problem::{Problem, ReferenceTuple};
+use crate::render::{ColoredCloud, RenderParams, color_cloud};
+use crate::trace::{Cancelled, Record, Sink};
+
+/// Puts runs into a Rerun recording, one query after the other.
+///
+/// A recording that breaks does not break the run: the recorder remembers its first error, wants no
+/// more events and reports the error when it is closed.
+pub struct Recorder {
+    stream: Stream,
+    configuration: String,
+    render: RenderParams,
+    methods: Vec<Method>,
+    /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
+    origin: Option<Origin>,
+    query: Query,
+    /// Hypotheses of each method in earlier runs: `eval` goes on where the last run ended.
+    evals: BTreeMap<Method, i64>,
+}
+
+/// What was told about the query in work.
+#[derive(Default)]
+struct Query {
+    problems: Vec<Problem>,
+    results: Vec<QueryResult>,
+    reference: usize,
+    method: Option<Method>,
+    /// Estimators that told their story, by reference: the hybrid repeats those of FB and MI.
+    told: BTreeSet<(usize, Method)>,
+    clouds: BTreeSet<usize>,
+    stages: Vec<Stage>,
+    tellers: Vec<Teller>,
+}
+
+/// An estimator that is telling.
+struct Teller {
+    method: Method,
+    /// Whether all this was told before.
+    is_repetition: bool,
+    hypotheses: i64,
+    feature: FeatureStory,
+    direct: DirectStory,
+}
+
+impl Recorder {
+    /// Opens the targets of a run with these methods.
+    ///
+    /// # Errors
+    /// [`RecordError`] names the target that cannot be opened.
+    pub fn open(
+        targets: &Targets,
+        identity: &Identity,
+        methods: &[Method],
+    ) -> Result<Self, RecordError> {
+        let mut params = Params::default();
+        // The report says so when the configuration cannot be read.
+        let _ = params.merge_toml(&identity.configuration);
+        Ok(Self {
+            stream: Stream::open(targets, identity)?,
+            render: params.render,
+            configuration: identity.configuration.clone(),
+            methods: methods.to_vec(),
+            origin: None,
+            query: Query::default(),
+            evals: BTreeMap::new(),
+        })
+    }
+
+    /// A query begins. `problems` holds one problem per reference.
+    pub fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
+        self.query = Query {
+            problems: problems.to_vec(),
+            ..Query::default()
+        };
+        let Some(first) = problems.first() else {
+            return;
+        };
+        self.stream.set_query(query_index);
+        self.stream.advance();
+        let origin = match self.origin {
+            Some(origin) => {
+                self.wipe();
+                origin
+            }
+            None => self.set_up(first),
+        };
+        let stream = &mut self.stream;
+        scene::log_query(stream, &first.query);
+        for (index, problem) in problems.iter().enumerate() {
+            scene::log_reference(stream, index, &problem.reference, origin);
+        }
+        if let Some(truth) = truth {
+            let camera = Camera {
+                owner: &entities::truth(),
+                world_from_camera: truth,
+                intrinsics: &first.query.intrinsics,
+                color: colors::TRUTH,
+                label: "truth".to_owned(),
+            };
+            camera.log(stream, origin);
+        }
+        self.report();
+        self.stream.flush();
+    }
+
+    /// A method begins on one of the query's problems; what it tells comes through [`Sink::accept`].
+    pub fn begin_method(&mut self, reference_index: usize, method: Method) {
+        self.query.reference = reference_index;
+        self.query.method = Some(method);
+        self.query.stages.clear();
+        self.query.tellers.clear();
+    }
+
+    /// The method's result.
+    pub fn end_method(&mut self, result: &QueryResult) {
+        self.stream.advance();
+        self.result_in_words(result);
+        self.estimate(result);
+        self.query.results.push(result.clone());
+        self.report();
+        self.stream.settle();
+    }
+
+    /// Completes the recording. With [`Targets::serve`] it goes on serving and does not return.
+    ///
+    /// # Errors
+    /// The first error of the whole run.
+    pub fn close(self) -> Result<(), RecordError> {
+        self.stream.close()
+    }
+
+    /// What holds for the whole recording follows from its first problem.
+    fn set_up(&mut self, first: &Problem) -> Origin {
+        let reference = &first.reference.world_from_camera;
+        let origin = Origin(reference.translation.vector);
+        self.origin = Some(origin);
+        self.stream
+            .log_static(entities::WORLD, &ViewCoordinates::RDF());
+        blueprint::send(&mut self.stream, &self.methods, first);
+        blueprint::log_styles(&mut self.stream, &self.methods);
+        origin
+    }
+
+    /// Nothing of the last query must be taken for the next one's.
+    fn wipe(&mut self) {
+        for path in entities::OF_A_QUERY {
+            self.stream.log(path, &rerun::Clear::recursive());
+        }
+    }
+
+    fn estimate(&mut self, result: &QueryResult) {
+        let Some(method) = self.query.method else {
+            return;
+        };
+        let (Some(problem), Some(origin)) = (self.query.problem(), self.origin) else {
+            return;
+        };
+        let pose = result.pose.as_ref().and_then(|pose| {
+            let rows = pose.world_from_camera;
+            pose_from_matrix(&Matrix3x4::from_fn(|row, column| rows[row][column])).ok()
+        });
+        let owner = entities::estimate(method);
+        match pose {
+            Some(pose) => {
+                let camera = Camera {
+                    owner: &owner,
+                    world_from_camera: &pose,
+                    intrinsics: &problem.query.intrinsics,
+                    color: colors::ESTIMATE,
+                    label: method.name().to_owned(),
+                };
+                camera.log(&mut self.stream, origin);
+            }
+            // The estimate of an earlier query must not be taken for this one's.
+            None => self.stream.log(&owner, &rerun::Clear::recursive()),
+        }
+    }
+
+    fn result_in_words(&mut self, result: &QueryResult) {
+        let outcome = match (&result.reason, &result.error) {
+            (Some(reason), _) => format!("{} {}", reason.code, reason.text),
+            (None, Some(error)) => format!(
+                "{:.3} m and {:.3}° from the truth",
+                error.translation_m, error.rotation_deg
+            ),
+            (None, None) => "a pose".to_owned(),
+        };
+        let level = match result.status {
+            Status::Ok => TextLogLevel::INFO,
+            Status::Failed => TextLogLevel::WARN,
+        };
+        self.say(&format!("{} result: {outcome}", result.method), level);
+    }
+
+    fn report(&mut self) {
+        let Some(origin) = self.origin else { return };
+        let Query {
+            problems, results, ..
+        } = &self.query;
+        let text = report::markdown(problems, results, &self.configuration, origin);
+        self.stream
+            .log(entities::REPORT, &TextDocument::from_markdown(text));
+    }
+
+    fn say(&mut self, words: &str, level: &str) {
+        self.stream
+            .log(entities::LOG, &TextLog::new(words).with_level(level));
+    }
+
+    fn stage_started(&mut self, stage: Stage) {
+        if let Stage::Estimator(method) = stage {
+            let is_first = self.query.told.insert((self.query.reference, method));
+            self.query.tellers.push(Teller {
+                method,
+                is_repetition: !is_first,
+                hypotheses: 0,
+                feature: FeatureStory::default(),
+                direct: DirectStory::default(),
+            });
+        }
+        self.query.stages.push(stage);
+        self.stream.advance();
+        self.show_stage();
+    }
+
+    fn stage_ended(&mut self, stage: Stage, succeeded: bool) {
+        let path = narration::stages(&self.query.stages);
+        self.query.stages.pop();
+        if let Some(teller) = self.query.tellers.last_mut() {
+            teller.feature.tell_trials(&mut self.stream);
+        }
+        if matches!(stage, Stage::Estimator(_))
+            && let Some(teller) = self.query.tellers.pop()
+            && !teller.is_repetition
+        {
+            *self.evals.entry(teller.method).or_default() += teller.hypotheses;
+        }
+        if !succeeded {
+            self.say(&format!("{path} stopped here"), TextLogLevel::WARN);
+        }
+        self.show_stage();
+        self.stream.flush();
+    }
+
+    /// The lane of the method that was asked for shows all stages, those inside the hybrid too.
+    fn show_stage(&mut self) {
+        let Some(method) = self.query.method else {
+            return;
+        };
+        let state = match self.query.stages.as_slice() {
+            // An empty state ends the lane.
+            [] => StateChange::single(""),
+            // The lane itself says which method it is.
+            [_] => StateChange::single(method.name()),
+            [_, inner @ ..] => StateChange::single(narration::stages(inner)),
+        };
+        self.stream.log(&entities::stage(method), &state);
+    }
+
+    /// As the direct methods colour it.
+    fn colored(&self, tuple: &ReferenceTuple) -> ColoredCloud {
+        let ReferenceTuple {
+            photo, intrinsics, ..
+        } = tuple;
+        color_cloud(&tuple.cloud, &photo.gray, intrinsics, &self.render)
+    }
+
+    fn tell(&mut self, event: &Event) {
+        let Some(teller) = self.query.tellers.last_mut() else {
+            return;
+        };
+        if matches!(event, Event::HypothesisTried(_) | Event::PoseScored(_)) {
+            teller.hypotheses += 1;
+        }
+        if teller.is_repetition {
+            return;
+        }
+        let teller_method = teller.method;
+        if let Some(words) = narration::sentence(event) {
+            self.stream.advance();
+            let path = narration::stages(&self.query.stages);
+            self.say(&format!("{path}: {words}"), TextLogLevel::INFO);
+        }
+        let index = self.query.reference;
+        let (Some(problem), Some(origin)) = (self.query.problems.get(index), self.origin) else {
+            return;
+        };
+        // FB uses the cloud without colouring it.
+        let colored = match event {
+            Event::CloudColored(event) => Some(Arc::clone(&event.cloud)),
+            Event::ProjectedCloud(_) => Some(Arc::new(self.colored(&problem.reference))),
+            _ => None,
+        };
+        if let Some(cloud) = colored
+            && self.query.clouds.insert(index)
+        {
+            scene::log_cloud(&mut self.stream, index, &problem.reference, &cloud, origin);
+        }
+        let place = Place {
+            reference: index,
+            problem,
+            method: teller_method,
+            origin,
+        };
+        let evals = self.evals.get(&teller_method).copied().unwrap_or(0);
+        if let Some(teller) = self.query.tellers.last_mut() {
+            teller.feature.tell(event, evals, &place, &mut self.stream);
+            teller.direct.tell(event, evals, &place, &mut self.stream);
+        }
+        if matches!(event, Event::ViewRendered(_)) {
+            self.stream.flush();
+        }
+    }
+}
+
+impl Query {
+    fn problem(&self) -> Option<&Problem> {
+        self.problems.get(self.reference)
+    }
+
+    /// Whether the hybrid that runs now can only repeat what was told before.
+    fn is_repeated_hybrid(&self) -> bool {
+        let was_told = |method| self.told.contains(&(self.reference, method));
+        self.method == Some(Method::Hybrid)
+            && was_told(Method::Feature)
+            && was_told(Method::MutualInformation)
+    }
+}
+
+impl Sink for Recorder {
+    fn wanted(&self) -> KindSet {
+        if self.stream.is_broken() {
+            KindSet::NONE
+        } else if self.query.is_repeated_hybrid() {
+            KindSet::of(&[Kind::BranchTaken])
+        } else {
+            KindSet::ALL
+        }
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        if self.stream.is_broken() {
+            return Ok(());
+        }
+        match &record.event {
+            Event::StageStarted(started) => self.stage_started(started.stage),
+            Event::StageEnded(ended) => self.stage_ended(ended.stage, ended.succeeded),
+            event => self.tell(event),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,177 @@
+//! The report of one query, as Markdown.
+
+use std::fmt::Write as _;
+
+use super::scene::Origin;
+use crate::evaluate::{QueryResult, Status};
+use crate::params::Params;
+use crate::problem::Problem;
+
+/// What the methods made of one query, so far.
+pub(super) fn markdown(
+    problems: &[Problem],
+    results: &[QueryResult],
+    configuration: &str,
+    origin: Origin,
+) -> String {
+    let mut text = String::new();
+    if let Some(problem) = problems.first() {
+        let names: Vec<&str> = problems.iter().map(|p| p.reference.name.as_str()).collect();
+        text += &format!(
+            "# Query {}\n\nAgainst {}, within {} m, seed {}.\n\n",
+            problem.query.name,
+            names.join(", "),
+            problem.uncertainty_radius_m,
+            problem.seed
+        );
+    }
+    text += &verdicts(results);
+    text += &features(results);
+    text += &costs(results);
+    text += &changes(configuration);
+    let Origin(origin) = origin;
+    text += &format!(
+        "\nThe world is drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \
+         world coordinates. Axes: x right, y down, z forward.\n",
+        origin.x, origin.y, origin.z
+    );
+    text
+}
+
+fn verdicts(results: &[QueryResult]) -> String {
+    let mut text = "| method | reference | result | error \\[m\\] | error \\[°\\] |\n\
+                    |:--|:--|:--|--:|--:|\n"
+        .to_owned();
+    for result in results {
+        let verdict = match (&result.status, &result.reason) {
+            (Status::Ok, _) => "pose".to_owned(),
+            (Status::Failed, Some(reason)) => format!("**{}** {}", reason.code, reason.text),
+            (Status::Failed, None) => "no pose".to_owned(),
+        };
+        let [metres, degrees] = match &result.error {
+            Some(error) => [error.translation_m, error.rotation_deg].map(|e| format!("{e:.3}")),
+            None => ["–".to_owned(), "–".to_owned()],
+        };
+        row(
+            &mut text,
+            &[
+                &result.method,
+                &result.references.join(", "),
+                &verdict,
+                &metres,
+                &degrees,
+            ],
+        );
+    }
+    let initial = results.iter().find_map(|result| result.initial_error);
+    if let Some(error) = initial {
+        text += &format!(
+            "\nThe first reference itself is {:.3} m and {:.3}° from the truth.\n",
+            error.translation_m, error.rotation_deg
+        );
+    }
+    for finding in results.iter().flat_map(|result| &result.diagnosis) {
+        text += &format!("\n- **{}** {}", finding.code, finding.text);
+    }
+    text + "\n"
+}
+
+fn features(results: &[QueryResult]) -> String {
+    let mut text = String::new();
+    for result in results {
+        let Some(counts) = &result.counts else {
+            continue;
+        };
+        if text.is_empty() {
+            text += "## Features\n\n| method | query | reference | ratio test | unique | depth | \
+                     inliers |\n|:--|--:|--:|--:|--:|--:|--:|\n";
+        }
+        let numbers = [
+            counts.query_keypoints,
+            counts.reference_keypoints,
+            counts.ratio_passed,
+            counts.unique,
+            counts.with_depth,
+            counts.inliers,
+        ]
+        .map(|count| count.to_string());
+        let mut cells: Vec<&str> = vec![&result.method];
+        cells.extend(numbers.iter().map(String::as_str));
+        row(&mut text, &cells);
+    }
+    text + "\n"
+}
+
+fn costs(results: &[QueryResult]) -> String {
+    let mut text = String::new();
+    for result in results {
+        let Some(cost) = &result.cost else { continue };
+        if text.is_empty() {
+            text += "## Costs\n\n| method | result | truth | reference | shuffled | runner-up | \
+                     coverage | evaluations |\n|:--|--:|--:|--:|--:|--:|--:|--:|\n";
+        }
+        let number = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.4}"));
+        row(
+            &mut text,
+            &[
+                &result.method,
+                &number(Some(cost.best)),
+                &number(cost.truth),
+                &number(cost.initial),
+                &number(cost.shuffled),
+                &number(cost.runner_up),
+                &format!("{:.2} %", 100.0 * cost.coverage_best),
+                &cost.evaluations.to_string(),
+            ],
+        );
+    }
+    text + "\n"
+}
+
+fn changes(configuration: &str) -> String {
+    let mut params = Params::default();
+    let changes = match params.merge_toml(configuration) {
+        Ok(()) => params.changes(),
+        Err(error) => return format!("## Parameters\n\nUnreadable: {error}\n"),
+    };
+    if changes.is_empty() {
+        return "## Parameters\n\nAll at their defaults.\n".to_owned();
+    }
+    let mut text = "## Parameters\n\nAll at their defaults but these:\n\n".to_owned();
+    for change in changes {
+        text += &format!("- `{change}`\n");
+    }
+    text
+}
+
+/// A bar inside a cell would end it.
+fn row(text: &mut String, cells: &[&str]) {
+    for cell in cells {
+        let cell = cell.replace('|', "\\|");
+        // Writing to a string cannot fail.
+        let _ = write!(text, "| {cell} ");
+    }
+    text.push_str("|\n");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_parameters_that_differ_are_listed() {
+        assert!(changes("").contains("All at their defaults."));
+        let text = changes("[fb]\nratio = 0.7\n");
+        assert!(
+            text.contains("- `fb.ratio=0.7`") && !text.contains("depth"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_bar_in_a_reason_does_not_end_its_cell() {
+        let mut text = String::new();
+        row(&mut text, &["fb", "a|b"]);
+        assert_eq!(text, "| fb | a\\|b |\n");
+    }
+}

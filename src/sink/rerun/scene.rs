@@ -1,0 +1,156 @@
+//! What is given and what comes out, in the world: clouds, cameras, photos.
+
+use nalgebra::{Point3, Vector3};
+use rerun::{LineStrips3D, Pinhole, Points3D, Quaternion, Transform3D};
+
+use super::colors::{self, Rgb};
+use super::stream::Stream;
+use super::{entities, images};
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+use crate::problem::{Problem, Query, ReferenceTuple};
+use crate::render::ColoredCloud;
+
+/// How large cameras are drawn \[m\].
+const IMAGE_PLANE_M: f32 = 1.5;
+
+/// The place that is drawn at (0, 0, 0), in world coordinates \[m\].
+///
+/// A viewer draws in single precision, in which map coordinates have steps of half a metre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin(pub(super) Vector3<f64>);
+
+impl Origin {
+    /// A position as it is drawn.
+    pub(super) fn place(&self, world: &Vector3<f64>) -> [f32; 3] {
+        (world - self.0).cast::<f32>().into()
+    }
+
+    /// A pose as it is drawn.
+    pub(super) fn transform(&self, world_from_camera: &Pose) -> Transform3D {
+        let rotation: [f32; 4] = world_from_camera.rotation.coords.cast::<f32>().into();
+        Transform3D::from_translation_rotation(
+            self.place(&world_from_camera.translation.vector),
+            Quaternion::from_xyzw(rotation),
+        )
+    }
+}
+
+/// The query's photo.
+pub(super) fn log_query(stream: &mut Stream, query: &Query) {
+    stream.log_image(entities::QUERY_IMAGE, images::photo(&query.photo));
+}
+
+/// A reference's camera with its photo.
+pub(super) fn log_reference(
+    stream: &mut Stream,
+    index: usize,
+    tuple: &ReferenceTuple,
+    origin: Origin,
+) {
+    let owner = entities::reference(index);
+    let camera = Camera {
+        owner: &owner,
+        world_from_camera: &tuple.world_from_camera,
+        intrinsics: &tuple.intrinsics,
+        color: colors::REFERENCE,
+        label: format!("reference {}", tuple.name),
+    };
+    camera.log(stream, origin);
+    stream.log_image(&entities::camera_image(&owner), images::photo(&tuple.photo));
+}
+
+/// A camera of the query: where it was, or where a method says that it was.
+pub(super) struct Camera<'a> {
+    pub(super) owner: &'a str,
+    pub(super) world_from_camera: &'a Pose,
+    pub(super) intrinsics: &'a Intrinsics,
+    pub(super) color: Rgb,
+    pub(super) label: String,
+}
+
+impl Camera<'_> {
+    pub(super) fn log(&self, stream: &mut Stream, origin: Origin) {
+        let path = entities::camera(self.owner);
+        stream.log(&path, &origin.transform(self.world_from_camera));
+        stream.log(
+            &path,
+            &pinhole(self.intrinsics).with_color(colors::color(self.color)),
+        );
+        let centre = origin.place(&self.world_from_camera.translation.vector);
+        let label = Points3D::new([centre])
+            .with_colors([colors::color(colors::light(self.color))])
+            .with_radii([rerun::Radius::new_ui_points(5.0)])
+            .with_labels([self.label.as_str()])
+            .with_show_labels(true);
+        stream.log(&format!("{}/label", self.owner), &label);
+    }
+}
+
+/// Rerun's pixel (0, 0) is the corner of the image, ours the centre of its first pixel.
+fn pinhole(intrinsics: &Intrinsics) -> Pinhole {
+    let Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    } = *intrinsics;
+    Pinhole::from_focal_length_and_resolution([fx as f32, fy as f32], [width as f32, height as f32])
+        .with_principal_point([cx as f32 + 0.5, cy as f32 + 0.5])
+        .with_image_plane_distance(IMAGE_PLANE_M)
+}
+
+/// The cloud in the colours that the reference photo gives it, else in its grey values.
+pub(super) fn log_cloud(
+    stream: &mut Stream,
+    index: usize,
+    tuple: &ReferenceTuple,
+    cloud: &ColoredCloud,
+    origin: Origin,
+) {
+    let world = |point: &Point3<f32>| {
+        let world = tuple.world_from_camera * point.cast::<f64>();
+        origin.place(&world.coords)
+    };
+    let positions = cloud.points.iter().map(|point| world(&point.position));
+    let colors = cloud.points.iter().map(|point| {
+        let gray = point.intensity.round().clamp(0.0, 255.0) as u8;
+        colors::color(photo_color(tuple, &point.position).unwrap_or([gray; 3]))
+    });
+    let points = Points3D::new(positions)
+        .with_colors(colors)
+        .with_radii([rerun::Radius::new_ui_points(1.5)]);
+    stream.log(&entities::cloud(index), &points);
+}
+
+fn photo_color(tuple: &ReferenceTuple, point: &Point3<f32>) -> Option<Rgb> {
+    let photo = tuple.photo.color.as_ref()?;
+    let pixel = tuple.intrinsics.project(&point.cast())?;
+    let nearest = |value: f64| value.round().max(0.0) as u32;
+    Some(
+        photo
+            .get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?
+            .0,
+    )
+}
+
+/// Rays from a camera centre to points, all in the reference camera's frame.
+pub(super) fn log_rays(
+    stream: &mut Stream,
+    path: &str,
+    problem: &Problem,
+    origin: Origin,
+    centre: &Point3<f64>,
+    points: &[Point3<f64>],
+    color: Rgb,
+) {
+    let world_from_reference = &problem.reference.world_from_camera;
+    let place = |point: &Point3<f64>| origin.place(&(world_from_reference * point).coords);
+    let start = place(centre);
+    let rays = LineStrips3D::new(points.iter().map(|point| [start, place(point)]))
+        .with_colors([colors::color(color)])
+        .with_radii([rerun::Radius::new_ui_points(0.5)]);
+    stream.log(path, &rays);
+}

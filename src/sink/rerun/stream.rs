@@ -1,0 +1,193 @@
+//! The stream of a recording: its times, its flushes, its first error.
+
+use std::time::Duration;
+
+use rerun::log::ChunkBatcherConfig;
+use rerun::{
+    AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimeColumn,
+};
+
+use super::entities::{APPLICATION_ID, EVAL_TIMELINE, QUERY_TIMELINE, STEP_TIMELINE};
+use super::file::RecordingFile;
+use super::images::Encoded;
+use super::targets::OpenTargets;
+use super::{Identity, RecordError, Targets};
+
+/// Nothing is flushed by time or size. Chunks then end where the run says so, which makes two
+/// recordings of one run equal chunk by chunk.
+const BATCHER: ChunkBatcherConfig = ChunkBatcherConfig {
+    flush_tick: Duration::MAX,
+    flush_num_bytes: u64::MAX,
+    flush_num_rows: u64::MAX,
+    ..ChunkBatcherConfig::DEFAULT
+};
+
+/// A Rerun stream that never fails: it keeps its first error for the end.
+pub(super) struct Stream {
+    id: String,
+    recording: RecordingStream,
+    file: Option<RecordingFile>,
+    error: Option<RecordError>,
+    /// A viewer went away while the file is well: what is left goes to the file.
+    viewer_lost: bool,
+    serves: bool,
+    query: i64,
+    step: i64,
+    eval: Option<i64>,
+}
+
+impl Stream {
+    pub(super) fn open(targets: &Targets, identity: &Identity) -> Result<Self, RecordError> {
+        let OpenTargets { sinks, file } = targets.open()?;
+        let id = identity.recording_id();
+        let recording = RecordingStreamBuilder::new(APPLICATION_ID)
+            .recording_id(id.as_str())
+            .recording_name(format!("{} {}", identity.scene, identity.queries.join(" ")))
+            .send_properties(true)
+            // Somebody asked for this recording, whatever the environment says.
+            .enabled(true)
+            .batcher_config(BATCHER)
+            .set_sinks(sinks)
+            .map_err(|error| unrecordable("anything", &error))?;
+        Ok(Self {
+            id,
+            recording,
+            file,
+            error: None,
+            viewer_lost: false,
+            serves: targets.serve,
+            query: 0,
+            step: -1,
+            eval: None,
+        })
+    }
+
+    /// Sends a layout; `send` is given the recording's id and its stream.
+    pub(super) fn send_layout(
+        &mut self,
+        send: impl FnOnce(&str, &RecordingStream) -> RecordingStreamResult<()>,
+    ) {
+        let sent = send(&self.id, &self.recording);
+        self.keep(sent.map_err(|error| unrecordable("the layout", &error)));
+    }
+
+    /// Whether recording on makes sense.
+    pub(super) fn is_broken(&self) -> bool {
+        self.error.is_some() && !self.viewer_lost
+    }
+
+    /// From here on the rows belong to this query.
+    pub(super) fn set_query(&mut self, index: usize) {
+        self.query = index as i64;
+    }
+
+    /// From here on the rows belong to this hypothesis, or to none.
+    pub(super) fn set_eval(&mut self, eval: Option<i64>) {
+        self.eval = eval;
+    }
+
+    /// The next decision.
+    pub(super) fn advance(&mut self) {
+        self.step += 1;
+    }
+
+    /// Records something as of now.
+    pub(super) fn log(&mut self, path: &str, what: &dyn AsComponents) {
+        if self.is_broken() {
+            return;
+        }
+        // Rerun keeps the time per thread, and a run may move to another one.
+        self.recording.set_time_sequence(QUERY_TIMELINE, self.query);
+        self.recording.set_time_sequence(STEP_TIMELINE, self.step);
+        match self.eval {
+            Some(eval) => self.recording.set_time_sequence(EVAL_TIMELINE, eval),
+            None => self.recording.disable_timeline(EVAL_TIMELINE),
+        }
+        let told = self.recording.log(path, what);
+        self.keep(told.map_err(|error| unrecordable(path, &error)));
+    }
+
+    /// Records an image as of now.
+    pub(super) fn log_image(&mut self, path: &str, image: Encoded) {
+        match image {
+            Ok(image) => self.log(path, &image),
+            Err(error) => self.keep(Err(unrecordable(path, &error))),
+        }
+    }
+
+    /// Records something that holds at all times.
+    pub(super) fn log_static(&mut self, path: &str, what: &dyn AsComponents) {
+        let told = self.recording.log_static(path, what);
+        self.keep(told.map_err(|error| unrecordable(path, &error)));
+    }
+
+    /// Records one number per hypothesis, at once. They have no step: thousands of them would stand
+    /// at the same one.
+    pub(super) fn log_scalars(&mut self, path: &str, rows: &[(i64, f64)]) {
+        if rows.is_empty() || self.is_broken() {
+            return;
+        }
+        let times = [
+            TimeColumn::new_sequence(QUERY_TIMELINE, rows.iter().map(|_| self.query)),
+            TimeColumn::new_sequence(EVAL_TIMELINE, rows.iter().map(|row| row.0)),
+        ];
+        let told = rerun::Scalars::new(rows.iter().map(|row| row.1))
+            .columns_of_unit_batches()
+            .map_err(Into::into)
+            .and_then(|columns| self.recording.send_columns(path, times, columns));
+        self.keep(told.map_err(|error| unrecordable(path, &error)));
+    }
+
+    /// Hands what was recorded so far to the targets, so that a killed run leaves it behind.
+    pub(super) fn flush(&mut self) {
+        let flushed = self.recording.flush_async();
+        self.keep(flushed.map_err(|error| RecordError::Viewer(error.to_string())));
+        self.ask_file();
+    }
+
+    /// As [`Self::flush`], and waits until the targets have it.
+    pub(super) fn settle(&mut self) {
+        let flushed = self.recording.flush_blocking();
+        self.ask_file();
+        if let Err(error) = flushed
+            && self.error.is_none()
+        {
+            self.viewer_lost = self.file.is_some();
+            self.error = Some(RecordError::Viewer(error.to_string()));
+        }
+    }
+
+    /// The end of the recording, with the first error of its life.
+    pub(super) fn close(mut self) -> Result<(), RecordError> {
+        self.settle();
+        let finished = self.file.as_ref().map_or(Ok(()), RecordingFile::finish);
+        if self.serves {
+            log::warn!("serving the recording to viewers; press Ctrl-C to end");
+            loop {
+                std::thread::park();
+            }
+        }
+        self.error.map_or(finished, Err)
+    }
+
+    fn ask_file(&mut self) {
+        let broken = self.file.as_ref().and_then(RecordingFile::error);
+        if let Some(error) = broken {
+            self.viewer_lost = false;
+            self.keep(Err(error));
+        }
+    }
+
+    fn keep(&mut self, told: Result<(), RecordError>) {
+        if let Err(error) = told {
+            self.error.get_or_insert(error);
+        }
+    }
+}
+
+fn unrecordable(what: &str, error: &dyn std::error::Error) -> RecordError {
+    RecordError::Encode {
+        what: what.to_owned(),
+        message: error.to_string(),
+    }
+}

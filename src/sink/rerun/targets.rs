@@ -1,0 +1,231 @@
+//! Where a recording goes, and what it is known by.
+
+use std::io;
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::PathBuf;
+
+use rerun::external::re_uri::RedapUri;
+use rerun::grpc_server::GrpcServerSink;
+use rerun::sink::{GrpcSink, LogSink};
+use rerun::{DEFAULT_CONNECT_URL, DEFAULT_SERVER_PORT, ServerOptions, SpawnError, SpawnOptions};
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::file::RecordingFile;
+use super::viewer::Viewer;
+
+/// Where a recording goes. All of them can be combined; none is a recording that nobody keeps.
+#[derive(Clone, Debug, Default)]
+pub struct Targets {
+    /// A file to save to.
+    pub save: Option<PathBuf>,
+    /// The URL of a running viewer, empty for a local one.
+    pub connect: Option<String>,
+    /// Whether to start a viewer.
+    pub spawn: bool,
+    /// Whether to serve the recording to viewers that connect to this process.
+    pub serve: bool,
+}
+
+/// What the stable id of a recording follows from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// The scene's name.
+    pub scene: String,
+    /// The query frames' names.
+    pub queries: Vec<String>,
+    /// The reference frames' names.
+    pub references: Vec<String>,
+    /// The configuration, as TOML.
+    pub configuration: String,
+    /// The seed of every random choice.
+    pub seed: u64,
+}
+
+impl Identity {
+    /// The recording id: equal for equal runs, whenever and wherever they are made.
+    pub fn recording_id(&self) -> String {
+        // The debug form quotes every string, so that no two identities are spelled alike.
+        format!("{:032x}", xxh3_128(format!("{self:?}").as_bytes()))
+    }
+}
+
+/// Why there is no recording, or not a whole one.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be created.
+    #[error("cannot create the recording {}: {source}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file was created but could not be written to its end.
+    #[error("the recording {} is incomplete: {message}", path.display())]
+    Incomplete {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        message: String,
+    },
+    /// The URL is not that of a viewer.
+    #[error("cannot connect to `{url}`: {message}")]
+    Address {
+        /// The URL.
+        url: String,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// No viewer could be started.
+    #[error("cannot start a Rerun viewer: {0}")]
+    Spawn(String),
+    /// The port is not free.
+    #[error("cannot serve the recording on port {port}: {source}")]
+    Serve {
+        /// The port.
+        port: u16,
+        /// Why.
+        source: io::Error,
+    },
+    /// A viewer did not take the recording.
+    #[error("the viewer did not receive the whole recording: {0}")]
+    Viewer(String),
+    /// Something could not be put into the form of a recording.
+    #[error("cannot record {what}: {message}")]
+    Encode {
+        /// What.
+        what: String,
+        /// Why.
+        message: String,
+    },
+}
+
+/// Targets that are ready to be written to.
+pub(super) struct OpenTargets {
+    /// All of them.
+    pub(super) sinks: Vec<Box<dyn LogSink>>,
+    /// The file among them, which can also tell what became of it.
+    pub(super) file: Option<RecordingFile>,
+}
+
+impl Targets {
+    /// Whether there is no target at all.
+    pub fn is_none(&self) -> bool {
+        self.save.is_none() && self.connect.is_none() && !self.spawn && !self.serve
+    }
+
+    /// Opens all targets.
+    pub(super) fn open(&self) -> Result<OpenTargets, RecordError> {
+        let mut sinks: Vec<Box<dyn LogSink>> = Vec::new();
+        let file = match &self.save {
+            Some(path) => Some(RecordingFile::create(path)?),
+            None => None,
+        };
+        if let Some(file) = &file {
+            sinks.push(Box::new(file.clone()));
+        }
+        if let Some(url) = &self.connect {
+            sinks.push(Box::new(connect(url)?));
+        }
+        if self.spawn {
+            sinks.push(Box::new(spawn()?));
+        }
+        if self.serve {
+            sinks.push(Box::new(serve()?));
+        }
+        Ok(OpenTargets { sinks, file })
+    }
+}
+
+fn connect(url: &str) -> Result<Viewer, RecordError> {
+    let url = if url.is_empty() {
+        DEFAULT_CONNECT_URL
+    } else {
+        url
+    };
+    let refused = |message: String| RecordError::Address {
+        url: url.to_owned(),
+        message,
+    };
+    match url.parse() {
+        Ok(RedapUri::Proxy(uri)) => Ok(Viewer::new(GrpcSink::new(uri))),
+        Ok(_) => Err(refused("the URL of a viewer ends in /proxy".to_owned())),
+        Err(error) => Err(refused(error.to_string())),
+    }
+}
+
+fn spawn() -> Result<Viewer, RecordError> {
+    let options = SpawnOptions {
+        hide_welcome_screen: true,
+        ..SpawnOptions::default()
+    };
+    let viewer = rerun::spawn(&options).map_err(|error| {
+        RecordError::Spawn(match error {
+            // Rerun's own message is a page long.
+            SpawnError::ExecutableNotFoundInPath {
+                executable_name, ..
+            } => format!(
+                "there is no `{executable_name}` in the PATH (`pip install rerun-sdk` brings it)"
+            ),
+            other => other.to_string(),
+        })
+    })?;
+    connect(&format!("rerun+http://127.0.0.1:{}/proxy", viewer.port))
+}
+
+/// Binds to all interfaces, as Rerun does.
+fn serve() -> Result<GrpcServerSink, RecordError> {
+    let port = DEFAULT_SERVER_PORT;
+    let refused = |source| RecordError::Serve { port, source };
+    // The server would find out on its own thread, and only log it.
+    TcpListener::bind((Ipv4Addr::UNSPECIFIED, port)).map_err(refused)?;
+    GrpcServerSink::new("0.0.0.0", port, ServerOptions::default())
+        .map_err(|error| refused(io::Error::other(error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_recording_id_follows_from_every_part_of_the_identity_and_nothing_else() {
+        let identity = Identity {
+            scene: "street".to_owned(),
+            queries: vec!["a".to_owned(), "b".to_owned()],
+            ..Identity::default()
+        };
+        let id = identity.recording_id();
+        assert_eq!(id, identity.clone().recording_id());
+        let mut other = identity.clone();
+        other.queries = vec!["a, b".to_owned()];
+        assert_ne!(id, other.recording_id());
+        other = identity.clone();
+        other.seed = 1;
+        assert_ne!(id, other.recording_id());
+    }
+
+    #[test]
+    fn what_cannot_be_opened_is_named_in_one_line() {
+        let line = |targets: Targets| match targets.open() {
+            Ok(_) => unreachable!("the target is no good"),
+            Err(error) => error.to_string(),
+        };
+        let nowhere = line(Targets {
+            save: Some(PathBuf::from("/nonexistent/run.rrd")),
+            ..Targets::default()
+        });
+        assert!(
+            nowhere.starts_with("cannot create the recording /nonexistent/run.rrd: "),
+            "{nowhere}"
+        );
+        let elsewhere = line(Targets {
+            connect: Some("http://example.org".to_owned()),
+            ..Targets::default()
+        });
+        assert!(
+            elsewhere.starts_with("cannot connect to `http://example.org`: "),
+            "{elsewhere}"
+        );
+        assert!(!nowhere.contains('\n') && !elsewhere.contains('\n'));
+    }
+}

@@ -1,0 +1,47 @@
+//! A viewer that a recording is sent to.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use rerun::log::LogMsg;
+use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
+
+/// A connection that is given up when it fails for the first time.
+///
+/// Rerun's own sink goes on trying: every flush then waits a second, and the run and a recording
+/// file beside it wait with it.
+pub(super) struct Viewer {
+    connection: GrpcSink,
+    lost: Mutex<Option<String>>,
+}
+
+impl Viewer {
+    pub(super) fn new(connection: GrpcSink) -> Self {
+        Self {
+            connection,
+            lost: Mutex::default(),
+        }
+    }
+
+    fn lost(&self) -> MutexGuard<'_, Option<String>> {
+        self.lost.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl LogSink for Viewer {
+    fn send(&self, message: LogMsg) {
+        if self.lost().is_none() {
+            self.connection.send(message);
+        }
+    }
+
+    fn flush_blocking(&self, timeout: Duration) -> Result<(), SinkFlushError> {
+        let mut lost = self.lost();
+        if let Some(reason) = &*lost {
+            return Err(SinkFlushError::failed(reason.clone()));
+        }
+        let flushed = self.connection.flush_blocking(timeout);
+        *lost = flushed.as_ref().err().map(ToString::to_string);
+        flushed
+    }
+}
