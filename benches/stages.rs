@@ -1,0 +1,210 @@
+//! How long the stages take, on one pair of frames of the street.
+//!
+//! `cargo bench --no-default-features` spares building Rerun in release.
+//!
+//! With `POSESCOPE_THREADS=1` in the environment everything runs on one thread.
+
+use std::sync::LazyLock;
+
+use divan::{Bencher, black_box};
+use nalgebra::{Point2, Point3, Unit, Vector3};
+use posescope::camera::Intrinsics;
+use posescope::cost::{self, Cost};
+use posescope::estimator;
+use posescope::event::Method;
+use posescope::features::{Features, SurfParams, nearest_neighbours, surf};
+use posescope::geometry::Pose;
+use posescope::grid::Offset;
+use posescope::image::gaussian_smoothed;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::render::{ColoredCloud, Scorer, color_cloud};
+use posescope::robust::{MlesacParams, mlesac};
+use posescope::scene;
+use posescope::solver::{Correspondence, p3p};
+use posescope::trace::Trace;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+fn main() {
+    if let Some(threads) = std::env::var("POSESCOPE_THREADS")
+        .ok()
+        .and_then(|threads| threads.parse().ok())
+    {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .expect("set once");
+    }
+    divan::main();
+}
+
+/// Two frames of the street, 8 m apart.
+static PAIR: LazyLock<Problem> = LazyLock::new(|| {
+    let street = scene::open("street", None).expect("is built in");
+    Problem {
+        query: street.query(70).expect("is made on demand"),
+        reference: street.reference(62).expect("is made on demand"),
+        uncertainty_radius_m: 15.0,
+        seed: 0,
+    }
+});
+
+static FEATURES: LazyLock<(Features, Features)> = LazyLock::new(|| {
+    let params = SurfParams::default();
+    (
+        surf(&PAIR.query.photo.gray, &params),
+        surf(&PAIR.reference.photo.gray, &params),
+    )
+});
+
+#[divan::bench(args = [true, false])]
+fn surf_one_image(bencher: Bencher, upright: bool) {
+    let params = SurfParams {
+        upright,
+        ..SurfParams::default()
+    };
+    let image = &PAIR.query.photo.gray;
+    bencher.bench(|| surf(black_box(image), &params));
+}
+
+#[divan::bench]
+fn match_one_way(bencher: Bencher) {
+    let (query, reference) = &*FEATURES;
+    let pairs = query.descriptors.len() * reference.descriptors.len();
+    bencher
+        .counter(divan::counter::ItemsCount::new(pairs))
+        .bench(|| nearest_neighbours(black_box(&query.descriptors), &reference.descriptors));
+}
+
+type Bearings = [Unit<Vector3<f64>>; 3];
+type Points = [Point3<f64>; 3];
+
+/// Random problems that have a solution.
+fn p3p_problems(count: usize) -> Vec<(Bearings, Points)> {
+    let mut rng = Pcg64::seed_from_u64(1);
+    let camera_from_world = random_pose(&mut rng);
+    (0..count)
+        .map(|_| {
+            let in_camera: [Point3<f64>; 3] = std::array::from_fn(|_| random_point(&mut rng));
+            (
+                in_camera.map(|point| Unit::new_normalize(point.coords)),
+                in_camera.map(|point| camera_from_world.inverse() * point),
+            )
+        })
+        .collect()
+}
+
+fn random_point(rng: &mut Pcg64) -> Point3<f64> {
+    let pixel = Point2::new(rng.random_range(0.0..1240.0), rng.random_range(0.0..375.0));
+    PAIR.query
+        .intrinsics
+        .unproject(&pixel, rng.random_range(5.0..50.0))
+}
+
+fn random_pose(rng: &mut Pcg64) -> Pose {
+    let mut angle = || rng.random_range(-1.0..1.0);
+    Pose::new(
+        Vector3::new(angle(), angle(), angle()) * 3.0,
+        Vector3::new(angle(), angle(), angle()),
+    )
+}
+
+#[divan::bench]
+fn p3p_thousand_problems(bencher: Bencher) {
+    let problems = p3p_problems(1000);
+    bencher
+        .counter(divan::counter::ItemsCount::new(problems.len()))
+        .bench(|| {
+            problems
+                .iter()
+                .map(|(bearings, points)| p3p(black_box(bearings), points).len())
+                .sum::<usize>()
+        });
+}
+
+/// 600 correspondences with 1 px of noise, of which a share is false.
+#[divan::bench(args = [50, 90])]
+fn mlesac_percent_outliers(bencher: Bencher, percent: usize) {
+    let intrinsics: Intrinsics = PAIR.query.intrinsics;
+    let mut rng = Pcg64::seed_from_u64(2);
+    let camera_from_world = random_pose(&mut rng);
+    let correspondences: Vec<Correspondence> = (0..600)
+        .map(|i| {
+            let point = random_point(&mut rng);
+            let shown = if i % 100 < percent {
+                random_point(&mut rng)
+            } else {
+                point
+            };
+            let pixel = intrinsics.project(&shown).expect("in front");
+            let mut noise = || rng.random_range(-1.7..1.7);
+            Correspondence {
+                pixel: Point2::new(pixel.x + noise(), pixel.y + noise()),
+                point: camera_from_world.inverse() * point,
+            }
+        })
+        .collect();
+    let params = MlesacParams::default();
+    bencher.bench(|| {
+        mlesac(black_box(&correspondences), &intrinsics, &params, 0, |_| {
+            Ok::<_, ()>(())
+        })
+    });
+}
+
+/// Rendering and judging one hypothesis; 64 at a time, as the grid search does.
+#[divan::bench(args = cost::ALL.iter().map(|entry| entry.name), consts = [1, 3])]
+fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
+    const HYPOTHESES: usize = 64;
+    let mut params = Params::default();
+    params.render.splat_px = SPLAT_PX;
+    let entry = cost::ALL.iter().find(|entry| entry.name == name);
+    let cost: Box<dyn Cost> = (entry.expect("is listed").new)(&params);
+    let (query, reference) = (&PAIR.query, &PAIR.reference);
+    let cloud: ColoredCloud = color_cloud(
+        &reference.cloud,
+        &reference.photo.gray,
+        &reference.intrinsics,
+        &params.render,
+    );
+    let scorer = Scorer::new(
+        &cloud.points,
+        gaussian_smoothed(&query.photo.gray, cost.query_smoothing_px()),
+        &query.intrinsics,
+        SPLAT_PX,
+        cost.as_ref(),
+    );
+    let poses: Vec<Pose> = (0..HYPOTHESES)
+        .map(|i| {
+            let offset = Offset {
+                right_m: (i % 8) as f64 - 3.5,
+                forward_m: (i / 8) as f64,
+                yaw_rad: 0.0,
+            };
+            offset.reference_from_camera()
+        })
+        .collect();
+    bencher
+        .counter(divan::counter::ItemsCount::new(HYPOTHESES))
+        .bench(|| scorer.score(black_box(&poses)));
+}
+
+#[divan::bench(args = Method::ALL.map(Method::name), sample_count = 10)]
+fn whole_estimator(bencher: Bencher, name: &str) {
+    let method = Method::from_name(name).expect("is listed");
+    let estimator = (estimator::entry(method).new)(&Params::default());
+    bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
+}
+
+#[divan::bench(args = [70], sample_count = 5)]
+fn street_photo(bencher: Bencher, frame: usize) {
+    let street = scene::open("street", None).expect("is built in");
+    bencher.bench(|| street.photo(black_box(frame)));
+}
+
+#[divan::bench(args = [70], sample_count = 5)]
+fn street_cloud(bencher: Bencher, frame: usize) {
+    let street = scene::open("street", None).expect("is built in");
+    bencher.bench(|| street.cloud(black_box(frame)));
+}

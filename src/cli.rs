@@ -1,0 +1,42 @@
+//! The command line of posescope.
+
+mod args;
+mod demo;
+mod failure;
+mod output;
+mod params;
+mod run;
+mod select;
+mod table;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use args::{Arguments, Command};
+use failure::CliError;
+
+/// Parses the arguments, runs the command, says what went wrong in one line.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    failure::report_panics_in_one_line();
+    let outcome = std::panic::catch_unwind(|| dispatch(&arguments));
+    match outcome {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            eprintln!("posescope: {error}");
+            error.exit_code()
+        }
+        Err(_) => ExitCode::from(failure::INTERNAL),
+    }
+}
+
+fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
+    let terminal = terminal::Terminal::new(&arguments.verbosity);
+    match &arguments.command {
+        None => demo::demo(&terminal),
+        Some(Command::Run(run)) => run::run(run, &terminal),
+        Some(Command::Params(params)) => params::print(params),
+    }
+}

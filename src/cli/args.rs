@@ -1,0 +1,180 @@
+//! The arguments.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::event::Method;
+
+/// See why a camera pose estimate fails.
+///
+/// Without a command: runs all four estimators on the built-in street, prints the table of results
+/// and saves recordings/demo.rrd for the Rerun viewer.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+#[command(after_help = "\
+Exit codes: 0 done, 1 a gate or a regression failed, 2 usage, 3 bad data or output, 4 internal.
+A query that cannot be localised is a result, not an error.")]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Localise one query, or several, and record every decision
+    Run(Box<RunArgs>),
+    /// List all parameters with unit, range, default and meaning
+    Params(ConfigArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct Verbosity {
+    /// No progress and no table; errors only
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more on stderr; twice for debugging
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+}
+
+/// Which parameters differ from their defaults.
+#[derive(Debug, Default, Args)]
+pub struct ConfigArgs {
+    /// Read parameters from a TOML file with a table per group
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Set a parameter, after --config; repeatable, for example fb.ratio=0.7
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub assignments: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Where the frames are: street, or a folder such as …/sequences/00 (KITTI odometry)
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Take the queries from another scene in the same world frame
+    #[arg(long, value_name = "SCENE")]
+    pub queries: Option<String>,
+    /// The frame to localise; repeatable (3823 finds 003823)
+    #[arg(long, value_name = "FRAME", required_unless_present = "all")]
+    pub query: Vec<String>,
+    /// Localise every frame
+    #[arg(long, conflicts_with = "query")]
+    pub all: bool,
+    /// A frame with known pose and cloud to localise against; repeatable, each is run by itself
+    #[arg(long, value_name = "FRAME")]
+    pub reference: Vec<String>,
+    /// How references are chosen where --reference names none: random:K or nearest:K of the frames
+    /// within the radius of the query's known position
+    #[arg(
+        long,
+        value_name = "HOW",
+        default_value = "random:1",
+        conflicts_with = "reference"
+    )]
+    pub references: Selection,
+    /// How far the query may be from its reference: the disc that the direct methods search [m]
+    #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
+    pub radius: f64,
+    /// The methods to run
+    #[arg(
+        long,
+        value_name = "fb,pm,mi,hy",
+        value_delimiter = ',',
+        value_parser = method,
+        default_value = "fb,pm,mi,hy"
+    )]
+    pub method: Vec<Method>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Number of threads [default: one per core]; results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    pub recording: RecordingArgs,
+    /// Write the results as JSON, one object per line; - for stdout
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+/// Where the recording goes: Rerun's own options, which can be combined.
+#[derive(Debug, Default, Args)]
+pub struct RecordingArgs {
+    /// Save the recording to a file
+    #[arg(long, value_name = "FILE.rrd")]
+    pub save: Option<PathBuf>,
+    /// Send the recording to a running viewer [default URL: the local viewer]
+    #[arg(long, value_name = "URL", num_args = 0..=1, default_missing_value = "")]
+    pub connect: Option<String>,
+    /// Start a Rerun viewer and send the recording to it
+    #[arg(long)]
+    pub spawn: bool,
+    /// Serve the recording, so that viewers can connect to this process
+    #[arg(long)]
+    pub serve: bool,
+}
+
+/// How references are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// K frames within the radius, drawn by the seed.
+    Random(usize),
+    /// The K nearest frames within the radius.
+    Nearest(usize),
+}
+
+impl FromStr for Selection {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "random:K or nearest:K expected, with K from 1".to_owned();
+        let (how, count) = text.split_once(':').ok_or_else(expected)?;
+        let count = count.parse().ok().filter(|count| *count > 0);
+        match (how, count) {
+            ("random", Some(count)) => Ok(Self::Random(count)),
+            ("nearest", Some(count)) => Ok(Self::Nearest(count)),
+            _ => Err(expected()),
+        }
+    }
+}
+
+fn method(name: &str) -> Result<Method, String> {
+    Method::from_name(name).ok_or_else(|| "fb, pm, mi or hy expected".to_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|number: &f64| *number > 0.0 && number.is_finite())
+        .ok_or_else(|| "a positive number expected".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn selections_are_read_and_nonsense_is_refused() {
+        assert_eq!("random:3".parse(), Ok(Selection::Random(3)));
+        assert_eq!("nearest:1".parse(), Ok(Selection::Nearest(1)));
+        for wrong in ["nearest", "nearest:0", "nearest:-1", "best:2", ""] {
+            assert!(wrong.parse::<Selection>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Errors of the command line and their exit codes.
+
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use posescope::params::ParamError;
+use posescope::scene::SceneError;
+use posescope::sink::rerun::RecordError;
+
+const USAGE: u8 = 2;
+const BAD_DATA: u8 = 3;
+/// The exit code of a panic.
+pub const INTERNAL: u8 = 4;
+
+/// Anything that ends a command early, as one line.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    #[error("{0}")]
+    Usage(String),
+    #[error(transparent)]
+    Param(#[from] ParamError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error("{}: {source}", .path.display())]
+    Config { path: PathBuf, source: ParamError },
+    #[error("{}: {source}", .path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{0}")]
+    NoReference(String),
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+impl CliError {
+    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
+        let path = path.into();
+        |source| Self::Io { path, source }
+    }
+
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Usage(_) | Self::Param(_) | Self::Scene(SceneError::UnknownFormat { .. }) => {
+                USAGE
+            }
+            Self::Scene(_)
+            | Self::Config { .. }
+            | Self::Io { .. }
+            | Self::NoReference(_)
+            | Self::Record(_) => BAD_DATA,
+        })
+    }
+}
+
+/// A panic is a bug of ours: it is told in one line that says where, and ends with its own code.
+pub fn report_panics_in_one_line() {
+    std::panic::set_hook(Box::new(|panic| {
+        let message = panic
+            .payload_as_str()
+            .unwrap_or("no message")
+            .replace('\n', " ");
+        let place = panic
+            .location()
+            .map(|location| format!("{}:{}", location.file(), location.line()))
+            .unwrap_or_default();
+        eprintln!(
+            "posescope: internal error at {place}: {message}; this is a bug, please report it"
+        );
+    }));
+}

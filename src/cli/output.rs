@@ -1,0 +1,44 @@
+//! Results as JSON, written as they come: a killed run keeps what it had.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use posescope::evaluate::QueryResult;
+
+use super::failure::CliError;
+
+/// One object per line, to a file or to stdout.
+pub struct JsonLines {
+    path: PathBuf,
+    writer: Box<dyn Write>,
+}
+
+impl JsonLines {
+    /// Opens the output before anything is computed, so that a wrong path costs no time.
+    pub fn create(path: &Path) -> Result<Self, CliError> {
+        let writer: Box<dyn Write> = if is_stdout(path) {
+            Box::new(io::stdout())
+        } else {
+            Box::new(File::create(path).map_err(CliError::io(path))?)
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            writer,
+        })
+    }
+
+    /// Writes one result and makes sure that it has arrived.
+    pub fn write(&mut self, result: &QueryResult) -> Result<(), CliError> {
+        let line = serde_json::to_string(result)
+            .map_err(|error| CliError::io(&self.path)(error.into()))?;
+        writeln!(self.writer, "{line}")
+            .and_then(|()| self.writer.flush())
+            .map_err(CliError::io(&self.path))
+    }
+}
+
+/// Whether `-` was given.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}

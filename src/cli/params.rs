@@ -1,0 +1,51 @@
+//! `posescope params`: the table of parameters.
+
+use comfy_table::{ContentArrangement, Table, presets};
+use posescope::params::Params;
+
+use super::args::ConfigArgs;
+use super::failure::CliError;
+
+/// The parameters that the arguments describe.
+pub fn resolve(config: &ConfigArgs) -> Result<Params, CliError> {
+    let mut params = Params::default();
+    if let Some(path) = &config.config {
+        let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;
+        params
+            .merge_toml(&text)
+            .map_err(|source| CliError::Config {
+                path: path.clone(),
+                source,
+            })?;
+    }
+    for assignment in &config.assignments {
+        params.assign(assignment)?;
+    }
+    Ok(params)
+}
+
+/// Prints all parameters; those that differ from their default are marked.
+pub fn print(config: &ConfigArgs) -> Result<(), CliError> {
+    let params = resolve(config)?;
+    let mut table = Table::new();
+    table
+        .load_preset(presets::NOTHING)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_header(["parameter", "value", "unit", "range", "meaning"]);
+    for (row, default) in params.list().into_iter().zip(Params::default().list()) {
+        let value = if row.value == default.value {
+            row.value.to_string()
+        } else {
+            format!("{} (default {})", row.value, default.value)
+        };
+        table.add_row([
+            row.key,
+            value,
+            row.about.unit.to_owned(),
+            row.domain.to_string(),
+            row.about.help.to_owned(),
+        ]);
+    }
+    println!("{table}");
+    Ok(())
+}

@@ -1,0 +1,60 @@
+//! The terminal: progress and messages on stderr, results on stdout.
+
+use std::time::Duration;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif_log_bridge::LogWrapper;
+use log::LevelFilter;
+
+use super::args::Verbosity;
+
+/// Where progress and messages go.
+pub struct Terminal {
+    bars: MultiProgress,
+    quiet: bool,
+}
+
+impl Terminal {
+    /// Sets up logging, so that a message does not tear a progress bar apart.
+    pub fn new(verbosity: &Verbosity) -> Self {
+        let (own, foreign) = match (verbosity.quiet, verbosity.verbose) {
+            (true, _) => (LevelFilter::Error, LevelFilter::Off),
+            (false, 0) => (LevelFilter::Warn, LevelFilter::Error),
+            (false, 1) => (LevelFilter::Info, LevelFilter::Warn),
+            (false, _) => (LevelFilter::Debug, LevelFilter::Info),
+        };
+        let logger = env_logger::Builder::new()
+            .filter_level(foreign)
+            .filter_module("posescope", own)
+            .parse_default_env()
+            .build();
+        let level = logger.filter();
+        let bars = MultiProgress::new();
+        // A second initialisation happens only where the library's user has set a logger already.
+        if LogWrapper::new(bars.clone(), logger).try_init().is_ok() {
+            log::set_max_level(level);
+        }
+        Self {
+            bars,
+            quiet: verbosity.quiet,
+        }
+    }
+
+    /// Whether only errors and asked-for results are printed.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
+    /// A bar over `steps` steps; it hides itself where stderr is no terminal.
+    pub fn bar(&self, steps: u64) -> ProgressBar {
+        if self.quiet {
+            return ProgressBar::hidden();
+        }
+        let template = "{bar:30} {pos}/{len} {elapsed} {wide_msg}";
+        let style =
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = self.bars.add(ProgressBar::new(steps).with_style(style));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}

@@ -1,0 +1,251 @@
+//! Bad input ends with one clear line and exit code 3, never with a panic.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use image::GrayImage;
+
+use crate::small_sequence::{CALIBRATION, SmallSequence};
+
+fn run(scene: &Path, extra: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("posescope").expect("the binary is built");
+    command
+        .arg("run")
+        .arg(scene)
+        .args(["--query", "5", "--method", "mi"])
+        .args(extra);
+    command
+}
+
+/// Runs, and expects exit code 3 and a single line that holds all of `words`.
+fn expect_one_line(command: &mut Command, words: &[&str]) {
+    let output = command.output().expect("the binary starts");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    for word in words {
+        assert!(message.contains(word), "`{word}` is missing in: {message}");
+    }
+}
+
+const REFERENCE: [&str; 2] = ["--reference", "4"];
+
+#[test]
+fn the_undamaged_sequence_works() {
+    let sequence = SmallSequence::write();
+    run(&sequence.folder(), &REFERENCE).assert().code(0);
+}
+
+#[test]
+fn a_missing_sequence_is_named() {
+    let sequence = SmallSequence::write();
+    let missing = sequence.path().join("sequences/77");
+    expect_one_line(&mut run(&missing, &REFERENCE), &["sequences/77", "no such"]);
+}
+
+#[test]
+fn a_folder_of_another_kind_is_not_taken_for_a_scene() {
+    let sequence = SmallSequence::write();
+    expect_one_line(
+        &mut run(sequence.path(), &REFERENCE),
+        &["not recognised", "kitti", "--format"],
+    );
+}
+
+#[test]
+fn an_unknown_query_is_told_which_frames_there_are() {
+    let sequence = SmallSequence::write();
+    let mut command = Command::cargo_bin("posescope").expect("the binary is built");
+    command
+        .arg("run")
+        .arg(sequence.folder())
+        .args(["--query", "99", "--reference", "4"]);
+    expect_one_line(&mut command, &["`99`", "000004 … 000007", "3 in all"]);
+}
+
+#[test]
+fn a_truncated_scan_is_named() {
+    let sequence = SmallSequence::write();
+    let scan = fs::read(sequence.scan("000004")).expect("just written");
+    fs::write(sequence.scan("000004"), &scan[..scan.len() - 5]).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["velodyne/000004.bin", "16 bytes", "cut off"],
+    );
+}
+
+#[test]
+fn a_point_that_is_not_a_number_is_named() {
+    let sequence = SmallSequence::write();
+    let mut scan = fs::read(sequence.scan("000004")).expect("just written");
+    scan[16 * 3 + 4..16 * 3 + 8].copy_from_slice(&f32::NAN.to_le_bytes());
+    fs::write(sequence.scan("000004"), scan).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["velodyne/000004.bin", "point 3 (byte 48)", "NaN"],
+    );
+}
+
+#[test]
+fn an_empty_scan_is_named() {
+    let sequence = SmallSequence::write();
+    fs::write(sequence.scan("000004"), b"").expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["velodyne/000004.bin", "empty"],
+    );
+}
+
+#[test]
+fn a_missing_scan_names_the_frames_that_have_one() {
+    let sequence = SmallSequence::write();
+    fs::remove_file(sequence.scan("000004")).expect("just written");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["velodyne/000004.bin", "2 frames have one"],
+    );
+}
+
+#[test]
+fn an_image_of_another_size_is_named() {
+    let sequence = SmallSequence::write();
+    GrayImage::new(80, 64)
+        .save(sequence.image("000005"))
+        .expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["image_0/000005.png", "160x64", "80x64"],
+    );
+}
+
+#[test]
+fn a_damaged_image_is_named() {
+    let sequence = SmallSequence::write();
+    let bytes = fs::read(sequence.image("000005")).expect("just written");
+    fs::write(sequence.image("000005"), &bytes[..bytes.len() / 2]).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["image_0/000005.png"],
+    );
+}
+
+#[test]
+fn a_calibration_with_eleven_numbers_names_the_line() {
+    let sequence = SmallSequence::write();
+    let short = CALIBRATION.replace("0 100 32 6 0 0 1 0", "0 100 32 6 0 0 1");
+    let short = short.replace(
+        "P2: 100 0 80 6 0 100 32 0 0 0 1 0",
+        "P2: 100 0 80 6 0 100 32 0 0 0 1",
+    );
+    fs::write(sequence.calibration(), short).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["calib.txt:2", "12 numbers expected, 11 found"],
+    );
+}
+
+#[test]
+fn a_calibration_without_tr_says_what_it_is_for() {
+    let sequence = SmallSequence::write();
+    let without: String = CALIBRATION
+        .lines()
+        .take(2)
+        .map(|l| format!("{l}\n"))
+        .collect();
+    fs::write(sequence.calibration(), without).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["calib.txt", "`Tr:`", "reference"],
+    );
+}
+
+#[test]
+fn a_pose_file_shorter_than_the_images_says_how_long_it_should_be() {
+    let sequence = SmallSequence::write();
+    fs::write(sequence.poses(), "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(6)).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["poses/42.txt", "frame 7", "6 lines found"],
+    );
+}
+
+#[test]
+fn a_pose_that_is_no_rigid_transform_names_the_line() {
+    let sequence = SmallSequence::write();
+    let mut poses = fs::read_to_string(sequence.poses()).expect("just written");
+    poses = poses.replacen("1 0 0 0 0 1 0 0 0 0 1 2\n", "1 0 0 0 0 2 0 0 0 0 1 2\n", 1);
+    fs::write(sequence.poses(), poses).expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &REFERENCE),
+        &["poses/42.txt:3", "not a rotation"],
+    );
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_named() {
+    let sequence = SmallSequence::write();
+    for option in ["--json", "--save"] {
+        let nowhere = sequence.path().join("no/such/folder/out");
+        let nowhere = nowhere.to_str().expect("a plain path");
+        let arguments = [REFERENCE[0], REFERENCE[1], option, nowhere];
+        expect_one_line(
+            &mut run(&sequence.folder(), &arguments),
+            &["no/such/folder/out"],
+        );
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error_and_the_table_is_shown_all_the_same() {
+    let sequence = SmallSequence::write();
+    let arguments = [REFERENCE[0], REFERENCE[1], "--save", "/dev/full"];
+    expect_one_line(
+        &mut run(&sequence.folder(), &arguments),
+        &["/dev/full", "No space left"],
+    );
+    let arguments = [REFERENCE[0], REFERENCE[1], "--json", "/dev/full"];
+    let mut command = run(&sequence.folder(), &arguments);
+    expect_one_line(&mut command, &["/dev/full", "No space left"]);
+    let output = command.output().expect("the binary starts");
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("000005"), "{table}");
+}
+
+/// A limit on the size of files stands in for a disk that fills while the recording is written.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_breaks_off_costs_no_result() {
+    let sequence = SmallSequence::write();
+    let recording = sequence.path().join("cut.rrd");
+    let binary = assert_cmd::cargo::cargo_bin!("posescope");
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 40; exec '{}' run '{}' --query 5 --reference 4 --save '{}'",
+        binary.display(),
+        sequence.folder().display(),
+        recording.display()
+    );
+    let mut command = Command::new("bash");
+    command.args(["-c", &script]);
+    expect_one_line(&mut command, &["cut.rrd", "incomplete", "File too large"]);
+    let table = command.output().expect("the binary starts").stdout;
+    let table = String::from_utf8_lossy(&table);
+    for method in ["fb", "pm", "mi", "hy"] {
+        assert!(table.contains(method), "{table}");
+    }
+}
+
+#[test]
+fn a_configuration_that_cannot_be_read_or_understood_is_named() {
+    let sequence = SmallSequence::write();
+    let config = sequence.path().join("tuned.toml");
+    let name = config.to_str().expect("a plain path");
+    let arguments = [REFERENCE[0], REFERENCE[1], "--config", name];
+    expect_one_line(&mut run(&sequence.folder(), &arguments), &["tuned.toml"]);
+    fs::write(&config, "[fb]\nratio = 3\n").expect("writable");
+    expect_one_line(
+        &mut run(&sequence.folder(), &arguments),
+        &["tuned.toml", "`fb.ratio` takes"],
+    );
+}

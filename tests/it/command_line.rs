@@ -1,0 +1,175 @@
+//! The binary as its user drives it.
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use crate::small_sequence::SmallSequence;
+
+fn posescope() -> Command {
+    Command::cargo_bin("posescope").expect("the binary is built")
+}
+
+fn json_lines(bytes: &[u8]) -> Vec<Value> {
+    String::from_utf8_lossy(bytes)
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("one object per line"))
+        .collect()
+}
+
+#[test]
+fn results_come_in_query_then_method_order_with_the_promised_keys() {
+    let sequence = SmallSequence::write();
+    let output = posescope()
+        .arg("run")
+        .arg(sequence.folder())
+        .args(["--query", "5", "--query", "7", "--reference", "4"])
+        .args(["--method", "mi,fb", "--json", "-", "-q"])
+        .output()
+        .expect("the binary starts");
+    assert!(output.status.success());
+    assert!(output.stderr.is_empty(), "-q is quiet");
+    let results = json_lines(&output.stdout);
+    let order: Vec<_> = results
+        .iter()
+        .map(|r| (r["query"].as_str(), r["method"].as_str()))
+        .collect();
+    let expected = [
+        ("000005", "fb"),
+        ("000005", "mi"),
+        ("000007", "fb"),
+        ("000007", "mi"),
+    ];
+    assert_eq!(order, expected.map(|(q, m)| (Some(q), Some(m))));
+
+    let keys: Vec<_> = results[0].as_object().expect("an object").keys().collect();
+    let promised = [
+        "schema",
+        "scene",
+        "query",
+        "references",
+        "method",
+        "fusion",
+        "seed",
+        "status",
+        "reason",
+        "pose",
+        "error",
+        "initial_error",
+        "counts",
+        "cost",
+        "diagnosis",
+    ];
+    for key in promised {
+        assert!(keys.iter().any(|k| *k == key), "{key} is missing");
+    }
+    assert_eq!(results[0]["schema"], "posescope.result/1");
+    assert_eq!(results[0]["scene"], "kitti/42");
+    for result in &results {
+        let has_pose = !result["pose"].is_null();
+        assert_eq!(result["status"] == "ok", has_pose);
+        assert_eq!(result["reason"].is_null(), has_pose);
+        assert_eq!(result["error"].is_null(), !has_pose);
+    }
+}
+
+#[test]
+fn usage_errors_have_exit_code_2_and_name_the_next_step() {
+    let sequence = SmallSequence::write();
+    let cases: [(&[&str], &str); 6] = [
+        (
+            &["--query", "5", "--set", "fb.ratoi=0.7"],
+            "did you mean `fb.ratio`",
+        ),
+        (&["--query", "5", "--set", "fb.ratio=7"], "0.1 … 1"),
+        (&["--query", "5", "--method", "xx"], "fb, pm, mi or hy"),
+        (
+            &["--query", "5", "--references", "best:1"],
+            "random:K or nearest:K",
+        ),
+        (&["--query", "5", "--radius=-1"], "a positive number"),
+        (&[], "--query"),
+    ];
+    for (arguments, words) in cases {
+        let output = posescope()
+            .arg("run")
+            .arg(sequence.folder())
+            .args(arguments)
+            .output()
+            .expect("the binary starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(
+            message.contains(words),
+            "`{words}` is missing in: {message}"
+        );
+    }
+}
+
+#[test]
+fn a_reference_is_chosen_within_the_radius_and_never_the_query_itself() {
+    let sequence = SmallSequence::write();
+    let references = |extra: &[&str]| {
+        let output = posescope()
+            .arg("run")
+            .arg(sequence.folder())
+            .args(["--query", "5", "--method", "mi", "--json", "-", "-q"])
+            .args(extra)
+            .output()
+            .expect("the binary starts");
+        let results = json_lines(&output.stdout);
+        let names = results
+            .iter()
+            .map(|r| r["references"][0].as_str().map(str::to_owned));
+        (
+            output.status.code(),
+            names.collect::<Option<Vec<_>>>().expect("names"),
+        )
+    };
+    let nearest = references(&["--references", "nearest:2"]);
+    assert_eq!(
+        nearest,
+        (Some(0), vec!["000004".to_owned(), "000007".to_owned()])
+    );
+    let within = references(&["--references", "random:5", "--radius", "1.5"]);
+    assert_eq!(within, (Some(0), vec!["000004".to_owned()]));
+    assert_eq!(references(&["--radius", "0.5"]).0, Some(3));
+}
+
+#[test]
+fn every_parameter_is_listed_and_changes_are_marked() {
+    let output = posescope()
+        .args(["params", "--set", "mi.bins=32"])
+        .output()
+        .expect("the binary starts");
+    assert!(output.status.success());
+    let table = String::from_utf8_lossy(&output.stdout);
+    for row in posescope::params::Params::default().list() {
+        assert!(table.contains(&row.key), "{} is missing", row.key);
+    }
+    assert!(table.contains("32 (default 16)"));
+}
+
+#[test]
+fn the_street_is_solved_and_the_bytes_do_not_depend_on_the_number_of_threads() {
+    let results = |threads: &str| {
+        let output = posescope()
+            .args(["run", "street", "--query", "70", "--reference", "62"])
+            .args(["--threads", threads, "--json", "-", "-q"])
+            .output()
+            .expect("the binary starts");
+        assert!(output.status.success());
+        output.stdout
+    };
+    let alone = results("1");
+    for result in json_lines(&alone) {
+        let error = result["error"]["translation_m"].as_f64();
+        let limit = if result["method"] == "fb" || result["method"] == "hy" {
+            0.2
+        } else {
+            1.5
+        };
+        assert!(error.is_some_and(|error| error < limit), "{result}");
+    }
+    assert_eq!(results("2"), alone);
+    assert_eq!(results("8"), alone);
+}

@@ -1,0 +1,269 @@
+//! What every estimator must keep. It walks over the registry, so a new entry is tested by being
+//! there.
+
+use image::{GrayImage, Luma};
+use nalgebra::Point3;
+use posescope::cloud::Cloud;
+use posescope::estimator::{self, Outcome};
+use posescope::event::{
+    DepthsLifted, Event, FeatureState, FeaturesClassified, FeaturesDetected, KindSet,
+    MatchesDecided, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
+};
+use posescope::history::History;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::trace::{Cancelled, Record, Sink, Trace};
+use proptest::prelude::*;
+
+use crate::two_walls::{CAMERA, cloud_of_the_walls, photo, problem, solvable};
+
+/// Problems with nothing to go by.
+fn hopeless() -> Vec<(&'static str, Problem)> {
+    let flat = || GrayImage::from_pixel(CAMERA.width, CAMERA.height, Luma([90]));
+    let one_point = Cloud {
+        points: vec![Point3::new(0.0, 0.0, 9.0)],
+    };
+    let behind = Cloud {
+        points: vec![Point3::new(0.0, 0.0, -9.0); 50],
+    };
+    vec![
+        (
+            "flat query and reference",
+            problem(flat(), flat(), cloud_of_the_walls()),
+        ),
+        (
+            "no cloud",
+            problem(photo(1.0, 5), photo(0.0, 5), Cloud::default()),
+        ),
+        (
+            "a cloud behind the camera",
+            problem(photo(1.0, 5), photo(0.0, 5), behind),
+        ),
+        ("one point", problem(flat(), photo(0.0, 5), one_point)),
+    ]
+}
+
+fn estimators() -> impl Iterator<Item = (&'static str, Box<dyn estimator::Estimator>)> {
+    estimator::ALL
+        .iter()
+        .map(|entry| (entry.method.name(), (entry.new)(&Params::default())))
+}
+
+fn silent(estimator: &dyn estimator::Estimator, problem: &Problem) -> Outcome {
+    estimator
+        .estimate(problem, &mut Trace::off())
+        .expect("nobody cancels")
+}
+
+#[test]
+fn every_estimator_finds_the_pose_and_says_the_same_whoever_listens() {
+    let problem = solvable();
+    for (name, estimator) in estimators() {
+        let outcome = silent(estimator.as_ref(), &problem);
+        let pose = outcome
+            .pose
+            .as_ref()
+            .unwrap_or_else(|f| panic!("{name}: {f}"));
+        let error = pose.translation.vector - nalgebra::Vector3::new(100.0, -2.0, 31.0);
+        assert!(error.norm() < 0.45, "{name}: {error}");
+
+        let mut history = History::default();
+        let told = estimator.estimate(&problem, &mut Trace::to(&mut history));
+        assert_eq!(told.expect("nobody cancels"), outcome, "{name}");
+    }
+}
+
+#[test]
+fn every_estimator_is_polite_on_a_hopeless_problem() {
+    for (what, problem) in hopeless() {
+        for (name, estimator) in estimators() {
+            let outcome = silent(estimator.as_ref(), &problem);
+            let failure = outcome.pose.expect_err(&format!("{name}: {what}"));
+            assert!(!failure.to_string().is_empty());
+        }
+    }
+}
+
+/// Stops the run at one event.
+struct StopAt(u64);
+
+impl Sink for StopAt {
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        if record.index == self.0 {
+            Err(Cancelled)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+#[test]
+fn every_estimator_can_be_stopped_at_any_event() {
+    let problem = solvable();
+    for (name, estimator) in estimators() {
+        let mut history = History::default();
+        estimator
+            .estimate(&problem, &mut Trace::to(&mut history))
+            .expect("nobody cancels");
+        let events = history.records().len() as u64;
+        // Every event near both ends, and a sample of the many in between.
+        let stops = (0..events).filter(|i| *i < 12 || events - i < 12 || i % 97 == 0);
+        for stop in stops {
+            let outcome = estimator.estimate(&problem, &mut Trace::to(&mut StopAt(stop)));
+            assert_eq!(
+                outcome.err(),
+                Some(Cancelled),
+                "{name} at {stop} of {events}"
+            );
+        }
+    }
+}
+
+#[test]
+fn stages_nest_and_every_one_that_starts_ends() {
+    for problem in [solvable()]
+        .into_iter()
+        .chain(hopeless().into_iter().map(|h| h.1))
+    {
+        for (name, estimator) in estimators() {
+            let mut history = History::default();
+            estimator
+                .estimate(&problem, &mut Trace::to(&mut history))
+                .expect("nobody cancels");
+            let mut open: Vec<Stage> = Vec::new();
+            let mut seen = 0;
+            for record in history.records() {
+                if let Event::StageStarted(StageStarted { stage }) = record.event {
+                    open.push(stage);
+                    seen += 1;
+                } else if let Event::StageEnded(StageEnded { stage, .. }) = record.event {
+                    assert_eq!(open.pop(), Some(stage), "{name}");
+                } else {
+                    assert_eq!(record.depth, open.len(), "{name}");
+                }
+            }
+            assert!(open.is_empty() && seen > 1, "{name}");
+        }
+    }
+}
+
+#[test]
+fn an_uninterested_sink_hears_stages_only() {
+    struct Uninterested(History);
+    impl Sink for Uninterested {
+        fn wanted(&self) -> KindSet {
+            KindSet::NONE
+        }
+        fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+            self.0.accept(record)
+        }
+    }
+    for (name, estimator) in estimators() {
+        let mut sink = Uninterested(History::default());
+        estimator
+            .estimate(&solvable(), &mut Trace::to(&mut sink))
+            .expect("nobody cancels");
+        let stages = sink.0.all::<StageStarted>().count() + sink.0.all::<StageEnded>().count();
+        assert_eq!(stages, sink.0.records().len(), "{name}");
+    }
+}
+
+#[test]
+fn the_outcome_does_not_depend_on_the_number_of_threads() {
+    let problem = solvable();
+    for (name, estimator) in estimators() {
+        let on = |threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool")
+                .install(|| silent(estimator.as_ref(), &problem))
+        };
+        let alone = on(1);
+        assert_eq!(on(2), alone, "{name}");
+        assert_eq!(on(8), alone, "{name}");
+    }
+}
+
+#[test]
+fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
+    let problem = solvable();
+    for entry in estimator::ALL {
+        let mut history = History::default();
+        let outcome = (entry.new)(&Params::default())
+            .estimate(&problem, &mut Trace::to(&mut history))
+            .expect("nobody cancels");
+        let Some(cost) = outcome.cost else { continue };
+        assert_eq!(
+            cost.evaluations,
+            1 + history.all::<PoseScored>().count() as u64
+        );
+        let (_, last) = history.all::<PhaseSearched>().last().expect("was searched");
+        let cell = last.surface.minimum().expect("has one");
+        assert_eq!(last.surface.eligible_cost(cell), Some(cost.best));
+        assert!(cost.best <= cost.initial.expect("textured"));
+        assert!(cost.shuffled.expect("textured") > cost.best);
+    }
+}
+
+/// Checks that every query feature is in one state and that the counts add up.
+fn check_states(problem: &Problem) {
+    let entry = &estimator::ALL[0];
+    let mut history = History::default();
+    let outcome = (entry.new)(&Params::default())
+        .estimate(problem, &mut Trace::to(&mut history))
+        .expect("nobody cancels");
+    let counts = outcome.counts.expect("features were used");
+    let states = &history
+        .last::<FeaturesClassified>()
+        .expect("always told")
+        .states;
+    let of = |name: &str| states.iter().filter(|state| state.name() == name).count();
+    let [ratio_failed, not_unique, no_depth, outlier, inlier] = FeatureState::NAMES.map(of);
+
+    assert_eq!(states.len(), counts.query_keypoints);
+    let all = ratio_failed + not_unique + no_depth + outlier + inlier;
+    assert_eq!(all, counts.query_keypoints, "each in exactly one");
+    if history.last::<MatchesDecided>().is_some() {
+        assert_eq!(counts.ratio_passed, counts.query_keypoints - ratio_failed);
+        assert_eq!(counts.unique, counts.ratio_passed - not_unique);
+    }
+    if let Some(lifted) = history.last::<DepthsLifted>() {
+        assert_eq!(lifted.matches.len(), counts.unique);
+        assert_eq!(counts.with_depth, counts.unique - no_depth);
+        assert_eq!(inlier + outlier, counts.with_depth);
+    }
+    assert_eq!(inlier, counts.inliers);
+    let params = Params::default().fb;
+    for state in states.iter() {
+        match *state {
+            FeatureState::RatioFailed { ratio } => assert!(ratio >= params.ratio as f32),
+            FeatureState::NotUnique { rival } => assert!(rival < states.len()),
+            FeatureState::NoDepth { distance_px } => assert!(distance_px > params.depth_radius_px),
+            FeatureState::Outlier { residual_px } => {
+                assert!(residual_px > params.mlesac.inlier_threshold_px);
+            }
+            FeatureState::Inlier { residual_px } => {
+                assert!(residual_px <= params.mlesac.inlier_threshold_px);
+            }
+        }
+    }
+    assert!(history.all::<FeaturesDetected>().count() == 2);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn every_feature_ends_in_one_state_and_the_counts_add_up(
+        seed in 0_u32..50, other in 0_u32..50, forward in 0.0_f64..3.0,
+        kept in 0.0_f64..1.0,
+    ) {
+        // Equal seeds match, others do not; few points leave many features without a depth.
+        let mut cloud = cloud_of_the_walls();
+        let keep = (cloud.points.len() as f64 * kept * kept) as usize;
+        cloud.points.truncate(keep);
+        let reference_seed = if other % 2 == 0 { seed } else { other };
+        check_states(&problem(photo(forward, seed), photo(0.0, reference_seed), cloud));
+    }
+}

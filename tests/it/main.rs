@@ -1,0 +1,13 @@
+//! Integration tests: one binary, because each would link the whole of Rerun again.
+
+mod bad_input;
+mod command_line;
+mod conformance;
+mod data;
+mod kitti;
+mod real_pair;
+mod recording;
+mod robust_pose;
+mod small_sequence;
+mod surf_warp;
+mod two_walls;

@@ -1,0 +1,323 @@
+//! What a recording promises: entities, timelines, equality, and to survive a killed run.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use posescope::estimator;
+use posescope::evaluate::evaluate;
+use posescope::event::{FeatureState, Kind, KindSet, Method};
+use posescope::geometry::Pose;
+use posescope::params::Params;
+use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
+use posescope::trace::{Sink as _, Trace};
+use rerun::external::re_log_encoding::DecoderApp;
+use rerun::log::{Chunk, LogMsg};
+
+use crate::two_walls::solvable;
+
+const STEP: &str = entities::STEP_TIMELINE;
+const EVAL: &str = entities::EVAL_TIMELINE;
+
+fn identity() -> Identity {
+    Identity {
+        scene: "two walls".to_owned(),
+        queries: vec!["query".to_owned()],
+        references: vec!["reference".to_owned()],
+        configuration: Params::default().to_toml(),
+        seed: 7,
+    }
+}
+
+/// Runs methods on one query, as the command line does.
+fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
+    let problem = solvable();
+    let truth = problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0);
+    recorder.begin_query(0, std::slice::from_ref(&problem), Some(&truth));
+    for &method in methods {
+        recorder.begin_method(0, method);
+        let outcome = (estimator::entry(method).new)(params)
+            .estimate(&problem, &mut Trace::to(recorder))
+            .expect("a recorder never cancels");
+        let result = evaluate(
+            "two walls",
+            &problem,
+            method,
+            params,
+            &outcome,
+            Some(&truth),
+        );
+        recorder.end_method(&result);
+    }
+}
+
+fn open(path: &Path, methods: &[Method]) -> Recorder {
+    let targets = Targets {
+        save: Some(path.to_owned()),
+        ..Targets::default()
+    };
+    Recorder::open(&targets, &identity(), methods).expect("a writable file")
+}
+
+fn recorded(
+    folder: &tempfile::TempDir,
+    name: &str,
+    methods: &[Method],
+    params: &Params,
+) -> PathBuf {
+    let path = folder.path().join(name);
+    let mut recorder = open(&path, methods);
+    run(&mut recorder, methods, params);
+    recorder.close().expect("a whole recording");
+    path
+}
+
+/// The chunks of the recording itself, without those of its layout.
+fn chunks(path: &Path) -> Vec<Chunk> {
+    let file = BufReader::new(File::open(path).expect("the recording"));
+    DecoderApp::decode_lazy(file)
+        .map(|message| message.expect("a readable message"))
+        .filter_map(|message| match message {
+            LogMsg::ArrowMsg(store, message) if store.is_recording() => {
+                Some(Chunk::from_arrow_msg(&message).expect("a chunk"))
+            }
+            _ => None,
+        })
+        .collect()
+}
+
+/// The timelines on which each entity has rows.
+fn timelines(chunks: &[Chunk]) -> BTreeMap<String, BTreeSet<String>> {
+    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for chunk in chunks {
+        let path = chunk
+            .entity_path()
+            .to_string()
+            .trim_start_matches('/')
+            .to_owned();
+        let names = chunk
+            .timelines()
+            .keys()
+            .map(|name| name.as_str().to_owned());
+        all.entry(path).or_default().extend(names);
+    }
+    all
+}
+
+fn assert_equal(left: &[Chunk], right: &[Chunk]) {
+    let mut unmatched: Vec<&Chunk> = right.iter().collect();
+    for chunk in left {
+        let equal = unmatched
+            .iter()
+            .position(|other| Chunk::ensure_similar(chunk, other).is_ok());
+        match equal {
+            Some(place) => drop(unmatched.swap_remove(place)),
+            None => panic!("{} differs", chunk.entity_path()),
+        }
+    }
+    assert!(unmatched.is_empty(), "{} chunks too many", unmatched.len());
+}
+
+#[test]
+fn every_promised_entity_is_on_its_timelines() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let chunks = chunks(&recorded(
+        &folder,
+        "run.rrd",
+        &Method::ALL,
+        &Params::default(),
+    ));
+    let found = timelines(&chunks);
+    let mut promised: Vec<(String, &str)> = [
+        "world/cloud",
+        "world/reference/0/camera",
+        "world/reference/0/camera/image",
+        "world/reference/0/camera/keypoints",
+        "world/truth/camera",
+        "world/correspondences/inlier",
+        "world/correspondences/outlier",
+        "query/image",
+        "query/keypoints/detected",
+        "fb/matches/0",
+        "fb/funnel",
+        "pm/residual",
+        "pm/weights",
+        "mi/joint_histogram",
+        "mi/entropy",
+        "report",
+        "log",
+    ]
+    .map(|path| (path.to_owned(), STEP))
+    .into();
+    promised.extend(["fb/ransac/likelihood", "fb/ransac/inliers"].map(|p| (p.to_owned(), EVAL)));
+    for state in FeatureState::NAMES {
+        promised.push((format!("query/keypoints/{state}"), STEP));
+        promised.push((format!("fb/matches/0/{state}"), STEP));
+    }
+    for method in Method::ALL.map(Method::name) {
+        promised.push((format!("world/estimate/{method}/camera"), STEP));
+        promised.push((format!("stage/{method}"), STEP));
+    }
+    for method in ["pm", "mi"] {
+        for part in ["cost", "cost/fine", "coverage", "coverage/fine", "path"] {
+            promised.push((format!("world/search/{method}/{part}"), STEP));
+        }
+        promised.push((format!("search/{method}/yaw"), STEP));
+        promised.push((format!("{method}/synthetic"), STEP));
+        promised.push((format!("{method}/synthetic"), EVAL));
+        promised.push((format!("{method}/cost"), EVAL));
+    }
+    for (path, timeline) in promised {
+        let Some(timelines) = found.get(&path) else {
+            panic!("{path} is missing");
+        };
+        assert!(
+            timelines.contains(timeline),
+            "{path} is not on {timeline}: {timelines:?}"
+        );
+        assert!(
+            timelines.contains(entities::QUERY_TIMELINE),
+            "{path} belongs to no query"
+        );
+    }
+}
+
+#[test]
+fn two_recordings_of_one_run_are_equal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first = chunks(&recorded(
+        &folder,
+        "first.rrd",
+        &Method::ALL,
+        &Params::default(),
+    ));
+    let second = chunks(&recorded(
+        &folder,
+        "second.rrd",
+        &Method::ALL,
+        &Params::default(),
+    ));
+    assert_equal(&first, &second);
+}
+
+#[test]
+fn the_hybrid_repeats_no_story_but_tells_all_of_it_when_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // With hardly any match FB fails, so that the hybrid tells the story of MI too.
+    let mut without_matches = Params::default();
+    without_matches.fb.ratio = 0.1;
+    let rows = |name: &str, methods: &[Method]| {
+        let chunks = chunks(&recorded(&folder, name, methods, &without_matches));
+        let count = |path: &str| {
+            let of = chunks
+                .iter()
+                .filter(|c| c.entity_path().to_string() == format!("/{path}"));
+            of.map(Chunk::num_rows).sum::<usize>()
+        };
+        ["fb/matches/0", "mi/synthetic", "world/cloud"].map(count)
+    };
+    let parts = rows("parts.rrd", &[Method::Feature, Method::MutualInformation]);
+    assert!(parts.iter().all(|&count| count > 0), "{parts:?}");
+    let both = [Method::Feature, Method::MutualInformation, Method::Hybrid];
+    assert_eq!(rows("both.rrd", &both), parts);
+    assert_eq!(rows("alone.rrd", &[Method::Hybrid]), parts);
+}
+
+#[test]
+fn a_second_query_begins_with_a_clean_slate_and_later_steps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("two.rrd");
+    let mut recorder = open(&path, &[Method::Feature]);
+    run(&mut recorder, &[Method::Feature], &Params::default());
+    run(&mut recorder, &[Method::Feature], &Params::default());
+    recorder.close().expect("a whole recording");
+    let trials = |chunk: &&Chunk| chunk.entity_path().to_string() == "/fb/ransac/inliers";
+    let chunks = chunks(&path);
+    let evals: Vec<i64> = chunks
+        .iter()
+        .filter(trials)
+        .flat_map(|chunk| chunk.timelines().values())
+        .filter(|column| column.timeline().name().as_str() == EVAL)
+        .flat_map(|column| column.times_raw().to_vec())
+        .collect();
+    let mut unique = evals.clone();
+    unique.dedup();
+    assert!(
+        evals.is_sorted() && evals == unique,
+        "no trial of the second run is one of the first"
+    );
+    assert!(evals.len() > 100);
+    let found = timelines(&chunks);
+    assert!(
+        entities::OF_A_QUERY
+            .iter()
+            .all(|root| found.contains_key(*root))
+    );
+}
+
+#[test]
+fn a_process_that_is_killed_leaves_what_it_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("killed.rrd");
+    let mut process = std::process::Command::new(assert_cmd::cargo::cargo_bin!("posescope"))
+        .args([
+            "run",
+            "street",
+            "--query",
+            "70",
+            "--reference",
+            "62",
+            "-q",
+            "--save",
+        ])
+        .arg(&path)
+        .spawn()
+        .expect("the binary starts");
+    // Long enough for the matches and some views, far from the end of some 5 MB.
+    let size = || std::fs::metadata(&path).map_or(0, |file| file.len());
+    while size() < 2_000_000 && process.try_wait().expect("a child").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    process.kill().expect("is still running");
+    process.wait().expect("was killed");
+    let found = timelines(&chunks(&path));
+    for promised in [
+        "fb/matches/0/inlier",
+        "world/estimate/fb/camera",
+        "pm/synthetic",
+    ] {
+        assert!(found.contains_key(promised), "{promised} is missing");
+    }
+    assert!(
+        !found.contains_key("world/estimate/hy/camera"),
+        "it was not killed in the middle"
+    );
+}
+
+#[test]
+fn a_whole_recording_wants_every_kind_and_a_repeating_hybrid_hardly_any() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut recorder = open(&folder.path().join("run.rrd"), &Method::ALL);
+    assert_eq!(recorder.wanted(), KindSet::ALL);
+    run(&mut recorder, &Method::ALL, &Params::default());
+    assert!(!recorder.wanted().contains(Kind::ViewRendered));
+    assert!(recorder.wanted().contains(Kind::BranchTaken));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_reported_with_the_name_of_the_file() {
+    let targets = Targets {
+        save: Some(PathBuf::from("/dev/full")),
+        ..Targets::default()
+    };
+    let Err(error) = Recorder::open(&targets, &identity(), &Method::ALL) else {
+        panic!("there is no room for even the header");
+    };
+    let line = error.to_string();
+    assert!(
+        line.contains("/dev/full: No space left on device"),
+        "{line}"
+    );
+}

@@ -1,0 +1,90 @@
+//! A small KITTI odometry sequence on disk, to be damaged.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::{GrayImage, Luma};
+use tempfile::TempDir;
+
+pub const WIDTH: u32 = 160;
+pub const HEIGHT: u32 = 64;
+pub const CALIBRATION: &str = "\
+P0: 100 0 80 0 0 100 32 0 0 0 1 0
+P2: 100 0 80 6 0 100 32 0 0 0 1 0
+Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0
+";
+
+/// Frames 000004, 000005 and 000007 of a wall with random texture, 1 m apart.
+pub struct SmallSequence {
+    root: TempDir,
+}
+
+impl SmallSequence {
+    pub fn write() -> Self {
+        let sequence = Self {
+            root: TempDir::new().expect("a temporary folder"),
+        };
+        let folder = sequence.folder();
+        for sub in ["image_0", "velodyne"] {
+            fs::create_dir_all(folder.join(sub)).expect("writable");
+        }
+        fs::create_dir_all(sequence.root.path().join("poses")).expect("writable");
+        fs::write(folder.join("calib.txt"), CALIBRATION).expect("writable");
+        fs::write(
+            folder.join("times.txt"),
+            "0.0\n0.1\n0.2\n0.3\n0.4\n0.5\n0.6\n0.7\n",
+        )
+        .expect("writable");
+        let poses: String = (0..8)
+            .map(|frame| format!("1 0 0 0 0 1 0 0 0 0 1 {frame}\n"))
+            .collect();
+        fs::write(sequence.poses(), poses).expect("writable");
+        for name in ["000004", "000005", "000007"] {
+            wall(WIDTH, HEIGHT)
+                .save(sequence.image(name))
+                .expect("writable");
+            fs::write(sequence.scan(name), scan_of_the_wall()).expect("writable");
+        }
+        sequence
+    }
+
+    pub fn folder(&self) -> PathBuf {
+        self.root.path().join("sequences/42")
+    }
+    pub fn poses(&self) -> PathBuf {
+        self.root.path().join("poses/42.txt")
+    }
+    pub fn calibration(&self) -> PathBuf {
+        self.folder().join("calib.txt")
+    }
+    pub fn image(&self, name: &str) -> PathBuf {
+        self.folder().join(format!("image_0/{name}.png"))
+    }
+    pub fn scan(&self, name: &str) -> PathBuf {
+        self.folder().join(format!("velodyne/{name}.bin"))
+    }
+    pub fn path(&self) -> &Path {
+        self.root.path()
+    }
+}
+
+/// Blocks of random grey, the same in every frame.
+pub fn wall(width: u32, height: u32) -> GrayImage {
+    GrayImage::from_fn(width, height, |x, y| {
+        let block = (x / 5).wrapping_mul(0x9E37_79B9) ^ (y / 5).wrapping_mul(0x85EB_CA6B);
+        let mixed = (block ^ (block >> 15)).wrapping_mul(0x2C1B_3C6D);
+        Luma([(mixed >> 24) as u8])
+    })
+}
+
+/// Points of a wall 10 m ahead, in the scanner's frame (x forward, y left, z up).
+pub fn scan_of_the_wall() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for row in -15..=15 {
+        for column in -40..=40 {
+            let point = [10.0, column as f32 * 0.19, row as f32 * 0.19, 0.5];
+            bytes.extend(point.iter().flat_map(|value: &f32| value.to_le_bytes()));
+        }
+    }
+    bytes
+}
