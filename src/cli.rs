@@ -23,7 +23,7 @@ pub fn main() -> ExitCode {
     failure::report_panics_in_one_line();
     let outcome = std::panic::catch_unwind(|| dispatch(&arguments));
     match outcome {
-        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Ok(())) | Ok(Err(CliError::ReaderGone)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             eprintln!("posescope: {error}");
             error.exit_code()

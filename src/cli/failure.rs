@@ -8,6 +8,7 @@ use posescope::params::ParamError;
 use posescope::scene::SceneError;
 use posescope::sink::rerun::RecordError;
 
+const DONE: u8 = 0;
 const USAGE: u8 = 2;
 const BAD_DATA: u8 = 3;
 /// The exit code of a panic.
@@ -30,6 +31,9 @@ pub enum CliError {
     NoReference(String),
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// Whoever read our stdout, such as `head`, has seen enough: not an error.
+    #[error("nobody reads the output any more")]
+    ReaderGone,
 }
 
 impl CliError {
@@ -40,6 +44,7 @@ impl CliError {
 
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
+            Self::ReaderGone => DONE,
             Self::Usage(_) | Self::Param(_) | Self::Scene(SceneError::UnknownFormat { .. }) => {
                 USAGE
             }

@@ -1,5 +1,6 @@
 //! Results as JSON, written as they come: a killed run keeps what it had.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -34,8 +35,22 @@ impl JsonLines {
             .map_err(|error| CliError::io(&self.path)(error.into()))?;
         writeln!(self.writer, "{line}")
             .and_then(|()| self.writer.flush())
-            .map_err(CliError::io(&self.path))
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::BrokenPipe => CliError::ReaderGone,
+                _ => CliError::io(&self.path)(error),
+            })
     }
+}
+
+/// Prints a table or a list on stdout.
+pub fn print(text: &dyn Display) -> Result<(), CliError> {
+    let mut stdout = io::stdout().lock();
+    writeln!(stdout, "{text}")
+        .and_then(|()| stdout.flush())
+        .map_err(|error| match error.kind() {
+            io::ErrorKind::BrokenPipe => CliError::ReaderGone,
+            _ => CliError::io("stdout")(error),
+        })
 }
 
 /// Whether `-` was given.

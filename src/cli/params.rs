@@ -5,6 +5,7 @@ use posescope::params::Params;
 
 use super::args::ConfigArgs;
 use super::failure::CliError;
+use super::output;
 
 /// The parameters that the arguments describe.
 pub fn resolve(config: &ConfigArgs) -> Result<Params, CliError> {
@@ -46,6 +47,5 @@ pub fn print(config: &ConfigArgs) -> Result<(), CliError> {
             row.about.help.to_owned(),
         ]);
     }
-    println!("{table}");
-    Ok(())
+    output::print(&table)
 }

@@ -76,17 +76,19 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     bar.finish_and_clear();
 
     // Whatever went wrong, what was computed is shown and the recording is closed.
+    let mut shown = Ok(());
     if !terminal.is_quiet() && !report.results.is_empty() {
         let table = table::results(&report.results);
         if args.json.as_deref().is_some_and(output::is_stdout) {
             eprintln!("{table}");
         } else {
-            println!("{table}");
+            shown = output::print(&table);
         }
     }
     let closed = report.recorder.map_or(Ok(()), Recorder::close);
     outcome?;
     closed?;
+    shown?;
     if let (Some(path), false) = (&args.recording.save, terminal.is_quiet()) {
         eprintln!("Recording: {0} (open it with `rerun {0}`)", path.display());
     }

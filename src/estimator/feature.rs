@@ -1,186 +1,34 @@
 //! FB, the indirect feature-based method (paper, section 2.2 and appendix A).
 
+mod journey;
+mod params;
+
 use std::sync::Arc;
 
 use nalgebra::Point2;
 
+use self::journey::Journey;
+pub use self::params::{DepthRule, FeatureParams};
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, settle};
 use crate::depth::{DepthReading, ProjectedCloudIndex};
 use crate::event::{
-    ConsensusJudged, DepthsLifted, FeatureState, FeaturesClassified, FeaturesDetected,
-    HypothesisTried, LiftedMatch, MatchesDecided, Method, PoseRefined, ProjectedCloud, Side, Stage,
+    ConsensusJudged, DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried,
+    LiftedMatch, MatchesDecided, Method, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
     Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
 };
 use crate::geometry::Pose;
-use crate::params::{About, Choice, Describe, ParamVisitor, Params};
+use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::robust::{
-    AcceptanceRule, Consensus, MlesacError, MlesacParams, effective_area_px, inliers_beyond_chance,
-    mlesac,
+    AcceptanceRule, Consensus, MlesacError, effective_area_px, inliers_beyond_chance, mlesac,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
 
 /// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
 const MINIMUM: usize = 4;
-
-/// Which depth a reference keypoint takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthRule {
-    /// That of the nearest projected point.
-    Nearest,
-    /// The same, refused where the depths around it differ too much: near a depth edge the nearest
-    /// point may belong to the other surface.
-    Guarded,
-}
-
-macro_rules! choice {
-    ($type:ty, $($variant:path => $name:literal),+) => {
-        impl Choice for $type {
-            fn names(&self) -> &'static [&'static str] { &[$($name),+] }
-            fn index(&self) -> usize { *self as usize }
-            fn choose(&mut self, index: usize) { *self = [$($variant),+][index]; }
-        }
-    };
-}
-choice!(AcceptanceRule, AcceptanceRule::Consensus => "consensus", AcceptanceRule::Paper => "paper");
-choice!(DepthRule, DepthRule::Nearest => "nearest", DepthRule::Guarded => "guarded");
-
-/// Parameters of matching, depth lift, consensus and acceptance.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FeatureParams {
-    /// Greatest ratio of nearest to second-nearest descriptor distance.
-    ///
-    /// On distances, not squared. 0.89 gave the smallest errors on a real pair in both directions;
-    /// 0.6 on squared distances, a common default, is 0.775 here.
-    pub ratio: f64,
-    /// Whether a match must be the best in both directions.
-    pub unique: bool,
-    /// How far a projected point may be from the keypoint it lends its depth \[px\].
-    pub depth_radius_px: f64,
-    /// Which depth a keypoint takes.
-    pub depth: DepthRule,
-    /// Greatest spread of depths within the radius that the guarded rule accepts, as a share.
-    pub depth_spread: f64,
-    /// MLESAC.
-    pub mlesac: MlesacParams,
-    /// When a consensus becomes a pose.
-    pub accept: AcceptanceRule,
-    /// How far outside the uncertainty radius a pose is still accepted, as a share of it: the
-    /// reference is taken within the radius of the true position, which is itself uncertain.
-    pub radius_slack: f64,
-}
-
-impl Default for FeatureParams {
-    fn default() -> Self {
-        Self {
-            ratio: 0.89,
-            unique: true,
-            depth_radius_px: 3.0,
-            depth: DepthRule::Nearest,
-            depth_spread: 0.1,
-            mlesac: MlesacParams::default(),
-            accept: AcceptanceRule::Consensus,
-            radius_slack: 0.1,
-        }
-    }
-}
-
-impl Describe for FeatureParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        let about = |name, unit, help| About { name, unit, help };
-        visitor.number(
-            about(
-                "ratio",
-                "",
-                "greatest ratio of nearest to second-nearest distance",
-            ),
-            &mut self.ratio,
-            0.1..=1.0,
-        );
-        visitor.flag(
-            about("unique", "", "a match must be the best in both directions"),
-            &mut self.unique,
-        );
-        visitor.number(
-            about(
-                "depth_radius",
-                "px",
-                "how far a LiDAR point may be from its keypoint",
-            ),
-            &mut self.depth_radius_px,
-            0.1..=50.0,
-        );
-        visitor.choice(
-            about(
-                "depth",
-                "",
-                "depth of a keypoint: the nearest point's, guarded against edges or not",
-            ),
-            &mut self.depth,
-        );
-        visitor.number(
-            about(
-                "depth_spread",
-                "",
-                "guarded: greatest spread of depths around, as a share",
-            ),
-            &mut self.depth_spread,
-            0.0..=10.0,
-        );
-        visitor.number(
-            about(
-                "sigma",
-                "px",
-                "MLESAC: standard deviation of an inlier's reprojection error",
-            ),
-            &mut self.mlesac.sigma_px,
-            0.05..=20.0,
-        );
-        visitor.number(
-            about(
-                "inlier",
-                "px",
-                "MLESAC: greatest reprojection error of an inlier",
-            ),
-            &mut self.mlesac.inlier_threshold_px,
-            0.1..=50.0,
-        );
-        visitor.number(
-            about(
-                "confidence",
-                "",
-                "MLESAC: probability of drawing one clean sample",
-            ),
-            &mut self.mlesac.confidence,
-            0.5..=0.999_999,
-        );
-        visitor.count(
-            about("max_trials", "", "MLESAC: greatest number of hypotheses"),
-            &mut self.mlesac.max_trials,
-            1..=10_000_000,
-        );
-        visitor.choice(
-            about(
-                "accept",
-                "",
-                "when a consensus becomes a pose: beyond chance, or the paper's four",
-            ),
-            &mut self.accept,
-        );
-        visitor.number(
-            about(
-                "radius_slack",
-                "",
-                "share of the uncertainty radius that a pose may lie beyond it",
-            ),
-            &mut self.radius_slack,
-            0.0..=100.0,
-        );
-    }
-}
 
 /// The feature-based estimator.
 pub struct FeatureBased {
@@ -455,75 +303,5 @@ impl FeatureBased {
         })?;
         verdict?;
         Ok(problem.world_from_query(&reference_from_query))
-    }
-}
-
-/// Follows every query feature to the one state it ends in.
-struct Journey {
-    states: Vec<FeatureState>,
-}
-
-impl Journey {
-    /// At first no feature has a match at all.
-    fn new(keypoints: usize) -> Self {
-        Self {
-            states: vec![
-                FeatureState::RatioFailed {
-                    ratio: f32::INFINITY
-                };
-                keypoints
-            ],
-        }
-    }
-
-    /// Returns the unique matches as (query, reference) indices.
-    fn after_matching(&mut self, decisions: &[Option<Match>]) -> Vec<(usize, usize)> {
-        let mut matches = Vec::new();
-        for decision in decisions.iter().flatten() {
-            self.states[decision.query] = match decision.verdict {
-                MatchVerdict::Ambiguous => FeatureState::RatioFailed {
-                    ratio: decision.ratio,
-                },
-                MatchVerdict::NotUnique { rival } => FeatureState::NotUnique { rival },
-                MatchVerdict::Candidate => {
-                    matches.push((decision.query, decision.reference));
-                    // Until a pose explains it, nothing does.
-                    FeatureState::Outlier {
-                        residual_px: f64::INFINITY,
-                    }
-                }
-            };
-        }
-        matches
-    }
-
-    fn passed_ratio_test(&self) -> usize {
-        self.states
-            .iter()
-            .filter(|state| !matches!(state, FeatureState::RatioFailed { .. }))
-            .count()
-    }
-
-    fn after_depth_lift(&mut self, lifted: &[LiftedMatch]) {
-        for lifted in lifted.iter().filter(|lifted| lifted.point.is_none()) {
-            self.states[lifted.query] = FeatureState::NoDepth {
-                distance_px: lifted.lidar_distance_px,
-            };
-        }
-    }
-
-    fn after_consensus(&mut self, members: &[usize], consensus: &Consensus) {
-        for (&query, &residual_px) in members.iter().zip(&consensus.residuals_px) {
-            self.states[query] = FeatureState::Outlier { residual_px };
-        }
-        for &inlier in &consensus.inliers {
-            self.states[members[inlier]] = FeatureState::Inlier {
-                residual_px: consensus.residuals_px[inlier],
-            };
-        }
-    }
-
-    fn states(&self) -> Arc<[FeatureState]> {
-        self.states.as_slice().into()
     }
 }

@@ -173,3 +173,18 @@ fn the_street_is_solved_and_the_bytes_do_not_depend_on_the_number_of_threads() {
     assert_eq!(results("2"), alone);
     assert_eq!(results("8"), alone);
 }
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    let binary = assert_cmd::cargo::cargo_bin!("posescope");
+    let script = format!(
+        "'{}' params | true; exit ${{PIPESTATUS[0]}}",
+        binary.display()
+    );
+    let output = std::process::Command::new("bash")
+        .args(["-c", &script])
+        .output()
+        .expect("bash is there");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && message.is_empty(), "{message}");
+}
