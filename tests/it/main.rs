@@ -1,9 +1,11 @@
 //! Integration tests: one binary, because each would link the whole of Rerun again.
 
 mod bad_input;
+mod binary;
 mod command_line;
 mod conformance;
 mod data;
+mod frame_cache;
 mod kitti;
 mod real_pair;
 mod recording;
