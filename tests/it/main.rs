@@ -12,4 +12,5 @@ mod recording;
 mod robust_pose;
 mod small_sequence;
 mod surf_warp;
+mod synth;
 mod two_walls;
