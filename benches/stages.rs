@@ -21,6 +21,7 @@ use posescope::problem::Problem;
 use posescope::render::{ColoredCloud, Scorer, color_cloud};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene;
+use posescope::scene::street::Street;
 use posescope::solver::{Correspondence, p3p};
 use posescope::trace::Trace;
 use rand::{RngExt, SeedableRng};
@@ -197,14 +198,17 @@ fn whole_estimator(bencher: Bencher, name: &str) {
     bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
 }
 
+/// Making a frame, past the cache.
 #[divan::bench(args = [70], sample_count = 5)]
 fn street_photo(bencher: Bencher, frame: usize) {
-    let street = scene::open("street", None).expect("is built in");
-    bencher.bench(|| street.photo(black_box(frame)));
+    let street = Street::open("street").expect("is built in");
+    let drive = street.traversal();
+    bencher.bench(|| drive.image(black_box(frame)));
 }
 
 #[divan::bench(args = [70], sample_count = 5)]
 fn street_cloud(bencher: Bencher, frame: usize) {
-    let street = scene::open("street", None).expect("is built in");
-    bencher.bench(|| street.cloud(black_box(frame)));
+    let street = Street::open("street").expect("is built in");
+    let drive = street.traversal();
+    bencher.bench(|| drive.cloud(black_box(frame)));
 }

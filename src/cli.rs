@@ -7,6 +7,7 @@ mod output;
 mod params;
 mod run;
 mod select;
+mod synth;
 mod table;
 mod terminal;
 
@@ -37,6 +38,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
     match &arguments.command {
         None => demo::demo(&terminal),
         Some(Command::Run(run)) => run::run(run, &terminal),
+        Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params),
     }
 }

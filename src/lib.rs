@@ -17,6 +17,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod cache;
 pub mod camera;
 pub mod cloud;
 pub mod cost;
@@ -25,6 +26,7 @@ pub mod estimator;
 pub mod evaluate;
 pub mod event;
 pub mod features;
+mod files;
 pub mod geometry;
 pub mod grid;
 pub mod history;

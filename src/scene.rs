@@ -9,7 +9,7 @@ pub mod street;
 use std::sync::Arc;
 
 pub use error::SceneError;
-pub use kitti::KittiOdometry;
+pub use kitti::{KittiOdometry, SequenceWriter};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;

@@ -4,8 +4,10 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use posescope::event::Method;
+use posescope::scene::street::{Size, Street};
 
 /// See why a camera pose estimate fails.
 ///
@@ -27,6 +29,8 @@ pub struct Arguments {
 pub enum Command {
     /// Localise one query, or several, and record every decision
     Run(Box<RunArgs>),
+    /// Write the built-in street to disk in KITTI odometry layout, one sequence per condition
+    Synth(SynthArgs),
     /// List all parameters with unit, range, default and meaning
     Params(ConfigArgs),
 }
@@ -122,6 +126,30 @@ pub struct RecordingArgs {
     /// Serve the recording, so that viewers can connect to this process
     #[arg(long)]
     pub serve: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct SynthArgs {
+    /// Where to write: DIR/sequences/CONDITION and DIR/poses/CONDITION.txt
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// The size of the images: 620x188 or 1241x376 pixels
+    #[arg(
+        long,
+        default_value = "full",
+        value_parser = PossibleValuesParser::new(Street::sizes())
+            .try_map(|name: String| Street::size(&name).ok_or("a size expected"))
+    )]
+    pub size: Size,
+    /// Write every Nth frame only; frames keep their numbers, poses and times stay complete
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub every: NonZeroUsize,
+    /// Write this traversal only; repeatable
+    #[arg(long, value_parser = PossibleValuesParser::new(Street::conditions()))]
+    pub condition: Vec<String>,
+    /// Write into a folder that is not empty, replacing sequences of the same names
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// How references are chosen.

@@ -36,7 +36,7 @@ pub enum SceneError {
         /// Names of all conditions.
         known: String,
     },
-    /// A file that cannot be opened or read.
+    /// A file that cannot be opened, read or written.
     #[error("{}: {source}", .path.display())]
     Io {
         /// The file.

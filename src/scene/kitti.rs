@@ -1,10 +1,14 @@
 //! KITTI odometry: `image_0|image_2`, `velodyne`, `calib.txt`, `times.txt`, and the poses in
 //! `../../poses/NN.txt` or in `poses.txt` beside the images.
 
+mod writer;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, Vector3};
+
+pub use writer::SequenceWriter;
 
 use super::{Entry, Scene, SceneError};
 use crate::camera::Intrinsics;

@@ -1,6 +1,6 @@
 //! A town street made from a seed: images, laser scans registered with them, and exact poses.
 //!
-//! Nothing is read from disk. The streets, houses, trees and everything on the surfaces are pure
+//! No data are needed. The streets, houses, trees and everything on the surfaces are pure
 //! functions of a seed and of the point in the world, so that all frames see the same town.
 //! Bytes depend on the seed, the [`Condition`], the [`Size`] and the frame only.
 //!
@@ -13,6 +13,7 @@ mod car;
 mod dataset;
 mod facade;
 mod frame;
+mod frame_cache;
 mod furniture;
 mod ground;
 mod houses;

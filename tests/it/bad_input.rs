@@ -6,10 +6,11 @@ use std::path::Path;
 use assert_cmd::Command;
 use image::GrayImage;
 
+use crate::binary::posescope;
 use crate::small_sequence::{CALIBRATION, SmallSequence};
 
 fn run(scene: &Path, extra: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("posescope").expect("the binary is built");
+    let mut command = posescope();
     command
         .arg("run")
         .arg(scene)
@@ -56,7 +57,7 @@ fn a_folder_of_another_kind_is_not_taken_for_a_scene() {
 #[test]
 fn an_unknown_query_is_told_which_frames_there_are() {
     let sequence = SmallSequence::write();
-    let mut command = Command::cargo_bin("posescope").expect("the binary is built");
+    let mut command = posescope();
     command
         .arg("run")
         .arg(sequence.folder())

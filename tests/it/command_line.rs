@@ -1,13 +1,9 @@
 //! The binary as its user drives it.
 
-use assert_cmd::Command;
 use serde_json::Value;
 
+use crate::binary::posescope;
 use crate::small_sequence::SmallSequence;
-
-fn posescope() -> Command {
-    Command::cargo_bin("posescope").expect("the binary is built")
-}
 
 fn json_lines(bytes: &[u8]) -> Vec<Value> {
     String::from_utf8_lossy(bytes)

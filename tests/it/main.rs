@@ -1,13 +1,16 @@
 //! Integration tests: one binary, because each would link the whole of Rerun again.
 
 mod bad_input;
+mod binary;
 mod command_line;
 mod conformance;
 mod data;
+mod frame_cache;
 mod kitti;
 mod real_pair;
 mod recording;
 mod robust_pose;
 mod small_sequence;
 mod surf_warp;
+mod synth;
 mod two_walls;

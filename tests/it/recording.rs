@@ -272,6 +272,7 @@ fn a_process_that_is_killed_leaves_what_it_told() {
             "--save",
         ])
         .arg(&path)
+        .env("POSESCOPE_CACHE", crate::binary::CACHE)
         .spawn()
         .expect("the binary starts");
     // Long enough for the matches and some views, far from the end of some 5 MB.
