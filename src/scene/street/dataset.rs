@@ -23,7 +23,13 @@ const WORLD_SEED: u64 = 7;
 const FRAME_INTERVAL_S: f64 = 0.1;
 
 /// The conditions by their names.
-const CONDITIONS: &[(&str, Condition)] = &[("overcast", Condition::Overcast)];
+const CONDITIONS: &[(&str, Condition)] = &[
+    ("overcast", Condition::Overcast),
+    ("sun", Condition::Sun),
+    ("night", Condition::Night),
+    ("rain", Condition::Rain),
+    ("snow", Condition::Snow),
+];
 
 /// A traversal of the street; frames are made when they are asked for.
 pub struct Street {
