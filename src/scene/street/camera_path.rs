@@ -30,10 +30,10 @@ fn pose(network: &Network, along: f64, traversal: u32) -> Pose {
     let habit =
         |amplitude: f64, stream: u32| amplitude * (2.0 * unit(derive(traversal, stream)) - 1.0);
     let here = network.circuit.at(along);
-    let plan = here.beside(LANE + habit(0.12, 6) + wobble(18.0, 0.18, 1));
+    let plan = here.beside(LANE + habit(0.06, 6) + wobble(18.0, 0.10, 1));
     let height = wobble(3.1, 0.025, 2);
     let heading = libm::atan2(here.heading.x, here.heading.y);
-    let heading = heading + habit(0.007, 7) + wobble(9.0, 0.008, 3);
+    let heading = heading + habit(0.004, 7) + wobble(9.0, 0.005, 3);
     let pitch = wobble(3.7, 0.007, 4);
     let roll = wobble(5.3, 0.007, 5);
     // World y points down and is 0 at the camera's nominal height.

@@ -118,7 +118,7 @@ impl Cover {
         let puddle = step(octaves(p, 2.3, 3, 0.6, footprint, seed ^ 95) - 0.15, 0.5);
         Appearance {
             albedo: bare.albedo * (1.0 - (0.45 + 0.2 * puddle) * self.wet),
-            film: self.wet * (0.62 + 0.38 * puddle),
+            film: self.wet * (0.28 + 0.62 * puddle),
             ..bare
         }
     }
@@ -155,7 +155,8 @@ impl Cover {
             _ => step(up - 0.4, 0.1),
         };
         // What clings to walls and signs, blown there by the wind.
-        let blown = 0.10 + 0.16 * value2(p.x * 0.7 + p.y, point.y * 0.9, solid.seed ^ 97).max(0.0);
+        let drift = value2(1.1 * (p.x + p.y), point.y * 1.3, solid.seed ^ 97);
+        let blown = 0.12 + 0.34 * drift.max(0.0);
         let share = lies.max(bare.ledge).max(blown).clamp(0.0, 1.0) * self.snow;
         let white = fresh(p, footprint, solid.seed);
         bare.covered(Appearance::matt(white), share)

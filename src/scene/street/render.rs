@@ -16,7 +16,7 @@ use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
 /// Pixels whose levels differ by more than this from a neighbour's are refined.
-const CONTRAST: f32 = 32.0;
+const CONTRAST: f32 = 36.0;
 
 /// A camera in the town.
 pub(super) struct View<'a> {

@@ -28,7 +28,13 @@ fn hashes(condition: Condition) -> [u64; 2] {
 /// platform, nor with the number of threads.
 #[test]
 fn the_bytes_depend_on_the_condition_and_not_on_the_number_of_threads() {
-    const EXPECTED: [[u64; 2]; 5] = [[0, 0], [0, 0], [0, 0], [0, 0], [0, 0]];
+    const EXPECTED: [[u64; 2]; 5] = [
+        [0x7F5E_640F_20A1_9AD3, 0x8ABF_5DE4_4895_7E2D],
+        [0xD83D_029F_6585_11CD, 0x6DB6_7C4F_86C5_4CA0],
+        [0x0AD9_A1C6_7534_C0B0, 0x23CB_5BC6_78CE_7852],
+        [0x7B85_E653_C8E5_37E4, 0x59DF_69AD_7BF4_36C6],
+        [0x72AC_B9F9_A386_4812, 0xC02C_22A9_CAF4_832D],
+    ];
     for threads in [1, 4] {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -54,9 +60,9 @@ fn traversals_share_houses_and_differ_in_cars_and_in_the_line_driven() {
     assert_eq!(overcast.frame_count(), sun.frame_count());
     for (a, b) in overcast.poses.iter().zip(&sun.poses) {
         let offset = (a.translation.vector - b.translation.vector).norm();
-        assert!(offset < 0.7, "{offset}");
+        assert!(offset < 0.35, "{offset}");
         let turn = a.rotation.angle_to(&b.rotation).to_degrees();
-        assert!(turn < 2.5, "{turn}");
+        assert!(turn < 2.0, "{turn}");
     }
     // Far above cars and below roofs, one sees the same walls.
     let sky_hook = Point3::new(0.0, -3.5, 0.0);

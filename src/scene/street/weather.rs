@@ -86,8 +86,8 @@ fn night() -> Look {
         zenith: Rgb::new(0.004, 0.005, 0.010),
         horizon: Rgb::new(0.022, 0.017, 0.014),
         clouds: 0.5,
-        sky_light: Rgb::new(0.014, 0.014, 0.018),
-        bounce: Rgb::new(0.030, 0.022, 0.013),
+        sky_light: Rgb::new(0.060, 0.050, 0.042),
+        bounce: Rgb::new(0.055, 0.040, 0.024),
         key_light: Rgb::zeros(),
         opposite: Rgb::new(0.020, 0.015, 0.010),
         lamps: 1.0,
@@ -95,12 +95,12 @@ fn night() -> Look {
         haze: 0.002,
         air: Rgb::new(0.020, 0.015, 0.010),
         lens: Lens {
-            blur: 2,
+            blur: 4,
             glare: 0.25,
             ..Lens::default()
         },
         exposure: Rgb::new(1.75, 1.55, 1.40),
-        noise: 9.0,
+        noise: 14.0,
         vignetting: 0.45,
         ..overcast()
     }
@@ -116,14 +116,14 @@ fn rain() -> Look {
         bounce: Rgb::new(0.07, 0.07, 0.07),
         key_light: Rgb::new(0.16, 0.16, 0.15),
         opposite: grey(0.07),
-        haze: 0.006,
+        haze: 0.005,
         air: Rgb::new(0.40, 0.42, 0.45),
         cover: Cover {
             snow: 0.0,
             wet: 1.0,
         },
         lens: Lens {
-            drops: 42,
+            drops: 36,
             streaks: 700,
             ..Lens::default()
         },
@@ -144,14 +144,14 @@ fn snow() -> Look {
         bounce: Rgb::new(0.36, 0.37, 0.39),
         key_light: Rgb::new(0.14, 0.14, 0.13),
         opposite: grey(0.22),
-        haze: 0.009,
+        haze: 0.010,
         air: Rgb::new(0.66, 0.68, 0.71),
         cover: Cover {
             snow: 1.0,
             wet: 0.0,
         },
         lens: Lens {
-            flakes: 1500,
+            flakes: 2400,
             ..Lens::default()
         },
         exposure: grey(1.30),
