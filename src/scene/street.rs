@@ -10,14 +10,18 @@
 mod box_tree;
 mod camera_path;
 mod car;
+mod cover;
 mod dataset;
 mod facade;
 mod frame;
 mod frame_cache;
 mod furniture;
 mod ground;
+mod headlamp;
 mod houses;
 mod intersect;
+mod lamps;
+mod lens;
 mod lidar;
 mod look;
 mod material;
@@ -30,8 +34,10 @@ mod pattern;
 mod plot;
 mod render;
 mod shade;
+mod shading;
 mod shape;
 mod town;
+mod weather;
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -52,12 +58,34 @@ pub use lidar::ScanPoint;
 pub enum Condition {
     /// An even grey sky, no shadows.
     Overcast,
+    /// A low sun in a blue sky: long shadows, dazzling walls.
+    Sun,
+    /// Street lamps, lit windows, the car's own head lamps, and a noisy, blurred image.
+    Night,
+    /// A wet road that mirrors the street, falling rain, drops on the lens.
+    Rain,
+    /// Snow on the ground, on roofs and cars; bare trees, falling flakes.
+    Snow,
 }
 
 impl Condition {
-    fn look(self) -> Look {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Overcast,
+        Self::Sun,
+        Self::Night,
+        Self::Rain,
+        Self::Snow,
+    ];
+
+    /// Its name, in lower case.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Overcast => Look::overcast(),
+            Self::Overcast => "overcast",
+            Self::Sun => "sun",
+            Self::Night => "night",
+            Self::Rain => "rain",
+            Self::Snow => "snow",
         }
     }
 }
@@ -114,7 +142,7 @@ impl Traversal {
     pub fn new(world_seed: u64, condition: Condition, size: Size) -> Self {
         let world = mix(world_seed as u32) ^ mix((world_seed >> 32) as u32).rotate_left(7);
         let seed = derive(world, condition as u32);
-        let town = Town::new(world_seed, seed);
+        let town = Town::new(world_seed, seed, condition.season());
         let poses = camera_path::poses(&town.network, seed);
         Self {
             town,
@@ -168,6 +196,8 @@ impl Traversal {
             world_from_camera: &self.poses[frame],
             frame_seed: derive(self.seed, 0xF4A3).wrapping_add(mix(frame as u32)),
             sky_seed: derive(self.seed, 0x5C1),
+            // What is on the lens stays there for a while.
+            lens_seed: derive(self.seed, 0x1E45).wrapping_add(mix(frame as u32 / 6)),
         }
     }
 }

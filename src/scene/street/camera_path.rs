@@ -1,15 +1,15 @@
 //! The journey: where the camera is at every frame.
 
-use nalgebra::{Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::network::Network;
-use super::noise::{derive, value1};
-use crate::geometry::{Pose, yaw};
+use super::noise::{derive, unit, value1};
+use crate::geometry::Pose;
 
 /// Height of the camera above the road \[m\].
 pub(super) const CAMERA_HEIGHT: f64 = 1.65;
 /// Distance to the right of the street's axis that a driver keeps \[m\].
-const LANE: f64 = 0.7;
+pub(super) const LANE: f64 = 0.7;
 /// Aimed distance of two frames \[m\].
 const STRIDE: f64 = 1.0;
 
@@ -26,19 +26,29 @@ fn pose(network: &Network, along: f64, traversal: u32) -> Pose {
     let wobble = |wavelength: f64, amplitude: f64, stream: u32| {
         amplitude * value1(along / wavelength, derive(traversal, stream))
     };
+    // No two drivers keep quite the same line, and no two cameras sit quite alike.
+    let habit =
+        |amplitude: f64, stream: u32| amplitude * (2.0 * unit(derive(traversal, stream)) - 1.0);
     let here = network.circuit.at(along);
-    let plan = here.beside(LANE + wobble(18.0, 0.18, 1));
+    let plan = here.beside(LANE + habit(0.06, 6) + wobble(18.0, 0.10, 1));
     let height = wobble(3.1, 0.025, 2);
-    let heading = here.heading.x.atan2(here.heading.y) + wobble(9.0, 0.008, 3);
+    let heading = libm::atan2(here.heading.x, here.heading.y);
+    let heading = heading + habit(0.004, 7) + wobble(9.0, 0.005, 3);
     let pitch = wobble(3.7, 0.007, 4);
     let roll = wobble(5.3, 0.007, 5);
-    // World y points down and is 0 at the camera's nominal height. `yaw` turns to the left.
-    let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), pitch)
-        * Rotation3::from_axis_angle(&Vector3::z_axis(), roll);
+    // World y points down and is 0 at the camera's nominal height.
     Pose::from_parts(
         Translation3::new(plan.x, -height, plan.y),
-        yaw(-heading) * UnitQuaternion::from_rotation_matrix(&tilt),
+        turn(Vector3::y_axis(), heading)
+            * turn(Vector3::x_axis(), pitch)
+            * turn(Vector3::z_axis(), roll),
     )
+}
+
+/// A turn about an axis, the same to the last bit on every platform.
+fn turn(axis: Unit<Vector3<f64>>, angle: f64) -> UnitQuaternion<f64> {
+    let (sin, cos) = libm::sincos(0.5 * angle);
+    UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, axis.into_inner() * sin))
 }
 
 #[cfg(test)]

@@ -28,7 +28,13 @@ const WORLD_SEED: u64 = 7;
 const FRAME_INTERVAL_S: f64 = 0.1;
 
 /// The conditions by their names.
-const CONDITIONS: &[(&str, Condition)] = &[("overcast", Condition::Overcast)];
+const CONDITIONS: &[(&str, Condition)] = &[
+    ("overcast", Condition::Overcast),
+    ("sun", Condition::Sun),
+    ("night", Condition::Night),
+    ("rain", Condition::Rain),
+    ("snow", Condition::Snow),
+];
 
 /// The sizes by their names.
 const SIZES: &[(&str, Size)] = &[("half", Size::Half), ("full", Size::Full)];

@@ -96,11 +96,11 @@ pub(super) fn appearance(
 
 /// Painted plaster with stains.
 pub(super) fn plaster(colour: Rgb, uv: Vector2<f64>, footprint: &Footprint, seed: u32) -> Rgb {
-    let blotches = octaves(uv.into(), 2.5, 4, 0.62, footprint, seed);
+    let blotches = octaves(uv.into(), 2.5, 3, 0.45, footprint, seed);
     let grain = octaves(uv.into(), 0.11, 3, 1.0, footprint, seed ^ 5);
     let streaked = Vector2::new(uv.x, 0.06 * uv.y);
     let streaks = octaves(streaked.into(), 0.35, 2, 0.7, footprint, seed ^ 6);
-    colour * (0.92 + 0.13 * blotches + 0.12 * grain + 0.14 * streaks.min(0.0))
+    colour * (0.92 + 0.15 * blotches + 0.05 * grain + 0.14 * streaks.min(0.0))
 }
 
 /// Bricks in running bond.
@@ -117,8 +117,8 @@ pub(super) fn brick(colour: Rgb, uv: Vector2<f64>, footprint: &Footprint, seed: 
         footprint.along.x,
     ));
     let stain = octaves(uv.into(), 2.0, 4, 0.6, footprint, seed ^ 3);
-    let clay = colour * (1.0 + 0.85 * single * footprint.contrast(0.12) + 0.2 * stain).max(0.2);
-    blend(clay, grey(0.26), 0.8 * joints)
+    let clay = colour * (1.0 + 0.4 * single * footprint.contrast(0.12) + 0.2 * stain).max(0.2);
+    blend(clay, grey(0.26), 0.6 * joints)
 }
 
 fn wall(facade: &Facade, uv: Vector2<f64>, footprint: &Footprint) -> Rgb {

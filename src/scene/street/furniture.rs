@@ -6,11 +6,13 @@ use rand_pcg::Pcg32;
 
 use super::car::CarShape;
 use super::frame::Frame;
+use super::lamps;
 use super::material::{Material, Rgb, Sign, grey};
 use super::network::{HALF_WIDTH, PAVEMENT};
 use super::path::{Station, right_of};
 use super::plot::{Builder, Plot};
 use super::shape::Shape;
+use super::weather::Season;
 
 /// Distance of parked cars' middles from the kerb \[m\].
 const PARKED: f64 = 1.08;
@@ -24,6 +26,7 @@ pub(super) fn place(builder: &mut Builder, traversal: u32) {
             boundaries(builder, street, side, traversal);
             kerbside(builder, street, side, traversal);
         }
+        lamps(builder, street);
     }
     background(builder, traversal);
 }
@@ -109,16 +112,30 @@ fn kerbside(builder: &mut Builder, street: usize, side: f64, traversal: u32) {
         let (here, to_crossing) = station(builder, street, along);
         let foot = here.beside(side * (HALF_WIDTH + 0.55));
         if (0.3..PAVEMENT).contains(&builder.network.kerb_distance(foot)) {
-            let towards_road = right_of(here.heading) * -side;
             match builder.rng.random_range(0..10_u32) {
                 0..=4 if leafy && to_crossing > 12.0 => tree(builder, foot, 1.0, traversal),
-                5 => lamp(builder, foot, towards_road),
-                6 | 7 => sign(builder, foot, here.heading * -side),
+                5..=7 => sign(builder, foot, here.heading * -side),
                 8 => bollards(builder, &here, side),
                 _ => bin(builder, here.beside(side * (HALF_WIDTH + PAVEMENT - 0.45))),
             }
         }
         along += builder.rng.random_range(5.0..10.0);
+    }
+}
+
+/// Lamps along a street, on alternating sides.
+fn lamps(builder: &mut Builder, street: usize) {
+    const SPACING: f64 = 24.0;
+    let length = builder.network.streets[street].axis.length();
+    let count = (length / SPACING).floor().max(1.0);
+    for k in 0..count as u32 {
+        let along = (f64::from(k) + 0.5) * length / count;
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let (here, _) = station(builder, street, along);
+        let foot = here.beside(side * (HALF_WIDTH + 0.35));
+        if (0.1..PAVEMENT).contains(&builder.network.kerb_distance(foot)) {
+            lamp(builder, foot, right_of(here.heading) * -side);
+        }
     }
 }
 
@@ -134,9 +151,13 @@ fn lamp(builder: &mut Builder, foot: Point2<f64>, towards_road: Vector2<f64>) {
     builder.add_block(
         &head,
         [height, height + 0.13],
-        Material::Plain(grey(0.2)),
+        Material::Lamp(lamps::COLOUR * 12.0),
         0,
     );
+    let light = foot + towards_road * 1.1;
+    builder
+        .lamps
+        .push(Point3::new(light.x, height - 0.05, light.y));
 }
 
 fn sign(builder: &mut Builder, foot: Point2<f64>, facing: Vector2<f64>) {
@@ -224,7 +245,7 @@ fn tree(builder: &mut Builder, foot: Point2<f64>, size: f64, traversal: u32) {
         let bulge = 2.0 * level - 0.8;
         let ring = spread * (1.0 - bulge * bulge).max(0.1).sqrt() * 0.8;
         let angle = f64::from(k) * 2.4 + builder.rng.random_range(-0.5..0.5);
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         let radius = spread * builder.rng.random_range(0.35..0.66);
         let centre = Point3::new(
             foot.x + ring * cos,
@@ -247,7 +268,11 @@ fn clump(builder: &mut Builder, centre: Point3<f64>, radius: f64, green: Rgb, se
         radius,
         half_height: 0.8 * radius,
     };
-    builder.add(shape, Material::Leaves(green), seed);
+    let (colour, density) = match builder.season {
+        Season::Summer => (green, 1.0),
+        Season::Winter => (Rgb::new(0.075, 0.062, 0.05), 0.42),
+    };
+    builder.add(shape, Material::Leaves { colour, density }, seed);
 }
 
 fn bush(builder: &mut Builder, foot: Point2<f64>, traversal: u32) {

@@ -122,7 +122,7 @@ pub(super) fn appearance(
 fn land(p: Point2<f64>, footprint: &Footprint, seed: u32) -> Rgb {
     let patches = octaves(p, 3.0, 3, 0.6, footprint, seed ^ 21);
     let blades = octaves(p, 0.16, 3, 0.9, footprint, seed ^ 22);
-    let grass = Rgb::new(0.055, 0.08, 0.028) * (1.0 + 0.55 * blades).max(0.15);
+    let grass = Rgb::new(0.055, 0.08, 0.028) * (1.0 + 0.3 * blades).max(0.15);
     let soil = Rgb::new(0.11, 0.09, 0.065) * (1.0 + 0.3 * blades);
     blend(grass, soil, (0.35 + 0.9 * patches).clamp(0.0, 1.0))
 }
@@ -146,15 +146,14 @@ fn pavement(place: &Place, p: Point2<f64>, footprint: &Footprint, seed: u32) -> 
             * clarity;
     let dirt = octaves(p, 1.5, 4, 0.65, footprint, seed ^ 42);
     let grain = octaves(p, 0.05, 2, 0.9, footprint, seed ^ 43);
-    grey(0.2)
-        * (1.0 + 0.25 * single * clarity + 0.25 * dirt + 0.25 * grain - 0.55 * joints).max(0.1)
+    grey(0.2) * (1.0 + 0.15 * single * clarity + 0.3 * dirt + 0.1 * grain - 0.55 * joints).max(0.1)
 }
 
 fn asphalt(p: Point2<f64>, footprint: &Footprint, seed: u32) -> f64 {
     let grain = octaves(p, 0.06, 2, 1.0, footprint, seed ^ 51);
-    let wear = octaves(p, 4.0, 4, 0.52, footprint, seed ^ 52);
+    let wear = octaves(p, 4.0, 3, 0.4, footprint, seed ^ 52);
     let cracked = cracks(p, footprint, seed);
-    0.125 * (1.0 + 0.28 * grain + 0.2 * wear - 0.6 * cracked).max(0.1)
+    0.125 * (1.0 + 0.11 * grain + 0.3 * wear - 0.6 * cracked).max(0.1)
 }
 
 /// Share of the pixel that is a crack; whole stretches have none.

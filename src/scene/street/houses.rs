@@ -5,6 +5,7 @@ use rand::RngExt;
 
 use super::facade::{Facade, GroundFloor, Wall};
 use super::frame::Frame;
+use super::lamps;
 use super::material::{Material, Rgb, Sign, grey};
 use super::network::{HALF_WIDTH, PAVEMENT};
 use super::path::right_of;
@@ -376,5 +377,6 @@ fn wall_lamp(builder: &mut Builder, at: Point2<f64>) {
         ahead: Vector2::y(),
         half: Vector2::repeat(0.09),
     };
-    builder.add_block(&lamp, [2.1, 2.4], Material::Plain(grey(0.45)), 0);
+    let glow = lamps::COLOUR * 4.0;
+    builder.add_block(&lamp, [2.1, 2.4], Material::Lamp(glow), 0);
 }

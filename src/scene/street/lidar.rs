@@ -36,10 +36,10 @@ pub struct ScanPoint {
 /// The scan taken at a camera pose, beam after beam.
 pub(super) fn scan(town: &Town, look: &Look, pose: &Pose, seed: u32) -> Vec<ScanPoint> {
     let circle: Vec<(f64, f64)> = (0..STEPS)
-        .map(|step| (f64::from(step) / f64::from(STEPS) * std::f64::consts::TAU).sin_cos())
+        .map(|step| libm::sincos(f64::from(step) / f64::from(STEPS) * std::f64::consts::TAU))
         .collect();
     let beam = |beam: u32| {
-        let (up, level) = elevation(beam).to_radians().sin_cos();
+        let (up, level) = libm::sincos(elevation(beam).to_radians());
         let circle = &circle;
         (0_u32..).zip(circle).filter_map(move |(step, (sin, cos))| {
             let direction = Vector3::new(level * sin, -up, level * cos);
@@ -77,7 +77,7 @@ fn shoot(
     if !(least..greatest).contains(&sight.distance) {
         return None;
     }
-    let appearance = town.appearance(&sight, &ray, 1.5e-3);
+    let appearance = town.appearance(&sight, &ray, 1.5e-3, &look.cover);
     if unit(derive(roll, 2)) < THROUGH_GLASS * appearance.glass {
         return None;
     }

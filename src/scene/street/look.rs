@@ -2,28 +2,47 @@
 
 use nalgebra::{Point2, Vector3};
 
-use super::material::{Appearance, Rgb, blend, grey};
+use super::cover::Cover;
+use super::lens::Lens;
+use super::material::{Appearance, Rgb, blend};
 use super::noise::{Footprint, octaves};
 
-/// How the town is lit and exposed. Shading reads nothing else of the weather.
+/// How the town is lit, what lies on it, and how it is exposed. Shading reads nothing else of the
+/// weather.
 #[derive(Clone, Debug)]
 pub(super) struct Look {
     /// Radiance of the sky overhead.
-    zenith: Rgb,
+    pub(super) zenith: Rgb,
     /// Radiance of the sky at the horizon.
-    horizon: Rgb,
+    pub(super) horizon: Rgb,
     /// Contrast of the clouds, 0 … 1.
-    clouds: f64,
+    pub(super) clouds: f64,
     /// Irradiance of an unobstructed horizontal surface by the sky.
-    sky_light: Rgb,
+    pub(super) sky_light: Rgb,
     /// Irradiance of a surface that faces the ground.
-    bounce: Rgb,
+    pub(super) bounce: Rgb,
     /// Where the brightest part of the sky is; unit vector.
-    key: Vector3<f64>,
+    pub(super) key: Vector3<f64>,
     /// Irradiance from there.
-    key_light: Rgb,
-    /// Radiance that saturates the sensor is 1 / `exposure`.
-    exposure: f64,
+    pub(super) key_light: Rgb,
+    /// Whether that light is a sun's, which casts shadows.
+    pub(super) shadows: bool,
+    /// Radiance of the far side of the street, which glossy things mirror.
+    pub(super) opposite: Rgb,
+    /// Strength of street lamps and lit windows; 0 when they are off.
+    pub(super) lamps: f64,
+    /// Strength of the car's own head lamps; 0 when they are off.
+    pub(super) headlamps: f64,
+    /// Share of the light that the air scatters away in a metre.
+    pub(super) haze: f64,
+    /// Radiance of the air.
+    pub(super) air: Rgb,
+    /// Snow and water on the surfaces.
+    pub(super) cover: Cover,
+    /// What the air before the lens and the lens do to the image.
+    pub(super) lens: Lens,
+    /// Radiance that saturates the sensor is 1 / `exposure`, by colour.
+    pub(super) exposure: Rgb,
     /// Standard deviation of the sensor's noise \[grey levels\].
     pub(super) noise: f64,
     /// Loss of light in the corners of the image, 0 … 1.
@@ -31,22 +50,6 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// An even grey-blue sky with soft clouds; nearly no shadows.
-    pub(super) fn overcast() -> Self {
-        Self {
-            zenith: Rgb::new(0.44, 0.52, 0.64),
-            horizon: Rgb::new(0.66, 0.70, 0.75),
-            clouds: 0.30,
-            sky_light: Rgb::new(0.86, 0.90, 0.95),
-            bounce: Rgb::new(0.10, 0.10, 0.09),
-            key: Vector3::new(0.48, 0.64, 0.6),
-            key_light: Rgb::new(0.50, 0.48, 0.44),
-            exposure: 1.12,
-            noise: 1.5,
-            vignetting: 0.12,
-        }
-    }
-
     /// Radiance of the sky in a direction that points upwards.
     pub(super) fn sky(&self, direction: &Vector3<f64>, seed: u32) -> Rgb {
         let up = direction.y.max(0.0);
@@ -60,14 +63,22 @@ impl Look {
             major: 0.01 / height,
         };
         let clouds = octaves(p, 1.3, 4, 0.5, &fine, seed);
-        base * (1.0 + self.clouds * clouds * (up * 4.0).min(1.0))
+        let sky = base * (1.0 + self.clouds * clouds * (up * 4.0).min(1.0));
+        if !self.shadows {
+            return sky;
+        }
+        // The sun dazzles: a glare around it.
+        let near = direction.dot(&self.key).max(0.0);
+        let square = near * near;
+        let eighth = square * square * square * square;
+        sky + self.key_light * (0.35 * eighth * eighth * eighth)
     }
 
     /// What a mirror shows that reflects into a direction: the sky above the roofs, else the
     /// far side of the street, which is not traced but made up.
     fn mirrored(&self, direction: &Vector3<f64>, seed: u32) -> Rgb {
         let above = ((direction.y - 0.28) * 8.0).clamp(0.0, 1.0);
-        let street = grey(0.09 + 0.1 * direction.y.max(0.0));
+        let street = self.opposite * (1.0 + 1.1 * direction.y.max(0.0));
         if above == 0.0 {
             street
         } else {
@@ -75,30 +86,45 @@ impl Look {
         }
     }
 
-    /// Radiance of a surface towards where `direction` comes from; `open` is the share of the
-    /// surroundings' light that reaches it.
+    /// Irradiance of a surface by the sky and what it lights; `open` is the share of the
+    /// surroundings' light that reaches it, `sunny` that of the brightest part of the sky.
+    pub(super) fn daylight(&self, normal: &Vector3<f64>, open: f64, sunny: f64) -> Rgb {
+        let sky_share = 0.5 + 0.5 * normal.y;
+        let key_share = normal.dot(&self.key).max(0.0) * sunny;
+        (self.sky_light * sky_share + self.key_light * key_share) * open
+            + self.bounce * (1.0 - sky_share)
+    }
+
+    /// Radiance of a surface under an irradiance, towards where `direction` comes from.
     pub(super) fn radiance(
         &self,
         appearance: &Appearance,
         normal: &Vector3<f64>,
         direction: &Vector3<f64>,
+        irradiance: &Rgb,
         open: f64,
         seed: u32,
     ) -> Rgb {
-        let sky_share = 0.5 + 0.5 * normal.y;
-        let key_share = normal.dot(&self.key).max(0.0);
-        let irradiance = (self.sky_light * sky_share + self.key_light * key_share) * open
-            + self.bounce * (1.0 - sky_share);
-        let diffuse = appearance.albedo.component_mul(&irradiance);
+        let diffuse =
+            appearance.albedo.component_mul(irradiance) + appearance.emission * self.lamps;
         if appearance.gloss < 0.05 {
             return diffuse;
         }
         let facing = -normal.dot(direction);
-        let grazing = 1.0 - facing.clamp(0.0, 1.0);
-        let fifth = grazing * grazing * grazing * grazing * grazing;
-        let share = appearance.gloss * (0.06 + 0.94 * fifth);
+        let share = appearance.gloss * schlick(facing, 0.06);
         let reflected = direction + normal * (2.0 * facing);
         diffuse * (1.0 - share) + self.mirrored(&reflected, seed) * (share * open.max(0.3))
+    }
+
+    /// A radiance as it is after a way through the air \[m\].
+    pub(super) fn through_air(&self, radiance: Rgb, way: f64) -> Rgb {
+        if self.haze == 0.0 {
+            return radiance;
+        }
+        // The inverse of the exponential's series: no platform's own exponential is called.
+        let depth = self.haze * way;
+        let left = 1.0 / (1.0 + depth * (1.0 + depth * (0.5 + depth / 6.0)));
+        blend(self.air, radiance, left)
     }
 
     /// Reflectance at the wavelength of a laser scanner, 0 … 1: leaves are bright there.
@@ -114,9 +140,17 @@ impl Look {
     /// about the middle.
     pub(super) fn levels(&self, radiance: &Rgb) -> Vector3<f64> {
         const STEEPENING: f64 = 0.6;
-        radiance.map(|r| {
-            let t = (self.exposure * r).clamp(0.0, 1.0).sqrt();
+        radiance.component_mul(&self.exposure).map(|r| {
+            let t = r.clamp(0.0, 1.0).sqrt();
             255.0 * (t + STEEPENING * t * (1.0 - t) * (2.0 * t - 1.0))
         })
     }
+}
+
+/// Schlick's approximation of the share of light that a surface mirrors; `least` is that at
+/// normal incidence.
+pub(super) fn schlick(cosine: f64, least: f64) -> f64 {
+    let grazing = 1.0 - cosine.clamp(0.0, 1.0);
+    let fifth = grazing * grazing * grazing * grazing * grazing;
+    least + (1.0 - least) * fifth
 }

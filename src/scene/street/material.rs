@@ -24,7 +24,7 @@ pub(super) fn blend(a: Rgb, b: Rgb, share: f64) -> Rgb {
 }
 
 /// How a point of a surface looks, whatever the light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Appearance {
     /// Diffuse reflectance.
     pub(super) albedo: Rgb,
@@ -32,6 +32,12 @@ pub(super) struct Appearance {
     pub(super) gloss: f64,
     /// Share of glass in the pixel: light of a laser goes through.
     pub(super) glass: f64,
+    /// Radiance of its own when lights are on.
+    pub(super) emission: Rgb,
+    /// Share of ledges too small to be solids, on which snow lies.
+    pub(super) ledge: f64,
+    /// Strength of a film of water that mirrors the surroundings, 0 … 1.
+    pub(super) film: f64,
 }
 
 impl Appearance {
@@ -39,8 +45,7 @@ impl Appearance {
     pub(super) fn matt(albedo: Rgb) -> Self {
         Self {
             albedo,
-            gloss: 0.0,
-            glass: 0.0,
+            ..Self::default()
         }
     }
 
@@ -50,6 +55,9 @@ impl Appearance {
             albedo: blend(self.albedo, over.albedo, share),
             gloss: self.gloss + (over.gloss - self.gloss) * share,
             glass: self.glass + (over.glass - self.glass) * share,
+            emission: blend(self.emission, over.emission, share),
+            ledge: self.ledge + (over.ledge - self.ledge) * share,
+            film: self.film + (over.film - self.film) * share,
         }
     }
 }
@@ -83,12 +91,19 @@ pub(super) enum Material {
     },
     /// A clipped hedge.
     Hedge(Rgb),
-    /// The leaves of a tree or a bush.
-    Leaves(Rgb),
+    /// The leaves of a tree or a bush, or its twigs.
+    Leaves {
+        /// Colour.
+        colour: Rgb,
+        /// Share of them that is there: 1 in summer.
+        density: f64,
+    },
     /// The bark of a tree.
     Bark,
     /// Something painted in one colour.
     Plain(Rgb),
+    /// A lamp's head: its radiance when it is on.
+    Lamp(Rgb),
     /// Red and white bands.
     Banded,
     /// A fence of vertical pickets with gaps.
@@ -116,9 +131,9 @@ impl Solid {
     pub(super) fn has_hole(&self, contact: &Contact, ray: &Ray) -> bool {
         let (u, v) = (contact.uv.x, contact.uv.y);
         match &self.material {
-            Material::Leaves(_) => {
+            Material::Leaves { density, .. } => {
                 let facing = contact.normal.dot(&ray.direction).abs();
-                leaf_gap(&ray.at(contact.distance), facing, self.seed)
+                leaf_gap(&ray.at(contact.distance), facing, *density, self.seed)
             }
             Material::Fence(_) => {
                 let rail = (0.18..0.26).contains(&v) || (0.78..0.86).contains(&v);
@@ -148,11 +163,15 @@ impl Solid {
             Material::Wall { colour, .. } => {
                 Appearance::matt(facade::brick(*colour, uv, footprint, self.seed))
             }
-            Material::Hedge(colour) | Material::Leaves(colour) => {
+            Material::Hedge(colour) | Material::Leaves { colour, .. } => {
                 leaves(*colour, contact, point, footprint, self.seed)
             }
             Material::Bark => Appearance::matt(bark(uv, footprint, self.seed)),
             Material::Plain(colour) => plain(*colour, uv, footprint, self.seed),
+            Material::Lamp(radiance) => Appearance {
+                emission: *radiance,
+                ..plain(grey(0.4), uv, footprint, self.seed)
+            },
             Material::Banded => {
                 let red = stripes(uv.y, 0.5, 0.25, footprint.along.y);
                 plain(
@@ -178,9 +197,9 @@ impl Solid {
 /// Mostly a function of the point alone, as the camera and the scanner must agree on it; but a
 /// clump is thin near its outline (where `facing`, the cosine of the view with the normal, is
 /// small), and without more gaps there, all clumps would have smooth round edges.
-fn leaf_gap(p: &Point3<f64>, facing: f64, seed: u32) -> bool {
-    let density = 0.16 - 1.5 * (0.62 - facing).max(0.0);
-    let coarse = density + 0.8 * value3(&(p * 3.7), seed);
+fn leaf_gap(p: &Point3<f64>, facing: f64, density: f64, seed: u32) -> bool {
+    let level = 0.8 * density - 0.64 - 1.5 * (0.62 - facing).max(0.0);
+    let coarse = level + 0.8 * value3(&(p * 3.7), seed);
     if coarse.abs() > 1.0 {
         return coarse < 0.0;
     }
@@ -206,7 +225,7 @@ fn leaves(
     let leaf = |grain, stream| (2.2 * tone(grain, stream)).clamp(-1.0, 1.0);
     let light = 0.45 + 0.55 * contact.normal.y;
     let level =
-        0.6 + 0.5 * light + 0.5 * tone(0.45, 3) + 0.55 * leaf(0.12, 4) + 0.5 * leaf(0.055, 5);
+        0.6 + 0.5 * light + 0.5 * tone(0.45, 3) + 0.4 * leaf(0.12, 4) + 0.3 * leaf(0.055, 5);
     let tint = 0.12 * tone(0.7, 6);
     let colour = colour.component_mul(&Rgb::new(1.0 + tint, 1.0, 1.0 - tint));
     Appearance::matt(colour * level.max(0.12))
@@ -225,6 +244,7 @@ fn plain(colour: Rgb, uv: Vector2<f64>, footprint: &Footprint, seed: u32) -> App
         albedo: colour * (1.0 + 0.15 * tone),
         gloss: 0.15,
         glass: 0.0,
+        ..Appearance::default()
     }
 }
 
@@ -250,7 +270,7 @@ fn tiles(
     let single = (unit(hash2(column, row, seed)) - 0.5) * footprint.contrast(0.3);
     let shadow = stripes(uv.y, ROW, 0.06, footprint.along.y);
     let moss = octaves(uv.into(), 1.8, 4, 0.6, footprint, seed);
-    let level = 1.0 + 0.75 * single + 0.35 * moss - 0.6 * shadow;
+    let level = 1.0 + 0.4 * single + 0.35 * moss - 0.6 * shadow;
     Appearance::matt(colour * level.max(0.15))
 }
 
@@ -279,6 +299,7 @@ fn sign_face(sign: Sign, contact: &Contact, footprint: &Footprint, seed: u32) ->
         albedo,
         gloss: 0.2,
         glass: 0.0,
+        ..Appearance::default()
     };
     if contact.part != Part::Front {
         return enamel(grey(0.22));

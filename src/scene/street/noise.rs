@@ -142,6 +142,9 @@ impl Footprint {
     }
 }
 
+/// Ratio of the grains of successive octaves.
+const LACUNARITY: f64 = 2.3;
+
 /// Sum of octaves of [`value2`]: grain widths `grain`, `grain / 2.3`, …; each octave `gain` times
 /// as strong as the one before; octaves finer than the pixel are left out. Roughly −1 … 1.
 pub(super) fn octaves(
@@ -153,15 +156,17 @@ pub(super) fn octaves(
     seed: u32,
 ) -> f64 {
     let (mut sum, mut grain, mut amplitude) = (0.0, grain, 1.0);
+    let mut p = p / grain;
     for octave in 0..count {
         let contrast = footprint.contrast(grain);
         if contrast <= 0.0 {
             break;
         }
-        let noise = value2(p.x / grain, p.y / grain, seed.wrapping_add(octave));
+        let noise = value2(p.x, p.y, seed.wrapping_add(octave));
         sum += amplitude * contrast * noise;
         amplitude *= gain;
-        grain /= 2.3;
+        grain *= 1.0 / LACUNARITY;
+        p *= LACUNARITY;
     }
     sum
 }

@@ -92,6 +92,8 @@ fn glazing(spot: &Spot, half: f64, low: f64, high: f64) -> Appearance {
         albedo: behind,
         gloss: 0.9,
         glass: 1.0,
+        emission: room_light(spot.seed).component_mul(&(behind * 1.6 + grey(0.3))),
+        ..Appearance::default()
     };
     let blind_height = if derive(spot.seed, 5).is_multiple_of(3) {
         height * unit(derive(spot.seed, 6))
@@ -109,6 +111,16 @@ fn glazing(spot: &Spot, half: f64, low: f64, high: f64) -> Appearance {
     let mullion = bar(x, -0.04, 0.04, du);
     pane.covered(frame, border.max(mullion))
         .covered(blind, step(y - (high - blind_height), dv))
+}
+
+/// Radiance of a room behind a window when lights are on; most people are out or asleep.
+fn room_light(seed: u32) -> Rgb {
+    if !derive(seed, 11).is_multiple_of(4) {
+        return Rgb::zeros();
+    }
+    let warmth = unit(derive(seed, 12));
+    let strength = 0.5 + 1.2 * unit(derive(seed, 13));
+    Rgb::new(1.0, 0.62 + 0.25 * warmth, 0.25 + 0.5 * warmth) * strength
 }
 
 /// A window with its surround, sill and shutters.
@@ -142,7 +154,13 @@ pub(super) fn window(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearan
     let (flowers, planted) = flower_box(facade, spot);
     shuttered
         .covered(Appearance::matt(wall.albedo * 0.45), 0.8 * sill_shadow)
-        .covered(Appearance::matt(grey(0.42)), sill)
+        .covered(
+            Appearance {
+                ledge: 1.0,
+                ..Appearance::matt(grey(0.42))
+            },
+            sill,
+        )
         .covered(glazing(spot, half, low, high), opening)
         .covered(Appearance::matt(grey(0.02)), 0.8 * reveal)
         .covered(flowers, planted)
@@ -180,6 +198,7 @@ pub(super) fn door(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearance
         albedo: grey(0.02),
         gloss: 0.9,
         glass: 1.0,
+        ..Appearance::default()
     };
     let lintel = spot.rectangle(half, high - 0.12, high);
     let plate = rectangle(spot.x, spot.y, [0.72, 1.3, 0.95, 1.6], spot.width);
@@ -237,10 +256,13 @@ fn shop_window(facade: &Facade, wall: Appearance, spot: &Spot, half: f64, top: f
     if opening == 0.0 {
         return wall;
     }
+    let goods = goods(facade, spot);
     let pane = Appearance {
-        albedo: goods(facade, spot),
+        albedo: goods,
         gloss: 0.8,
         glass: 1.0,
+        emission: (goods * 4.0 + grey(0.15)) * (1.5 * unit(derive(facade.seed, 44))),
+        ..Appearance::default()
     };
     let frame = 1.0 - spot.rectangle(half - 0.06, low + 0.06, top - 0.06);
     let (poster, posted) = poster(spot);

@@ -23,6 +23,7 @@ pub(super) fn appearance(
         albedo: colour * (1.0 + 0.08 * dirt),
         gloss: 0.8,
         glass: 0.0,
+        ..Appearance::default()
     };
     match contact.part {
         Part::Pane | Part::Screen => {
@@ -58,6 +59,7 @@ fn glass(contact: &Contact, seed: u32) -> Appearance {
         albedo: grey(0.006 + 0.04 * inside.max(0.0)),
         gloss: 0.85,
         glass: 1.0,
+        ..Appearance::default()
     }
 }
 
@@ -71,6 +73,7 @@ fn trim() -> Appearance {
         albedo: grey(0.03),
         gloss: 0.2,
         glass: 0.0,
+        ..Appearance::default()
     }
 }
 
@@ -139,6 +142,7 @@ fn face(
         },
         gloss: 0.8,
         glass: 0.0,
+        ..Appearance::default()
     };
     let low = if nose {
         0.36
@@ -176,6 +180,7 @@ fn wheel(contact: &Contact, footprint: &Footprint, seed: u32) -> Appearance {
         albedo: grey(0.2 + 0.2 * unit(derive(seed, 9))),
         gloss: 0.5,
         glass: 0.0,
+        ..Appearance::default()
     };
     rubber().covered(metal, rim).covered(black(), open * rim)
 }

@@ -54,7 +54,7 @@ impl Piece {
                 heading,
             };
         }
-        let (sin, cos) = (self.curvature * along).sin_cos();
+        let (sin, cos) = libm::sincos(self.curvature * along);
         let right = right_of(heading);
         Station {
             position: position + (heading * sin + right * (1.0 - cos)) / self.curvature,
@@ -146,8 +146,8 @@ impl Path {
     ) -> Point2<f64> {
         let heading = (vertex.position - before.position).normalize();
         let onward = (after.position - vertex.position).normalize();
-        let turn = onward.dot(&right_of(heading)).atan2(onward.dot(&heading));
-        let tangent = vertex.radius * (0.5 * turn.abs()).tan();
+        let turn = libm::atan2(onward.dot(&right_of(heading)), onward.dot(&heading));
+        let tangent = vertex.radius * libm::tan(0.5 * turn.abs());
         let arc_begin = vertex.position - heading * tangent;
         self.add_line(begin, arc_begin);
         self.pieces.push(Piece {

@@ -10,6 +10,7 @@ use super::network::Network;
 use super::path::right_of;
 use super::shade::Blot;
 use super::shape::Shape;
+use super::weather::Season;
 
 /// A rectangle of land.
 #[derive(Clone, Copy, Debug)]
@@ -73,23 +74,29 @@ pub(super) struct Builder<'a> {
     solids: Vec<Solid>,
     blots: Vec<Blot>,
     taken: Vec<Plot>,
+    /// Whether trees bear leaves.
+    pub(super) season: Season,
+    /// Where street lamps shine from.
+    pub(super) lamps: Vec<Point3<f64>>,
 }
 
 impl<'a> Builder<'a> {
     /// An empty town.
-    pub(super) fn new(network: &'a Network, seed: u64) -> Self {
+    pub(super) fn new(network: &'a Network, seed: u64, season: Season) -> Self {
         Self {
             network,
             rng: Pcg32::seed_from_u64(seed ^ 0x5EED_7077),
             solids: Vec::new(),
             blots: Vec::new(),
             taken: Vec::new(),
+            season,
+            lamps: Vec::new(),
         }
     }
 
-    /// The solids, and the shade that they cast on the ground.
-    pub(super) fn finish(self) -> (Vec<Solid>, Vec<Blot>) {
-        (self.solids, self.blots)
+    /// The solids, the shade that they cast on the ground, and the lamps.
+    pub(super) fn finish(self) -> (Vec<Solid>, Vec<Blot>, Vec<Point3<f64>>) {
+        (self.solids, self.blots, self.lamps)
     }
 
     /// Adds a solid.

@@ -6,14 +6,17 @@ use rayon::prelude::*;
 
 use super::camera_path::CAMERA_HEIGHT;
 use super::frame::Ray;
+use super::headlamp::Headlamp;
+use super::lens::{Levels, Plane};
 use super::look::Look;
 use super::noise::{derive, hash3, normal};
+use super::shading::Shading;
 use super::town::{Face, Sight, Town};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
 /// Pixels whose levels differ by more than this from a neighbour's are refined.
-const CONTRAST: f32 = 26.0;
+const CONTRAST: f32 = 36.0;
 
 /// A camera in the town.
 pub(super) struct View<'a> {
@@ -29,6 +32,8 @@ pub(super) struct View<'a> {
     pub(super) frame_seed: u32,
     /// Seed of what is the same in all frames.
     pub(super) sky_seed: u32,
+    /// Seed of what is on the lens.
+    pub(super) lens_seed: u32,
 }
 
 /// A world point in town coordinates.
@@ -48,7 +53,7 @@ pub(super) fn town_ray(pose: &Pose, origin: &Point3<f64>, direction: &Vector3<f6
 /// Levels of a pixel, and what it shows.
 #[derive(Clone, Copy)]
 struct Sample {
-    levels: [f32; 3],
+    levels: Levels,
     /// `None` is the sky.
     face: Option<Face>,
 }
@@ -65,16 +70,43 @@ impl View<'_> {
     pub(super) fn image(&self) -> RgbImage {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let columns = width as usize;
-        let row = |y: u32| (0..width).map(move |x| self.sample(f64::from(x), f64::from(y)));
-        let samples: Vec<Sample> = (0..height).into_par_iter().flat_map_iter(row).collect();
-        let mut bytes = vec![0; samples.len() * 3];
+        let shading = Shading {
+            town: self.town,
+            look: self.look,
+            headlamp: (self.look.headlamps > 0.0).then(|| Headlamp::new(self.world_from_camera)),
+            sky_seed: self.sky_seed,
+        };
+        let samples: Vec<Sample> = (0..height)
+            .into_par_iter()
+            .flat_map_iter(|y| {
+                let shading = &shading;
+                (0..width).scan(None, move |left, x| {
+                    let sample = self.sample(shading, f64::from(x), f64::from(y), *left);
+                    *left = sample.face;
+                    Some(sample)
+                })
+            })
+            .collect();
+        let levels: Vec<Levels> = (0..height as usize)
+            .into_par_iter()
+            .flat_map_iter(|y| {
+                let (samples, shading) = (&samples, &shading);
+                (0..columns).map(move |x| self.refined(shading, samples, columns, x, y))
+            })
+            .collect();
+        let plane = Plane { levels, columns };
+        let plane = self
+            .look
+            .lens
+            .project(plane, self.frame_seed, self.lens_seed);
+        let mut bytes = vec![0; plane.levels.len() * 3];
         bytes
             .par_chunks_mut(3 * columns)
+            .zip(plane.levels.par_chunks(columns))
             .enumerate()
-            .for_each(|(y, line)| {
-                for (x, pixel) in line.chunks_exact_mut(3).enumerate() {
-                    let levels = self.refined(&samples, columns, x, y);
-                    pixel.copy_from_slice(&self.sensed(&levels, x as u32, y as u32));
+            .for_each(|(y, (line, levels))| {
+                for (x, (pixel, levels)) in line.chunks_exact_mut(3).zip(levels).enumerate() {
+                    pixel.copy_from_slice(&self.sensed(levels, x as u32, y as u32));
                 }
             });
         RgbImage::from_raw(width, height, bytes).expect("three bytes for every pixel")
@@ -91,37 +123,37 @@ impl View<'_> {
         town_ray(self.world_from_camera, &Point3::origin(), bearing)
     }
 
-    fn sample(&self, x: f64, y: f64) -> Sample {
+    fn sample(&self, shading: &Shading<'_>, x: f64, y: f64, likely: Option<Face>) -> Sample {
         let bearing = self.intrinsics.bearing(&Point2::new(x, y));
         let ray = self.ray(&bearing);
-        let sight = self.town.look(&ray, 0.0);
+        let sight = self.town.look_near(&ray, 0.0, likely);
         Sample {
-            levels: self.levels(&ray, sight.as_ref(), bearing.z).cast().into(),
+            levels: self.levels(shading, &ray, sight.as_ref(), bearing.z),
             face: sight.map(|s| s.face()),
         }
     }
 
     /// Grey levels of what a ray sees; `cosine` is that of its angle to the optical axis.
-    fn levels(&self, ray: &Ray, sight: Option<&Sight>, cosine: f64) -> Vector3<f64> {
-        let radiance = match sight {
-            None => self.look.sky(&ray.direction, self.sky_seed),
-            Some(sight) => {
-                let pixel = cosine / self.intrinsics.fx;
-                let appearance = self.town.appearance(sight, ray, pixel);
-                self.look.radiance(
-                    &appearance,
-                    &sight.normal,
-                    &ray.direction,
-                    self.town.openness(sight),
-                    self.sky_seed,
-                )
-            }
-        };
-        self.look.levels(&radiance)
+    fn levels(
+        &self,
+        shading: &Shading<'_>,
+        ray: &Ray,
+        sight: Option<&Sight>,
+        cosine: f64,
+    ) -> Levels {
+        let radiance = shading.radiance(ray, sight, cosine / self.intrinsics.fx);
+        self.look.levels(&radiance).cast().into()
     }
 
-    /// The mean of four samples where a pixel differs from a neighbour, else its one sample.
-    fn refined(&self, samples: &[Sample], columns: usize, x: usize, y: usize) -> Vector3<f64> {
+    /// The mean of several samples where a pixel differs from a neighbour, else its one sample.
+    fn refined(
+        &self,
+        shading: &Shading<'_>,
+        samples: &[Sample],
+        columns: usize,
+        x: usize,
+        y: usize,
+    ) -> Levels {
         /// With the one in the middle, a lattice of which no two samples share a row or a column.
         const OTHERS: [(f64, f64); 3] = [(-0.35, -0.17), (0.17, -0.35), (0.18, 0.35)];
         let index = y * columns + x;
@@ -131,26 +163,28 @@ impl View<'_> {
         let above = index.checked_sub(columns).map(|i| &samples[i]);
         let below = samples.get(index + columns);
         let neighbours = || [left, right, above, below].into_iter().flatten();
-        let middle = Vector3::from(here.levels).cast::<f64>();
         if !neighbours().any(|other| here.differs(other)) {
-            return middle;
+            return here.levels;
         }
         let surrounded = neighbours().all(|other| here.face == other.face);
-        let sum = OTHERS.iter().fold(middle, |sum, (dx, dy)| {
+        // Textures are smoothed over the pixel by themselves: there, one more sample will do.
+        let others = &OTHERS[..if surrounded { 1 } else { 3 }];
+        let sum = others.iter().fold(here.levels, |sum, (dx, dy)| {
             let pixel = Point2::new(x as f64 + dx, y as f64 + dy);
             let bearing = self.intrinsics.bearing(&pixel);
             let ray = self.ray(&bearing);
             let sight = match here.face {
                 Some(face) if surrounded => self.town.look_again(&ray, face),
-                _ => self.town.look(&ray, 0.0),
+                likely => self.town.look_near(&ray, 0.0, likely),
             };
-            sum + self.levels(&ray, sight.as_ref(), bearing.z)
+            let levels = self.levels(shading, &ray, sight.as_ref(), bearing.z);
+            std::array::from_fn(|c| sum[c] + levels[c])
         });
-        sum / 4.0
+        sum.map(|level| level / (1 + others.len()) as f32)
     }
 
     /// What the sensor makes of the levels: vignetting, noise, eight bits.
-    fn sensed(&self, levels: &Vector3<f64>, x: u32, y: u32) -> [u8; 3] {
+    fn sensed(&self, levels: &Levels, x: u32, y: u32) -> [u8; 3] {
         let from_centre = |at: u32, size: u32| 2.0 * f64::from(at) / f64::from(size) - 1.0;
         let (u, v) = (
             from_centre(x, self.intrinsics.width),
@@ -160,7 +194,7 @@ impl View<'_> {
         std::array::from_fn(|channel| {
             let seed = derive(self.frame_seed, channel as u32);
             let noise = normal(hash3(x.cast_signed(), y.cast_signed(), 1, seed));
-            let level = levels[channel] * gain + self.look.noise * noise;
+            let level = f64::from(levels[channel]) * gain + self.look.noise * noise;
             (level + 0.5).clamp(0.0, 255.0) as u8
         })
     }

@@ -5,15 +5,76 @@ fn traversal(size: Size) -> Traversal {
     Traversal::new(7, Condition::Overcast, size)
 }
 
+/// Hashes of the image of half size and of the cloud of frame 40.
+fn hashes(condition: Condition) -> [u64; 2] {
+    let drive = Traversal::new(7, condition, Size::Half);
+    let mut points = Vec::new();
+    for point in drive.cloud(40) {
+        let ScanPoint {
+            position: p,
+            reflectance,
+        } = point;
+        for number in [p.x, p.y, p.z, reflectance] {
+            points.extend(number.to_le_bytes());
+        }
+    }
+    [
+        xxhash_rust::xxh3::xxh3_64(drive.image(40).as_raw()),
+        xxhash_rust::xxh3::xxh3_64(&points),
+    ]
+}
+
+/// They change with every change of the looks or the geometry, and with nothing else: not with the
+/// platform, nor with the number of threads.
 #[test]
-fn the_bytes_do_not_depend_on_the_number_of_threads() {
-    let drive = traversal(Size::Half);
-    let alone = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a pool of one thread");
-    assert_eq!(alone.install(|| drive.image(40)), drive.image(40));
-    assert_eq!(alone.install(|| drive.cloud(40)), drive.cloud(40));
+fn the_bytes_depend_on_the_condition_and_not_on_the_number_of_threads() {
+    const EXPECTED: [[u64; 2]; 5] = [
+        [0x7F5E_640F_20A1_9AD3, 0x8ABF_5DE4_4895_7E2D],
+        [0xD83D_029F_6585_11CD, 0x6DB6_7C4F_86C5_4CA0],
+        [0x0AD9_A1C6_7534_C0B0, 0x23CB_5BC6_78CE_7852],
+        [0x7B85_E653_C8E5_37E4, 0x59DF_69AD_7BF4_36C6],
+        [0x72AC_B9F9_A386_4812, 0xC02C_22A9_CAF4_832D],
+    ];
+    for threads in [1, 4] {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool of threads");
+        let found = Condition::ALL.map(|condition| pool.install(|| hashes(condition)));
+        assert_eq!(found, EXPECTED, "{threads} threads: {found:#018x?}");
+    }
+}
+
+#[test]
+fn conditions_are_called_as_they_are_opened() {
+    for condition in Condition::ALL {
+        let opened = Street::open(&format!("street:{}", condition.name()));
+        assert!(opened.is_ok(), "{condition:?}");
+    }
+}
+
+#[test]
+fn traversals_share_houses_and_differ_in_cars_and_in_the_line_driven() {
+    let [overcast, sun] = [Condition::Overcast, Condition::Sun]
+        .map(|condition| Traversal::new(7, condition, Size::Half));
+    assert_eq!(overcast.frame_count(), sun.frame_count());
+    for (a, b) in overcast.poses.iter().zip(&sun.poses) {
+        let offset = (a.translation.vector - b.translation.vector).norm();
+        assert!(offset < 0.35, "{offset}");
+        let turn = a.rotation.angle_to(&b.rotation).to_degrees();
+        assert!(turn < 2.0, "{turn}");
+    }
+    // Far above cars and below roofs, one sees the same walls.
+    let sky_hook = Point3::new(0.0, -3.5, 0.0);
+    let wall = |drive: &Traversal, pose: &Pose| {
+        let ray = render::town_ray(pose, &sky_hook, &nalgebra::Vector3::x());
+        drive.town.look(&ray, 0.0).map(|sight| sight.distance)
+    };
+    let mut same = 0;
+    for pose in overcast.poses.iter().step_by(10) {
+        same += usize::from(wall(&overcast, pose) == wall(&sun, pose));
+    }
+    assert!(same > 50, "{same}");
 }
 
 #[test]
@@ -63,13 +124,15 @@ fn agreement(drive: &Traversal, frame: usize) -> Agreement {
 
 #[test]
 fn scans_and_images_show_the_same_surfaces() {
-    let drive = traversal(Size::Full);
-    for frame in [5, 130, 333] {
-        let counts = agreement(&drive, frame);
-        let visible = counts.agreeing + counts.wrong;
-        assert!(visible > 8_000, "{counts:?}");
-        assert!(counts.wrong * 50 <= visible, "{counts:?}");
-        assert!(counts.hidden * 20 <= visible, "{counts:?}");
+    for condition in Condition::ALL {
+        let drive = Traversal::new(7, condition, Size::Full);
+        for frame in [5, 130, 333] {
+            let counts = agreement(&drive, frame);
+            let visible = counts.agreeing + counts.wrong;
+            assert!(visible > 8_000, "{condition:?} {counts:?}");
+            assert!(counts.wrong * 50 <= visible, "{condition:?} {counts:?}");
+            assert!(counts.hidden * 20 <= visible, "{condition:?} {counts:?}");
+        }
     }
 }
 

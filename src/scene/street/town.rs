@@ -3,19 +3,24 @@
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::box_tree::BoxTree;
+use super::cover::Cover;
 use super::frame::Ray;
 use super::furniture;
 use super::ground::{self, GroundContact};
 use super::houses;
+use super::lamps::Lamps;
 use super::material::{Appearance, Solid};
 use super::network::Network;
 use super::noise::Footprint;
 use super::plot::Builder;
 use super::shade::ContactShade;
 use super::shape::{Contact, Part};
+use super::weather::Season;
 
 /// Beyond this, there is only sky \[m\].
 const FAR: f64 = 500.0;
+/// The search of a ray ends this much below the carriageway \[m\].
+const CARRIAGEWAY_SLACK: f64 = 1e-3;
 /// A ray that goes through a hole goes on this much farther \[m\].
 const PAST_HOLE: f64 = 1e-4;
 
@@ -27,6 +32,8 @@ pub(super) struct Town {
     solids: Vec<Solid>,
     tree: BoxTree,
     shade: ContactShade,
+    /// The street lamps.
+    pub(super) lamps: Lamps,
     seed: u32,
 }
 
@@ -80,17 +87,18 @@ impl Sight {
 
 impl Town {
     /// The town of a seed, with the cars and leaves of a traversal.
-    pub(super) fn new(seed: u64, traversal: u32) -> Self {
+    pub(super) fn new(seed: u64, traversal: u32, season: Season) -> Self {
         let network = Network::new(seed);
-        let mut builder = Builder::new(&network, seed);
+        let mut builder = Builder::new(&network, seed, season);
         houses::build(&mut builder);
         furniture::place(&mut builder, traversal);
         furniture::park_cars(&mut builder, traversal);
-        let (solids, blots) = builder.finish();
+        let (solids, blots, lamps) = builder.finish();
         let boxes: Vec<_> = solids.iter().map(|solid| solid.shape.bounds()).collect();
         Self {
             tree: BoxTree::new(&boxes),
             shade: ContactShade::new(blots),
+            lamps: Lamps::new(&lamps),
             solids,
             network,
             seed: super::noise::mix(seed as u32 ^ (seed >> 32) as u32),
@@ -99,8 +107,23 @@ impl Town {
 
     /// The first surface on a ray farther than `from`.
     pub(super) fn look(&self, ray: &Ray, from: f64) -> Option<Sight> {
+        self.look_near(ray, from, None)
+    }
+
+    /// As [`Self::look`]; the search is quicker if it is a piece of `likely` that is seen.
+    pub(super) fn look_near(&self, ray: &Ray, from: f64, likely: Option<Face>) -> Option<Sight> {
         let mut best: Option<(u32, Contact)> = None;
         let mut limit = FAR;
+        if ray.direction.y < 0.0 && ray.origin.y > 0.0 {
+            // Nothing is below the carriageway.
+            limit = limit.min(-ray.origin.y / ray.direction.y + CARRIAGEWAY_SLACK);
+        }
+        if let Some(Face::Solid(index, _)) = likely
+            && let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit)
+        {
+            limit = contact.distance;
+            best = Some((index, contact));
+        }
         self.tree.traverse(ray, limit, |index| {
             if let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit) {
                 limit = contact.distance;
@@ -144,17 +167,53 @@ impl Town {
         }
     }
 
-    /// How a surface looks to a pixel that is `pixel` radians wide.
-    pub(super) fn appearance(&self, sight: &Sight, ray: &Ray, pixel: f64) -> Appearance {
+    /// How a surface in some weather looks to a pixel that is `pixel` radians wide.
+    pub(super) fn appearance(
+        &self,
+        sight: &Sight,
+        ray: &Ray,
+        pixel: f64,
+        cover: &Cover,
+    ) -> Appearance {
         let footprint = footprint(sight, ray, pixel);
         match &sight.target {
             Target::Ground(contact) => {
-                ground::appearance(&self.network, contact, &sight.point, &footprint, self.seed)
+                let hidden = cover.hides_ground(contact, &sight.point, &footprint, self.seed);
+                let bare = if hidden.share < 1.0 {
+                    ground::appearance(&self.network, contact, &sight.point, &footprint, self.seed)
+                } else {
+                    Appearance::default()
+                };
+                hidden.over(cover.wetted_ground(bare, contact, &sight.point, &footprint, self.seed))
             }
             Target::Solid(index, contact) => {
-                self.solids[*index as usize].appearance(contact, &sight.point, &footprint)
+                let solid = &self.solids[*index as usize];
+                let bare = solid.appearance(contact, &sight.point, &footprint);
+                cover.on_solid(bare, solid, contact, &sight.point, &footprint)
             }
         }
+    }
+
+    /// Whether something is between a surface and a light far away in a direction.
+    pub(super) fn is_shaded(&self, sight: &Sight, light: &Vector3<f64>) -> bool {
+        /// A surface does not shade itself.
+        const CLEAR: f64 = 0.02;
+        /// Nothing is high enough to cast longer shadows \[m\].
+        const LONGEST: f64 = 60.0;
+        let ray = Ray {
+            origin: sight.point + sight.normal * CLEAR,
+            direction: *light,
+        };
+        let mut shaded = false;
+        self.tree.traverse(&ray, LONGEST, |index| {
+            shaded = shaded
+                || self
+                    .meet(&self.solids[index as usize], &ray, CLEAR, LONGEST)
+                    .is_some();
+            // No box is nearer than that: the search ends.
+            if shaded { -1.0 } else { LONGEST }
+        });
+        shaded
     }
 
     /// The share of the light of the surroundings that reaches a surface.
