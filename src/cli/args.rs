@@ -58,7 +58,8 @@ pub struct ConfigArgs {
 
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Where the frames are: street, or a folder such as …/sequences/00 (KITTI odometry)
+    /// Where the frames are: street, street:night and so on, or a folder such as …/sequences/00
+    /// (KITTI odometry)
     pub scene: String,
     /// The format of the scene, if its content does not tell
     #[arg(long, value_name = "NAME")]

@@ -14,7 +14,7 @@ use crate::scene::{Entry, Scene, SceneError};
 
 pub(in crate::scene) const ENTRY: Entry = Entry {
     name: "street",
-    about: "the built-in street: street, or street:overcast",
+    about: "the built-in street: street, or one of its conditions such as street:night",
     recognizes: |argument| argument.split(':').next() == Some(NAME),
     open: |argument| Ok(Box::new(Street::open(argument)?)),
 };
