@@ -1,6 +1,6 @@
 //! How well each method localises a photo of one weather against a reference of another.
 //!
-//! `cargo run --release --example street_conditions -- --queries 60` prints Markdown: for FB, PM,
+//! `cargo run --release --no-default-features --example street_conditions -- --queries 60` prints Markdown: for FB, PM,
 //! MI and HY tables of five reference conditions (rows) by five query conditions (columns), and
 //! whether the findings of Fu, Pertuz, Matas and Kämäräinen (2019) show.
 //!

@@ -1,6 +1,6 @@
 //! Pictures of the built-in street in every weather, and how long they take.
 //!
-//! `cargo run --release --example street_gallery -- --out docs/street` writes one picture of half
+//! `cargo run --release --no-default-features --example street_gallery -- --out docs/street` writes one picture of half
 //! size per condition; `--frame N` (repeatable) chooses the place, `--full` the full size, `--png`
 //! lossless files.
 
