@@ -5,6 +5,7 @@ mod binary;
 mod command_line;
 mod conformance;
 mod data;
+mod decisions;
 mod frame_cache;
 mod kitti;
 mod real_pair;

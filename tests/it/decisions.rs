@@ -1,0 +1,109 @@
+//! Single decisions of the estimators, on two walls: each parameter changes what it says it does.
+
+use posescope::cloud::Cloud;
+use posescope::estimator::{self, Failure, Outcome};
+use posescope::evaluate::evaluate;
+use posescope::event::Method;
+use posescope::geometry::Pose;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::trace::Trace;
+
+use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
+
+fn with(assignments: &[&str]) -> Params {
+    let mut params = Params::default();
+    for assignment in assignments {
+        params.assign(assignment).expect("a good assignment");
+    }
+    params
+}
+
+fn outcome(method: Method, problem: &Problem, params: &Params) -> Outcome {
+    (estimator::entry(method).new)(params)
+        .estimate(problem, &mut Trace::off())
+        .expect("nobody cancels")
+}
+
+#[test]
+fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is_asked_for() {
+    // The query is 1 m from the reference.
+    let near = Problem {
+        uncertainty_radius_m: 0.5,
+        ..solvable()
+    };
+    let refused = outcome(Method::Feature, &near, &Params::default()).pose;
+    let failure = refused.expect_err("it is twice as far as it may be");
+    assert!(
+        matches!(failure, Failure::OutsideRadius { .. }),
+        "{failure}"
+    );
+    assert_eq!(failure.code(), "R5");
+    for accepting in ["fb.accept=paper", "fb.radius_slack=2"] {
+        let pose = outcome(Method::Feature, &near, &with(&[accepting])).pose;
+        assert!(pose.is_ok(), "{accepting}");
+    }
+}
+
+#[test]
+fn the_guarded_depth_rule_drops_keypoints_at_depth_edges_and_only_those() {
+    // Behind the left wall lies a second surface that the nearest-point rule does not notice.
+    let mut points = cloud_of_the_walls().points;
+    let behind: Vec<_> = points
+        .iter()
+        .filter(|point| point.z < 13.0)
+        .map(|point| point * 2.0)
+        .collect();
+    points.extend(behind);
+    let edged = problem(photo(1.0, 5), photo(0.0, 5), Cloud { points });
+    let with_depth = |problem: &Problem, rule: &str| {
+        let outcome = outcome(Method::Feature, problem, &with(&[rule]));
+        outcome.counts.expect("features were used").with_depth
+    };
+    let nearest = with_depth(&edged, "fb.depth=nearest");
+    let guarded = with_depth(&edged, "fb.depth=guarded");
+    assert!(0 < guarded && guarded < nearest, "{guarded} of {nearest}");
+    // On single walls the guard drops no more than the edge between them.
+    let plain = solvable();
+    let kept = with_depth(&plain, "fb.depth=guarded");
+    assert!(
+        10 * kept >= 8 * with_depth(&plain, "fb.depth=nearest"),
+        "{kept}"
+    );
+}
+
+#[test]
+fn without_the_uniqueness_test_every_match_that_passes_the_ratio_goes_on() {
+    let problem = problem(photo(1.0, 5), photo(0.0, 6), cloud_of_the_walls());
+    let counts = |assignment: &str| {
+        let params = with(&["fb.ratio=1", assignment]);
+        let outcome = outcome(Method::Feature, &problem, &params);
+        outcome.counts.expect("features were used")
+    };
+    let (strict, lax) = (counts("fb.unique=true"), counts("fb.unique=false"));
+    assert!(strict.unique < strict.ratio_passed);
+    assert_eq!(lax.unique, lax.ratio_passed);
+}
+
+#[test]
+fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
+    let problem = solvable();
+    let params = Params::default();
+    let result = |method, truth: Option<&Pose>| {
+        let outcome = outcome(method, &problem, &params);
+        evaluate("two walls", &problem, method, &params, &outcome, truth)
+    };
+    // If the reference pose were the true one, its cost would be the initial cost.
+    let reference = problem.reference.world_from_camera;
+    for method in [Method::Photometric, Method::MutualInformation] {
+        let cost = result(method, Some(&reference))
+            .cost
+            .expect("a direct method");
+        assert!(cost.initial.is_some());
+        assert_eq!(cost.truth, cost.initial, "{}", method.name());
+        let unknown = result(method, None);
+        assert_eq!(unknown.cost.expect("a direct method").truth, None);
+        assert_eq!((unknown.error, unknown.initial_error), (None, None));
+    }
+    assert_eq!(result(Method::Feature, Some(&reference)).cost, None);
+}
