@@ -23,13 +23,11 @@ use posescope::event::Method;
 use posescope::image::Photo;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
-use posescope::scene::street::{Condition, Size, Traversal};
+use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::trace::Trace;
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// The town of the built-in scene.
-const WORLD_SEED: u64 = 7;
 /// A pose counts as a success within this distance of the truth \[m\], as in the paper.
 const SUCCESS_M: f64 = 10.0;
 

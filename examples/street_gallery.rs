@@ -8,10 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use image::codecs::jpeg::JpegEncoder;
-use posescope::scene::street::{Condition, Size, Traversal};
-
-/// The town of the built-in scene.
-const WORLD_SEED: u64 = 7;
+use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut out = PathBuf::from(".");

@@ -50,7 +50,7 @@ use render::View;
 use town::Town;
 
 pub(super) use dataset::ENTRY;
-pub use dataset::Street;
+pub use dataset::{Street, WORLD_SEED};
 pub use lidar::ScanPoint;
 
 /// Weather and time of day of a traversal. It also decides which cars are parked.

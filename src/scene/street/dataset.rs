@@ -22,7 +22,7 @@ pub(in crate::scene) const ENTRY: Entry = Entry {
 const NAME: &str = "street";
 
 /// The town that everybody sees: results on the street can be compared because it is one street.
-const WORLD_SEED: u64 = 7;
+pub const WORLD_SEED: u64 = 7;
 
 /// Time between two frames, about 1 m apart at the speed of a town \[s\].
 const FRAME_INTERVAL_S: f64 = 0.1;
