@@ -16,6 +16,7 @@ use posescope::event::Method;
 use posescope::features::{MatchVerdict, SurfParams, classify, nearest_neighbours, surf};
 use posescope::geometry::PoseError;
 use posescope::image::GrayImage;
+use posescope::memo::Memo;
 use posescope::params::Params;
 use posescope::problem::{Problem, ReferenceTuple};
 use posescope::scene::{self, Scene};
@@ -229,6 +230,7 @@ fn pairs(
                 intrinsics: scene.intrinsics(),
                 world_from_camera,
                 cloud: scene.cloud(reference)?,
+                memo: Memo::off(),
             }),
             uncertainty_radius_m: 2.0 * distance_m,
             seed: 0,

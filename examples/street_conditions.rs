@@ -21,6 +21,7 @@ use posescope::cloud::Cloud;
 use posescope::estimator;
 use posescope::event::Method;
 use posescope::image::Photo;
+use posescope::memo::Memo;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
@@ -143,6 +144,7 @@ fn localize(
             name: format!("{frame:06}"),
             photo: Photo::from_color(drive.image(frame)),
             intrinsics: drive.intrinsics(),
+            memo: Memo::off(),
         });
         let truth = drive.world_from_camera(frame);
         for (reference_condition, other) in drives {
@@ -216,6 +218,7 @@ fn tuple(drive: &Traversal, frame: usize) -> Arc<ReferenceTuple> {
         cloud: Cloud {
             points: points.into_iter().map(|point| point.position).collect(),
         },
+        memo: Memo::off(),
     })
 }
 

@@ -20,7 +20,7 @@ use crate::event::Method;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::Score;
+use crate::render::{Comparison, Score};
 use crate::trace::{Cancelled, Trace};
 
 /// How many features passed each step of FB. Every query keypoint is in exactly one state, so
@@ -81,6 +81,11 @@ pub trait Estimator: Send + Sync {
 
     /// The cost that this estimator minimises, at any pose of the query; `None` if it has none.
     fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {
+        Some(self.compare_at(problem, world_from_query)?.score)
+    }
+
+    /// As [`Self::score_at`], with the synthetic view and what the cost was made of.
+    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         let _ = (problem, world_from_query);
         None
     }

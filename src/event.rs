@@ -6,11 +6,10 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use crate::cost::{Explanation, IntensityPair};
-use crate::features::{Features, Match};
+use crate::features::{Features, Match, MatchVerdict};
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase, ScoredLattice};
-use crate::render::{ColoredCloud, Score, SyntheticView};
+use crate::render::{ColoredCloud, Comparison, Score};
 use crate::robust::{Acceptance, Trial};
 
 /// Which of the two photos.
@@ -213,6 +212,8 @@ pub struct StageEnded {
     pub stage: Stage,
     /// Whether it did what it was for.
     pub succeeded: bool,
+    /// Whether its result was remembered from an earlier run.
+    pub reused: bool,
 }
 
 /// SURF features of one photo.
@@ -229,6 +230,14 @@ pub struct FeaturesDetected {
 pub struct MatchesDecided {
     /// One per query keypoint, in their order; `None` where the reference has no feature.
     pub decisions: Arc<[Option<Match>]>,
+}
+
+impl MatchesDecided {
+    /// Number of matches that are distinct and unique.
+    pub fn candidates(&self) -> usize {
+        let is_candidate = |found: &&Match| found.verdict == MatchVerdict::Candidate;
+        self.decisions.iter().flatten().filter(is_candidate).count()
+    }
 }
 
 /// The cloud was projected into the reference photo.
@@ -261,6 +270,14 @@ pub struct LiftedMatch {
 pub struct DepthsLifted {
     /// One per unique match, in the order of the query keypoints.
     pub matches: Arc<[LiftedMatch]>,
+}
+
+impl DepthsLifted {
+    /// Number of matches with a depth.
+    pub fn with_depth(&self) -> usize {
+        let matches = self.matches.iter();
+        matches.filter(|lifted| lifted.point.is_some()).count()
+    }
 }
 
 /// One trial of MLESAC.
@@ -411,14 +428,8 @@ pub struct ViewRendered {
     pub evaluation: u64,
     /// Where the camera is.
     pub offset: Offset,
-    /// Its cost and support.
-    pub score: Score,
-    /// The view.
-    pub view: Arc<SyntheticView>,
-    /// Query and view at each covered pixel, in the order of the view's pixels.
-    pub pairs: Arc<[IntensityPair]>,
-    /// What the cost was made of; `None` where there is no cost.
-    pub explanation: Option<Arc<Explanation>>,
+    /// The view, its cost and what made it.
+    pub comparison: Arc<Comparison>,
 }
 
 /// How the minimum of the search compares with other poses.

@@ -10,6 +10,11 @@ pub struct History {
 }
 
 impl History {
+    /// Adds a record behind the others.
+    pub fn push(&mut self, record: Record) {
+        self.records.push(record);
+    }
+
     /// All records.
     pub fn records(&self) -> &[Record] {
         &self.records
@@ -45,7 +50,7 @@ impl History {
 
 impl Sink for History {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        self.records.push(record.clone());
+        self.push(record.clone());
         Ok(())
     }
 }

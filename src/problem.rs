@@ -6,6 +6,7 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
+use crate::memo::Memo;
 
 /// The photo whose pose is sought.
 #[derive(Clone, Debug)]
@@ -16,6 +17,8 @@ pub struct Query {
     pub photo: Photo,
     /// The query camera.
     pub intrinsics: Intrinsics,
+    /// What estimators worked out about this query.
+    pub memo: Memo,
 }
 
 /// A photo with known pose and the cloud registered with it: the paper's reference tuple (I_R, P_R).
@@ -31,6 +34,8 @@ pub struct ReferenceTuple {
     pub world_from_camera: Pose,
     /// The cloud P_R, in the reference camera's frame.
     pub cloud: Cloud,
+    /// What estimators worked out about this reference.
+    pub memo: Memo,
 }
 
 /// One query to localise against one reference tuple.

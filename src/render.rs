@@ -6,7 +6,7 @@ mod score;
 mod splat;
 
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud};
-pub use score::{Score, Scorer};
+pub use score::{Comparison, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
 use crate::params::{About, Describe, ParamVisitor};

@@ -15,6 +15,7 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
+use crate::memo::Memo;
 use crate::problem::{Query, ReferenceTuple};
 
 /// A sequence of frames in one world frame. Frames are addressed by position, `0..frames().len()`.
@@ -87,6 +88,7 @@ impl dyn Scene + '_ {
             name: self.frames()[frame].clone(),
             photo: self.photo(frame)?,
             intrinsics: self.intrinsics(),
+            memo: Memo::off(),
         }))
     }
 
@@ -108,6 +110,7 @@ impl dyn Scene + '_ {
             intrinsics: self.intrinsics(),
             world_from_camera,
             cloud: self.cloud(frame)?,
+            memo: Memo::off(),
         }))
     }
 }

@@ -75,6 +75,8 @@ struct Watcher<'a> {
     wanted: KindSet,
     delivered: u64,
     depth: usize,
+    /// Whether the stage that is open and innermost used a remembered result.
+    reused: bool,
 }
 
 impl<'a> Trace<'a> {
@@ -103,6 +105,7 @@ impl<'a> Trace<'a> {
                 wanted,
                 delivered: 0,
                 depth: 0,
+                reused: false,
             }),
         }
     }
@@ -135,6 +138,13 @@ impl<'a> Trace<'a> {
         }
     }
 
+    /// Says where the stage's result comes from: whether it was remembered from an earlier run.
+    pub fn note_reuse(&mut self, reused: bool) {
+        if let Some(watcher) = &mut self.watcher {
+            watcher.reused = reused;
+        }
+    }
+
     /// Runs `body` as a named part of the estimator, which a watcher can step over and out of.
     ///
     /// # Errors
@@ -147,6 +157,7 @@ impl<'a> Trace<'a> {
         if let Some(watcher) = &mut self.watcher {
             watcher.attend_if_asked()?;
             watcher.depth += 1;
+            watcher.reused = false;
             watcher.deliver(StageStarted { stage }.into())?;
         }
         let outcome = body(self);
@@ -154,6 +165,7 @@ impl<'a> Trace<'a> {
             let ended = StageEnded {
                 stage,
                 succeeded: outcome.is_ok(),
+                reused: std::mem::take(&mut watcher.reused),
             };
             let told = watcher.deliver(ended.into());
             watcher.depth -= 1;
@@ -268,7 +280,8 @@ mod tests {
             last.event,
             Event::StageEnded(StageEnded {
                 stage: Stage::DepthLift,
-                succeeded: false
+                succeeded: false,
+                ..
             })
         ));
     }

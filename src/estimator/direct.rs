@@ -15,8 +15,9 @@ use crate::event::{
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice};
 use crate::image::gaussian_smoothed;
-use crate::problem::Problem;
-use crate::render::{ColoredCloud, RenderParams, Score, Scorer, color_cloud};
+use crate::memo::Recalled;
+use crate::problem::{Problem, ReferenceTuple};
+use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
@@ -25,6 +26,8 @@ pub struct Direct {
     pub(super) cost: Box<dyn Cost>,
     pub(super) render: RenderParams,
     pub(super) grid: GridParams,
+    /// All parameters of the cost, as a key of what is remembered.
+    pub(super) cost_key: String,
 }
 
 impl Estimator for Direct {
@@ -46,13 +49,10 @@ impl Estimator for Direct {
         })
     }
 
-    fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {
-        let cloud = self.colored(problem);
+    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
+        let cloud = self.colored(problem).value;
         let reference_from_query = problem.reference_from_query(world_from_query);
-        self.scorer(problem, &cloud)
-            .score(&[reference_from_query])
-            .first()
-            .copied()
+        Some(self.scorer(problem, &cloud).compare(&reference_from_query))
     }
 }
 
@@ -63,7 +63,11 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let cloud = trace.stage(Stage::Color, |trace| {
-            let cloud = Arc::new(self.colored(problem));
+            let Recalled {
+                value: cloud,
+                reused,
+            } = self.colored(problem);
+            trace.note_reuse(reused);
             trace.emit(|| CloudColored {
                 cloud: Arc::clone(&cloud),
             })?;
@@ -80,14 +84,17 @@ impl Direct {
         let initial = scorer.score(&[start.reference_from_camera()])[0];
         let mut search = Search {
             scorer: &scorer,
-            cost: self.cost.as_ref(),
+            memory: Memory {
+                direct: self,
+                problem,
+            },
             covered_at_reference: initial.covered,
             least_covered: (self.grid.coverage_floor * f64::from(initial.covered)).ceil() as u32,
             evaluations: 1,
             best: start,
             best_score: initial,
         };
-        trace.emit(|| search.render(Moment::Start, start, initial))?;
+        trace.emit(|| search.render(Moment::Start, start))?;
 
         let mut coarse_positions = None;
         for _ in 0..self.grid.rounds {
@@ -116,7 +123,7 @@ impl Direct {
                 let hypotheses = evaluations as usize;
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
             };
-            trace.emit(|| search.render(Moment::End, best, best_score))?;
+            trace.emit(|| search.render(Moment::End, best))?;
             let area = problem.query.intrinsics.area();
             let summary = CostSummary {
                 initial: initial.cost,
@@ -142,21 +149,27 @@ impl Direct {
         })
     }
 
-    fn colored(&self, problem: &Problem) -> ColoredCloud {
+    fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        color_cloud(
-            &reference.cloud,
-            &reference.photo.gray,
-            &reference.intrinsics,
-            &self.render,
-        )
+        reference.memo.recall(&self.render, || {
+            color_cloud(
+                &reference.cloud,
+                &reference.photo.gray,
+                &reference.intrinsics,
+                &self.render,
+            )
+        })
     }
 
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
+        let sigma = self.cost.query_smoothing_px();
+        let smoothed = query
+            .memo
+            .recall(&sigma, || gaussian_smoothed(&query.photo.gray, sigma));
         Scorer::new(
             &cloud.points,
-            gaussian_smoothed(&query.photo.gray, self.cost.query_smoothing_px()),
+            smoothed.value,
             &query.intrinsics,
             self.render.splat_px,
             self.cost.as_ref(),
@@ -164,10 +177,43 @@ impl Direct {
     }
 }
 
+/// Where the scores of a lattice are remembered: with the query, under all that they depend on.
+struct Memory<'a> {
+    direct: &'a Direct,
+    problem: &'a Problem,
+}
+
+/// Remembered scores. They keep their reference alive, so that its address stays its own.
+struct LatticeScores {
+    scores: Vec<Score>,
+    _reference: Arc<ReferenceTuple>,
+}
+
+impl Memory<'_> {
+    fn scores(
+        &self,
+        lattice: &Lattice,
+        score: impl FnOnce() -> Vec<Score>,
+    ) -> Recalled<LatticeScores> {
+        let Self { direct, problem } = self;
+        let reference = &problem.reference;
+        let key = (
+            Arc::as_ptr(reference),
+            &direct.cost_key,
+            &direct.render,
+            lattice,
+        );
+        problem.query.memo.recall(&key, || LatticeScores {
+            scores: score(),
+            _reference: Arc::clone(reference),
+        })
+    }
+}
+
 /// The state of a search: where it stands and what it has seen.
 struct Search<'a> {
     scorer: &'a Scorer<'a>,
-    cost: &'a dyn Cost,
+    memory: Memory<'a>,
     covered_at_reference: u32,
     least_covered: u32,
     evaluations: u64,
@@ -192,7 +238,12 @@ impl Search<'_> {
         let mut scores = vec![None; lattice.cells()];
         let mut least: Option<f64> = None;
         let phase = lattice.phase;
-        for (&(cell, offset), score) in hypotheses.iter().zip(self.scorer.score(&poses)) {
+        let Recalled {
+            value: found,
+            reused,
+        } = self.memory.scores(&lattice, || self.scorer.score(&poses));
+        trace.note_reuse(reused);
+        for (&(cell, offset), &score) in hypotheses.iter().zip(&found.scores) {
             scores[cell] = Some(score);
             let cost = score.eligible_cost(self.least_covered);
             let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
@@ -210,7 +261,7 @@ impl Search<'_> {
                 is_best,
             })?;
             if is_best {
-                trace.emit(|| self.render(Moment::NewBest, offset, score))?;
+                trace.emit(|| self.render(Moment::NewBest, offset))?;
             }
         }
         let surface = Arc::new(ScoredLattice {
@@ -232,28 +283,25 @@ impl Search<'_> {
         Ok(surface)
     }
 
-    fn render(&self, moment: Moment, offset: Offset, score: Score) -> ViewRendered {
-        let (view, pairs) = self.scorer.view(&offset.reference_from_camera());
+    fn render(&self, moment: Moment, offset: Offset) -> ViewRendered {
         ViewRendered {
             moment,
             evaluation: self.evaluations.saturating_sub(1),
             offset,
-            score,
-            view: Arc::new(view),
-            explanation: self.cost.explain(&pairs).map(Arc::new),
-            pairs: pairs.into(),
+            comparison: Arc::new(self.scorer.compare(&offset.reference_from_camera())),
         }
     }
 
     /// The cost at the minimum if the view's pixels had nothing to do with the query's: what a
     /// minimum must beat to mean anything.
     fn shuffled_cost(&self, seed: u64) -> Option<f64> {
-        let (_, mut pairs) = self.scorer.view(&self.best.reference_from_camera());
+        let best = self.best.reference_from_camera();
+        let Comparison { mut pairs, .. } = self.scorer.compare(&best);
         let mut values: Vec<f32> = pairs.iter().map(|pair| pair.synthetic).collect();
         values.shuffle(&mut Pcg64::seed_from_u64(seed));
         for (pair, value) in pairs.iter_mut().zip(values) {
             pair.synthetic = value;
         }
-        self.cost.evaluate(&pairs)
+        self.memory.direct.cost.evaluate(&pairs)
     }
 }

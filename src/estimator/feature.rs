@@ -3,6 +3,7 @@
 mod journey;
 mod params;
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use nalgebra::Point2;
@@ -19,16 +20,29 @@ use crate::features::{
     Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
 };
 use crate::geometry::Pose;
+use crate::memo::Recalled;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::robust::{
-    AcceptanceRule, Consensus, MlesacError, effective_area_px, inliers_beyond_chance, mlesac,
+    AcceptanceRule, Consensus, MlesacError, Trial, effective_area_px, inliers_beyond_chance, mlesac,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
 
 /// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
 const MINIMUM: usize = 4;
+
+/// Remembered matches. They keep their reference alive, so that its address stays its own.
+struct Decisions {
+    decisions: Arc<[Option<Match>]>,
+    _reference: Arc<ReferenceTuple>,
+}
+
+/// What MLESAC found, and all it tried on the way.
+struct Solved {
+    trials: Vec<Trial>,
+    outcome: Result<Consensus, MlesacError<Infallible>>,
+}
 
 /// The feature-based estimator.
 pub struct FeatureBased {
@@ -69,6 +83,8 @@ impl FeatureBased {
         let (query, reference) = trace.stage(Stage::Detect, |trace| {
             let query = self.detect(Side::Query, problem, trace)?;
             let reference = self.detect(Side::Reference, problem, trace)?;
+            trace.note_reuse(query.reused && reference.reused);
+            let (query, reference) = (query.value, reference.value);
             counts.query_keypoints = query.keypoints.len();
             counts.reference_keypoints = reference.keypoints.len();
             Ok::<_, Halt>((query, reference))
@@ -102,11 +118,13 @@ impl FeatureBased {
         }
 
         let matches = trace.stage(Stage::Match, |trace| {
-            let decisions = self.best_matches(query, reference);
+            let decisions = self.best_matches(problem, query, reference);
+            trace.note_reuse(decisions.reused);
+            let decisions = &decisions.value.decisions;
             trace.emit(|| MatchesDecided {
-                decisions: Arc::clone(&decisions),
+                decisions: Arc::clone(decisions),
             })?;
-            Ok::<_, Halt>(journey.after_matching(&decisions))
+            Ok::<_, Halt>(journey.after_matching(decisions))
         })?;
         counts.ratio_passed = journey.passed_ratio_test();
         counts.unique = matches.len();
@@ -164,32 +182,44 @@ impl FeatureBased {
         side: Side,
         problem: &Problem,
         trace: &mut Trace<'_>,
-    ) -> Result<Arc<Features>, Cancelled> {
-        let photo = match side {
-            Side::Query => &problem.query.photo,
-            Side::Reference => &problem.reference.photo,
+    ) -> Result<Recalled<Features>, Cancelled> {
+        let (photo, memo) = match side {
+            Side::Query => (&problem.query.photo, &problem.query.memo),
+            Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let features = Arc::new(surf(&photo.gray, &self.surf));
+        let features = memo.recall(&self.surf, || surf(&photo.gray, &self.surf));
         trace.emit(|| FeaturesDetected {
             side,
-            features: Arc::clone(&features),
+            features: Arc::clone(&features.value),
         })?;
         Ok(features)
     }
 
     /// The best match of each query feature, and whether it stands out.
-    fn best_matches(&self, query: &Features, reference: &Features) -> Arc<[Option<Match>]> {
-        let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
-        let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
-        let mut matches = classify(&forward, &backward, self.params.ratio as f32);
-        if !self.params.unique {
-            for found in matches.iter_mut().flatten() {
-                if let MatchVerdict::NotUnique { .. } = found.verdict {
-                    found.verdict = MatchVerdict::Candidate;
+    fn best_matches(
+        &self,
+        problem: &Problem,
+        query: &Features,
+        reference: &Features,
+    ) -> Recalled<Decisions> {
+        let FeatureParams { ratio, unique, .. } = self.params;
+        let key = (Arc::as_ptr(&problem.reference), self.surf, ratio, unique);
+        problem.query.memo.recall(&key, || {
+            let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
+            let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
+            let mut matches = classify(&forward, &backward, ratio as f32);
+            if !unique {
+                for found in matches.iter_mut().flatten() {
+                    if let MatchVerdict::NotUnique { .. } = found.verdict {
+                        found.verdict = MatchVerdict::Candidate;
+                    }
                 }
             }
-        }
-        matches.into()
+            Decisions {
+                decisions: matches.into(),
+                _reference: Arc::clone(&problem.reference),
+            }
+        })
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -200,7 +230,10 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics);
+        let cloud = tuple.memo.recall(&"projected", || {
+            ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
+        });
+        let cloud = cloud.value;
         trace.emit(|| ProjectedCloud {
             points: tuple.cloud.len(),
             in_view: cloud.len(),
@@ -237,14 +270,23 @@ impl FeatureBased {
         correspondences: &[Correspondence],
         trace: &mut Trace<'_>,
     ) -> Result<Consensus, Halt> {
-        mlesac(
-            correspondences,
-            &problem.query.intrinsics,
-            &self.params.mlesac,
-            problem.random_seed("mlesac"),
-            |trial| trace.emit(|| HypothesisTried { trial: *trial }),
-        )
-        .map_err(|error| match error {
+        let intrinsics = &problem.query.intrinsics;
+        let params = &self.params.mlesac;
+        let seed = problem.random_seed("mlesac");
+        let key = (intrinsics, params, seed, correspondences);
+        let solved = problem.query.memo.recall(&key, || {
+            let mut trials = Vec::new();
+            let outcome = mlesac(correspondences, intrinsics, params, seed, |trial| {
+                trials.push(*trial);
+                Ok(())
+            });
+            Solved { trials, outcome }
+        });
+        trace.note_reuse(solved.reused);
+        for trial in &solved.value.trials {
+            trace.emit(|| HypothesisTried { trial: *trial })?;
+        }
+        solved.value.outcome.clone().map_err(|error| match error {
             MlesacError::TooFewCorrespondences { found, .. } => Halt::from(Failure::NoConsensus {
                 correspondences: found,
                 best_inliers: 0,
@@ -258,7 +300,7 @@ impl FeatureBased {
                 best_inliers,
                 trials,
             }),
-            MlesacError::Cancelled(cancelled) => Halt::from(cancelled),
+            MlesacError::Cancelled(never) => match never {},
         })
     }
 

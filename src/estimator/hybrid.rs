@@ -7,7 +7,7 @@ use crate::event::{BranchTaken, Method, Stage};
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::Score;
+use crate::render::Comparison;
 use crate::trace::{Cancelled, Trace};
 
 /// FB, and MI where FB has no pose.
@@ -52,7 +52,8 @@ impl Estimator for Hybrid {
         })
     }
 
-    fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {
-        self.mutual_information.score_at(problem, world_from_query)
+    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
+        self.mutual_information
+            .compare_at(problem, world_from_query)
     }
 }

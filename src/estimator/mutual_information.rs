@@ -12,5 +12,6 @@ pub fn mutual_information(params: &Params) -> Direct {
         cost: Box::new(MutualInformation::new(&params.mi)),
         render: params.render.clone(),
         grid: params.grid.clone(),
+        cost_key: format!("{:?}", params.mi),
     }
 }

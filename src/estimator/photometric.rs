@@ -12,5 +12,6 @@ pub fn photometric(params: &Params) -> Direct {
         cost: Box::new(Photometric::new(&params.pm)),
         render: params.render.clone(),
         grid: params.grid.clone(),
+        cost_key: format!("{:?}", params.pm),
     }
 }

@@ -1,10 +1,12 @@
 //! Scoring many hypotheses of the direct methods at once.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::{ColoredPoint, Rasterizer, SplattedPixel, SyntheticView};
 use crate::camera::Intrinsics;
-use crate::cost::{Cost, IntensityPair};
+use crate::cost::{Cost, Explanation, IntensityPair};
 use crate::geometry::Pose;
 use crate::image::FloatImage;
 
@@ -26,10 +28,23 @@ impl Score {
     }
 }
 
+/// A synthetic view beside the query, and what the cost makes of the two.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// The view.
+    pub view: SyntheticView,
+    /// Query and view at each covered pixel, in the order of the view's pixels.
+    pub pairs: Vec<IntensityPair>,
+    /// Cost and support.
+    pub score: Score,
+    /// What the cost was made of; `None` where there is no cost.
+    pub explanation: Option<Explanation>,
+}
+
 /// Renders the coloured cloud for a hypothesis and compares it with the query.
 pub struct Scorer<'a> {
     points: &'a [ColoredPoint],
-    query: FloatImage,
+    query: Arc<FloatImage>,
     intrinsics: Intrinsics,
     splat_px: usize,
     cost: &'a dyn Cost,
@@ -40,7 +55,7 @@ impl<'a> Scorer<'a> {
     /// `intrinsics` says.
     pub fn new(
         points: &'a [ColoredPoint],
-        query: FloatImage,
+        query: Arc<FloatImage>,
         intrinsics: &Intrinsics,
         splat_px: usize,
         cost: &'a dyn Cost,
@@ -73,13 +88,21 @@ impl<'a> Scorer<'a> {
             .collect()
     }
 
-    /// The synthetic view of one camera and what it is compared with, pixel by pixel.
-    pub fn view(&self, reference_from_camera: &Pose) -> (SyntheticView, Vec<IntensityPair>) {
+    /// The synthetic view of one camera beside the query.
+    pub fn compare(&self, reference_from_camera: &Pose) -> Comparison {
         let view = self
             .rasterizer()
             .view(self.points, &reference_from_camera.inverse());
-        let pairs = self.pair_up(&view.pixels).collect();
-        (view, pairs)
+        let pairs: Vec<IntensityPair> = self.pair_up(&view.pixels).collect();
+        Comparison {
+            score: Score {
+                cost: self.cost.evaluate(&pairs),
+                covered: pairs.len() as u32,
+            },
+            explanation: self.cost.explain(&pairs),
+            view,
+            pairs,
+        }
     }
 
     fn rasterizer(&self) -> Rasterizer {

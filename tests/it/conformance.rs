@@ -1,15 +1,18 @@
 //! What every estimator must keep. It walks over the registry, so a new entry is tested by being
 //! there.
 
+use std::sync::Arc;
+
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope::cloud::Cloud;
 use posescope::estimator::{self, Outcome};
 use posescope::event::{
     DepthsLifted, Event, FeatureState, FeaturesClassified, FeaturesDetected, KindSet,
-    MatchesDecided, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
+    MatchesDecided, Method, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
 };
 use posescope::history::History;
+use posescope::memo::Memo;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::trace::{Cancelled, Record, Sink, Trace};
@@ -266,4 +269,77 @@ proptest! {
         let reference_seed = if other % 2 == 0 { seed } else { other };
         check_states(&problem(photo(forward, seed), photo(0.0, reference_seed), cloud));
     }
+}
+
+/// Stages of a run with a remembering problem, and whether each reused its result.
+fn stages_of(estimator: &dyn estimator::Estimator, problem: &Problem) -> Vec<(Stage, bool)> {
+    let mut history = History::default();
+    estimator
+        .estimate(problem, &mut Trace::to(&mut history))
+        .expect("nobody cancels");
+    history
+        .all::<StageEnded>()
+        .map(|(_, ended)| (ended.stage, ended.reused))
+        .collect()
+}
+
+fn remembering() -> Problem {
+    let mut problem = solvable();
+    let mut query = (*problem.query).clone();
+    query.memo = Memo::of(64);
+    problem.query = Arc::new(query);
+    let mut reference = (*problem.reference).clone();
+    reference.memo = Memo::of(64);
+    problem.reference = Arc::new(reference);
+    problem
+}
+
+#[test]
+fn a_remembering_problem_has_the_same_outcomes_the_second_time_too() {
+    let problem = remembering();
+    for (name, estimator) in estimators() {
+        let outcome = silent(estimator.as_ref(), &solvable());
+        for _ in 0..2 {
+            assert_eq!(silent(estimator.as_ref(), &problem), outcome, "{name}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_depend_on_a_changed_parameter_is_reused() {
+    let reused_after = |method: Method, change: &str| -> Vec<&'static str> {
+        let problem = remembering();
+        let entry = estimator::entry(method);
+        let first = stages_of((entry.new)(&Params::default()).as_ref(), &problem);
+        assert!(first.iter().all(|(_, reused)| !reused), "{first:?}");
+        let mut params = Params::default();
+        params.assign(change).expect("a good assignment");
+        stages_of((entry.new)(&params).as_ref(), &problem)
+            .into_iter()
+            .filter_map(|(stage, reused)| reused.then_some(stage.name()))
+            .collect()
+    };
+    let positions = ["color", "position_coarse", "position_fine"];
+    assert_eq!(
+        reused_after(Method::Feature, "fb.accept=paper"),
+        ["detect", "match", "ransac"]
+    );
+    assert_eq!(
+        reused_after(Method::Feature, "fb.depth_radius=2"),
+        ["detect", "match"]
+    );
+    assert_eq!(reused_after(Method::Feature, "fb.ratio=0.7"), ["detect"]);
+    assert!(reused_after(Method::Feature, "surf.threshold=900").is_empty());
+    assert_eq!(
+        reused_after(Method::MutualInformation, "grid.yaw_step_deg=2"),
+        positions
+    );
+    assert_eq!(
+        reused_after(Method::MutualInformation, "mi.bins=8"),
+        ["color"]
+    );
+    assert_eq!(
+        reused_after(Method::Photometric, "mi.bins=8"),
+        [&positions[..], &["yaw_coarse", "yaw_fine"]].concat()
+    );
 }

@@ -9,6 +9,7 @@ use posescope::estimator;
 use posescope::event::Method;
 use posescope::geometry::PoseError;
 use posescope::image::Photo;
+use posescope::memo::Memo;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Size, Street};
@@ -42,6 +43,7 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
             name: format!("{query:06}"),
             photo: photo(query),
             intrinsics,
+            memo: Memo::off(),
         }),
         reference: Arc::new(ReferenceTuple {
             name: format!("{reference:06}"),
@@ -51,6 +53,7 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
             cloud: Cloud {
                 points: scan.iter().map(|point| point.position).collect(),
             },
+            memo: Memo::off(),
         }),
         uncertainty_radius_m: 15.0,
         seed: 0,

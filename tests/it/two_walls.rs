@@ -7,6 +7,7 @@ use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
+use posescope::memo::Memo;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 
 pub const CAMERA: Intrinsics = Intrinsics {
@@ -47,6 +48,7 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
             name: "query".to_owned(),
             photo: Photo::from_gray(query),
             intrinsics: CAMERA,
+            memo: Memo::off(),
         }),
         reference: Arc::new(ReferenceTuple {
             name: "reference".to_owned(),
@@ -54,6 +56,7 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
             intrinsics: CAMERA,
             world_from_camera: Pose::translation(100.0, -2.0, 30.0),
             cloud,
+            memo: Memo::off(),
         }),
         uncertainty_radius_m: 3.0,
         seed: 7,

@@ -10,6 +10,7 @@ use super::surface::{self, CostRange};
 use crate::cost::Explanation;
 use crate::event::{Event, PhaseSearched, PoseScored, ViewRendered};
 use crate::grid::{Offset, Phase};
+use crate::render::Comparison;
 
 /// What a direct method told so far, as far as later events refer to it.
 #[derive(Default)]
@@ -53,9 +54,14 @@ impl DirectStory {
 
     fn rendered(&mut self, event: &ViewRendered, place: &Place<'_>, stream: &mut Stream) {
         let path = |part| entities::direct(place.method, part);
-        let ViewRendered { view, pairs, .. } = event;
+        let Comparison {
+            view,
+            pairs,
+            score,
+            explanation,
+        } = event.comparison.as_ref();
         stream.log_image(&path("synthetic"), images::synthetic(view));
-        match event.explanation.as_deref() {
+        match explanation {
             Some(Explanation::Photometric(weights)) => {
                 stream.log_image(&path("residual"), images::residual(view, pairs));
                 stream.log_image(&path("weights"), images::weights(view, weights));
@@ -71,7 +77,7 @@ impl DirectStory {
             }
             None => {}
         }
-        if let Some(cost) = event.score.cost {
+        if let Some(cost) = score.cost {
             stream.log(&path("best"), &Scalars::single(cost));
         }
         self.path.push(event.offset);

@@ -31,11 +31,7 @@ pub(super) fn sentence(event: &Event) -> Option<String> {
         ),
         Event::DepthsLifted(event) => format!(
             "{} of {} matches have a depth",
-            event
-                .matches
-                .iter()
-                .filter(|lifted| lifted.point.is_some())
-                .count(),
+            event.with_depth(),
             event.matches.len()
         ),
         Event::HypothesisTried(event) if event.trial.is_best => {
@@ -110,8 +106,8 @@ fn rendered(event: &ViewRendered) -> String {
     };
     format!(
         "{what}: cost {} over {} pixels, {}",
-        cost(event.score.cost),
-        event.score.covered,
+        cost(event.comparison.score.cost),
+        event.comparison.score.covered,
         at(&event.offset)
     )
 }

@@ -1,0 +1,140 @@
+//! A run that somebody drives: an estimator on a thread of its own that can be paused, stepped,
+//! broken into and stopped.
+//!
+//! The estimators know nothing of this. A gate, which is one more [`Sink`](crate::trace::Sink),
+//! holds the thread back between two events.
+
+mod breakpoint;
+mod gate;
+mod job;
+mod run;
+
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver};
+
+pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
+pub use gate::RunMode;
+pub use job::{Job, Loaded};
+pub use run::{Run, Span, StageBar};
+
+use gate::Control;
+use job::Message;
+
+/// What a session is doing.
+#[derive(Clone, Debug, PartialEq)]
+pub enum State {
+    /// Photos and clouds are being read.
+    Loading,
+    /// Events are coming in.
+    Running,
+    /// The estimator waits behind the last event.
+    Paused {
+        /// The breakpoint that stopped it, if one did.
+        breakpoint: Option<String>,
+    },
+    /// All that was asked for is done.
+    Finished,
+    /// It was told to stop.
+    Cancelled,
+    /// It cannot go on: bad data, or a fault of ours.
+    Broken(String),
+}
+
+/// A run on its own thread, and what it has told so far.
+///
+/// Dropping a session cancels its run and does not wait for the thread.
+pub struct Session {
+    control: Arc<Control>,
+    inbox: Receiver<Message>,
+    run: Run,
+    state: State,
+}
+
+impl Session {
+    /// Starts a job. `wake` is called on the worker's thread whenever there is something new, often;
+    /// it must not block.
+    pub fn start(
+        job: Job,
+        mode: RunMode,
+        breakpoints: Breakpoints,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Self {
+        let control = Arc::new(Control::new(mode, breakpoints));
+        // Unbounded: a full queue that nobody drains would keep a cancelled worker waiting.
+        let (outbox, inbox) = mpsc::channel();
+        let run = Run::new(job.params.clone());
+        job::spawn(job, Arc::clone(&control), outbox, Arc::new(wake));
+        Self {
+            control,
+            inbox,
+            run,
+            state: State::Loading,
+        }
+    }
+
+    /// Takes in what the worker told since the last call. Whether there was anything.
+    pub fn drain(&mut self) -> bool {
+        let mut is_new = false;
+        while let Ok(message) = self.inbox.try_recv() {
+            is_new = true;
+            match message {
+                Message::Loaded(loaded) => {
+                    self.run.loaded = Some(loaded);
+                    self.state = State::Running;
+                }
+                Message::Began { method, reference } => self.run.begin(method, reference),
+                Message::Told(record) => {
+                    self.run.push(record);
+                    // It was told to go on, or is about to say that it waits.
+                    self.state = State::Running;
+                }
+                Message::Waits { breakpoint } => self.state = State::Paused { breakpoint },
+                Message::Goes => self.state = State::Running,
+                Message::Ended { result, times } => self.run.end(*result, times),
+                Message::Finished => self.state = State::Finished,
+                Message::Cancelled => self.state = State::Cancelled,
+                Message::Broke(why) => self.state = State::Broken(why),
+            }
+        }
+        is_new
+    }
+
+    /// What the run has told so far.
+    pub fn run(&self) -> &Run {
+        &self.run
+    }
+
+    /// What the session is doing, as of the last [`Self::drain`].
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Whether more events may come.
+    pub fn is_alive(&self) -> bool {
+        matches!(
+            self.state,
+            State::Loading | State::Running | State::Paused { .. }
+        )
+    }
+
+    /// Goes on in another way; a paused run goes on at once, a running one pauses soon.
+    pub fn set_mode(&self, mode: RunMode) {
+        self.control.set_mode(mode);
+    }
+
+    /// Replaces the breakpoints.
+    pub fn set_breakpoints(&self, breakpoints: Breakpoints) {
+        self.control.set_breakpoints(breakpoints);
+    }
+
+    /// Asks the run to stop. It says [`State::Cancelled`] when it has.
+    pub fn cancel(&self) {
+        self.control.cancel();
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.control.cancel();
+    }
+}

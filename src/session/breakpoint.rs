@@ -1,0 +1,548 @@
+//! Where a run is to stop: at a stage, or where a number crosses a bound.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::event::{Event, Method, Stage, StageStarted};
+use crate::grid::Phase;
+use crate::trace::{Cancelled, Record, Sink};
+
+/// A number that events carry, under the name that breakpoints know it by.
+struct Quantity {
+    name: &'static str,
+    about: &'static str,
+    of: fn(&Event) -> Option<f64>,
+}
+
+/// Every number that a breakpoint can watch.
+const QUANTITIES: &[Quantity] = &[
+    Quantity {
+        name: "keypoints",
+        about: "keypoints of a photo",
+        of: |event| match event {
+            Event::FeaturesDetected(event) => Some(event.features.keypoints.len() as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "matches",
+        about: "matches that are distinct and unique",
+        of: |event| match event {
+            Event::MatchesDecided(event) => Some(event.candidates() as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "depths",
+        about: "matches with a depth",
+        of: |event| match event {
+            Event::DepthsLifted(event) => Some(event.with_depth() as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "trial",
+        about: "number of the MLESAC trial",
+        of: |event| match event {
+            Event::HypothesisTried(event) => Some(event.trial.index as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "best_inliers",
+        about: "inliers of the best MLESAC hypothesis so far",
+        of: |event| match event {
+            Event::HypothesisTried(event) => Some(event.trial.best?.score.inliers as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "inliers",
+        about: "inliers of the refined pose",
+        of: |event| match event {
+            Event::PoseRefined(event) => Some(event.inliers as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "distance",
+        about: "distance of the refined pose from the reference [m]",
+        of: |event| match event {
+            Event::ConsensusJudged(event) => Some(event.distance_m),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "evaluation",
+        about: "number of the hypothesis of the grid search",
+        of: |event| match event {
+            Event::PoseScored(event) => Some(event.evaluation as f64),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "cost",
+        about: "cost of a hypothesis that is the best of its phase so far",
+        of: |event| match event {
+            Event::PoseScored(event) if event.is_best => event.score.cost,
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "coverage",
+        about: "coverage of such a hypothesis, as a share of that at the reference pose",
+        of: |event| match event {
+            Event::PoseScored(event) if event.is_best => Some(event.coverage),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "tried_cost",
+        about: "cost of any hypothesis of the grid search",
+        of: |event| match event {
+            Event::PoseScored(event) => event.score.cost,
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "tried_coverage",
+        about: "coverage of any hypothesis of the grid search",
+        of: |event| match event {
+            Event::PoseScored(event) => Some(event.coverage),
+            _ => None,
+        },
+    },
+    Quantity {
+        name: "margin",
+        about: "cost of the second-best local minimum less that of the best",
+        of: |event| match event {
+            Event::MinimumAssessed(event) => Some(event.runner_up? - event.best),
+            _ => None,
+        },
+    },
+];
+
+/// How a number is compared with a bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Comparator {
+    Less,
+    LessOrEqual,
+    Greater,
+    GreaterOrEqual,
+    Equal,
+}
+
+impl Comparator {
+    /// The longer sign of two that begin alike comes first.
+    const ALL: [(&'static str, Self); 6] = [
+        ("<=", Self::LessOrEqual),
+        (">=", Self::GreaterOrEqual),
+        ("==", Self::Equal),
+        ("<", Self::Less),
+        (">", Self::Greater),
+        ("=", Self::Equal),
+    ];
+
+    fn holds(self, left: f64, right: f64) -> bool {
+        match self {
+            Self::Less => left < right,
+            Self::LessOrEqual => left <= right,
+            Self::Greater => left > right,
+            Self::GreaterOrEqual => left >= right,
+            Self::Equal => left == right,
+        }
+    }
+}
+
+/// What a breakpoint waits for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BreakAt {
+    /// The start of a stage of this name.
+    Stage(&'static str),
+    /// A comparison that becomes true.
+    Crossing(Crossing),
+}
+
+/// A watched number and its bound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crossing {
+    /// Position in the table of quantities.
+    quantity: usize,
+    comparator: Comparator,
+    bound: f64,
+}
+
+/// Why a text is no breakpoint.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{text}` is no breakpoint: {expected}; write a stage such as `fb.ransac` or a comparison such \
+     as `inliers < 10`"
+)]
+pub struct BreakpointError {
+    text: String,
+    expected: String,
+}
+
+/// One breakpoint: `fb.ransac`, `inliers < 10`, `mi.coverage < 0.1`.
+///
+/// A comparison stops the run when it becomes true, not again while it stays so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Breakpoint {
+    text: String,
+    method: Option<Method>,
+    at: BreakAt,
+}
+
+impl Breakpoint {
+    /// Names of the stages a breakpoint can be set at, in the order of the estimators.
+    pub fn stages() -> Vec<&'static str> {
+        let stages = [
+            Stage::Detect,
+            Stage::Match,
+            Stage::DepthLift,
+            Stage::Consensus,
+            Stage::Accept,
+            Stage::Color,
+        ];
+        let names = Method::ALL.map(Stage::Estimator);
+        let phases = Phase::ALL.map(Stage::Search);
+        names
+            .iter()
+            .chain(&stages)
+            .chain(&phases)
+            .chain(&[Stage::Assess])
+            .map(|stage| stage.name())
+            .collect()
+    }
+
+    /// Names of the numbers a breakpoint can watch, each with what it is.
+    pub fn quantities() -> impl Iterator<Item = (&'static str, &'static str)> {
+        QUANTITIES
+            .iter()
+            .map(|quantity| (quantity.name, quantity.about))
+    }
+
+    /// What it waits for.
+    pub fn at(&self) -> &BreakAt {
+        &self.at
+    }
+}
+
+impl fmt::Display for Breakpoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for Breakpoint {
+    type Err = BreakpointError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let text = text.trim();
+        let refuse = |expected: String| BreakpointError {
+            text: text.to_owned(),
+            expected,
+        };
+        let comparison = Comparator::ALL.iter().find_map(|(sign, comparator)| {
+            let (name, bound) = text.split_once(sign)?;
+            Some((name.trim(), *comparator, bound.trim()))
+        });
+        let scoped = comparison.map_or(text, |(name, ..)| name);
+        let (method, name) = match scoped.split_once('.') {
+            Some((method, name)) => {
+                let known = Method::from_name(method)
+                    .ok_or_else(|| refuse(format!("there is no method `{method}`")))?;
+                (Some(known), name)
+            }
+            None => (None, scoped),
+        };
+        let at =
+            match comparison {
+                Some((_, comparator, bound)) => {
+                    let quantity = QUANTITIES
+                        .iter()
+                        .position(|quantity| quantity.name == name)
+                        .ok_or_else(|| {
+                            let names: Vec<_> = QUANTITIES.iter().map(|q| q.name).collect();
+                            refuse(format!("`{name}` is none of {}", names.join(", ")))
+                        })?;
+                    let bound = bound
+                        .parse()
+                        .ok()
+                        .filter(|bound: &f64| bound.is_finite())
+                        .ok_or_else(|| refuse(format!("`{bound}` is no number")))?;
+                    BreakAt::Crossing(Crossing {
+                        quantity,
+                        comparator,
+                        bound,
+                    })
+                }
+                None => {
+                    let stages = Self::stages();
+                    let stage = stages.iter().find(|stage| **stage == name);
+                    BreakAt::Stage(stage.ok_or_else(|| {
+                        refuse(format!("`{name}` is none of {}", stages.join(", ")))
+                    })?)
+                }
+            };
+        Ok(Self {
+            text: text.to_owned(),
+            method,
+            at,
+        })
+    }
+}
+
+/// Breakpoints, and what they remember of the run.
+#[derive(Clone, Debug, Default)]
+pub struct Breakpoints {
+    watched: Vec<Watched>,
+    /// The methods whose stages are open, the outermost first.
+    methods: Vec<Method>,
+}
+
+#[derive(Clone, Debug)]
+struct Watched {
+    breakpoint: Breakpoint,
+    /// Whether the comparison was true when its number was told last.
+    was_true: bool,
+}
+
+impl Breakpoints {
+    /// These.
+    pub fn new(breakpoints: impl IntoIterator<Item = Breakpoint>) -> Self {
+        Self {
+            watched: breakpoints
+                .into_iter()
+                .map(|breakpoint| Watched {
+                    breakpoint,
+                    was_true: false,
+                })
+                .collect(),
+            methods: Vec::new(),
+        }
+    }
+
+    /// Takes over other breakpoints in the middle of a run: those that stay remember what they saw.
+    pub(super) fn replace(&mut self, other: Self) {
+        let old = std::mem::replace(&mut self.watched, other.watched);
+        for new in &mut self.watched {
+            new.was_true = old
+                .iter()
+                .any(|old| old.breakpoint == new.breakpoint && old.was_true);
+        }
+    }
+
+    /// The first breakpoint that an event reaches, as it was written. Every event must be shown.
+    pub fn reached(&mut self, record: &Record) -> Option<String> {
+        if let Event::StageStarted(StageStarted {
+            stage: Stage::Estimator(method),
+        }) = record.event
+        {
+            self.methods.push(method);
+        }
+        let methods = &self.methods;
+        let mut reached = None;
+        for watched in &mut self.watched {
+            let Breakpoint { text, method, at } = &watched.breakpoint;
+            if method.is_some_and(|method| !methods.contains(&method)) {
+                continue;
+            }
+            let fires = match at {
+                BreakAt::Stage(name) => matches!(
+                    record.event,
+                    Event::StageStarted(StageStarted { stage }) if stage.name() == *name
+                ),
+                BreakAt::Crossing(crossing) => {
+                    match (QUANTITIES[crossing.quantity].of)(&record.event) {
+                        Some(value) => {
+                            let is_true = crossing.comparator.holds(value, crossing.bound);
+                            let was_true = std::mem::replace(&mut watched.was_true, is_true);
+                            is_true && !was_true
+                        }
+                        None => false,
+                    }
+                }
+            };
+            if fires && reached.is_none() {
+                reached = Some(text.clone());
+            }
+        }
+        if let Event::StageEnded(ended) = &record.event
+            && matches!(ended.stage, Stage::Estimator(_))
+        {
+            self.methods.pop();
+            if self.methods.is_empty() {
+                // The next estimator's numbers are others.
+                for watched in &mut self.watched {
+                    watched.was_true = false;
+                }
+            }
+        }
+        reached
+    }
+}
+
+/// A sink that ends a run at its first breakpoint.
+#[derive(Debug, Default)]
+pub struct StopAtBreakpoint {
+    breakpoints: Breakpoints,
+    reached: Option<String>,
+}
+
+impl StopAtBreakpoint {
+    /// Stops at the first of these.
+    pub fn new(breakpoints: Breakpoints) -> Self {
+        Self {
+            breakpoints,
+            reached: None,
+        }
+    }
+
+    /// The breakpoint that ended the run, as it was written.
+    pub fn reached(&self) -> Option<&str> {
+        self.reached.as_deref()
+    }
+}
+
+impl Sink for StopAtBreakpoint {
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        // The stages that close behind the break are not breaks of their own.
+        if self.reached.is_some() {
+            return Err(Cancelled);
+        }
+        self.reached = self.breakpoints.reached(record);
+        match self.reached {
+            Some(_) => Err(Cancelled),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::{MinimumAssessed, PoseRefined};
+    use crate::event::{ProjectedCloud, StageEnded};
+    use crate::geometry::Pose;
+    use crate::grid::Offset;
+
+    fn record(event: impl Into<Event>) -> Record {
+        Record {
+            index: 0,
+            depth: 1,
+            event: event.into(),
+        }
+    }
+
+    fn inliers(inliers: usize) -> Record {
+        record(PoseRefined {
+            reference_from_query: Pose::identity(),
+            inliers,
+            correspondences: 30,
+            trials: 9,
+        })
+    }
+
+    fn reached(breakpoints: &[&str], records: &[Record]) -> Vec<Option<String>> {
+        let breakpoints = breakpoints.iter().map(|b| b.parse().expect("a breakpoint"));
+        let mut breakpoints = Breakpoints::new(breakpoints);
+        records
+            .iter()
+            .map(|record| breakpoints.reached(record))
+            .collect()
+    }
+
+    #[test]
+    fn a_stage_is_reached_in_the_method_that_was_named() {
+        let started = |stage| record(StageStarted { stage });
+        let ended = |stage| {
+            record(StageEnded {
+                stage,
+                succeeded: true,
+                reused: false,
+            })
+        };
+        let run = [
+            started(Stage::Estimator(Method::Feature)),
+            started(Stage::Consensus),
+            ended(Stage::Consensus),
+            ended(Stage::Estimator(Method::Feature)),
+            started(Stage::Estimator(Method::Hybrid)),
+            started(Stage::Estimator(Method::Feature)),
+            started(Stage::Consensus),
+        ];
+        let at = |text| -> Vec<usize> {
+            let reached = reached(&[text], &run);
+            (0..run.len()).filter(|i| reached[*i].is_some()).collect()
+        };
+        assert_eq!(at("ransac"), [1, 6]);
+        assert_eq!(at("fb.ransac"), [1, 6]);
+        assert_eq!(at("hy.ransac"), [6]);
+        assert_eq!(at("mi.ransac"), [0; 0]);
+        assert_eq!(at("hy"), [4]);
+    }
+
+    #[test]
+    fn a_comparison_is_reached_when_it_becomes_true() {
+        let run = [inliers(20), inliers(9), inliers(8), inliers(10), inliers(3)];
+        let hits: Vec<bool> = reached(&["inliers < 10"], &run)
+            .iter()
+            .map(Option::is_some)
+            .collect();
+        assert_eq!(hits, [false, true, false, false, true]);
+        let other = record(ProjectedCloud {
+            points: 3,
+            in_view: 2,
+        });
+        assert_eq!(reached(&["inliers < 10"], &[other]), [None]);
+    }
+
+    #[test]
+    fn the_margin_is_the_runner_up_less_the_best() {
+        let assessed = |runner_up| {
+            record(MinimumAssessed {
+                offset: Offset::default(),
+                initial: None,
+                best: 0.80,
+                shuffled: None,
+                runner_up,
+            })
+        };
+        let run = [assessed(Some(0.81)), assessed(None), assessed(Some(0.9))];
+        let hits = reached(&["margin<0.02", "margin >= 0.05"], &run);
+        assert_eq!(
+            hits,
+            [
+                Some("margin<0.02".to_owned()),
+                None,
+                Some("margin >= 0.05".to_owned())
+            ]
+        );
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_what_there_is() {
+        let message = |text: &str| {
+            text.parse::<Breakpoint>()
+                .expect_err("nonsense")
+                .to_string()
+        };
+        assert!(message("fb.ransack").contains("ransac"));
+        assert!(message("xy.ransac").contains("no method `xy`"));
+        assert!(message("inlers < 10").contains("inliers"));
+        assert!(message("inliers < ten").contains("no number"));
+        assert!(message("").contains("fb.ransac"));
+    }
+
+    #[test]
+    fn every_stage_and_every_quantity_can_be_named() {
+        for stage in Breakpoint::stages() {
+            assert!(stage.parse::<Breakpoint>().is_ok(), "{stage}");
+        }
+        for (quantity, about) in Breakpoint::quantities() {
+            assert!(format!("{quantity} >= 0").parse::<Breakpoint>().is_ok());
+            assert!(!about.is_empty());
+        }
+    }
+}

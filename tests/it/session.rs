@@ -1,0 +1,236 @@
+//! Driving an estimator: pause, step, break, cancel.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use posescope::evaluate::QueryResult;
+use posescope::event::{Event, Method, Stage, StageEnded, StageStarted};
+use posescope::params::Params;
+use posescope::session::{Breakpoints, Job, RunMode, Session, State};
+
+use crate::walls_scene::{GREY, UNREADABLE, Walls};
+
+fn job(query: usize) -> Job {
+    let scene = Arc::new(Walls::new());
+    Job {
+        references: scene.clone(),
+        queries: scene,
+        query,
+        reference_frames: vec![0],
+        methods: Method::ALL.to_vec(),
+        params: Params::default(),
+        uncertainty_radius_m: 3.0,
+        seed: 7,
+        at_hand: None,
+    }
+}
+
+fn start(job: Job, mode: RunMode, breakpoints: &[&str]) -> Session {
+    let breakpoints = breakpoints.iter().map(|b| b.parse().expect("a breakpoint"));
+    Session::start(job, mode, Breakpoints::new(breakpoints), || {})
+}
+
+/// Waits until the session needs somebody.
+fn settle(session: &mut Session) -> State {
+    let begun = Instant::now();
+    loop {
+        session.drain();
+        match session.state() {
+            State::Loading | State::Running => {}
+            state => return state.clone(),
+        }
+        assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Gives an order and waits for what comes of it. The record where the run stands then.
+fn order(session: &mut Session, mode: RunMode) -> Event {
+    let before = session.run().len();
+    session.set_mode(mode);
+    loop {
+        settle(session);
+        if session.run().len() > before || !session.is_alive() {
+            break;
+        }
+    }
+    let last = session.run().records().last().expect("something was told");
+    last.event.clone()
+}
+
+fn starts(event: &Event) -> Option<Stage> {
+    match event {
+        Event::StageStarted(StageStarted { stage }) => Some(*stage),
+        _ => None,
+    }
+}
+
+fn ends(event: &Event) -> Option<Stage> {
+    match event {
+        Event::StageEnded(StageEnded { stage, .. }) => Some(*stage),
+        _ => None,
+    }
+}
+
+fn results(session: &Session) -> Vec<QueryResult> {
+    session.run().results().cloned().collect()
+}
+
+#[test]
+fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
+    let mut session = start(job(1), RunMode::Paused, &[]);
+    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(session.run().len(), 1);
+    let first = &session.run().records()[0].event;
+    assert_eq!(starts(first), Some(Stage::Estimator(Method::Feature)));
+
+    let event = order(&mut session, RunMode::StepInto);
+    assert_eq!(starts(&event), Some(Stage::Detect));
+    let event = order(&mut session, RunMode::StepOver);
+    assert_eq!(ends(&event), Some(Stage::Detect));
+    let event = order(&mut session, RunMode::StepOver);
+    assert_eq!(starts(&event), Some(Stage::Match));
+    let event = order(&mut session, RunMode::StepInto);
+    assert!(matches!(event, Event::MatchesDecided(_)));
+    let event = order(&mut session, RunMode::StepOut);
+    assert_eq!(ends(&event), Some(Stage::Match));
+    let event = order(&mut session, RunMode::StepOut);
+    assert_eq!(ends(&event), Some(Stage::Estimator(Method::Feature)));
+    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+}
+
+#[test]
+fn stepping_gives_the_results_of_running() {
+    let mut run = start(job(1), RunMode::Running, &[]);
+    assert_eq!(settle(&mut run), State::Finished);
+    let mut stepped = start(job(1), RunMode::Paused, &[]);
+    settle(&mut stepped);
+    let orders = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
+    for mode in orders.into_iter().cycle() {
+        order(&mut stepped, mode);
+        if !stepped.is_alive() {
+            break;
+        }
+    }
+    assert_eq!(results(&run).len(), 4);
+    assert_eq!(results(&stepped), results(&run));
+    assert_eq!(stepped.run().len(), run.run().len());
+}
+
+#[test]
+fn a_breakpoint_stops_a_run_and_says_which_it_was() {
+    let mut session = start(
+        job(1),
+        RunMode::Running,
+        &["mi.yaw_coarse", "inliers < 1000"],
+    );
+    let stopped_by = |text: &str| State::Paused {
+        breakpoint: Some(text.to_owned()),
+    };
+    assert_eq!(settle(&mut session), stopped_by("inliers < 1000"));
+    let event = order(&mut session, RunMode::Running);
+    assert_eq!(starts(&event).map(Stage::name), Some("yaw_coarse"));
+    assert_eq!(session.state(), &stopped_by("mi.yaw_coarse"));
+    session.set_breakpoints(Breakpoints::default());
+    order(&mut session, RunMode::Running);
+    assert_eq!(settle(&mut session), State::Finished);
+}
+
+#[test]
+fn a_running_session_pauses_and_a_paused_one_stays() {
+    let mut session = start(job(1), RunMode::Running, &[]);
+    session.set_mode(RunMode::Paused);
+    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    let told = session.run().len();
+    session.set_mode(RunMode::Paused);
+    std::thread::sleep(Duration::from_millis(30));
+    session.drain();
+    assert_eq!(session.run().len(), told);
+}
+
+#[test]
+fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
+    let mut session = start(job(1), RunMode::Paused, &[]);
+    settle(&mut session);
+    session.cancel();
+    while session.is_alive() {
+        settle(&mut session);
+        std::thread::yield_now();
+        session.drain();
+    }
+    assert_eq!(session.state(), &State::Cancelled);
+
+    let scene = Arc::new(Walls::new());
+    let mut dropped = start(
+        Job {
+            references: scene.clone(),
+            queries: scene.clone(),
+            ..job(1)
+        },
+        RunMode::Paused,
+        &[],
+    );
+    settle(&mut dropped);
+    drop(dropped);
+    let begun = Instant::now();
+    // The worker's handles on the scene go with it.
+    while Arc::strong_count(&scene) > 1 {
+        assert!(begun.elapsed() < Duration::from_secs(20), "it lives on");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
+    let mut session = start(job(UNREADABLE), RunMode::Running, &[]);
+    match settle(&mut session) {
+        State::Broken(why) => assert!(why.contains("000004"), "{why}"),
+        other => panic!("{other:?}"),
+    }
+    let mut session = start(job(GREY), RunMode::Running, &[]);
+    assert_eq!(settle(&mut session), State::Finished);
+    let results = results(&session);
+    assert_eq!(results.len(), 4);
+    assert!(results[0].pose.is_none() && results[0].reason.is_some());
+}
+
+#[test]
+fn a_fault_in_the_worker_is_a_state_of_the_session() {
+    let mut broken = job(1);
+    // Only frame 0 has a cloud; the scene of this test panics when asked for another.
+    broken.reference_frames = vec![2];
+    let mut session = start(broken, RunMode::Running, &[]);
+    match settle(&mut session) {
+        State::Broken(why) => assert!(why.contains("internal error"), "{why}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
+    let mut first = start(job(1), RunMode::Running, &[]);
+    settle(&mut first);
+    let mut again = job(1);
+    again.at_hand = first.run().loaded.clone();
+    again.params.assign("fb.ratio=0.7").expect("a good value");
+    let mut second = start(again, RunMode::Running, &[]);
+    settle(&mut second);
+    let reused: Vec<_> = second
+        .run()
+        .stages()
+        .iter()
+        .filter(|bar| bar.depth == 2 && bar.reused)
+        .map(|bar| bar.stage.name())
+        .collect();
+    let direct = [
+        "color",
+        "position_coarse",
+        "position_fine",
+        "yaw_coarse",
+        "yaw_fine",
+    ];
+    // FB detects nothing anew; PM and MI have all but their assessment.
+    assert_eq!(reused[0], "detect");
+    assert_eq!(reused[1..6], direct);
+    assert_eq!(reused[6..11], direct);
+}

@@ -1,0 +1,67 @@
+//! The small world as a scene: five frames, the camera moving ahead, one of them spoiled.
+
+use posescope::camera::Intrinsics;
+use posescope::cloud::Cloud;
+use posescope::geometry::Pose;
+use posescope::image::Photo;
+use posescope::scene::{Scene, SceneError};
+
+use crate::two_walls::{CAMERA, cloud_of_the_walls, photo};
+
+/// Frames 000000 to 000004, at 0, 1, 0.5 and 0.8 m ahead; 000003 shows nothing but grey, and the
+/// photo of 000004 cannot be read.
+pub struct Walls {
+    names: Vec<String>,
+}
+
+const AHEAD_M: [f64; 5] = [0.0, 1.0, 0.5, 0.8, 0.2];
+pub const GREY: usize = 3;
+pub const UNREADABLE: usize = 4;
+
+impl Walls {
+    pub fn new() -> Self {
+        Self {
+            names: (0..AHEAD_M.len()).map(|i| format!("{i:06}")).collect(),
+        }
+    }
+}
+
+impl Scene for Walls {
+    fn name(&self) -> &str {
+        "walls"
+    }
+    fn frames(&self) -> &[String] {
+        &self.names
+    }
+    fn intrinsics(&self) -> Intrinsics {
+        CAMERA
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        Some(Pose::translation(100.0, -2.0, 30.0 + AHEAD_M[frame]))
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        Some(frame as f64)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        frame == 0
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        match frame {
+            GREY => Ok(Photo::from_gray(image::GrayImage::from_pixel(
+                CAMERA.width,
+                CAMERA.height,
+                image::Luma([90]),
+            ))),
+            UNREADABLE => Err(SceneError::UnknownFrame {
+                scene: "walls".to_owned(),
+                frame: self.names[frame].clone(),
+                known: "000000 … 000003".to_owned(),
+            }),
+            _ => Ok(Photo::from_gray(photo(AHEAD_M[frame], 5))),
+        }
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        assert_eq!(frame, 0, "only the first frame has a cloud");
+        Ok(cloud_of_the_walls())
+    }
+}
