@@ -17,6 +17,8 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+#[cfg(feature = "app")]
+pub mod app;
 mod cache;
 pub mod camera;
 pub mod cloud;
@@ -32,7 +34,13 @@ pub mod grid;
 pub mod history;
 pub mod image;
 pub mod memo;
+#[cfg(feature = "rerun")]
+mod narration;
+#[cfg(feature = "rerun")]
+mod palette;
 pub mod params;
+#[cfg(feature = "rerun")]
+mod picture;
 pub mod problem;
 pub mod render;
 pub mod robust;

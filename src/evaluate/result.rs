@@ -1,10 +1,11 @@
 //! One query, one method: the object of `run --json` and of a run folder.
 
+use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
 use crate::estimator::{self, CostSummary, FeatureCounts, Outcome};
 use crate::event::Method;
-use crate::geometry::{Pose, PoseError, matrix_from_pose};
+use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 use crate::params::Params;
 use crate::problem::Problem;
 
@@ -100,6 +101,14 @@ impl From<&Pose> for PoseReport {
             position_m: [t.x, t.y, t.z],
             quaternion_xyzw: [q.x * sign, q.y * sign, q.z * sign, q.w * sign],
         }
+    }
+}
+
+impl PoseReport {
+    /// The pose; `None` where the numbers are none.
+    pub fn to_pose(&self) -> Option<Pose> {
+        let rows = &self.world_from_camera;
+        pose_from_matrix(&Matrix3x4::from_fn(|row, column| rows[row][column])).ok()
     }
 }
 

@@ -7,14 +7,12 @@
 //! killed leaves a readable recording of everything up to the last view or stage.
 
 mod blueprint;
-mod colors;
 mod direct;
+mod encode;
 pub mod entities;
 mod feature;
 mod file;
-mod images;
 mod layout;
-mod narration;
 mod place;
 mod recorder;
 mod report;
@@ -26,3 +24,9 @@ mod viewer;
 
 pub use recorder::Recorder;
 pub use targets::{Identity, RecordError, Targets};
+
+use crate::palette::Rgb;
+
+fn color([r, g, b]: Rgb) -> rerun::Color {
+    rerun::Color::from_rgb(r, g, b)
+}

@@ -325,7 +325,7 @@ fn what_does_not_depend_on_a_changed_parameter_is_reused() {
         ["detect", "match", "ransac"]
     );
     assert_eq!(
-        reused_after(Method::Feature, "fb.depth_radius=2"),
+        reused_after(Method::Feature, "fb.depth_radius=0.5"),
         ["detect", "match"]
     );
     assert_eq!(reused_after(Method::Feature, "fb.ratio=0.7"), ["detect"]);

@@ -17,3 +17,4 @@ mod surf_warp;
 mod synth;
 mod two_walls;
 mod walls_scene;
+mod window;

@@ -4,10 +4,11 @@ use rerun::SeriesLines;
 use rerun::blueprint::components::{Corner2D, Eye3DKind};
 use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGrid3D, PlotLegend};
 
+use super::entities;
 use super::layout::{self, Node, View};
 use super::stream::Stream;
-use super::{colors, entities};
 use crate::event::{FeatureState, Method};
+use crate::palette;
 use crate::problem::Problem;
 
 /// Sends the layout for a run with these methods. The eyes stand where the first reference does.
@@ -25,7 +26,7 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
     }
     for method in [Method::Photometric, Method::MutualInformation] {
         if shows(methods, method) {
-            let best = names(&["best cost"]).with_colors([colors::color(colors::ESTIMATE)]);
+            let best = names(&["best cost"]).with_colors([super::color(palette::ESTIMATE)]);
             stream.log_static(&entities::direct(method, "best"), &best);
         }
     }

@@ -2,14 +2,15 @@
 
 use rerun::Scalars;
 
+use super::encode::png;
 use super::entities;
-use super::images;
 use super::place::Place;
 use super::stream::Stream;
 use super::surface::{self, CostRange};
 use crate::cost::Explanation;
 use crate::event::{Event, PhaseSearched, PoseScored, ViewRendered};
 use crate::grid::{Offset, Phase};
+use crate::picture;
 use crate::render::Comparison;
 
 /// What a direct method told so far, as far as later events refer to it.
@@ -60,14 +61,17 @@ impl DirectStory {
             score,
             explanation,
         } = event.comparison.as_ref();
-        stream.log_image(&path("synthetic"), images::synthetic(view));
+        stream.log_image(&path("synthetic"), png(picture::synthetic(view)));
         match explanation {
             Some(Explanation::Photometric(weights)) => {
-                stream.log_image(&path("residual"), images::residual(view, pairs));
-                stream.log_image(&path("weights"), images::weights(view, weights));
+                stream.log_image(&path("residual"), png(picture::residual(view, pairs)));
+                stream.log_image(&path("weights"), png(picture::weights(view, weights)));
             }
             Some(Explanation::MutualInformation(histogram)) => {
-                stream.log_image(&path("joint_histogram"), images::joint_histogram(histogram));
+                stream.log_image(
+                    &path("joint_histogram"),
+                    png(picture::joint_histogram(histogram)),
+                );
                 let entropies = [
                     histogram.query_entropy,
                     histogram.synthetic_entropy,

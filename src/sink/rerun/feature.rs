@@ -5,9 +5,8 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocument};
 
-use super::colors::{self, Rgb};
+use super::encode::jpeg;
 use super::entities::{self, UNDECIDED};
-use super::images;
 use super::place::Place;
 use super::scene::log_rays;
 use super::stream::Stream;
@@ -16,6 +15,8 @@ use crate::event::{
 };
 use crate::features::{Features, Match, MatchVerdict};
 use crate::geometry::Pose;
+use crate::palette::{self, Rgb};
+use crate::picture;
 
 /// What FB told so far, as far as later events refer to it.
 #[derive(Default)]
@@ -79,15 +80,15 @@ impl FeatureStory {
             .map(|keypoint| shown([keypoint.x, keypoint.y]));
         let points = Points2D::new(pixels)
             .with_radii(features.keypoints.iter().map(|keypoint| keypoint.scale))
-            .with_colors([colors::color(colors::UNDECIDED)]);
+            .with_colors([super::color(palette::UNDECIDED)]);
         stream.log(&entities::detected(*side, place.reference), &points);
     }
 
     fn canvas(&mut self, place: &Place<'_>, stream: &mut Stream) {
         let problem = place.problem;
-        let (canvas, top) = images::stacked(&problem.query.photo, &problem.reference.photo);
+        let (canvas, top) = picture::stacked(&problem.query.photo, &problem.reference.photo);
         self.canvas_top = top;
-        stream.log_image(&entities::matches(place.reference), canvas);
+        stream.log_image(&entities::matches(place.reference), jpeg(&canvas.into()));
     }
 
     fn undecided(&self, place: &Place<'_>, stream: &mut Stream) {
@@ -98,7 +99,7 @@ impl FeatureStory {
             .filter(|decision| decision.verdict == MatchVerdict::Candidate)
             .map(|decision| decision.query)
             .collect();
-        let lines = self.lines(&matches, colors::UNDECIDED);
+        let lines = self.lines(&matches, palette::UNDECIDED);
         stream.log(
             &entities::matches_in_state(place.reference, UNDECIDED),
             &lines,
@@ -115,7 +116,7 @@ impl FeatureStory {
             Some([shown([from.x, from.y]), shown([to.x, below])])
         });
         LineStrips2D::new(ends)
-            .with_colors([colors::color(color)])
+            .with_colors([super::color(color)])
             .with_radii([Radius::new_ui_points(0.75)])
     }
 
@@ -145,7 +146,7 @@ impl FeatureStory {
             let members: Vec<usize> = (0..states.len())
                 .filter(|&query| states[query].index() == index)
                 .collect();
-            let color = colors::STATES[index];
+            let color = palette::STATES[index];
             let points = self.points(&members, states, color);
             stream.log(&entities::query_keypoints(name), &points);
             let lines = self.lines(&members, color);
@@ -162,7 +163,7 @@ impl FeatureStory {
             Some(shown([keypoint.x, keypoint.y]))
         });
         Points2D::new(pixels)
-            .with_colors([colors::color(color)])
+            .with_colors([super::color(color)])
             .with_radii([Radius::new_ui_points(3.0)])
             .with_labels(members.iter().map(|&query| decided_by(&states[query])))
             .with_show_labels(false)
@@ -192,9 +193,9 @@ impl FeatureStory {
             });
             let points: Vec<Point3<f64>> = members.filter_map(|lifted| lifted.point).collect();
             let color = if name == "inlier" {
-                colors::TRUTH
+                palette::TRUTH
             } else {
-                colors::ESTIMATE
+                palette::ESTIMATE
             };
             let path = entities::correspondences(name);
             log_rays(

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use nalgebra::Matrix3x4;
 use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
 use super::direct::DirectStory;
@@ -11,10 +10,12 @@ use super::feature::FeatureStory;
 use super::place::Place;
 use super::scene::{self, Camera, Origin};
 use super::stream::Stream;
-use super::{Identity, RecordError, Targets, blueprint, colors, entities, narration, report};
-use crate::evaluate::{QueryResult, Status};
+use super::{Identity, RecordError, Targets, blueprint, entities, report};
+use crate::evaluate::{PoseReport, QueryResult, Status};
 use crate::event::{Event, Kind, KindSet, Method, Stage};
-use crate::geometry::{Pose, pose_from_matrix};
+use crate::geometry::Pose;
+use crate::narration;
+use crate::palette;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::{ColoredCloud, RenderParams, color_cloud};
@@ -112,7 +113,7 @@ impl Recorder {
                 owner: &entities::truth(),
                 world_from_camera: truth,
                 intrinsics: &first.query.intrinsics,
-                color: colors::TRUTH,
+                color: palette::TRUTH,
                 label: "truth".to_owned(),
             };
             camera.log(stream, origin);
@@ -173,10 +174,7 @@ impl Recorder {
         let (Some(problem), Some(origin)) = (self.query.problem(), self.origin) else {
             return;
         };
-        let pose = result.pose.as_ref().and_then(|pose| {
-            let rows = pose.world_from_camera;
-            pose_from_matrix(&Matrix3x4::from_fn(|row, column| rows[row][column])).ok()
-        });
+        let pose = result.pose.as_ref().and_then(PoseReport::to_pose);
         let owner = entities::estimate(method);
         match pose {
             Some(pose) => {
@@ -184,7 +182,7 @@ impl Recorder {
                     owner: &owner,
                     world_from_camera: &pose,
                     intrinsics: &problem.query.intrinsics,
-                    color: colors::ESTIMATE,
+                    color: palette::ESTIMATE,
                     label: method.name().to_owned(),
                 };
                 camera.log(&mut self.stream, origin);

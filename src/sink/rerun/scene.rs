@@ -3,11 +3,13 @@
 use nalgebra::{Point3, Vector3};
 use rerun::{LineStrips3D, Pinhole, Points3D, Quaternion, Transform3D};
 
-use super::colors::{self, Rgb};
+use super::encode::jpeg;
+use super::entities;
 use super::stream::Stream;
-use super::{entities, images};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
+use crate::palette::{self, Rgb};
+use crate::picture;
 use crate::problem::{Problem, Query, ReferenceTuple};
 use crate::render::ColoredCloud;
 
@@ -38,7 +40,7 @@ impl Origin {
 
 /// The query's photo.
 pub(super) fn log_query(stream: &mut Stream, query: &Query) {
-    stream.log_image(entities::QUERY_IMAGE, images::photo(&query.photo));
+    stream.log_image(entities::QUERY_IMAGE, jpeg(&picture::photo(&query.photo)));
 }
 
 /// A reference's camera with its photo.
@@ -53,11 +55,14 @@ pub(super) fn log_reference(
         owner: &owner,
         world_from_camera: &tuple.world_from_camera,
         intrinsics: &tuple.intrinsics,
-        color: colors::REFERENCE,
+        color: palette::REFERENCE,
         label: format!("reference {}", tuple.name),
     };
     camera.log(stream, origin);
-    stream.log_image(&entities::camera_image(&owner), images::photo(&tuple.photo));
+    stream.log_image(
+        &entities::camera_image(&owner),
+        jpeg(&picture::photo(&tuple.photo)),
+    );
 }
 
 /// A camera of the query: where it was, or where a method says that it was.
@@ -75,11 +80,11 @@ impl Camera<'_> {
         stream.log(&path, &origin.transform(self.world_from_camera));
         stream.log(
             &path,
-            &pinhole(self.intrinsics).with_color(colors::color(self.color)),
+            &pinhole(self.intrinsics).with_color(super::color(self.color)),
         );
         let centre = origin.place(&self.world_from_camera.translation.vector);
         let label = Points3D::new([centre])
-            .with_colors([colors::color(colors::light(self.color))])
+            .with_colors([super::color(palette::light(self.color))])
             .with_radii([rerun::Radius::new_ui_points(5.0)])
             .with_labels([self.label.as_str()])
             .with_show_labels(true);
@@ -117,7 +122,7 @@ pub(super) fn log_cloud(
     let positions = cloud.points.iter().map(|point| world(&point.position));
     let colors = cloud.points.iter().map(|point| {
         let gray = point.intensity.round().clamp(0.0, 255.0) as u8;
-        colors::color(photo_color(tuple, &point.position).unwrap_or([gray; 3]))
+        super::color(photo_color(tuple, &point.position).unwrap_or([gray; 3]))
     });
     let points = Points3D::new(positions)
         .with_colors(colors)
@@ -150,7 +155,7 @@ pub(super) fn log_rays(
     let place = |point: &Point3<f64>| origin.place(&(world_from_reference * point).coords);
     let start = place(centre);
     let rays = LineStrips3D::new(points.iter().map(|point| [start, place(point)]))
-        .with_colors([colors::color(color)])
+        .with_colors([super::color(color)])
         .with_radii([rerun::Radius::new_ui_points(0.5)]);
     stream.log(path, &rays);
 }

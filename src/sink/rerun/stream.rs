@@ -7,9 +7,9 @@ use rerun::{
     AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimeColumn,
 };
 
+use super::encode::Encoded;
 use super::entities::{APPLICATION_ID, EVAL_TIMELINE, QUERY_TIMELINE, STEP_TIMELINE};
 use super::file::RecordingFile;
-use super::images::Encoded;
 use super::targets::OpenTargets;
 use super::{Identity, RecordError, Targets};
 

@@ -8,11 +8,11 @@ use rerun::{
     TensorData,
 };
 
-use super::colors::{self, Rgb};
 use super::entities;
 use super::place::Place;
 use super::stream::Stream;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
+use crate::palette::{self, Rgb};
 
 /// How far below the camera the ground is drawn \[m\]: about where it is for a car's camera.
 const GROUND_M: f64 = 1.6;
@@ -71,10 +71,10 @@ pub(super) fn log_maps(
     let cost = |cell: usize| {
         surface.scores[cell]?;
         let eligible = surface.eligible_cost(cell);
-        Some(eligible.map_or([70; 3], |cost| colors::viridis(range.merit(cost))))
+        Some(eligible.map_or([70; 3], |cost| palette::viridis(range.merit(cost))))
     };
     let coverage = |cell: usize| {
-        Some(colors::viridis(
+        Some(palette::viridis(
             f64::from(surface.scores[cell]?.covered) / most,
         ))
     };
@@ -147,7 +147,7 @@ pub(super) fn log_path(stream: &mut Stream, path: &[Offset], place: &Place<'_>) 
         .iter()
         .map(|offset| on_ground(offset, PATH_ABOVE_M, place));
     let strip = LineStrips3D::new([places.collect::<Vec<_>>()])
-        .with_colors([colors::color(colors::ESTIMATE)])
+        .with_colors([super::color(palette::ESTIMATE)])
         .with_radii([Radius::new_ui_points(2.0)]);
     stream.log(&entities::search(place.method, "path"), &strip);
 }
@@ -170,13 +170,13 @@ pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, place: &Plac
         .unzip();
     let is_fine = surface.lattice.phase == Phase::YawFine;
     let color = if is_fine {
-        colors::ESTIMATE
+        palette::ESTIMATE
     } else {
-        colors::REFERENCE
+        palette::REFERENCE
     };
     let chart = BarChart::new(vector(gains))
         .with_abscissa(vector(angles))
-        .with_color(colors::color(color));
+        .with_color(super::color(color));
     let path = entities::yaw_curve(place.method);
     match is_fine {
         true => stream.log(&format!("{path}/fine"), &chart),

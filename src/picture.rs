@@ -1,27 +1,21 @@
-//! Pictures: photos as JPEG, synthetic ones as PNG, so that a recording stays small.
+//! What recordings and the window show of photos, synthetic views and histograms, as pictures.
 
-use image::codecs::jpeg::JpegEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, GrayImage, ImageBuffer, ImageResult, Luma, Pixel, Rgb, RgbImage};
-use rerun::EncodedImage;
-use rerun::components::MediaType;
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 
-use super::colors;
 use crate::cost::{IntensityPair, JointHistogram, PhotometricWeights};
 use crate::image::Photo;
+use crate::palette;
 use crate::render::SyntheticView;
-
-/// An image ready to be recorded, or why there is none.
-pub(super) type Encoded = ImageResult<EncodedImage>;
 
 /// Differences from −64 to 64 grey values have colours of their own; greater ones look like these.
 const RESIDUAL_RANGE: f64 = 64.0;
-/// 85 halves the size of 95 and shows no blocks at the viewer's magnifications.
-const JPEG_QUALITY: u8 = 85;
 
 /// A photo, in colour where it has any.
-pub(super) fn photo(photo: &Photo) -> Encoded {
-    jpeg(&shown(photo))
+pub(crate) fn photo(photo: &Photo) -> DynamicImage {
+    match &photo.color {
+        Some(color) => DynamicImage::ImageRgb8(color.clone()),
+        None => DynamicImage::ImageLuma8(GrayImage::clone(&photo.gray)),
+    }
 }
 
 /// Both photos on one canvas, the query above the reference, with the row at which the reference
@@ -30,61 +24,57 @@ pub(super) fn photo(photo: &Photo) -> Encoded {
 /// Above each other, because photos of cars are wide: beside each other they would be 2482 pixels
 /// wide for KITTI, and half as large in the same view. A camera that moves ahead also shifts
 /// features more sideways than up, so that true matches are nearly upright lines.
-pub(super) fn stacked(query: &Photo, reference: &Photo) -> (Encoded, u32) {
-    let (query, reference) = (shown(query).into_rgb8(), shown(reference).into_rgb8());
+pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (RgbImage, u32) {
+    let (query, reference) = (photo(query).into_rgb8(), photo(reference).into_rgb8());
     let top = query.height() + 4;
     let width = query.width().max(reference.width());
     let mut canvas = RgbImage::from_pixel(width, top + reference.height(), Rgb([255; 3]));
     image::imageops::replace(&mut canvas, &query, 0, 0);
     image::imageops::replace(&mut canvas, &reference, 0, i64::from(top));
-    (jpeg(&DynamicImage::ImageRgb8(canvas)), top)
+    (canvas, top)
 }
 
 /// The synthetic view in its grey values.
-pub(super) fn synthetic(view: &SyntheticView) -> Encoded {
+pub(crate) fn synthetic(view: &SyntheticView) -> GrayImage {
     let values = view
         .pixels
         .iter()
         .map(|pixel| Luma([gray(pixel.intensity)]));
-    png(&DynamicImage::ImageLuma8(painted(view, Luma([0]), values)))
+    painted(view, Luma([0]), values)
 }
 
 /// Query minus synthetic view: blue where the query is darker, orange where it is brighter.
-pub(super) fn residual(view: &SyntheticView, pairs: &[IntensityPair]) -> Encoded {
+pub(crate) fn residual(view: &SyntheticView, pairs: &[IntensityPair]) -> RgbImage {
     let values = pairs.iter().map(|pair| {
-        Rgb(colors::diverging(
+        Rgb(palette::diverging(
             f64::from(pair.query - pair.synthetic) / RESIDUAL_RANGE,
         ))
     });
-    let background = Rgb(colors::NOTHING);
-    png(&DynamicImage::ImageRgb8(painted(view, background, values)))
+    let background = Rgb(palette::NOTHING);
+    painted(view, background, values)
 }
 
 /// Which pixels the photometric cost counted: white; those it ignored: grey.
-pub(super) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> Encoded {
+pub(crate) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
     let values = weights
         .counted
         .iter()
         .map(|&counted| Luma([if counted { 255 } else { 90 }]));
-    png(&DynamicImage::ImageLuma8(painted(view, Luma([0]), values)))
+    painted(view, Luma([0]), values)
 }
 
 /// How often grey values meet: the synthetic view's to the right, the query's upwards.
 ///
 /// The colour is ln(1 + count) against that of all pairs in one cell, the same range for every view;
 /// with the counts themselves a few cells would be all that can be seen.
-pub(super) fn joint_histogram(histogram: &JointHistogram) -> Encoded {
+pub(crate) fn joint_histogram(histogram: &JointHistogram) -> RgbImage {
     let side = histogram.bins as u32;
     let all: f64 = histogram.counts.iter().copied().map(f64::from).sum();
-    png(&DynamicImage::ImageRgb8(RgbImage::from_fn(
-        side,
-        side,
-        |x, y| {
-            let cell = (side - 1 - y) * side + x;
-            let count = f64::from(histogram.counts[cell as usize]);
-            Rgb(colors::viridis(count.ln_1p() / all.max(1.0).ln_1p()))
-        },
-    )))
+    RgbImage::from_fn(side, side, |x, y| {
+        let cell = (side - 1 - y) * side + x;
+        let count = f64::from(histogram.counts[cell as usize]);
+        Rgb(palette::viridis(count.ln_1p() / all.max(1.0).ln_1p()))
+    })
 }
 
 /// A picture of the covered pixels' values.
@@ -118,28 +108,6 @@ fn gray(value: f32) -> u8 {
     value.round().clamp(0.0, 255.0) as u8
 }
 
-fn shown(photo: &Photo) -> DynamicImage {
-    match &photo.color {
-        Some(color) => DynamicImage::ImageRgb8(color.clone()),
-        None => DynamicImage::ImageLuma8(GrayImage::clone(&photo.gray)),
-    }
-}
-
-fn jpeg(image: &DynamicImage) -> Encoded {
-    let mut bytes = Vec::new();
-    image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;
-    Ok(EncodedImage::from_file_contents(bytes).with_media_type(MediaType::jpeg()))
-}
-
-fn png(image: &DynamicImage) -> Encoded {
-    let mut bytes = Vec::new();
-    // Scattered pixels have no gradient that a filter could predict.
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::NoFilter);
-    image.write_with_encoder(encoder)?;
-    Ok(EncodedImage::from_file_contents(bytes).with_media_type(MediaType::png()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,7 +134,6 @@ mod tests {
     fn the_canvas_stacks_photos_of_different_sizes() {
         let photo = |w, h| Photo::from_gray(GrayImage::new(w, h));
         let (canvas, top) = stacked(&photo(20, 10), &photo(30, 8));
-        assert!(canvas.is_ok());
-        assert_eq!(top, 14);
+        assert_eq!((canvas.dimensions(), top), ((30, 22), 14));
     }
 }

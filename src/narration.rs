@@ -1,11 +1,11 @@
-//! Decisions in words, for the log of a recording.
+//! Decisions in words, for logs.
 
 use crate::event::{Event, MinimumAssessed, Moment, Side, Stage, ViewRendered};
 use crate::features::MatchVerdict;
 use crate::grid::Offset;
 
 /// One sentence for an event that is a decision; `None` for the others.
-pub(super) fn sentence(event: &Event) -> Option<String> {
+pub(crate) fn sentence(event: &Event) -> Option<String> {
     Some(match event {
         Event::FeaturesDetected(event) => {
             let side = match event.side {
@@ -93,7 +93,7 @@ pub(super) fn sentence(event: &Event) -> Option<String> {
 }
 
 /// The stages around an event, outermost first.
-pub(super) fn stages(open: &[Stage]) -> String {
+pub(crate) fn stages(open: &[Stage]) -> String {
     let names: Vec<&str> = open.iter().map(|stage| stage.name()).collect();
     names.join(" › ")
 }

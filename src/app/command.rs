@@ -1,0 +1,396 @@
+//! Everything that a person can ask for, and the keys for it.
+
+use std::cell::RefCell;
+
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+use crate::event::Method;
+use crate::geometry::Pose;
+
+/// Something to be done between two frames.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Run, or pause a running run.
+    RunOrPause,
+    /// Run, whatever stands still.
+    Run,
+    /// Go to the next event.
+    StepInto,
+    /// Go behind the stage that begins here.
+    StepOver,
+    /// Go to the end of the stage around this.
+    StepOut,
+    /// Run to the end, past all breakpoints.
+    RunToEnd,
+    /// Begin again and wait at the first step.
+    Restart,
+    /// Move the cursor ahead; at the last record of a paused run, step.
+    Forward(usize),
+    /// Move the cursor back.
+    Back(usize),
+    /// To the first record.
+    First,
+    /// To the last record, and stay there as more come in.
+    Last,
+    /// To this record.
+    MoveCursor(usize),
+    /// To the last record that an estimator has told.
+    SelectMethod(Method),
+    /// Localise another query.
+    SelectQuery(usize),
+    /// Localise the next query, or the one before.
+    NextQuery {
+        /// The one before.
+        back: bool,
+    },
+    /// Localise the next query with a failed method.
+    NextFailure {
+        /// Look backwards.
+        back: bool,
+    },
+    /// Localise all queries, without stepping, to know which fail.
+    RunAllQueries,
+    /// Choose the references in another way.
+    PickReferences(super::ReferencePick),
+    /// Use other reference frames.
+    SetReferences(Vec<usize>),
+    /// Change the uncertainty radius \[m\] and run again.
+    SetRadius(f64),
+    /// Change the seed and run again.
+    SetSeed(u64),
+    /// Set a parameter and run again what depends on it.
+    SetParam {
+        /// `group.name`.
+        key: String,
+        /// The value as text.
+        value: String,
+    },
+    /// All parameters to their defaults.
+    ResetParams,
+    /// Replace the breakpoints.
+    SetBreakpoints(Vec<String>),
+    /// Keep the present run as A, to compare the following ones with.
+    Pin,
+    /// Forget A.
+    Unpin,
+    /// Show another of the two runs.
+    Compare(super::Comparing),
+    /// Show A instead of B, or the other way round.
+    Flip,
+    /// Blink between query and synthetic view.
+    Blink,
+    /// Show only what differs.
+    OnlyDifferences,
+    /// Show or hide the ground truth.
+    ShowTruth,
+    /// Put the keyboard into the filter.
+    Filter,
+    /// Look at one query feature.
+    SelectFeature(Option<usize>),
+    /// Look at a pose as long as the pointer is there (`world_from_camera`).
+    Hover(Option<Pose>),
+    /// Take the camera in hand at a pose (`world_from_camera`), or let it go.
+    TakeCamera(Option<Pose>),
+    /// Take the camera to a place of the search.
+    JumpCamera(super::camera::Place),
+    /// Move the camera in hand, in its own frame \[m, rad\].
+    MoveCamera(super::camera::Nudge),
+    /// Save the run as a recording.
+    SaveRecording(std::path::PathBuf),
+    /// Send the run to a running Rerun viewer.
+    StreamRecording,
+    /// Start a Rerun viewer and send the run to it.
+    SpawnViewer,
+    /// Put the command line that repeats this run on the clipboard.
+    CopyCommandLine,
+    /// Save a view, or the whole window, as a picture.
+    SavePicture(Option<&'static str>),
+    /// Save scene, query, settings and layout.
+    SaveSession(std::path::PathBuf),
+    /// Go back to a saved session.
+    RestoreSession(std::path::PathBuf),
+    /// Bring a view to the front.
+    ShowView(&'static str),
+    /// The first layout.
+    ResetLayout,
+    /// Dark or light.
+    SwitchTheme,
+    /// Show or hide the list of keys.
+    Help,
+    /// Take a message away.
+    Dismiss(usize),
+}
+
+/// Commands that wait for the end of the frame.
+#[derive(Debug, Default)]
+pub struct Queue(RefCell<Vec<Command>>);
+
+impl Queue {
+    /// Adds one.
+    pub fn send(&self, command: Command) {
+        self.0.borrow_mut().push(command);
+    }
+
+    pub(super) fn take(&self) -> Vec<Command> {
+        self.0.take()
+    }
+}
+
+/// A key and what it does.
+pub struct Shortcut {
+    /// The key with its modifiers.
+    pub keys: KeyboardShortcut,
+    /// What it does.
+    pub command: Command,
+    /// The same in words.
+    pub help: &'static str,
+}
+
+/// Every key. Where two keys do the same, the second follows with the same words.
+pub fn shortcuts() -> Vec<Shortcut> {
+    use super::camera::{Nudge, Place};
+    const NONE: Modifiers = Modifiers::NONE;
+    const SHIFT: Modifiers = Modifiers::SHIFT;
+    const ALT: Modifiers = Modifiers::ALT;
+    const ALT_SHIFT: Modifiers = Modifiers::ALT.plus(Modifiers::SHIFT);
+    let keys = |modifiers, key, command, help| Shortcut {
+        keys: KeyboardShortcut::new(modifiers, key),
+        command,
+        help,
+    };
+    let mut all = vec![
+        keys(NONE, Key::Space, Command::RunOrPause, "Run or pause"),
+        keys(NONE, Key::ArrowRight, Command::Forward(1), "One step on"),
+        keys(NONE, Key::ArrowLeft, Command::Back(1), "One step back"),
+        keys(SHIFT, Key::ArrowRight, Command::Forward(10), "Ten steps on"),
+        keys(SHIFT, Key::ArrowLeft, Command::Back(10), "Ten steps back"),
+        keys(NONE, Key::Home, Command::First, "To the first step"),
+        keys(NONE, Key::End, Command::Last, "To the last step"),
+        keys(NONE, Key::F5, Command::Run, "Run to the next breakpoint"),
+        keys(SHIFT, Key::F5, Command::Restart, "Restart"),
+        keys(NONE, Key::F9, Command::RunToEnd, "Run to the end"),
+        keys(NONE, Key::F10, Command::StepOver, "Step over the stage"),
+        keys(NONE, Key::F11, Command::StepInto, "Step into"),
+        keys(NONE, Key::I, Command::StepInto, "Step into"),
+        keys(SHIFT, Key::F11, Command::StepOut, "Step out of the stage"),
+        keys(SHIFT, Key::I, Command::StepOut, "Step out of the stage"),
+        keys(
+            NONE,
+            Key::J,
+            Command::NextQuery { back: false },
+            "Next query",
+        ),
+        keys(
+            NONE,
+            Key::K,
+            Command::NextQuery { back: true },
+            "Previous query",
+        ),
+        keys(
+            NONE,
+            Key::N,
+            Command::NextFailure { back: false },
+            "Next failure",
+        ),
+        keys(
+            SHIFT,
+            Key::N,
+            Command::NextFailure { back: true },
+            "Previous failure",
+        ),
+        keys(
+            NONE,
+            Key::B,
+            Command::Blink,
+            "Blink between query and synthetic view",
+        ),
+        keys(NONE, Key::D, Command::OnlyDifferences, "Differences only"),
+        keys(NONE, Key::G, Command::ShowTruth, "Ground truth on or off"),
+        keys(NONE, Key::P, Command::Pin, "Keep this run as A"),
+        keys(NONE, Key::X, Command::Flip, "Swap A and B"),
+        keys(NONE, Key::Slash, Command::Filter, "Filter"),
+        keys(
+            NONE,
+            Key::Num5,
+            Command::JumpCamera(Place::Start),
+            "Camera to the start",
+        ),
+        keys(
+            NONE,
+            Key::Num6,
+            Command::JumpCamera(Place::Coarse),
+            "Camera to the coarse minimum",
+        ),
+        keys(
+            NONE,
+            Key::Num7,
+            Command::JumpCamera(Place::Fine),
+            "Camera to the fine minimum",
+        ),
+        keys(
+            NONE,
+            Key::Num8,
+            Command::JumpCamera(Place::Estimate),
+            "Camera to the estimate",
+        ),
+        keys(
+            NONE,
+            Key::Num9,
+            Command::JumpCamera(Place::Truth),
+            "Camera to the truth",
+        ),
+        keys(
+            NONE,
+            Key::Num0,
+            Command::JumpCamera(Place::Last),
+            "Camera to where it was before",
+        ),
+        keys(
+            NONE,
+            Key::Escape,
+            Command::TakeCamera(None),
+            "Let the camera go",
+        ),
+        keys(
+            ALT,
+            Key::ArrowUp,
+            Command::MoveCamera(Nudge::Forward(1.0)),
+            "Camera ahead",
+        ),
+        keys(
+            ALT,
+            Key::ArrowDown,
+            Command::MoveCamera(Nudge::Forward(-1.0)),
+            "Camera back",
+        ),
+        keys(
+            ALT,
+            Key::ArrowRight,
+            Command::MoveCamera(Nudge::Right(1.0)),
+            "Camera to the right",
+        ),
+        keys(
+            ALT,
+            Key::ArrowLeft,
+            Command::MoveCamera(Nudge::Right(-1.0)),
+            "Camera to the left",
+        ),
+        keys(
+            ALT_SHIFT,
+            Key::ArrowUp,
+            Command::MoveCamera(Nudge::Up(1.0)),
+            "Camera up",
+        ),
+        keys(
+            ALT_SHIFT,
+            Key::ArrowDown,
+            Command::MoveCamera(Nudge::Up(-1.0)),
+            "Camera down",
+        ),
+        keys(
+            ALT_SHIFT,
+            Key::ArrowLeft,
+            Command::MoveCamera(Nudge::Yaw(1.0)),
+            "Turn the camera left",
+        ),
+        keys(
+            ALT_SHIFT,
+            Key::ArrowRight,
+            Command::MoveCamera(Nudge::Yaw(-1.0)),
+            "Turn the camera right",
+        ),
+        keys(
+            Modifiers::COMMAND,
+            Key::C,
+            Command::CopyCommandLine,
+            "Copy the command line",
+        ),
+        keys(
+            Modifiers::COMMAND,
+            Key::P,
+            Command::SavePicture(None),
+            "Save the window as a picture",
+        ),
+        keys(NONE, Key::L, Command::SwitchTheme, "Light or dark"),
+        keys(NONE, Key::Questionmark, Command::Help, "This list"),
+        keys(NONE, Key::F1, Command::Help, "This list"),
+    ];
+    let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4];
+    let methods = Method::ALL
+        .into_iter()
+        .zip(numbers)
+        .zip(["Show FB", "Show PM", "Show MI", "Show HY"]);
+    all.extend(
+        methods.map(|((method, number), help)| {
+            keys(NONE, number, Command::SelectMethod(method), help)
+        }),
+    );
+    all
+}
+
+/// Turns the keys of this frame into commands, unless somebody is typing.
+pub(super) fn read_keys(ctx: &egui::Context, queue: &Queue) {
+    if ctx.egui_wants_keyboard_input() {
+        return;
+    }
+    let mut shortcuts = shortcuts();
+    // egui takes a key with Shift for one without: those with more modifiers are asked first.
+    shortcuts.sort_by_key(|shortcut| {
+        let Modifiers {
+            alt,
+            shift,
+            command,
+            ..
+        } = shortcut.keys.modifiers;
+        std::cmp::Reverse(u8::from(alt) + u8::from(shift) + u8::from(command))
+    });
+    for shortcut in shortcuts {
+        while ctx.input_mut(|input| input.consume_shortcut(&shortcut.keys)) {
+            queue.send(shortcut.command.clone());
+        }
+    }
+    // `?` and `/` are typed in another way on every keyboard; the text says what was meant.
+    let typed = ctx.input(|input| {
+        input.events.iter().find_map(|event| match event {
+            egui::Event::Text(text) if text == "?" => Some(Command::Help),
+            _ => None,
+        })
+    });
+    if let Some(command) = typed {
+        queue.send(command);
+    }
+}
+
+/// The list of keys.
+pub(super) fn help_ui(ctx: &egui::Context, open: &mut bool) {
+    egui::Window::new("Keys").open(open).show(ctx, |ui| {
+        egui::ScrollArea::vertical()
+            .max_height(520.0)
+            .show(ui, |ui| {
+                egui::Grid::new("keys").striped(true).show(ui, |ui| {
+                    for shortcut in shortcuts() {
+                        ui.monospace(ui.ctx().format_shortcut(&shortcut.keys));
+                        ui.label(shortcut.help);
+                        ui.end_row();
+                    }
+                });
+            });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_does_two_things() {
+        let mut keys: Vec<_> = shortcuts()
+            .iter()
+            .map(|s| format!("{:?}", s.keys))
+            .collect();
+        keys.sort();
+        let all = keys.len();
+        keys.dedup();
+        assert_eq!(keys.len(), all);
+    }
+}

@@ -1,0 +1,343 @@
+//! What lies on the desk: the run, where a person looks at it, what is switched on.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::command;
+use super::prober::{Probe, Prober};
+use super::queries::Queries;
+use super::scope::{Scope, ShownAt};
+use super::setup::Setup;
+use super::textures::Textures;
+use crate::event::Method;
+use crate::geometry::Pose;
+use crate::params::Params;
+use crate::session::{Breakpoints, Run, RunMode, Session, State};
+
+/// Which of two runs is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Comparing {
+    /// The present run, B.
+    #[default]
+    Present,
+    /// The run that was kept, A.
+    Kept,
+    /// Both, beside each other.
+    SideBySide,
+}
+
+/// Something to tell the person at the window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// One line.
+    pub text: String,
+    /// Whether something went wrong.
+    pub is_error: bool,
+}
+
+/// A run that was kept to be compared with.
+pub struct Kept {
+    /// The run.
+    pub run: Run,
+    /// Where the cursor was.
+    pub cursor: usize,
+}
+
+/// Everything that the views draw from.
+pub struct Desk {
+    /// What is run.
+    pub setup: Setup,
+    /// The parameters of the setup, shared with the prober.
+    pub(super) params: Arc<Params>,
+    pub(super) session: Session,
+    pub(super) ctx: egui::Context,
+    /// Position among the records of the present run.
+    pub cursor: usize,
+    /// Whether the cursor goes along with new records.
+    pub follows: bool,
+    /// Where the cursor is to be once the new run has come so far.
+    pub(super) anchor: Option<Anchor>,
+    /// The run A, if one was kept.
+    pub kept: Option<Kept>,
+    /// Which of the runs is shown.
+    pub comparing: Comparing,
+    /// Whether the ground truth is shown.
+    pub shows_truth: bool,
+    /// Whether only what differs is shown.
+    pub only_differences: bool,
+    /// Whether the picture blinks, and which of the two it shows now.
+    pub blinking: bool,
+    /// Whether the keyboard is wanted by the filter.
+    pub wants_filter: bool,
+    /// The query feature that is looked at.
+    pub selected_feature: Option<usize>,
+    /// The pose under the pointer (`world_from_camera`).
+    pub hovered: Option<Pose>,
+    /// The camera in hand (`world_from_camera`).
+    pub camera: Option<Pose>,
+    /// Where the camera was before the last jump.
+    pub(super) camera_before: Option<Pose>,
+    pub(super) prober: Prober,
+    /// The queries, what is known of them.
+    pub queries: Queries,
+    /// The latest notes, the newest last.
+    pub notes: Vec<Note>,
+    /// Pictures on the graphics card.
+    pub textures: Textures,
+    /// Results of the queries that were run, by query.
+    pub results: BTreeMap<usize, Vec<crate::evaluate::QueryResult>>,
+}
+
+/// A place in a run that can be found again in another one.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Anchor {
+    method: Method,
+    reference: usize,
+    /// The stages around it, by name, the outermost first.
+    stages: Vec<&'static str>,
+    /// How many records into the innermost stage.
+    records_in: usize,
+    /// Whether it was the last record of the stage.
+    is_end: bool,
+}
+
+impl Anchor {
+    fn of(run: &Run, cursor: usize) -> Option<Self> {
+        let span = run.span_at(cursor)?;
+        let stages: Vec<_> = run.stages_at(cursor).collect();
+        let innermost = stages.last()?;
+        Some(Self {
+            method: span.method,
+            reference: span.reference,
+            stages: stages.iter().map(|bar| bar.stage.name()).collect(),
+            records_in: cursor - innermost.records.start,
+            is_end: cursor + 1 == innermost.records.end && innermost.succeeded.is_some(),
+        })
+    }
+
+    /// The same place in another run, if the run has come so far.
+    fn find(&self, run: &Run) -> Option<usize> {
+        let span = run
+            .spans()
+            .iter()
+            .find(|span| span.method == self.method && span.reference == self.reference)?;
+        let inside = |records: &std::ops::Range<usize>| {
+            span.records.start <= records.start && records.end <= span.records.end
+        };
+        let bar = run.stages().iter().find(|bar| {
+            inside(&bar.records)
+                && bar.depth == self.stages.len()
+                && run
+                    .stages_at(bar.records.start)
+                    .map(|bar| bar.stage.name())
+                    .eq(self.stages.iter().copied())
+        });
+        match bar {
+            Some(bar) => {
+                let last = bar.records.end - 1;
+                let wanted = bar.records.start + self.records_in;
+                match (bar.succeeded.is_some(), self.is_end) {
+                    (true, true) => Some(last),
+                    (true, false) => Some(wanted.min(last)),
+                    (false, true) => None,
+                    (false, false) => (wanted <= last).then_some(wanted),
+                }
+            }
+            // The stage is not part of this run: the estimator stopped before it.
+            None => span.result.as_ref().map(|_| span.records.end - 1),
+        }
+    }
+}
+
+impl Desk {
+    pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
+        let params = Arc::new(setup.params.clone());
+        let session = start(&setup, setup.mode, None, &ctx);
+        Self {
+            params,
+            prober: Prober::new(ctx.clone()),
+            queries: Queries::new(ctx.clone()),
+            session,
+            ctx,
+            cursor: 0,
+            follows: true,
+            anchor: None,
+            kept: None,
+            comparing: Comparing::default(),
+            shows_truth: true,
+            only_differences: false,
+            blinking: false,
+            wants_filter: false,
+            selected_feature: None,
+            hovered: None,
+            camera: None,
+            camera_before: None,
+            notes: Vec::new(),
+            textures: Textures::default(),
+            results: BTreeMap::new(),
+            setup,
+        }
+    }
+
+    /// The present run.
+    pub fn run(&self) -> &Run {
+        self.session.run()
+    }
+
+    /// What the present run is doing.
+    pub fn state(&self) -> &State {
+        self.session.state()
+    }
+
+    /// The present run at the cursor.
+    pub(super) fn scope<'a>(&'a self, commands: &'a command::Queue) -> Scope<'a> {
+        Scope {
+            run: self.run(),
+            cursor: self.cursor,
+            desk: self,
+            commands,
+        }
+    }
+
+    /// The kept run at the place that corresponds to the cursor.
+    pub(super) fn kept_scope<'a>(&'a self, commands: &'a command::Queue) -> Option<Scope<'a>> {
+        let kept = self.kept.as_ref()?;
+        let same = Anchor::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
+        Some(Scope {
+            run: &kept.run,
+            cursor: same.unwrap_or(kept.cursor),
+            desk: self,
+            commands,
+        })
+    }
+
+    /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
+    pub fn looking_at(&self) -> Option<(Pose, ShownAt)> {
+        self.hovered
+            .map(|pose| (pose, ShownAt::Pointer))
+            .or_else(|| self.camera.map(|pose| (pose, ShownAt::Camera)))
+    }
+
+    /// What is known about the pose that was asked for last.
+    pub fn probe(&self) -> Option<&Probe> {
+        self.prober.latest()
+    }
+
+    /// Whether the answer for the pose that is looked at is still worked out.
+    pub fn is_probing(&self) -> bool {
+        self.looking_at().is_some() && self.prober.is_busy()
+    }
+
+    /// Takes in what the threads have to say.
+    pub(super) fn attend(&mut self) {
+        let was_alive = self.session.is_alive();
+        if self.session.drain() {
+            let last = self.session.run().len().saturating_sub(1);
+            if let Some(anchor) = &self.anchor {
+                match anchor.find(self.session.run()) {
+                    Some(at) => {
+                        self.cursor = at;
+                        self.anchor = None;
+                    }
+                    None if !self.session.is_alive() => {
+                        self.cursor = last;
+                        self.anchor = None;
+                    }
+                    None => self.cursor = last,
+                }
+            } else if self.follows {
+                self.cursor = last;
+            }
+            if was_alive && !self.session.is_alive() {
+                self.ended();
+            }
+        }
+        if let Err(why) = self.prober.attend() {
+            self.note(why, true);
+        }
+        for (query, outcome) in self.queries.attend() {
+            match outcome {
+                Ok(results) => {
+                    self.results.insert(query, results);
+                }
+                Err(why) => self.note(why, true),
+            }
+        }
+        self.queries.paint_thumbnails(&self.setup.queries);
+        if let Some((pose, _)) = self.looking_at()
+            && let Some(problem) = self.problem().cloned()
+        {
+            self.prober.ask(&problem, &self.params, pose);
+        }
+    }
+
+    fn problem(&self) -> Option<&crate::problem::Problem> {
+        let loaded = self.run().loaded.as_deref()?;
+        let span = self.run().span_at(self.cursor);
+        loaded.problems.get(span.map_or(0, |span| span.reference))
+    }
+
+    fn ended(&mut self) {
+        match self.session.state() {
+            State::Finished => {
+                let results = self.session.run().results().cloned().collect();
+                self.results.insert(self.setup.query, results);
+            }
+            State::Broken(why) => self.note(why.clone(), true),
+            _ => {}
+        }
+    }
+
+    /// Tells the person at the window.
+    pub fn note(&mut self, text: impl Into<String>, is_error: bool) {
+        const KEPT: usize = 5;
+        self.notes.push(Note {
+            text: text.into(),
+            is_error,
+        });
+        let surplus = self.notes.len().saturating_sub(KEPT);
+        self.notes.drain(..surplus);
+    }
+
+    /// Another query, or other references: everything begins anew.
+    pub(super) fn begin(&mut self, mode: RunMode) {
+        let at_hand = self.run().loaded.clone();
+        self.session = start(&self.setup, mode, at_hand, &self.ctx);
+        self.cursor = 0;
+        self.follows = true;
+        self.anchor = None;
+        self.hovered = None;
+        self.selected_feature = None;
+        self.prober.forget();
+    }
+
+    /// Other settings for the same query: what does not depend on them is reused, and the cursor
+    /// stays where it was, in meaning.
+    pub(super) fn begin_again(&mut self) {
+        let anchor = Anchor::of(self.run(), self.cursor);
+        let follows = self.follows && self.session.is_alive();
+        self.params = Arc::new(self.setup.params.clone());
+        self.begin(RunMode::Running);
+        self.follows = follows;
+        self.anchor = anchor;
+    }
+}
+
+fn start(
+    setup: &Setup,
+    mode: RunMode,
+    at_hand: Option<Arc<crate::session::Loaded>>,
+    ctx: &egui::Context,
+) -> Session {
+    let ctx = ctx.clone();
+    let breakpoints = setup
+        .breakpoints
+        .iter()
+        .filter_map(|text| text.parse().ok());
+    Session::start(
+        setup.job(at_hand),
+        mode,
+        Breakpoints::new(breakpoints),
+        move || ctx.request_repaint(),
+    )
+}

@@ -1,0 +1,174 @@
+//! Where the views are: a tree of tabs and splits that a person can rearrange.
+
+use std::collections::BTreeMap;
+
+use eframe::egui_wgpu::RenderState;
+use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
+
+use super::command::Queue;
+use super::desk::{Comparing, Desk};
+use super::scope::Scope;
+use super::views::{self, View};
+
+/// The tree of views, and the views themselves.
+pub(super) struct Layout {
+    tree: Tree<String>,
+    views: BTreeMap<&'static str, Panel>,
+}
+
+/// A view has what it remembers once for each of two runs.
+struct Panel {
+    present: Box<dyn View>,
+    kept: Box<dyn View>,
+}
+
+impl Layout {
+    pub(super) fn new(render_state: Option<&RenderState>) -> Self {
+        let views = views::ALL
+            .iter()
+            .map(|entry| {
+                let panel = Panel {
+                    present: (entry.new)(render_state),
+                    kept: (entry.new)(render_state),
+                };
+                (entry.name, panel)
+            })
+            .collect();
+        Self {
+            tree: first_tree(),
+            views,
+        }
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.tree = first_tree();
+    }
+
+    /// Brings a view to the front; a view that was closed comes back.
+    pub(super) fn show(&mut self, name: &str) {
+        let is_wanted = |pane: &String| pane == name;
+        let found = self.tree.tiles.iter().find_map(|(id, tile)| match tile {
+            egui_tiles::Tile::Pane(pane) if is_wanted(pane) => Some(*id),
+            _ => None,
+        });
+        let id = found.unwrap_or_else(|| {
+            let id = self.tree.tiles.insert_pane(name.to_owned());
+            match self.tree.root() {
+                Some(root) => {
+                    self.tree
+                        .move_tile_to_container(id, root, usize::MAX, false);
+                }
+                None => self.tree.root = Some(id),
+            }
+            id
+        });
+        self.tree.make_active(|tile, _| tile == id);
+    }
+
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, desk: &Desk, commands: &Queue) {
+        let mut panes = Panes {
+            views: &mut self.views,
+            desk,
+            commands,
+        };
+        self.tree.ui(&mut panes, ui);
+    }
+
+    /// The arrangement, to be saved.
+    pub(super) fn to_json(&self) -> serde_json::Result<serde_json::Value> {
+        serde_json::to_value(&self.tree)
+    }
+
+    /// A saved arrangement.
+    pub(super) fn restore(&mut self, saved: serde_json::Value) -> serde_json::Result<()> {
+        self.tree = serde_json::from_value(saved)?;
+        Ok(())
+    }
+}
+
+fn first_tree() -> Tree<String> {
+    let mut tiles = Tiles::default();
+    let mut tabs = |names: &[&str]| {
+        let panes: Vec<_> = names
+            .iter()
+            .filter(|name| views::ALL.iter().any(|entry| entry.name == **name))
+            .map(|name| tiles.insert_pane((*name).to_owned()))
+            .collect();
+        tiles.insert_tab_tile(panes)
+    };
+    let lists = tabs(&[views::QUERIES, views::PARAMETERS, "breakpoints"]);
+    let pictures = tabs(&["images", "synthetic"]);
+    let space = tabs(&["space", "ransac"]);
+    let surface = tabs(&["surface"]);
+    let histogram = tabs(&["histogram"]);
+    let words = tabs(&["report", "log"]);
+    let lower = tiles.insert_horizontal_tile(vec![surface, histogram]);
+    let middle = tiles.insert_vertical_tile(vec![pictures, lower]);
+    let right = tiles.insert_vertical_tile(vec![space, words]);
+    let root = tiles.insert_horizontal_tile(vec![lists, middle, right]);
+    if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
+        tiles.get_mut(root)
+    {
+        linear.shares.set_share(lists, 0.22);
+        linear.shares.set_share(middle, 0.48);
+        linear.shares.set_share(right, 0.30);
+    }
+    Tree::new(egui::Id::unique("views"), root, tiles)
+}
+
+/// What the tree draws its panes with.
+struct Panes<'a> {
+    views: &'a mut BTreeMap<&'static str, Panel>,
+    desk: &'a Desk,
+    commands: &'a Queue,
+}
+
+impl Behavior<String> for Panes<'_> {
+    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut String) -> UiResponse {
+        let Some(panel) = self.views.get_mut(pane.as_str()) else {
+            ui.weak(format!("There is no view `{pane}`"));
+            return UiResponse::None;
+        };
+        egui::Frame::NONE.inner_margin(6.0).show(ui, |ui| {
+            let present = self.desk.scope(self.commands);
+            let kept = self.desk.kept_scope(self.commands);
+            match (self.desk.comparing, kept) {
+                (Comparing::Kept, Some(kept)) => draw(ui, "A", &mut panel.kept, &kept),
+                (Comparing::SideBySide, Some(kept)) => ui.columns(2, |columns| {
+                    draw(&mut columns[0], "A", &mut panel.kept, &kept);
+                    draw(&mut columns[1], "B", &mut panel.present, &present);
+                }),
+                _ => draw(ui, "B", &mut panel.present, &present),
+            }
+        });
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
+        let entry = views::ALL.iter().find(|entry| entry.name == pane);
+        entry.map_or(pane.as_str(), |entry| entry.title).into()
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions {
+            all_panes_must_have_tabs: true,
+            ..SimplificationOptions::default()
+        }
+    }
+
+    fn is_tab_closable(&self, _tiles: &Tiles<String>, _tile: TileId) -> bool {
+        true
+    }
+}
+
+fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, scope: &Scope<'_>) {
+    ui.push_id(run, |ui| {
+        if scope.desk.kept.is_some() {
+            ui.weak(match run {
+                "A" => "A, kept",
+                _ => "B, present",
+            });
+        }
+        view.ui(ui, scope);
+    });
+}

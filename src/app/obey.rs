@@ -1,0 +1,313 @@
+//! Doing what was asked for.
+
+use super::App;
+use super::camera::Place;
+use super::command::Command;
+use super::desk::{Comparing, Desk, Kept};
+use super::setup::ReferencePick;
+use crate::evaluate::{QueryResult, Status};
+use crate::event::{Method, PhaseSearched};
+use crate::geometry::Pose;
+use crate::grid::Phase;
+use crate::session::{Breakpoint, Breakpoints, RunMode, State};
+
+impl App {
+    /// Does one thing. What cannot be done is said, not ignored.
+    pub(super) fn obey(&mut self, command: Command, ctx: &egui::Context) {
+        let desk = &mut self.desk;
+        match command {
+            Command::RunOrPause => match desk.state() {
+                State::Running | State::Loading => desk.session.set_mode(RunMode::Paused),
+                State::Paused { .. } => desk.go(RunMode::Running),
+                _ => desk.begin(RunMode::Running),
+            },
+            Command::Run => match desk.state() {
+                State::Paused { .. } | State::Running | State::Loading => desk.go(RunMode::Running),
+                _ => desk.begin(RunMode::Running),
+            },
+            Command::StepInto => desk.go(RunMode::StepInto),
+            Command::StepOver => desk.go(RunMode::StepOver),
+            Command::StepOut => desk.go(RunMode::StepOut),
+            Command::RunToEnd => {
+                desk.session.set_breakpoints(Breakpoints::default());
+                desk.go(RunMode::Running);
+            }
+            Command::Restart => desk.begin(RunMode::Paused),
+            Command::Forward(steps) => desk.forward(steps),
+            Command::Back(steps) => desk.move_cursor(desk.cursor.saturating_sub(steps)),
+            Command::First => desk.move_cursor(0),
+            Command::Last => {
+                desk.move_cursor(desk.run().len());
+                desk.follows = true;
+            }
+            Command::MoveCursor(cursor) => desk.move_cursor(cursor),
+            Command::SelectMethod(method) => desk.select_method(method),
+            Command::SelectQuery(query) => desk.select_query(query),
+            Command::NextQuery { back } => desk.next_query(back, |_, _| true),
+            Command::NextFailure { back } => desk.next_failure(back),
+            Command::RunAllQueries => desk.queries.run_all(&desk.setup),
+            Command::PickReferences(pick) => desk.pick_references(pick),
+            Command::SetReferences(frames) => desk.set_references(frames),
+            Command::SetRadius(radius_m) => {
+                desk.setup.uncertainty_radius_m = radius_m;
+                desk.begin_again();
+            }
+            Command::SetSeed(seed) => {
+                desk.setup.seed = seed;
+                desk.begin_again();
+            }
+            Command::SetParam { key, value } => match desk.setup.params.set(&key, &value) {
+                Ok(()) if desk.setup.params != *desk.params => desk.begin_again(),
+                Ok(()) => {}
+                Err(error) => desk.note(error.to_string(), true),
+            },
+            Command::ResetParams => {
+                desk.setup.params = crate::params::Params::default();
+                desk.begin_again();
+            }
+            Command::SetBreakpoints(texts) => desk.set_breakpoints(texts),
+            Command::Pin => {
+                desk.kept = Some(Kept {
+                    run: desk.run().clone(),
+                    cursor: desk.cursor,
+                });
+                desk.note(
+                    "This run is kept as A; change a parameter to compare",
+                    false,
+                );
+            }
+            Command::Unpin => {
+                desk.kept = None;
+                desk.comparing = Comparing::Present;
+            }
+            Command::Compare(_) | Command::Flip if desk.kept.is_none() => {
+                desk.note("There is no run A; keep one first (P)", true);
+            }
+            Command::Compare(comparing) => desk.comparing = comparing,
+            Command::Flip => {
+                desk.comparing = match desk.comparing {
+                    Comparing::Kept => Comparing::Present,
+                    Comparing::Present | Comparing::SideBySide => Comparing::Kept,
+                }
+            }
+            Command::Blink => desk.blinking = !desk.blinking,
+            Command::OnlyDifferences => desk.only_differences = !desk.only_differences,
+            Command::ShowTruth => desk.shows_truth = !desk.shows_truth,
+            Command::Filter => {
+                desk.wants_filter = true;
+                self.layout.show(super::views::PARAMETERS);
+            }
+            Command::SelectFeature(feature) => desk.selected_feature = feature,
+            Command::Hover(pose) => desk.hovered = pose,
+            Command::TakeCamera(pose) => desk.camera = pose,
+            Command::JumpCamera(place) => desk.jump_camera(place),
+            Command::MoveCamera(nudge) => match desk.camera.or_else(|| desk.place(Place::Start)) {
+                Some(pose) => desk.camera = Some(nudge.apply(&pose)),
+                None => desk.note("There is no camera before the query is loaded", true),
+            },
+            Command::CopyCommandLine => {
+                ctx.copy_text(desk.setup.command_line());
+                desk.note("The command line is on the clipboard", false);
+            }
+            Command::ShowView(name) => self.layout.show(name),
+            Command::ResetLayout => self.layout.reset(),
+            Command::SwitchTheme => {
+                let is_dark = ctx.global_style().visuals.dark_mode;
+                ctx.set_theme(if is_dark {
+                    egui::Theme::Light
+                } else {
+                    egui::Theme::Dark
+                });
+            }
+            Command::Help => self.help = !self.help,
+            Command::Dismiss(note) => {
+                if note < desk.notes.len() {
+                    desk.notes.remove(note);
+                }
+            }
+            Command::SaveRecording(_)
+            | Command::StreamRecording
+            | Command::SpawnViewer
+            | Command::SavePicture(_)
+            | Command::SaveSession(_)
+            | Command::RestoreSession(_) => {
+                desk.note("not there yet", true);
+            }
+        }
+    }
+}
+
+impl Desk {
+    /// Goes on from where the run stands.
+    fn go(&mut self, mode: RunMode) {
+        if !self.session.is_alive() {
+            self.note("The run is over; restart it (Shift+F5)", false);
+            return;
+        }
+        self.follows = true;
+        self.session.set_mode(mode);
+    }
+
+    fn forward(&mut self, steps: usize) {
+        let last = self.run().len().saturating_sub(1);
+        if self.cursor < last {
+            self.move_cursor(self.cursor + steps);
+        } else if matches!(self.state(), State::Paused { .. }) {
+            self.go(RunMode::StepInto);
+        }
+    }
+
+    fn move_cursor(&mut self, cursor: usize) {
+        self.cursor = cursor.min(self.run().len().saturating_sub(1));
+        self.follows = false;
+        self.anchor = None;
+    }
+
+    fn select_method(&mut self, method: Method) {
+        let reference = self
+            .run()
+            .span_at(self.cursor)
+            .map_or(0, |span| span.reference);
+        let span = self
+            .run()
+            .spans()
+            .iter()
+            .find(|span| span.method == method && span.reference == reference);
+        match span.and_then(|span| span.records.end.checked_sub(1)) {
+            Some(last) => self.move_cursor(last),
+            None => {
+                let name = method.name().to_uppercase();
+                self.note(format!("{name} has not begun yet"), false);
+            }
+        }
+    }
+
+    fn select_query(&mut self, query: usize) {
+        if self.setup.pick != ReferencePick::ByHand {
+            let before = std::mem::replace(&mut self.setup.query, query);
+            match self.setup.choose(query) {
+                Ok(frames) => self.setup.reference_frames = frames,
+                Err(why) => {
+                    self.setup.query = before;
+                    self.note(why, true);
+                    return;
+                }
+            }
+        }
+        self.setup.query = query;
+        self.camera = None;
+        self.begin(RunMode::Running);
+    }
+
+    /// The next query in the list that is `wanted`, round the end.
+    fn next_query(&mut self, back: bool, wanted: impl Fn(&Self, usize) -> bool) {
+        let offered = &self.setup.offered;
+        let here = offered
+            .iter()
+            .position(|query| *query == self.setup.query)
+            .unwrap_or(0);
+        let count = offered.len();
+        let next = (1..=count)
+            .map(|step| if back { count - step } else { step })
+            .map(|step| offered[(here + step) % count])
+            .find(|query| wanted(self, *query));
+        if let Some(query) = next {
+            self.select_query(query);
+        }
+    }
+
+    fn next_failure(&mut self, back: bool) {
+        let fails = |desk: &Self, query: usize| {
+            let results = desk.results.get(&query);
+            results.is_some_and(|results| results.iter().any(has_failed))
+        };
+        if self.results.keys().any(|query| fails(self, *query)) {
+            self.next_query(back, fails);
+        } else {
+            self.note("No query is known to fail; run all of them first", false);
+        }
+    }
+
+    fn pick_references(&mut self, pick: ReferencePick) {
+        let before = std::mem::replace(&mut self.setup.pick, pick);
+        if pick == ReferencePick::ByHand {
+            return;
+        }
+        match self.setup.choose(self.setup.query) {
+            Ok(frames) => {
+                self.setup.reference_frames = frames;
+                self.begin(RunMode::Running);
+            }
+            Err(why) => {
+                self.setup.pick = before;
+                self.note(why, true);
+            }
+        }
+    }
+
+    fn set_references(&mut self, frames: Vec<usize>) {
+        if frames.is_empty() {
+            self.note("A query needs at least one reference", true);
+            return;
+        }
+        self.setup.pick = ReferencePick::ByHand;
+        self.setup.reference_frames = frames;
+        self.begin(RunMode::Running);
+    }
+
+    fn set_breakpoints(&mut self, texts: Vec<String>) {
+        let parsed: Result<Vec<Breakpoint>, _> = texts.iter().map(|text| text.parse()).collect();
+        match parsed {
+            Ok(breakpoints) => {
+                self.session.set_breakpoints(Breakpoints::new(breakpoints));
+                self.setup.breakpoints = texts;
+            }
+            Err(error) => self.note(error.to_string(), true),
+        }
+    }
+
+    fn jump_camera(&mut self, place: Place) {
+        let Some(pose) = self.place(place) else {
+            let name = place.name().to_lowercase();
+            self.note(format!("There is no pose for {name} here"), false);
+            return;
+        };
+        self.camera_before = self.camera.or_else(|| self.place(Place::Start));
+        self.camera = Some(pose);
+    }
+
+    /// The pose of a place of the search (`world_from_camera`).
+    pub(super) fn place(&self, place: Place) -> Option<Pose> {
+        let run = self.run();
+        let loaded = run.loaded.as_deref()?;
+        let span = run.span_at(self.cursor);
+        let problem = loaded.problems.get(span.map_or(0, |span| span.reference))?;
+        let minimum = |wanted: Phase| {
+            let events = run.all_until::<PhaseSearched>(self.cursor);
+            let best = events
+                .filter(|(_, event)| event.surface.lattice.phase == wanted)
+                .last()?
+                .1
+                .best?;
+            Some(problem.world_from_query(&best.reference_from_camera()))
+        };
+        match place {
+            Place::Start => Some(problem.reference.world_from_camera),
+            Place::Coarse => minimum(Phase::PositionCoarse),
+            Place::Fine => minimum(Phase::PositionFine),
+            Place::Estimate => span?.result.as_ref()?.pose.as_ref()?.to_pose(),
+            Place::Truth => loaded.truth,
+            Place::Last => self.camera_before,
+        }
+    }
+}
+
+/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
+pub(super) fn has_failed(result: &QueryResult) -> bool {
+    /// The failure radius of the paper for KITTI \[m\].
+    const FAILURE_RADIUS_M: f64 = 10.0;
+    result.status == Status::Failed
+        || result
+            .error
+            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
+}

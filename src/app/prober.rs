@@ -1,0 +1,126 @@
+//! Costs and pictures of any pose, worked out beside the window's thread.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::estimator;
+use crate::event::Method;
+use crate::geometry::Pose;
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::render::Comparison;
+
+/// The direct methods at one pose.
+#[derive(Clone)]
+pub struct Probe {
+    /// `world_from_camera`.
+    pub pose: Pose,
+    /// The synthetic view and cost of each method that has one.
+    pub comparisons: Vec<(Method, Arc<Comparison>)>,
+    /// How long it took.
+    pub took: Duration,
+}
+
+struct Request {
+    problem: Problem,
+    params: Arc<Params>,
+    pose: Pose,
+}
+
+/// Answers for the pose that was asked for last; older questions are dropped.
+pub struct Prober {
+    requests: Sender<Request>,
+    answers: Receiver<Result<Probe, String>>,
+    asked: Option<Pose>,
+    latest: Option<Probe>,
+}
+
+impl Prober {
+    pub(super) fn new(ctx: egui::Context) -> Self {
+        let (requests, inbox) = mpsc::channel::<Request>();
+        let (outbox, answers) = mpsc::channel();
+        // Without a thread the answers never come, and the send below says so.
+        let _ = thread::Builder::new()
+            .name("prober".to_owned())
+            .spawn(move || {
+                while let Ok(first) = inbox.recv() {
+                    let request = inbox.try_iter().last().unwrap_or(first);
+                    let probe = catch_unwind(AssertUnwindSafe(|| request.answer()));
+                    let answer = probe.map_err(|_| "the pose could not be tried".to_owned());
+                    if outbox.send(answer).is_err() {
+                        break;
+                    }
+                    ctx.request_repaint();
+                }
+            });
+        Self {
+            requests,
+            answers,
+            asked: None,
+            latest: None,
+        }
+    }
+
+    /// Asks about a pose, unless it was asked for last.
+    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, pose: Pose) {
+        if self.asked == Some(pose) {
+            return;
+        }
+        let request = Request {
+            problem: problem.clone(),
+            params: Arc::clone(params),
+            pose,
+        };
+        if self.requests.send(request).is_ok() {
+            self.asked = Some(pose);
+        }
+    }
+
+    /// Forgets everything: the problem or the parameters have changed.
+    pub(super) fn forget(&mut self) {
+        self.asked = None;
+        self.latest = None;
+    }
+
+    /// Takes in answers. An error is a fault of ours.
+    pub(super) fn attend(&mut self) -> Result<(), String> {
+        while let Ok(answer) = self.answers.try_recv() {
+            self.latest = Some(answer?);
+        }
+        Ok(())
+    }
+
+    /// The answer for a pose; while it is worked out, the latest there is.
+    pub(super) fn latest(&self) -> Option<&Probe> {
+        self.latest.as_ref()
+    }
+
+    /// Whether an answer is awaited.
+    pub(super) fn is_busy(&self) -> bool {
+        self.asked != self.latest.as_ref().map(|probe| probe.pose)
+    }
+}
+
+impl Request {
+    fn answer(&self) -> Probe {
+        let begun = Instant::now();
+        let comparisons = estimator::ALL
+            .iter()
+            // The hybrid's cost is that of MI.
+            .filter(|entry| entry.method != Method::Hybrid)
+            .filter_map(|entry| {
+                let estimator = (entry.new)(&self.params);
+                let comparison = estimator.compare_at(&self.problem, &self.pose)?;
+                Some((entry.method, Arc::new(comparison)))
+            })
+            .collect();
+        Probe {
+            pose: self.pose,
+            comparisons,
+            took: begun.elapsed(),
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! What is known about the queries beside the one at work: thumbnails, and whether they fail.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use egui::{ColorImage, TextureHandle, TextureOptions};
+
+use super::setup::Setup;
+use super::textures::color_image;
+use crate::estimator;
+use crate::evaluate::{QueryResult, evaluate};
+use crate::picture;
+use crate::problem::Problem;
+use crate::scene::Scene;
+use crate::trace::Trace;
+
+/// Width of a thumbnail \[px\].
+const THUMBNAIL_WIDTH: u32 = 124;
+
+/// The results of a query, or why it could not be run.
+pub(super) type Outcome = (usize, Result<Vec<QueryResult>, String>);
+
+/// Thumbnails and results that are made beside the window's thread.
+pub struct Queries {
+    ctx: egui::Context,
+    thumbnails: BTreeMap<usize, Option<TextureHandle>>,
+    wanted: Arc<Mutex<BTreeSet<usize>>>,
+    pictures: (Sender<Picture>, Receiver<Picture>),
+    painter_is_busy: bool,
+    batch: Option<Batch>,
+}
+
+enum Picture {
+    Thumbnail(usize, Option<ColorImage>),
+    Idle,
+}
+
+/// All queries at work, one after the other.
+struct Batch {
+    outcomes: Receiver<Outcome>,
+    cancelled: Arc<AtomicBool>,
+    done: usize,
+    all: usize,
+}
+
+impl Queries {
+    pub(super) fn new(ctx: egui::Context) -> Self {
+        Self {
+            ctx,
+            thumbnails: BTreeMap::new(),
+            wanted: Arc::default(),
+            pictures: mpsc::channel(),
+            painter_is_busy: false,
+            batch: None,
+        }
+    }
+
+    /// The thumbnail of a frame, once it is made. Asking for it has it made.
+    pub fn thumbnail(&self, frame: usize) -> Option<&TextureHandle> {
+        match self.thumbnails.get(&frame) {
+            Some(thumbnail) => thumbnail.as_ref(),
+            None => {
+                let mut wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
+                wanted.insert(frame);
+                None
+            }
+        }
+    }
+
+    /// How far the run over all queries is: done, and all.
+    pub fn progress(&self) -> Option<(usize, usize)> {
+        self.batch.as_ref().map(|batch| (batch.done, batch.all))
+    }
+
+    /// Starts to run all queries, or stops doing so.
+    pub(super) fn run_all(&mut self, setup: &Setup) {
+        if let Some(batch) = self.batch.take() {
+            batch.cancelled.store(true, Ordering::Relaxed);
+            return;
+        }
+        let (outbox, outcomes) = mpsc::channel();
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let (setup, flag, ctx) = (setup.clone(), Arc::clone(&cancelled), self.ctx.clone());
+        let all = setup.offered.len();
+        let started = thread::Builder::new()
+            .name("queries".to_owned())
+            .spawn(move || {
+                for &query in &setup.offered {
+                    if flag.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    let outcome = catch_unwind(AssertUnwindSafe(|| localize(&setup, query)))
+                        .unwrap_or_else(|_| {
+                            let name = &setup.queries.frames()[query];
+                            Err(format!("internal error at query {name}"))
+                        });
+                    if outbox.send((query, outcome)).is_err() {
+                        break;
+                    }
+                    ctx.request_repaint();
+                }
+            });
+        if started.is_ok() {
+            self.batch = Some(Batch {
+                outcomes,
+                cancelled,
+                done: 0,
+                all,
+            });
+        }
+    }
+
+    /// Takes in what was made; has what is wanted made.
+    pub(super) fn attend(&mut self) -> Vec<Outcome> {
+        while let Ok(picture) = self.pictures.1.try_recv() {
+            match picture {
+                Picture::Thumbnail(frame, image) => {
+                    let texture = image.map(|image| {
+                        let name = format!("thumbnail {frame}");
+                        self.ctx.load_texture(name, image, TextureOptions::LINEAR)
+                    });
+                    self.thumbnails.insert(frame, texture);
+                }
+                Picture::Idle => self.painter_is_busy = false,
+            }
+        }
+        let Some(batch) = &mut self.batch else {
+            return Vec::new();
+        };
+        let outcomes: Vec<Outcome> = batch.outcomes.try_iter().collect();
+        batch.done += outcomes.len();
+        if batch.done == batch.all {
+            self.batch = None;
+        }
+        outcomes
+    }
+
+    /// Has the wanted thumbnails made.
+    pub(super) fn paint_thumbnails(&mut self, scene: &Arc<dyn Scene>) {
+        let is_idle = || {
+            let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
+            wanted.is_empty()
+        };
+        if self.painter_is_busy || is_idle() {
+            return;
+        }
+        let (scene, wanted) = (Arc::clone(scene), Arc::clone(&self.wanted));
+        let (outbox, ctx) = (self.pictures.0.clone(), self.ctx.clone());
+        let started = thread::Builder::new()
+            .name("thumbnails".to_owned())
+            .spawn(move || {
+                loop {
+                    let next = wanted
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .pop_first();
+                    let Some(frame) = next else { break };
+                    let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene.as_ref(), frame)));
+                    let told = outbox.send(Picture::Thumbnail(frame, image.ok().flatten()));
+                    if told.is_err() {
+                        return;
+                    }
+                    ctx.request_repaint();
+                }
+                let _ = outbox.send(Picture::Idle);
+                ctx.request_repaint();
+            });
+        self.painter_is_busy = started.is_ok();
+    }
+}
+
+impl Drop for Queries {
+    fn drop(&mut self) {
+        if let Some(batch) = &self.batch {
+            batch.cancelled.store(true, Ordering::Relaxed);
+        }
+        self.wanted
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clear();
+    }
+}
+
+fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
+    let photo = scene.photo(frame).ok()?;
+    let (width, height) = photo.dimensions();
+    let small = picture::photo(&photo).thumbnail(THUMBNAIL_WIDTH, height * THUMBNAIL_WIDTH / width);
+    Some(color_image(&small))
+}
+
+fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
+    let scene = setup.queries.as_ref();
+    let references = match setup.pick {
+        super::ReferencePick::ByHand => setup.reference_frames.clone(),
+        _ => setup.choose(query)?,
+    };
+    let photo = scene.query(query).map_err(|error| error.to_string())?;
+    let truth = scene.pose(query);
+    let mut results = Vec::new();
+    for &method in &setup.methods {
+        let estimator = (estimator::entry(method).new)(&setup.params);
+        for &reference in &references {
+            let problem = Problem {
+                query: Arc::clone(&photo),
+                reference: setup
+                    .references
+                    .reference(reference)
+                    .map_err(|error| error.to_string())?,
+                uncertainty_radius_m: setup.uncertainty_radius_m,
+                seed: setup.seed,
+            };
+            let Ok(outcome) = estimator.estimate(&problem, &mut Trace::off()) else {
+                unreachable!("nobody cancels a run that nobody watches")
+            };
+            let name = setup.references.name();
+            let params = &setup.params;
+            results.push(evaluate(
+                name,
+                &problem,
+                method,
+                params,
+                &outcome,
+                truth.as_ref(),
+            ));
+        }
+    }
+    Ok(results)
+}

@@ -1,0 +1,191 @@
+//! What a view sees: a run at a cursor.
+
+use std::sync::Arc;
+
+use super::command::{Command, Queue};
+use super::desk::Desk;
+use crate::event::{DebugEvent, Method, MinimumAssessed, Moment, ViewRendered};
+use crate::geometry::Pose;
+use crate::problem::Problem;
+use crate::render::Comparison;
+use crate::session::{Run, Span};
+
+/// A run at a cursor, and the desk around it.
+#[derive(Clone, Copy)]
+pub struct Scope<'a> {
+    /// The run that is shown: the present one, or A.
+    pub run: &'a Run,
+    /// Position among its records.
+    pub cursor: usize,
+    /// Everything else: the camera in hand, what is switched on.
+    pub desk: &'a Desk,
+    pub(super) commands: &'a Queue,
+}
+
+/// A synthetic view beside the query, and where it comes from.
+#[derive(Clone)]
+pub struct Shown {
+    /// View, cost, and what made the cost.
+    pub comparison: Arc<Comparison>,
+    /// Where the camera is (`world_from_camera`).
+    pub pose: Pose,
+    /// Why it is shown.
+    pub at: ShownAt,
+}
+
+/// Why a synthetic view is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShownAt {
+    /// The pointer is over this pose.
+    Pointer,
+    /// The camera in hand is there.
+    Camera,
+    /// The estimator rendered it.
+    Event(Moment),
+}
+
+impl ShownAt {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pointer => "under the pointer",
+            Self::Camera => "camera in hand",
+            Self::Event(Moment::Start) => "at the reference",
+            Self::Event(Moment::NewBest) => "new best",
+            Self::Event(Moment::End) => "result",
+        }
+    }
+}
+
+impl<'a> Scope<'a> {
+    /// Asks for something to be done after this frame.
+    pub fn send(&self, command: Command) {
+        self.commands.send(command);
+    }
+
+    /// The part of the run that the cursor is in.
+    pub fn span(&self) -> Option<&'a Span> {
+        self.run.span_at(self.cursor)
+    }
+
+    /// The estimator at the cursor.
+    pub fn method(&self) -> Option<Method> {
+        self.span().map(|span| span.method)
+    }
+
+    /// The problem at the cursor; before the first record, that of the first reference.
+    pub fn problem(&self) -> Option<&'a Problem> {
+        let loaded = self.run.loaded.as_deref()?;
+        loaded
+            .problems
+            .get(self.span().map_or(0, |span| span.reference))
+    }
+
+    /// The true pose of the query, if it is known and shown.
+    pub fn truth(&self) -> Option<&'a Pose> {
+        if !self.desk.shows_truth {
+            return None;
+        }
+        self.run.loaded.as_deref()?.truth.as_ref()
+    }
+
+    /// The latest event of a type at or before the cursor, told by the estimator there.
+    pub fn latest<E: DebugEvent + 'static>(&self) -> Option<&'a E> {
+        self.run.latest(self.cursor)
+    }
+
+    /// All events of a type up to the cursor, told by the estimator there.
+    pub fn all<E: DebugEvent + 'static>(&self) -> impl DoubleEndedIterator<Item = (usize, &'a E)> {
+        self.run.all_until(self.cursor)
+    }
+
+    /// The part of another estimator on the same reference, and the cursor for it: its last record,
+    /// or the cursor itself where it is the estimator at the cursor.
+    pub fn of(&self, method: Method) -> Option<(&'a Span, usize)> {
+        let here = self.span();
+        if let Some(span) = here
+            && span.method == method
+        {
+            return Some((span, self.cursor));
+        }
+        let reference = here.map_or(0, |span| span.reference);
+        let is_wanted = |span: &&Span| span.method == method && span.reference == reference;
+        let span = self.run.spans().iter().rev().find(is_wanted)?;
+        Some((span, span.records.end.checked_sub(1)?))
+    }
+
+    /// The latest event of a type that a method has told: up to the cursor if the cursor is in its
+    /// part, else in all of its part.
+    pub fn latest_of<E: DebugEvent + 'static>(&self, method: Method) -> Option<&'a E> {
+        let (span, cursor) = self.of(method)?;
+        self.run.latest_in(span, cursor)
+    }
+
+    /// The direct method whose pictures are shown: that at the cursor, MI for the others.
+    pub fn direct_method(&self) -> Method {
+        match self.method() {
+            Some(Method::Photometric) => Method::Photometric,
+            _ => Method::MutualInformation,
+        }
+    }
+
+    /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
+    /// the latest that the estimator rendered.
+    pub fn shown(&self, method: Method) -> Option<Shown> {
+        if let Some((pose, at)) = self.desk.looking_at()
+            && let Some(probe) = self.desk.probe()
+            && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
+        {
+            // While the answer for this pose is worked out the last one stays, under its own pose.
+            let _ = pose;
+            return Some(Shown {
+                comparison: Arc::clone(comparison),
+                pose: probe.pose,
+                at,
+            });
+        }
+        let event: &ViewRendered = match self.method() {
+            Some(Method::Hybrid) => self.latest(),
+            _ => self.latest_of(method),
+        }?;
+        let problem = self.problem()?;
+        Some(Shown {
+            comparison: Arc::clone(&event.comparison),
+            pose: problem.world_from_query(&event.offset.reference_from_camera()),
+            at: ShownAt::Event(event.moment),
+        })
+    }
+
+    /// The estimate of a method on the reference at the cursor (`world_from_camera`).
+    pub fn estimate(&self, method: Method) -> Option<Pose> {
+        let (span, _) = self.of(method)?;
+        span.result.as_ref()?.pose.as_ref()?.to_pose()
+    }
+
+    /// Costs of a direct method that a cost can be placed between: with shuffled pixels and at the
+    /// truth.
+    pub fn cost_bounds(&self, method: Method) -> CostBounds {
+        let assessed = self.latest_of::<MinimumAssessed>(method);
+        let report = self
+            .of(method)
+            .and_then(|(span, _)| span.result.as_ref()?.cost.as_ref());
+        CostBounds {
+            shuffled: assessed.and_then(|assessed| assessed.shuffled),
+            best: assessed.map(|assessed| assessed.best),
+            truth: report
+                .and_then(|report| report.truth)
+                .filter(|_| self.desk.shows_truth),
+        }
+    }
+}
+
+/// What a cost can be compared with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CostBounds {
+    /// What no relation at all costs.
+    pub shuffled: Option<f64>,
+    /// The result of the search.
+    pub best: Option<f64>,
+    /// The true pose.
+    pub truth: Option<f64>,
+}

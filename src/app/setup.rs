@@ -1,0 +1,151 @@
+//! What the window is opened on.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::event::Method;
+use crate::params::Params;
+use crate::scene::Scene;
+use crate::session::{Job, Loaded, RunMode};
+
+/// How the references of a query are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReferencePick {
+    /// The frames that were named, for every query.
+    ByHand,
+    /// This many within the radius, drawn by the seed.
+    Random(usize),
+    /// This many, the nearest first.
+    Nearest(usize),
+}
+
+impl fmt::Display for ReferencePick {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ByHand => f.write_str("by hand"),
+            Self::Random(count) => write!(f, "random:{count}"),
+            Self::Nearest(count) => write!(f, "nearest:{count}"),
+        }
+    }
+}
+
+/// Chooses references by a rule: `(rule, references, queries, query, radius, seed)`.
+pub type Chooser =
+    fn(ReferencePick, &dyn Scene, &dyn Scene, usize, bool, f64, u64) -> Result<Vec<usize>, String>;
+
+/// What is run, and how the window begins.
+#[derive(Clone)]
+pub struct Setup {
+    /// The scene as it was named on the command line.
+    pub scene_argument: String,
+    /// Where the references are.
+    pub references: Arc<dyn Scene>,
+    /// The scene of the queries, if it is another one.
+    pub queries_argument: Option<String>,
+    /// Where the queries are; often the same scene.
+    pub queries: Arc<dyn Scene>,
+    /// The queries that the list offers, as positions in their scene.
+    pub offered: Vec<usize>,
+    /// The query to begin with.
+    pub query: usize,
+    /// Its references.
+    pub reference_frames: Vec<usize>,
+    /// How the references of other queries are chosen.
+    pub pick: ReferencePick,
+    /// The rule behind `pick`.
+    pub chooser: Chooser,
+    /// The methods to run.
+    pub methods: Vec<Method>,
+    /// Their parameters.
+    pub params: Params,
+    /// How far the query may be from a reference \[m\].
+    pub uncertainty_radius_m: f64,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Breakpoints to begin with.
+    pub breakpoints: Vec<String>,
+    /// Whether it waits at the first step or runs.
+    pub mode: RunMode,
+    /// Where recordings, pictures and sessions are saved unless somebody names another place.
+    pub folder: PathBuf,
+}
+
+impl Setup {
+    pub(super) fn job(&self, at_hand: Option<Arc<Loaded>>) -> Job {
+        Job {
+            references: Arc::clone(&self.references),
+            queries: Arc::clone(&self.queries),
+            query: self.query,
+            reference_frames: self.reference_frames.clone(),
+            methods: self.methods.clone(),
+            params: self.params.clone(),
+            uncertainty_radius_m: self.uncertainty_radius_m,
+            seed: self.seed,
+            at_hand,
+        }
+    }
+
+    /// The references of a query by the present rule.
+    pub(super) fn choose(&self, query: usize) -> Result<Vec<usize>, String> {
+        (self.chooser)(
+            self.pick,
+            self.references.as_ref(),
+            self.queries.as_ref(),
+            query,
+            self.queries_argument.is_none(),
+            self.uncertainty_radius_m,
+            self.seed,
+        )
+    }
+
+    /// The command line that repeats this run.
+    pub fn command_line(&self) -> String {
+        let mut words = vec!["posescope".to_owned(), "run".to_owned()];
+        words.push(self.scene_argument.clone());
+        if let Some(queries) = &self.queries_argument {
+            words.extend(["--queries".to_owned(), queries.clone()]);
+        }
+        let frame = |scene: &Arc<dyn Scene>, index: usize| scene.frames()[index].clone();
+        words.extend(["--query".to_owned(), frame(&self.queries, self.query)]);
+        for &reference in &self.reference_frames {
+            words.extend(["--reference".to_owned(), frame(&self.references, reference)]);
+        }
+        if self.methods != Method::ALL {
+            let names: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
+            words.extend(["--method".to_owned(), names.join(",")]);
+        }
+        words.extend(["--radius".to_owned(), self.uncertainty_radius_m.to_string()]);
+        words.extend(["--seed".to_owned(), self.seed.to_string()]);
+        for change in self.params.changes() {
+            words.extend(["--set".to_owned(), change]);
+        }
+        words
+            .iter()
+            .map(|word| quoted(word))
+            .collect::<Vec<_>>()
+            .join(" ")
+    }
+}
+
+/// A word as a POSIX shell reads it back.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_split_them() {
+        assert_eq!(quoted("street:night"), "street:night");
+        assert_eq!(quoted("my data/00"), "'my data/00'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
+}

@@ -1,0 +1,53 @@
+//! Colours and sizes of the window.
+
+use egui::Color32;
+
+use crate::event::{FeatureState, Method};
+use crate::palette::{self, Rgb};
+
+/// Colour of the reference.
+pub const REFERENCE: Color32 = rgb(palette::REFERENCE);
+/// Colour of estimates.
+pub const ESTIMATE: Color32 = rgb(palette::ESTIMATE);
+/// Colour of the ground truth.
+pub const TRUTH: Color32 = rgb(palette::TRUTH);
+/// Colour of the camera in hand.
+pub const CAMERA: Color32 = rgb(palette::UNDECIDED);
+
+/// As egui takes it.
+pub const fn rgb([r, g, b]: Rgb) -> Color32 {
+    Color32::from_rgb(r, g, b)
+}
+
+/// The colour of a feature's state, by its position in [`FeatureState::NAMES`].
+pub fn state(index: usize) -> Color32 {
+    rgb(palette::STATES[index.min(FeatureState::NAMES.len() - 1)])
+}
+
+/// The colour of a method's lane and curves.
+pub fn method(method: Method) -> Color32 {
+    match method {
+        Method::Feature => Color32::from_rgb(0x56, 0xB4, 0xE9),
+        Method::Photometric => Color32::from_rgb(0xE6, 0x9F, 0x00),
+        Method::MutualInformation => Color32::from_rgb(0xCC, 0x79, 0xA7),
+        Method::Hybrid => Color32::from_rgb(0x80, 0x80, 0x80),
+    }
+}
+
+/// Viridis, for costs: 0 the worst, 1 the best.
+pub fn viridis(value: f64) -> Color32 {
+    rgb(palette::viridis(value))
+}
+
+pub(super) fn install(ctx: &egui::Context) {
+    // The font for text has no arrows and no shapes; that for code has.
+    let mut fonts = egui::FontDefinitions::default();
+    if let Some(proportional) = fonts.families.get_mut(&egui::FontFamily::Proportional) {
+        proportional.push("Hack".to_owned());
+    }
+    ctx.set_fonts(fonts);
+    ctx.all_styles_mut(|style| {
+        style.spacing.item_spacing = egui::vec2(6.0, 4.0);
+        style.interaction.tooltip_delay = 0.3;
+    });
+}

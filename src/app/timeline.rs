@@ -1,0 +1,132 @@
+//! All records of the run on one line, with a lane for each estimator.
+
+use egui::{Align2, Color32, FontId, Rect, Sense, Slider, Stroke, StrokeKind, Ui, pos2, vec2};
+
+use super::command::{Command, Queue};
+use super::desk::Desk;
+use super::theme;
+use crate::session::{Run, StageBar};
+
+/// Height of a stage's bar \[points\].
+const BAR_HEIGHT: f32 = 9.0;
+/// Depths that have a row of their own; deeper stages share the last.
+const ROWS: usize = 3;
+
+pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    let run = desk.run();
+    let last = run.len().saturating_sub(1);
+    ui.horizontal(|ui| {
+        let mut cursor = desk.cursor;
+        let label = ui.label("Step");
+        ui.spacing_mut().slider_width = (ui.available_width() - 420.0).max(120.0);
+        let slider = ui
+            .add(Slider::new(&mut cursor, 0..=last).smart_aim(false))
+            .labelled_by(label.id);
+        if slider.changed() {
+            commands.send(Command::MoveCursor(cursor));
+        }
+        // A slider keeps the arrow keys once it has the focus; they are the steps' keys.
+        if slider.has_focus() {
+            slider.surrender_focus();
+        }
+        ui.label(format!("of {last}"));
+        let stages: Vec<_> = run
+            .stages_at(desk.cursor)
+            .map(|bar| bar.stage.name())
+            .collect();
+        ui.monospace(stages.join(" › "));
+    });
+    lanes(ui, desk, commands);
+}
+
+fn lanes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    let run = desk.run();
+    let height = BAR_HEIGHT * ROWS as f32 + 16.0;
+    let size = vec2(ui.available_width(), height);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+    let count = run.len().max(1) as f32;
+    let x_of = |record: usize| rect.left() + rect.width() * record as f32 / count;
+    response
+        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Stages of the run"));
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+    for span in run.spans() {
+        let name = span.method.name().to_uppercase();
+        let (left, right) = (x_of(span.records.start), x_of(span.records.end));
+        let top = pos2(left + 3.0, rect.top() + 1.0);
+        if right - left > 20.0 {
+            let color = ui.visuals().text_color();
+            painter.text(
+                top,
+                Align2::LEFT_TOP,
+                name,
+                FontId::proportional(10.0),
+                color,
+            );
+        }
+    }
+    for bar in run.stages() {
+        draw(ui, &painter, bar, rect, x_of);
+    }
+    let x = x_of(desk.cursor) + 0.5 * rect.width() / count;
+    let color = ui.visuals().strong_text_color();
+    painter.vline(x, rect.y_range(), Stroke::new(2.0, color));
+
+    if let Some(pointer) = response.interact_pointer_pos() {
+        let record = ((pointer.x - rect.left()) / rect.width() * count).max(0.0) as usize;
+        commands.send(Command::MoveCursor(record));
+    } else if let Some(pointer) = response.hover_pos() {
+        let record = ((pointer.x - rect.left()) / rect.width() * count).max(0.0) as usize;
+        response.on_hover_text_at_pointer(words_at(run, record));
+    }
+}
+
+fn draw(ui: &Ui, painter: &egui::Painter, bar: &StageBar, rect: Rect, x_of: impl Fn(usize) -> f32) {
+    let row = bar.depth.clamp(1, ROWS) - 1;
+    let top = rect.top() + 13.0 + BAR_HEIGHT * row as f32;
+    let (left, right) = (x_of(bar.records.start), x_of(bar.records.end));
+    let area = Rect::from_min_max(
+        pos2(left, top),
+        pos2(right.max(left + 1.0), top + BAR_HEIGHT - 1.0),
+    );
+    let color = color_of(bar);
+    if bar.reused {
+        // Remembered results are outlined, those made now are filled.
+        painter.rect_stroke(area, 1.0, Stroke::new(1.0, color), StrokeKind::Inside);
+    } else {
+        painter.rect_filled(area, 1.0, color);
+    }
+    if bar.succeeded == Some(false) {
+        let text = ui.visuals().strong_text_color();
+        let font = FontId::proportional(10.0);
+        painter.text(area.right_center(), Align2::RIGHT_CENTER, "×", font, text);
+    }
+}
+
+fn color_of(bar: &StageBar) -> Color32 {
+    use crate::event::Stage;
+    match (bar.stage, bar.succeeded) {
+        (_, Some(false)) => theme::ESTIMATE,
+        (Stage::Estimator(method), _) => theme::method(method),
+        (Stage::Detect | Stage::Color, _) => Color32::from_rgb(0x6A, 0x8C, 0xAF),
+        (Stage::Match | Stage::Search(_), _) => Color32::from_rgb(0x8F, 0xA8, 0x6E),
+        (Stage::DepthLift, _) => Color32::from_rgb(0xB0, 0x9A, 0x5B),
+        (Stage::Consensus, _) => Color32::from_rgb(0x9A, 0x7F, 0xB0),
+        (Stage::Accept | Stage::Assess, _) => Color32::from_rgb(0x5F, 0x9E, 0x8F),
+    }
+}
+
+fn words_at(run: &Run, record: usize) -> String {
+    let stages: Vec<_> = run
+        .stages_at(record)
+        .map(|bar| {
+            let remark = match (bar.reused, bar.succeeded) {
+                (true, _) => " (reused)",
+                (_, Some(false)) => " (failed)",
+                _ => "",
+            };
+            format!("{}{remark}", bar.stage.name())
+        })
+        .collect();
+    format!("step {record}: {}", stages.join(" › "))
+}

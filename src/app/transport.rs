@@ -1,0 +1,265 @@
+//! The bar of buttons: run, step, which of two runs, and what is switched on.
+
+use egui::{Button, RichText, Ui};
+
+use super::command::{Command, Queue};
+use super::desk::{Comparing, Desk};
+use super::setup::ReferencePick;
+use super::theme;
+use crate::event::Method;
+use crate::session::State;
+
+pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    ui.horizontal_wrapped(|ui| {
+        run_buttons(ui, desk, commands);
+        ui.separator();
+        query(ui, desk, commands);
+        ui.separator();
+        methods(ui, desk, commands);
+        ui.separator();
+        switches(ui, desk, commands);
+        compared(ui, desk, commands);
+        menus(ui, desk, commands);
+    });
+    notes(ui, desk, commands);
+}
+
+fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Command) {
+    if ui.add(Button::new(text)).on_hover_text(help).clicked() {
+        commands.send(command);
+    }
+}
+
+fn run_buttons(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    let is_running = matches!(desk.state(), State::Running | State::Loading);
+    let (text, help) = if is_running {
+        ("Pause", "Pause behind the next event (Space)")
+    } else {
+        ("▶ Run", "Run to the next breakpoint or the end (Space, F5)")
+    };
+    button(ui, commands, text, help, Command::RunOrPause);
+    let is_paused = matches!(desk.state(), State::Paused { .. });
+    ui.add_enabled_ui(is_paused || is_running, |ui| {
+        button(
+            ui,
+            commands,
+            "Into",
+            "To the next event (F11, I)",
+            Command::StepInto,
+        );
+        let help = "Behind the stage that begins here (F10)";
+        button(ui, commands, "Over", help, Command::StepOver);
+        let help = "To the end of the stage around this (Shift+F11)";
+        button(ui, commands, "Out", help, Command::StepOut);
+        let help = "Run to the end, past all breakpoints (F9)";
+        button(ui, commands, "To end", help, Command::RunToEnd);
+    });
+    let help = "Begin again and wait at the first step (Shift+F5)";
+    button(ui, commands, "Restart", help, Command::Restart);
+    match desk.state() {
+        State::Loading => {
+            ui.spinner();
+            ui.label("Loading");
+        }
+        State::Running => {
+            ui.spinner();
+            ui.label("Running");
+        }
+        State::Paused { breakpoint: None } => {
+            ui.label("Paused");
+        }
+        State::Paused {
+            breakpoint: Some(text),
+        } => {
+            ui.label(RichText::new(format!("● {text}")).color(theme::ESTIMATE))
+                .on_hover_text("The breakpoint that stopped the run");
+        }
+        State::Finished => {
+            ui.label("Finished");
+        }
+        State::Cancelled => {
+            ui.label("Cancelled");
+        }
+        State::Broken(why) => {
+            ui.label(RichText::new("Stopped").color(theme::ESTIMATE))
+                .on_hover_text(why);
+        }
+    }
+}
+
+fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    let setup = &desk.setup;
+    let frame = |scene: &std::sync::Arc<dyn crate::scene::Scene>, index: usize| {
+        scene.frames()[index].clone()
+    };
+    button(
+        ui,
+        commands,
+        "◀",
+        "Previous query (K)",
+        Command::NextQuery { back: true },
+    );
+    ui.label(frame(&setup.queries, setup.query))
+        .on_hover_text("The query");
+    button(
+        ui,
+        commands,
+        "▶",
+        "Next query (J)",
+        Command::NextQuery { back: false },
+    );
+    ui.label("←");
+    let names: Vec<_> = setup
+        .reference_frames
+        .iter()
+        .map(|&reference| frame(&setup.references, reference))
+        .collect();
+    ui.label(RichText::new(names.join(", ")).color(theme::REFERENCE))
+        .on_hover_text("The references");
+    ui.menu_button("References", |ui| {
+        for pick in [
+            ReferencePick::Random(1),
+            ReferencePick::Random(3),
+            ReferencePick::Nearest(1),
+            ReferencePick::Nearest(3),
+            ReferencePick::ByHand,
+        ] {
+            if ui.radio(setup.pick == pick, pick.to_string()).clicked() {
+                commands.send(Command::PickReferences(pick));
+            }
+        }
+        ui.separator();
+        let mut radius = setup.uncertainty_radius_m;
+        let label = ui.label("Radius");
+        let drag = egui::DragValue::new(&mut radius)
+            .range(1.0..=500.0)
+            .suffix(" m")
+            .update_while_editing(false);
+        let response = ui.add(drag).labelled_by(label.id);
+        if response.drag_stopped() || response.lost_focus() {
+            commands.send(Command::SetRadius(radius));
+        }
+        let mut seed = setup.seed;
+        let label = ui.label("Seed");
+        let drag = egui::DragValue::new(&mut seed).update_while_editing(false);
+        let response = ui.add(drag).labelled_by(label.id);
+        if (response.drag_stopped() || response.lost_focus()) && seed != setup.seed {
+            commands.send(Command::SetSeed(seed));
+        }
+    });
+}
+
+fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    let here = desk.run().span_at(desk.cursor).map(|span| span.method);
+    for (number, method) in (1..).zip(Method::ALL) {
+        let is_here = here == Some(method);
+        let text = method.name().to_uppercase();
+        let response = ui.selectable_label(is_here, text);
+        if response
+            .on_hover_text(format!("Show what it did ({number})"))
+            .clicked()
+        {
+            commands.send(Command::SelectMethod(method));
+        }
+    }
+}
+
+fn switches(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    let switch = |ui: &mut Ui, is_on: bool, text: &str, help: &str, command: Command| {
+        let mut state = is_on;
+        if ui
+            .toggle_value(&mut state, text)
+            .on_hover_text(help)
+            .clicked()
+        {
+            commands.send(command);
+        }
+    };
+    let help = "Show the ground truth (G)";
+    switch(ui, desk.shows_truth, "Truth", help, Command::ShowTruth);
+    let help = "Show only what differs (D)";
+    switch(
+        ui,
+        desk.only_differences,
+        "Differences",
+        help,
+        Command::OnlyDifferences,
+    );
+    let help = "Blink between query and synthetic view (B)";
+    switch(ui, desk.blinking, "Blink", help, Command::Blink);
+}
+
+fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    ui.separator();
+    if desk.kept.is_none() {
+        button(
+            ui,
+            commands,
+            "Keep as A",
+            "Keep this run to compare with (P)",
+            Command::Pin,
+        );
+        return;
+    }
+    for (comparing, text, help) in [
+        (Comparing::Kept, "A", "Show the run that was kept (X)"),
+        (Comparing::Present, "B", "Show the present run (X)"),
+        (
+            Comparing::SideBySide,
+            "A | B",
+            "Show both beside each other",
+        ),
+    ] {
+        let response = ui.selectable_label(desk.comparing == comparing, text);
+        if response.on_hover_text(help).clicked() {
+            commands.send(Command::Compare(comparing));
+        }
+    }
+    button(
+        ui,
+        commands,
+        "Forget A",
+        "Forget the run that was kept",
+        Command::Unpin,
+    );
+}
+
+fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    ui.separator();
+    ui.menu_button("Views", |ui| {
+        for entry in super::views::ALL {
+            if ui.button(entry.title).on_hover_text(entry.about).clicked() {
+                commands.send(Command::ShowView(entry.name));
+            }
+        }
+        ui.separator();
+        if ui.button("First layout").clicked() {
+            commands.send(Command::ResetLayout);
+        }
+    });
+    super::save::menu(ui, desk, commands);
+    button(
+        ui,
+        commands,
+        "Theme",
+        "Light or dark (L)",
+        Command::SwitchTheme,
+    );
+    button(ui, commands, "?", "All keys (?)", Command::Help);
+}
+
+fn notes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+    for (index, note) in desk.notes.iter().enumerate() {
+        ui.horizontal(|ui| {
+            if ui.small_button("×").on_hover_text("Dismiss").clicked() {
+                commands.send(Command::Dismiss(index));
+            }
+            let text = RichText::new(&note.text);
+            ui.label(if note.is_error {
+                text.color(theme::ESTIMATE).strong()
+            } else {
+                text
+            });
+        });
+    }
+}

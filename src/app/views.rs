@@ -1,0 +1,71 @@
+//! The views: each one file and one entry in [`ALL`].
+//!
+//! A view draws from the [`Scope`] that it is handed and keeps nothing of the run. What it does keep
+//! is how a person looks at it: a zoom, a filter.
+
+mod breakpoints;
+mod log;
+mod parameters;
+mod queries;
+mod report;
+
+use eframe::egui_wgpu::RenderState;
+
+use super::scope::Scope;
+
+/// A part of the window.
+pub trait View {
+    /// Draws the view. It must bear any moment of any run, and none.
+    fn ui(&mut self, ui: &mut egui::Ui, scope: &Scope<'_>);
+}
+
+/// A view's place in the registry.
+pub struct Entry {
+    /// The name in saved layouts.
+    pub name: &'static str,
+    /// The title on its tab.
+    pub title: &'static str,
+    /// One phrase.
+    pub about: &'static str,
+    /// Makes the view. The render state is for those that draw on the graphics card themselves.
+    pub new: fn(Option<&RenderState>) -> Box<dyn View>,
+}
+
+/// Name of the list of queries.
+pub(super) const QUERIES: &str = "queries";
+/// Name of the list of parameters.
+pub(super) const PARAMETERS: &str = "parameters";
+
+/// Every view, in the order of the menu.
+pub const ALL: &[Entry] = &[
+    Entry {
+        name: QUERIES,
+        title: "Queries",
+        about: "all queries with what is known of them",
+        new: |_| Box::<queries::QueryList>::default(),
+    },
+    Entry {
+        name: PARAMETERS,
+        title: "Parameters",
+        about: "every parameter with unit, range and meaning",
+        new: |_| Box::<parameters::Parameters>::default(),
+    },
+    Entry {
+        name: "breakpoints",
+        title: "Breakpoints",
+        about: "where a run is to stop",
+        new: |_| Box::<breakpoints::BreakpointList>::default(),
+    },
+    Entry {
+        name: "report",
+        title: "Report",
+        about: "verdicts, errors, timings, parameters",
+        new: |_| Box::<report::Report>::default(),
+    },
+    Entry {
+        name: "log",
+        title: "Log",
+        about: "every decision in words",
+        new: |_| Box::<log::Log>::default(),
+    },
+];

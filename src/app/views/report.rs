@@ -1,0 +1,262 @@
+//! Verdicts, errors, features, costs, timings, parameters.
+
+use egui::{Color32, Grid, RichText, ScrollArea, Ui};
+
+use super::View;
+use crate::app::desk::Comparing;
+use crate::app::{Scope, theme};
+use crate::evaluate::{QueryResult, Status};
+use crate::session::Span;
+
+/// The report of the run, so far.
+#[derive(Default)]
+pub struct Report {}
+
+impl View for Report {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+            if scope.run.spans().is_empty() {
+                ui.weak("Nothing has run yet");
+                return;
+            }
+            let others: Vec<&QueryResult> = other_results(scope);
+            verdicts(ui, scope, &others);
+            features(ui, scope, &others);
+            costs(ui, scope, &others);
+            times(ui, scope);
+            changes(ui, scope);
+        });
+    }
+}
+
+/// The results of the run that this one is compared with.
+fn other_results<'a>(scope: &Scope<'a>) -> Vec<&'a QueryResult> {
+    let desk = scope.desk;
+    let other = match &desk.kept {
+        Some(kept) if std::ptr::eq(scope.run, desk.run()) => Some(&kept.run),
+        Some(_) if desk.comparing != Comparing::Present => Some(desk.run()),
+        _ => None,
+    };
+    other.map_or(Vec::new(), |run| run.results().collect())
+}
+
+fn counterpart<'a>(span: &Span, others: &[&'a QueryResult]) -> Option<&'a QueryResult> {
+    let result = span.result.as_ref()?;
+    others
+        .iter()
+        .find(|other| other.method == result.method && other.references == result.references)
+        .copied()
+}
+
+/// A number, marked where the other run has another.
+fn cell(ui: &mut Ui, text: String, other: Option<String>) {
+    match other {
+        Some(other) if other != text => {
+            ui.label(RichText::new(format!("{text} ≠")).strong())
+                .on_hover_text(format!("the other run: {other}"));
+        }
+        _ => {
+            ui.label(text);
+        }
+    }
+}
+
+fn heading(ui: &mut Ui, columns: &[&str]) {
+    for column in columns {
+        ui.label(RichText::new(*column).weak().small());
+    }
+    ui.end_row();
+}
+
+fn name(ui: &mut Ui, span: &Span) {
+    let name = span.method.name().to_uppercase();
+    ui.label(
+        RichText::new(name)
+            .color(theme::method(span.method))
+            .strong(),
+    );
+}
+
+fn verdict(result: &QueryResult) -> (String, Option<Color32>) {
+    match (result.status, &result.reason, &result.error) {
+        (Status::Failed, Some(reason), _) => (
+            format!("× {} {}", reason.code, reason.text),
+            Some(theme::ESTIMATE),
+        ),
+        (Status::Failed, None, _) => ("× no pose".to_owned(), Some(theme::ESTIMATE)),
+        (Status::Ok, _, Some(error)) => (
+            format!("{:.3} m, {:.3}°", error.translation_m, error.rotation_deg),
+            None,
+        ),
+        (Status::Ok, _, None) => ("a pose".to_owned(), None),
+    }
+}
+
+/// An error tells the ground truth, which may be hidden.
+fn shown_verdict(result: &QueryResult, shows_truth: bool) -> (String, Option<Color32>) {
+    match result.status {
+        Status::Ok if !shows_truth => ("a pose".to_owned(), None),
+        _ => verdict(result),
+    }
+}
+
+fn verdicts(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
+    let shows_truth = scope.desk.shows_truth;
+    Grid::new("verdicts").striped(true).show(ui, |ui| {
+        heading(ui, &["method", "reference", "result"]);
+        for span in scope.run.spans() {
+            name(ui, span);
+            let Some(result) = &span.result else {
+                ui.weak("at work");
+                ui.end_row();
+                continue;
+            };
+            ui.label(result.references.join(", "));
+            let (text, color) = shown_verdict(result, shows_truth);
+            let other = counterpart(span, others).map(|other| shown_verdict(other, shows_truth).0);
+            let marked = other.is_some_and(|other| other != text);
+            let text = RichText::new(if marked { format!("{text} ≠") } else { text });
+            ui.label(color.map_or(text.clone(), |color| text.color(color)));
+            ui.end_row();
+        }
+    });
+    let initial = scope.run.results().find_map(|result| result.initial_error);
+    if let (Some(error), true) = (initial, shows_truth) {
+        ui.weak(format!(
+            "The reference itself is {:.2} m and {:.2}° from the truth",
+            error.translation_m, error.rotation_deg
+        ));
+    }
+    for finding in scope.run.results().flat_map(|result| &result.diagnosis) {
+        ui.label(format!("{} {}", finding.code, finding.text));
+    }
+    ui.separator();
+}
+
+fn features(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
+    let mut spans = with_result(scope, |result| result.counts.is_some()).peekable();
+    if spans.peek().is_none() {
+        return;
+    }
+    Grid::new("features").striped(true).show(ui, |ui| {
+        let columns = [
+            "features",
+            "query",
+            "reference",
+            "ratio",
+            "unique",
+            "depth",
+            "inliers",
+        ];
+        heading(ui, &columns);
+        for span in spans {
+            name(ui, span);
+            let numbers = |result: &QueryResult| {
+                let counts = result.counts.unwrap_or_default();
+                [
+                    counts.query_keypoints,
+                    counts.reference_keypoints,
+                    counts.ratio_passed,
+                    counts.unique,
+                    counts.with_depth,
+                    counts.inliers,
+                ]
+                .map(|count| count.to_string())
+            };
+            row(ui, span, others, numbers);
+        }
+    });
+    ui.separator();
+}
+
+fn costs(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
+    let mut spans = with_result(scope, |result| result.cost.is_some()).peekable();
+    if spans.peek().is_none() {
+        return;
+    }
+    let shows_truth = scope.desk.shows_truth;
+    Grid::new("costs").striped(true).show(ui, |ui| {
+        let columns = [
+            "costs",
+            "result",
+            "truth",
+            "start",
+            "shuffled",
+            "runner-up",
+            "coverage",
+        ];
+        heading(ui, &columns);
+        for span in spans {
+            name(ui, span);
+            let number = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.4}"));
+            let numbers = |result: &QueryResult| match &result.cost {
+                Some(cost) => [
+                    number(Some(cost.best)),
+                    number(cost.truth.filter(|_| shows_truth)),
+                    number(cost.initial),
+                    number(cost.shuffled),
+                    number(cost.runner_up),
+                    format!("{:.2} %", 100.0 * cost.coverage_best),
+                ],
+                None => Default::default(),
+            };
+            row(ui, span, others, numbers);
+        }
+    });
+    ui.separator();
+}
+
+fn with_result<'a>(
+    scope: &Scope<'a>,
+    wanted: impl Fn(&QueryResult) -> bool,
+) -> impl Iterator<Item = &'a Span> {
+    scope
+        .run
+        .spans()
+        .iter()
+        .filter(move |span| span.result.as_ref().is_some_and(&wanted))
+}
+
+fn row<const N: usize>(
+    ui: &mut Ui,
+    span: &Span,
+    others: &[&QueryResult],
+    numbers: impl Fn(&QueryResult) -> [String; N],
+) {
+    let other = counterpart(span, others).map(&numbers);
+    if let Some(result) = &span.result {
+        for (index, text) in numbers(result).into_iter().enumerate() {
+            cell(ui, text, other.as_ref().map(|other| other[index].clone()));
+        }
+    }
+    ui.end_row();
+}
+
+fn times(ui: &mut Ui, scope: &Scope<'_>) {
+    ui.collapsing("Timings", |ui| {
+        Grid::new("times").striped(true).show(ui, |ui| {
+            heading(ui, &["stage", "ms"]);
+            for span in scope.run.spans() {
+                let Some(times) = &span.times else { continue };
+                for (stage, time) in times.iter() {
+                    ui.monospace(stage);
+                    ui.label(format!("{:.2}", 1e3 * time.as_secs_f64()));
+                    ui.end_row();
+                }
+            }
+        });
+        ui.weak("A paused run counts its pauses; a reused stage takes next to nothing");
+    });
+}
+
+fn changes(ui: &mut Ui, scope: &Scope<'_>) {
+    let changes = scope.run.params.changes();
+    if changes.is_empty() {
+        ui.weak("All parameters at their defaults");
+    } else {
+        ui.label("Parameters that differ from their defaults:");
+        for change in changes {
+            ui.monospace(change);
+        }
+    }
+}

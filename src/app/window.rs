@@ -1,0 +1,62 @@
+//! Opening the window.
+
+use egui::ViewportBuilder;
+
+use super::App;
+use super::setup::Setup;
+
+/// Why no window could be opened, and what would help.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// There is no display.
+    #[error("no window: no display is set (DISPLAY or WAYLAND_DISPLAY)")]
+    NoDisplay,
+    /// There is a display, but nothing to draw with.
+    #[error(
+        "no window: no graphics adapter ({0}); Mesa's software Vulkan is one: install the package \
+         mesa-vulkan-drivers (Debian, Ubuntu) or vulkan-swrast (Arch), or mesa-vulkan-drivers (Fedora)"
+    )]
+    NoAdapter(String),
+    /// Anything else that eframe has to say.
+    #[error("no window: {0}")]
+    Failed(String),
+}
+
+/// Whether a window may be opened at all, judged by the environment.
+pub fn has_display() -> bool {
+    if cfg!(any(target_os = "macos", target_os = "windows")) {
+        return true;
+    }
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// [`WindowError`] when there is no display, or nothing to draw with.
+pub fn open(setup: Setup) -> Result<(), WindowError> {
+    if !has_display() {
+        return Err(WindowError::NoDisplay);
+    }
+    let options = eframe::NativeOptions {
+        viewport: ViewportBuilder::default()
+            .with_title(format!("posescope: {}", setup.scene_argument))
+            .with_app_id("posescope")
+            .with_inner_size([1500.0, 950.0]),
+        ..eframe::NativeOptions::default()
+    };
+    eframe::run_native(
+        "posescope",
+        options,
+        Box::new(|creation| Ok(Box::new(App::new(creation, setup)))),
+    )
+    .map_err(|error| match error {
+        eframe::Error::Wgpu(why) => WindowError::NoAdapter(one_line(&why.to_string())),
+        other => WindowError::Failed(one_line(&other.to_string())),
+    })
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
