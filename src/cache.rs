@@ -9,7 +9,7 @@ mod memory;
 use std::sync::Arc;
 
 pub(crate) use disk::DiskCache;
-use memory::Recent;
+pub(crate) use memory::Recent;
 
 /// A value that can be kept as bytes.
 pub(crate) trait Stored: Sized {

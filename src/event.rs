@@ -8,6 +8,7 @@ use nalgebra::Point3;
 
 use crate::cost::{Explanation, IntensityPair};
 use crate::features::{Features, Match};
+use crate::fusion::Share;
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase, ScoredLattice};
 use crate::render::{ColoredCloud, Score, SyntheticView};
@@ -81,6 +82,8 @@ pub enum Stage {
     Search(Phase),
     /// PM, MI: what the result is worth.
     Assess,
+    /// One pose from those of several references.
+    Fuse,
 }
 
 impl Stage {
@@ -99,6 +102,7 @@ impl Stage {
             Self::Search(Phase::YawCoarse) => "yaw_coarse",
             Self::Search(Phase::YawFine) => "yaw_fine",
             Self::Assess => "assess",
+            Self::Fuse => "fusion",
         }
     }
 }
@@ -197,6 +201,7 @@ events! {
     ViewRendered,
     MinimumAssessed,
     BranchTaken,
+    ReferencesFused,
 }
 
 /// A stage begins.
@@ -443,4 +448,15 @@ pub struct BranchTaken {
     pub method: Method,
     /// Why FB's pose was kept or not.
     pub why: String,
+}
+
+/// Several references gave a pose each, and a fusion made one of them.
+#[derive(Clone, Debug)]
+pub struct ReferencesFused {
+    /// The fusion's name.
+    pub fusion: &'static str,
+    /// What each reference alone gave, and its weight, in the order of the references.
+    pub shares: Arc<[Share]>,
+    /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
+    pub pose: Option<Pose>,
 }

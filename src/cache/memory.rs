@@ -3,28 +3,28 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// At most `capacity` values; the one that was not asked for the longest makes room.
-pub(super) struct Recent<T> {
+pub(crate) struct Recent<T> {
     capacity: usize,
     /// From the least to the most recently used. A few dozen, so that searching takes no time.
     entries: Mutex<Vec<(String, Arc<T>)>>,
 }
 
 impl<T> Recent<T> {
-    pub(super) fn new(capacity: usize) -> Self {
+    pub(crate) fn new(capacity: usize) -> Self {
         Self {
             capacity,
             entries: Mutex::default(),
         }
     }
 
-    pub(super) fn get(&self, key: &str) -> Option<Arc<T>> {
+    pub(crate) fn get(&self, key: &str) -> Option<Arc<T>> {
         let mut entries = self.entries();
         let at = entries.iter().position(|(known, _)| known == key)?;
         entries[at..].rotate_left(1);
         entries.last().map(|(_, value)| Arc::clone(value))
     }
 
-    pub(super) fn insert(&self, key: &str, value: Arc<T>) {
+    pub(crate) fn insert(&self, key: &str, value: Arc<T>) {
         let mut entries = self.entries();
         entries.retain(|(known, _)| known != key);
         entries.push((key.to_owned(), value));

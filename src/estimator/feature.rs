@@ -16,7 +16,7 @@ use crate::event::{
     LiftedMatch, MatchesDecided, Method, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
+    FeatureCache, Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
 };
 use crate::geometry::Pose;
 use crate::params::Params;
@@ -34,6 +34,7 @@ const MINIMUM: usize = 4;
 pub struct FeatureBased {
     surf: SurfParams,
     params: FeatureParams,
+    remembered: Option<Arc<FeatureCache>>,
 }
 
 impl Estimator for FeatureBased {
@@ -48,6 +49,10 @@ impl Estimator for FeatureBased {
             cost: None,
         })
     }
+
+    fn remember(&mut self, features: &Arc<FeatureCache>) {
+        self.remembered = Some(Arc::clone(features));
+    }
 }
 
 impl FeatureBased {
@@ -56,6 +61,7 @@ impl FeatureBased {
         Self {
             surf: params.surf,
             params: params.fb.clone(),
+            remembered: None,
         }
     }
 
@@ -102,7 +108,7 @@ impl FeatureBased {
         }
 
         let matches = trace.stage(Stage::Match, |trace| {
-            let decisions = self.best_matches(query, reference);
+            let decisions = best_matches(query, reference, &self.params);
             trace.emit(|| MatchesDecided {
                 decisions: Arc::clone(&decisions),
             })?;
@@ -169,27 +175,15 @@ impl FeatureBased {
             Side::Query => &problem.query.photo,
             Side::Reference => &problem.reference.photo,
         };
-        let features = Arc::new(surf(&photo.gray, &self.surf));
+        let features = match &self.remembered {
+            Some(cache) => cache.surf(&photo.gray, &self.surf),
+            None => Arc::new(surf(&photo.gray, &self.surf)),
+        };
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features),
         })?;
         Ok(features)
-    }
-
-    /// The best match of each query feature, and whether it stands out.
-    fn best_matches(&self, query: &Features, reference: &Features) -> Arc<[Option<Match>]> {
-        let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
-        let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
-        let mut matches = classify(&forward, &backward, self.params.ratio as f32);
-        if !self.params.unique {
-            for found in matches.iter_mut().flatten() {
-                if let MatchVerdict::NotUnique { .. } = found.verdict {
-                    found.verdict = MatchVerdict::Candidate;
-                }
-            }
-        }
-        matches.into()
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -304,4 +298,36 @@ impl FeatureBased {
         verdict?;
         Ok(problem.world_from_query(&reference_from_query))
     }
+}
+
+/// The best match of each query feature, and whether it stands out.
+fn best_matches(
+    query: &Features,
+    reference: &Features,
+    params: &FeatureParams,
+) -> Arc<[Option<Match>]> {
+    let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
+    let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
+    let mut matches = classify(&forward, &backward, params.ratio as f32);
+    if !params.unique {
+        for found in matches.iter_mut().flatten() {
+            if let MatchVerdict::NotUnique { .. } = found.verdict {
+                found.verdict = MatchVerdict::Candidate;
+            }
+        }
+    }
+    matches.into()
+}
+
+/// How many features of the query have a match in the reference: FB's count after the ratio test and
+/// uniqueness, before any depth is looked up. Fusion weighs references by it.
+pub fn count_matches(query: &Features, reference: &Features, params: &FeatureParams) -> usize {
+    if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
+        return 0;
+    }
+    best_matches(query, reference, params)
+        .iter()
+        .flatten()
+        .filter(|found| found.verdict == MatchVerdict::Candidate)
+        .count()
 }
