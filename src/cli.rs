@@ -1,12 +1,12 @@
 //! The command line of posescope.
 
 mod args;
+mod audience;
 mod demo;
 mod failure;
 mod output;
 mod params;
 mod run;
-mod select;
 mod synth;
 mod table;
 mod terminal;

@@ -2,11 +2,12 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::evaluate::Selection;
 use posescope::event::Method;
+use posescope::fusion;
 use posescope::scene::street::{Size, Street};
 
 /// See why a camera pose estimate fails.
@@ -73,11 +74,11 @@ pub struct RunArgs {
     /// Localise every frame
     #[arg(long, conflicts_with = "query")]
     pub all: bool,
-    /// A frame with known pose and cloud to localise against; repeatable, each is run by itself
+    /// A frame with known pose and cloud to localise against; repeatable
     #[arg(long, value_name = "FRAME")]
     pub reference: Vec<String>,
-    /// How references are chosen where --reference names none: random:K or nearest:K of the frames
-    /// within the radius of the query's known position
+    /// How references are chosen where --reference names none: random:K, nearest:K or maxf:K (those
+    /// with the most feature matches) of the frames within the radius of the query's known position
     #[arg(
         long,
         value_name = "HOW",
@@ -97,6 +98,9 @@ pub struct RunArgs {
         default_value = "fb,pm,mi,hy"
     )]
     pub method: Vec<Method>,
+    /// Fuse the poses of several references into one; otherwise each reference gives its own
+    #[arg(long, value_name = "maxf|avg|wavg|r-wavg", value_parser = fusion)]
+    pub fusion: Option<&'static fusion::Entry>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -153,28 +157,11 @@ pub struct SynthArgs {
     pub force: bool,
 }
 
-/// How references are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Selection {
-    /// K frames within the radius, drawn by the seed.
-    Random(usize),
-    /// The K nearest frames within the radius.
-    Nearest(usize),
-}
-
-impl FromStr for Selection {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "random:K or nearest:K expected, with K from 1".to_owned();
-        let (how, count) = text.split_once(':').ok_or_else(expected)?;
-        let count = count.parse().ok().filter(|count| *count > 0);
-        match (how, count) {
-            ("random", Some(count)) => Ok(Self::Random(count)),
-            ("nearest", Some(count)) => Ok(Self::Nearest(count)),
-            _ => Err(expected()),
-        }
-    }
+fn fusion(name: &str) -> Result<&'static fusion::Entry, String> {
+    fusion::find(name).ok_or_else(|| {
+        let names: Vec<&str> = fusion::ALL.iter().map(|entry| entry.name).collect();
+        format!("{} expected", names.join(", "))
+    })
 }
 
 fn method(name: &str) -> Result<Method, String> {
@@ -196,14 +183,5 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn selections_are_read_and_nonsense_is_refused() {
-        assert_eq!("random:3".parse(), Ok(Selection::Random(3)));
-        assert_eq!("nearest:1".parse(), Ok(Selection::Nearest(1)));
-        for wrong in ["nearest", "nearest:0", "nearest:-1", "best:2", ""] {
-            assert!(wrong.parse::<Selection>().is_err(), "{wrong}");
-        }
     }
 }

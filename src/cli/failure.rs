@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use posescope::evaluate::ChoiceError;
 use posescope::params::ParamError;
 use posescope::scene::SceneError;
 use posescope::sink::rerun::RecordError;
@@ -30,6 +31,8 @@ pub enum CliError {
     #[error("{0}")]
     NoReference(String),
     #[error(transparent)]
+    Choice(#[from] ChoiceError),
+    #[error(transparent)]
     Record(#[from] RecordError),
     /// Whoever read our stdout, such as `head`, has seen enough: not an error.
     #[error("nobody reads the output any more")]
@@ -45,13 +48,15 @@ impl CliError {
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::ReaderGone => DONE,
-            Self::Usage(_) | Self::Param(_) | Self::Scene(SceneError::UnknownFormat { .. }) => {
-                USAGE
-            }
+            Self::Usage(_)
+            | Self::Param(_)
+            | Self::Choice(ChoiceError::UnknownPosition { .. })
+            | Self::Scene(SceneError::UnknownFormat { .. }) => USAGE,
             Self::Scene(_)
             | Self::Config { .. }
             | Self::Io { .. }
             | Self::NoReference(_)
+            | Self::Choice(_)
             | Self::Record(_) => BAD_DATA,
         })
     }

@@ -12,6 +12,7 @@ mod direct;
 pub mod entities;
 mod feature;
 mod file;
+mod fusion;
 mod images;
 mod layout;
 mod narration;
