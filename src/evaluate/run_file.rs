@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::experiment::Experiment;
-use super::{Request, Setting};
+use super::{Request, Selection, Setting};
 use crate::camera::Intrinsics;
 use crate::event::Method;
 use crate::fusion;
@@ -212,8 +212,14 @@ impl RunFile {
         fusions.filter_map(|name| fusion::find(name)).collect()
     }
 
+    /// How references are chosen.
+    pub fn selection(&self) -> Selection {
+        self.references.parse().unwrap_or(Selection::Random(1))
+    }
+
     /// What is asked of every query, still without references: by radius, then number of references.
-    pub fn settings(&self, most_references: usize) -> Vec<Setting> {
+    pub fn settings(&self) -> Vec<Setting> {
+        let most_references = self.selection().count();
         let counts = match self.experiment {
             Some(Experiment::Multi) => 1..=most_references,
             _ => most_references..=most_references,
@@ -241,8 +247,23 @@ impl RunFile {
     }
 
     /// Results of each query.
-    pub fn results_per_item(&self, most_references: usize) -> usize {
-        self.methods.len() * self.settings(most_references).len() * self.fusions.len().max(1)
+    pub fn results_per_item(&self) -> usize {
+        self.methods.len() * self.settings().len() * self.fusions.len().max(1)
+    }
+
+    /// Whether every name in it is known; says which is not.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let unknown_method = |name: &&String| Method::from_name(name).is_none();
+        let unknown_fusion = |name: &&String| fusion::find(name).is_none();
+        let unknown = (self.methods.iter().find(unknown_method))
+            .or_else(|| self.fusions.iter().find(unknown_fusion));
+        if let Some(name) = unknown {
+            return Err(format!("`{name}` is neither a method nor a fusion"));
+        }
+        if self.methods.is_empty() || self.radii_m.is_empty() {
+            return Err("a run has at least one method and one radius".to_owned());
+        }
+        self.references.parse::<Selection>().map(drop)
     }
 
     /// The same run in one piece.

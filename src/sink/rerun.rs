@@ -8,6 +8,7 @@
 
 mod blueprint;
 mod colors;
+mod comparison;
 mod direct;
 pub mod entities;
 mod feature;
@@ -25,5 +26,6 @@ mod surface;
 mod targets;
 mod viewer;
 
+pub use comparison::{ComparisonError, record_comparison};
 pub use recorder::Recorder;
 pub use targets::{Identity, RecordError, Targets};
