@@ -4,7 +4,7 @@
 //!
 //! With `POSESCOPE_THREADS=1` in the environment everything runs on one thread.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use divan::{Bencher, black_box};
 use nalgebra::{Point2, Point3, Unit, Vector3};
@@ -171,7 +171,7 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
     );
     let scorer = Scorer::new(
         &cloud.points,
-        gaussian_smoothed(&query.photo.gray, cost.query_smoothing_px()),
+        Arc::new(gaussian_smoothed(&query.photo.gray, cost.query_smoothing_px())),
         &query.intrinsics,
         SPLAT_PX,
         cost.as_ref(),

@@ -1,12 +1,16 @@
 //! The command line of posescope.
 
 mod args;
+mod audience;
 mod demo;
+mod diff;
+mod eval;
+mod export;
 mod failure;
+mod failures;
 mod output;
 mod params;
 mod run;
-mod select;
 mod synth;
 mod table;
 mod terminal;
@@ -38,6 +42,9 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
     match &arguments.command {
         None => demo::demo(&terminal),
         Some(Command::Run(run)) => run::run(run, &terminal),
+        Some(Command::Eval(args)) => eval::eval(args, &terminal),
+        Some(Command::Diff(args)) => diff::diff(args, &terminal),
+        Some(Command::Export(args)) => export::run(args, &terminal),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params),
     }

@@ -1,9 +1,49 @@
-//! Measuring outcomes. The only place that sees ground truth.
+//! Measuring outcomes, of one query and of thousands. The only place that sees ground truth.
 
+mod diff;
+mod execute;
+mod experiment;
+#[cfg(feature = "cli")]
+mod export;
+mod gate;
+#[cfg(feature = "cli")]
+mod junit;
+mod localize;
+mod metrics;
+mod paper;
+#[cfg(feature = "cli")]
+mod plots;
+#[cfg(feature = "cli")]
+mod report;
 mod result;
+mod run_file;
+mod run_folder;
+mod select;
+#[cfg(feature = "cli")]
+mod table;
+#[cfg(feature = "cli")]
+mod tables;
 mod timing;
 
-pub use result::{
-    CostReport, Diagnosis, PoseReport, QueryResult, Reason, SCHEMA, Status, evaluate,
+pub use diff::{Change, Comparison, Difference, Tolerance};
+pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes, is_success};
+pub use experiment::{
+    Defaults, Draw, DrawError, Experiment, default_failure_radius_m, default_prior_m, defaults,
 };
+#[cfg(feature = "cli")]
+pub use export::{Choice, Export, ExportError, ExportedFile, Format, export};
+pub use gate::{Gate, Passage};
+pub use localize::{Localizer, Request, Unwatched, Watch};
+pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
+pub use paper::{Sought, figure as paper_figure};
+#[cfg(feature = "cli")]
+pub use report::{Report, SUMMARY_SCHEMA, read_rows, write_report};
+pub use result::{
+    CostReport, Diagnosis, PoseReport, QueryResult, Reason, SCHEMA, Setting, Status, evaluate,
+};
+pub use run_file::{Camera, Item, Pair, RUN_SCHEMA, RunFile, Shard};
+pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run};
+pub use select::{ByMatches, ChoiceError, Chooser, Ranking, Selection, draw, frames_within};
+#[cfg(feature = "cli")]
+pub use table::Table;
 pub use timing::{StageTimes, StageTimings};

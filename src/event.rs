@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::features::{Features, Match, MatchVerdict};
+use crate::fusion::Share;
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase, ScoredLattice};
 use crate::render::{ColoredCloud, Comparison, Score};
@@ -80,6 +81,8 @@ pub enum Stage {
     Search(Phase),
     /// PM, MI: what the result is worth.
     Assess,
+    /// One pose from those of several references.
+    Fuse,
 }
 
 impl Stage {
@@ -98,6 +101,7 @@ impl Stage {
             Self::Search(Phase::YawCoarse) => "yaw_coarse",
             Self::Search(Phase::YawFine) => "yaw_fine",
             Self::Assess => "assess",
+            Self::Fuse => "fusion",
         }
     }
 }
@@ -196,6 +200,7 @@ events! {
     ViewRendered,
     MinimumAssessed,
     BranchTaken,
+    ReferencesFused,
 }
 
 /// A stage begins.
@@ -454,4 +459,15 @@ pub struct BranchTaken {
     pub method: Method,
     /// Why FB's pose was kept or not.
     pub why: String,
+}
+
+/// Several references gave a pose each, and a fusion made one of them.
+#[derive(Clone, Debug)]
+pub struct ReferencesFused {
+    /// The fusion's name.
+    pub fusion: &'static str,
+    /// What each reference alone gave, and its weight, in the order of the references.
+    pub shares: Arc<[Share]>,
+    /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
+    pub pose: Option<Pose>,
 }

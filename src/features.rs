@@ -18,6 +18,7 @@
 //! All of it runs on all threads of the current [`rayon`] pool and gives the same result
 //! on any number of them.
 
+mod cache;
 mod descriptor;
 mod detector;
 mod hessian;
@@ -28,6 +29,7 @@ mod surf;
 
 use nalgebra::Point2;
 
+pub use cache::FeatureCache;
 pub use matching::{Match, MatchVerdict, Neighbours, classify, nearest_neighbours};
 pub use surf::{SurfParams, surf};
 

@@ -29,6 +29,7 @@ pub mod evaluate;
 pub mod event;
 pub mod features;
 mod files;
+pub mod fusion;
 pub mod geometry;
 pub mod grid;
 pub mod history;

@@ -1,7 +1,8 @@
 //! Decisions in words, for logs.
 
-use crate::event::{Event, MinimumAssessed, Moment, Side, Stage, ViewRendered};
+use crate::event::{Event, MinimumAssessed, Moment, ReferencesFused, Side, Stage, ViewRendered};
 use crate::features::MatchVerdict;
+use crate::fusion::Fate;
 use crate::grid::Offset;
 
 /// One sentence for an event that is a decision; `None` for the others.
@@ -85,6 +86,7 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::BranchTaken(event) => {
             format!("takes the pose of {}: {}", event.method.name(), event.why)
         }
+        Event::ReferencesFused(event) => fused(event),
         Event::HypothesisTried(_)
         | Event::PoseScored(_)
         | Event::StageStarted(_)
@@ -121,6 +123,22 @@ fn assessed(event: &MinimumAssessed) -> String {
         cost(event.shuffled),
         cost(event.runner_up)
     )
+}
+
+fn fused(event: &ReferencesFused) -> String {
+    let shares: Vec<String> = event
+        .shares
+        .iter()
+        .map(|share| {
+            let say = match share.fate {
+                Fate::Kept => format!("weight {:.3}", share.weight),
+                Fate::Dropped => "dropped".to_owned(),
+                Fate::Failed => "failed".to_owned(),
+            };
+            format!("{} {say} ({} matches)", share.reference, share.matches)
+        })
+        .collect();
+    format!("{} of {}", event.fusion, shares.join(", "))
 }
 
 fn cost(cost: Option<f64>) -> String {

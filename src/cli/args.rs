@@ -2,11 +2,12 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::evaluate::{Experiment, Format, Gate, Selection, Shard, Tolerance};
 use posescope::event::Method;
+use posescope::fusion;
 use posescope::scene::street::{Size, Street};
 
 /// See why a camera pose estimate fails.
@@ -29,6 +30,13 @@ pub struct Arguments {
 pub enum Command {
     /// Localise one query, or several, and record every decision
     Run(Box<RunArgs>),
+    /// Run an experiment over many queries into a run folder
+    Eval(Box<EvalArgs>),
+    /// List the queries that a run fixed, broke or changed against another; exit code 1 if it broke
+    /// any
+    Diff(DiffArgs),
+    /// Write the poses or tables of a run in formats of other programs
+    Export(ExportArgs),
     /// Write the built-in street to disk in KITTI odometry layout, one sequence per condition
     Synth(SynthArgs),
     /// List all parameters with unit, range, default and meaning
@@ -73,11 +81,11 @@ pub struct RunArgs {
     /// Localise every frame
     #[arg(long, conflicts_with = "query")]
     pub all: bool,
-    /// A frame with known pose and cloud to localise against; repeatable, each is run by itself
+    /// A frame with known pose and cloud to localise against; repeatable
     #[arg(long, value_name = "FRAME")]
     pub reference: Vec<String>,
-    /// How references are chosen where --reference names none: random:K or nearest:K of the frames
-    /// within the radius of the query's known position
+    /// How references are chosen where --reference names none: random:K, nearest:K or maxf:K (those
+    /// with the most feature matches) of the frames within the radius of the query's known position
     #[arg(
         long,
         value_name = "HOW",
@@ -97,6 +105,9 @@ pub struct RunArgs {
         default_value = "fb,pm,mi,hy"
     )]
     pub method: Vec<Method>,
+    /// Fuse the poses of several references into one; otherwise each reference gives its own
+    #[arg(long, value_name = "maxf|avg|wavg|r-wavg", value_parser = fusion)]
+    pub fusion: Option<&'static fusion::Entry>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -130,6 +141,142 @@ pub struct RecordingArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// Where the references are, as in `run`; several scenes are evaluated one after the other
+    #[arg(value_name = "SCENE", required_unless_present = "merge")]
+    pub scenes: Vec<String>,
+    /// The format of the scenes, if their content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Take the queries from this scene in the same world frame; repeatable: every scene of
+    /// references is paired with every one of queries
+    #[arg(long, value_name = "SCENE")]
+    pub queries: Vec<String>,
+    /// One of the paper's experiments, which sets the defaults below: one random reference within 10,
+    /// 15, 20, 25 m; 1 to 5 references and four fusions; 5 ranked references within a large prior
+    #[arg(long, value_name = "single|multi|large", value_parser = experiment)]
+    pub experiment: Option<Experiment>,
+    /// How references are chosen: random:K, nearest:K, maxf:K or retrieve:K [default: random:1;
+    /// multi: random:5; large: retrieve:5]
+    #[arg(long, value_name = "HOW")]
+    pub references: Option<Selection>,
+    /// Uncertainty radius; several are run one by one [m] [default: 15; multi: 10]
+    #[arg(long, value_name = "METRES", value_delimiter = ',', value_parser = positive)]
+    pub radius: Vec<f64>,
+    /// How far from a query's known position references may be, where that is more than the radius
+    /// [m] [default for large: 200, RobotCar 50]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub prior: Option<f64>,
+    /// The methods to run [default: all; single and multi: fb,pm,mi]
+    #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',', value_parser = method)]
+    pub method: Vec<Method>,
+    /// Fusions of several references [default: r-wavg; multi: all]
+    #[arg(
+        long,
+        value_name = "maxf,avg,wavg,r-wavg",
+        value_delimiter = ',',
+        value_parser = fusion
+    )]
+    pub fusion: Vec<&'static fusion::Entry>,
+    /// Draw this share of the frames as queries; the others are the references [default: 1, where
+    /// every frame is a query of all others; experiments: 0.1]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub queries_share: Option<f64>,
+    /// At most as many queries, drawn by the seed
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub limit: Option<u32>,
+    /// Only this one of the queries; repeatable
+    #[arg(long, value_name = "FRAME")]
+    pub only: Vec<String>,
+    /// A pose as far off counts as a failure [m] [default: 10, RobotCar 20]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub failure_radius: Option<f64>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Number of threads [default: one per core]; results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// The run folder [default: below runs/, named after what is asked]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in the folder
+    #[arg(long, conflicts_with = "merge")]
+    pub resume: bool,
+    /// Run one part of N; every query is in one of them
+    #[arg(long, value_name = "I/N", conflicts_with = "merge")]
+    pub shard: Option<Shard>,
+    /// Instead of running: bring all parts of a run together in one folder
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "scenes", requires = "out")]
+    pub merge: Vec<PathBuf>,
+    /// Exit with code 1 unless this holds, such as \"success@mi >= 0.9\" or
+    /// \"recall@0.5m,5deg@fb >= 0.8\"; repeatable
+    #[arg(long, value_name = "CONDITION")]
+    pub gate: Vec<Gate>,
+    /// Exit with code 1 if a query fails that succeeded in this run
+    #[arg(long, value_name = "RUN")]
+    pub baseline: Option<PathBuf>,
+    /// Keep recordings of at most as many failures
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub max_recordings: usize,
+    /// Keep recordings of failures of at most this size together [MB]
+    #[arg(long, value_name = "MB", default_value_t = 500)]
+    pub max_recording_mb: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// The run folder to compare with
+    #[arg(value_name = "RUN_A")]
+    pub before: PathBuf,
+    /// The run folder that may be better or worse
+    #[arg(value_name = "RUN_B")]
+    pub after: PathBuf,
+    /// Changes of the translation error up to this are none [m]
+    #[arg(long, value_name = "METRES", default_value_t = Tolerance::default().metres)]
+    pub tolerance_m: f64,
+    /// Changes of the rotation error up to this are none [°]
+    #[arg(long, value_name = "DEGREES", default_value_t = Tolerance::default().degrees)]
+    pub tolerance_deg: f64,
+    /// Save a recording with both runs on the same timelines
+    #[arg(long, value_name = "FILE.rrd")]
+    pub save: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// The run folder
+    pub run: PathBuf,
+    /// The format
+    #[arg(
+        long,
+        value_parser = PossibleValuesParser::new(Format::ALL.map(|(name, _)| name))
+            .try_map(|name: String| Format::from_name(&name).ok_or("a format expected"))
+    )]
+    pub format: Format,
+    /// The file to write, or the folder for colmap [default: stdout]
+    #[arg(long, value_name = "PATH")]
+    pub out: Option<PathBuf>,
+    /// Results of this method only, as the following
+    #[arg(long, value_parser = method)]
+    pub method: Option<Method>,
+    /// Results of this fusion
+    #[arg(long, value_parser = fusion)]
+    pub fusion: Option<&'static fusion::Entry>,
+    /// Results with this uncertainty radius [m]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub radius: Option<f64>,
+    /// Results with as many references asked for
+    #[arg(long, value_name = "K")]
+    pub references: Option<usize>,
+    /// Results against this scene of references
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<String>,
+}
+
+#[derive(Debug, Args)]
 pub struct SynthArgs {
     /// Where to write: DIR/sequences/CONDITION and DIR/poses/CONDITION.txt
     #[arg(value_name = "DIR")]
@@ -153,28 +300,27 @@ pub struct SynthArgs {
     pub force: bool,
 }
 
-/// How references are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Selection {
-    /// K frames within the radius, drawn by the seed.
-    Random(usize),
-    /// The K nearest frames within the radius.
-    Nearest(usize),
+fn fusion(name: &str) -> Result<&'static fusion::Entry, String> {
+    fusion::find(name).ok_or_else(|| {
+        let names: Vec<&str> = fusion::ALL.iter().map(|entry| entry.name).collect();
+        format!("{} expected", names.join(", "))
+    })
 }
 
-impl FromStr for Selection {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "random:K or nearest:K expected, with K from 1".to_owned();
-        let (how, count) = text.split_once(':').ok_or_else(expected)?;
-        let count = count.parse().ok().filter(|count| *count > 0);
-        match (how, count) {
-            ("random", Some(count)) => Ok(Self::Random(count)),
-            ("nearest", Some(count)) => Ok(Self::Nearest(count)),
-            _ => Err(expected()),
-        }
+fn experiment(name: &str) -> Result<Experiment, String> {
+    match name {
+        "single" => Ok(Experiment::Single),
+        "multi" => Ok(Experiment::Multi),
+        "large" => Ok(Experiment::Large),
+        _ => Err("single, multi or large expected".to_owned()),
     }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|share: &f64| *share > 0.0 && *share <= 1.0)
+        .ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
 }
 
 fn method(name: &str) -> Result<Method, String> {
@@ -196,14 +342,5 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn selections_are_read_and_nonsense_is_refused() {
-        assert_eq!("random:3".parse(), Ok(Selection::Random(3)));
-        assert_eq!("nearest:1".parse(), Ok(Selection::Nearest(1)));
-        for wrong in ["nearest", "nearest:0", "nearest:-1", "best:2", ""] {
-            assert!(wrong.parse::<Selection>().is_err(), "{wrong}");
-        }
     }
 }

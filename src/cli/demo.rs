@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::args::{ConfigArgs, RecordingArgs, RunArgs, Selection};
+use super::args::{ConfigArgs, RecordingArgs, RunArgs};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
+use posescope::evaluate::Selection;
 use posescope::event::Method;
 
 /// A place on the street where parked cars hide part of what the reference saw.
@@ -30,6 +31,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
             references: Selection::Random(1),
             radius: 15.0,
             method: Method::ALL.to_vec(),
+            fusion: None,
             seed: 0,
             config: ConfigArgs::default(),
             threads: None,

@@ -4,11 +4,13 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use posescope::evaluate::{ChoiceError, DrawError, FolderError, RunError};
 use posescope::params::ParamError;
 use posescope::scene::SceneError;
-use posescope::sink::rerun::RecordError;
+use posescope::sink::rerun::{ComparisonError, RecordError};
 
 const DONE: u8 = 0;
+const NOT_GOOD_ENOUGH: u8 = 1;
 const USAGE: u8 = 2;
 const BAD_DATA: u8 = 3;
 /// The exit code of a panic.
@@ -30,7 +32,16 @@ pub enum CliError {
     #[error("{0}")]
     NoReference(String),
     #[error(transparent)]
+    Choice(#[from] ChoiceError),
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    #[error(transparent)]
     Record(#[from] RecordError),
+    /// A gate or a comparison says no.
+    #[error("{0}")]
+    NotGoodEnough(String),
     /// Whoever read our stdout, such as `head`, has seen enough: not an error.
     #[error("nobody reads the output any more")]
     ReaderGone,
@@ -45,15 +56,45 @@ impl CliError {
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::ReaderGone => DONE,
-            Self::Usage(_) | Self::Param(_) | Self::Scene(SceneError::UnknownFormat { .. }) => {
-                USAGE
-            }
+            Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
+            Self::Usage(_)
+            | Self::Param(_)
+            | Self::Choice(ChoiceError::UnknownPosition { .. } | ChoiceError::NoIndex)
+            | Self::Draw(DrawError::NotDrawn { .. })
+            | Self::Folder(
+                FolderError::NotEmpty { .. }
+                | FolderError::OtherRun { .. }
+                | FolderError::InUse { .. },
+            )
+            | Self::Scene(SceneError::UnknownFormat { .. }) => USAGE,
             Self::Scene(_)
             | Self::Config { .. }
             | Self::Io { .. }
             | Self::NoReference(_)
+            | Self::Choice(_)
+            | Self::Draw(_)
+            | Self::Folder(_)
             | Self::Record(_) => BAD_DATA,
         })
+    }
+}
+
+impl From<RunError> for CliError {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Scene(error) => error.into(),
+            RunError::Choice(error) => error.into(),
+            RunError::Folder(error) => error.into(),
+        }
+    }
+}
+
+impl From<ComparisonError> for CliError {
+    fn from(error: ComparisonError) -> Self {
+        match error {
+            ComparisonError::Folder(error) => error.into(),
+            ComparisonError::Record(error) => error.into(),
+        }
     }
 }
 

@@ -1,32 +1,25 @@
 //! `posescope run`: queries × references × methods, each told to the recording.
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use posescope::estimator;
-use posescope::evaluate::{QueryResult, StageTimes, StageTimings, evaluate};
+use posescope::evaluate::{Chooser, Localizer, QueryResult, Request};
 use posescope::event::Method;
-use posescope::geometry::Pose;
 use posescope::params::Params;
-use posescope::problem::Problem;
 use posescope::scene::{self, Scene};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
-use posescope::sink::{Fanout, Progress};
-use posescope::trace::{Sink, Trace};
 
 use super::args::RunArgs;
+use super::audience::Audience;
 use super::failure::CliError;
 use super::output::{self, JsonLines};
-use super::select::choose_references;
 use super::terminal::Terminal;
 use super::{params, table};
 
 /// What is asked of every query.
 struct Plan<'a> {
     args: &'a RunArgs,
-    params: Params,
-    references: Box<dyn Scene>,
-    queries: Option<Box<dyn Scene>>,
+    params: &'a Params,
+    localizer: Localizer<'a>,
 }
 
 /// One query with its references, as positions in their scenes.
@@ -37,55 +30,54 @@ struct Task {
 
 /// Runs the command.
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.get())
-            .build_global()
-            .map_err(|error| CliError::Usage(error.to_string()))?;
-    }
+    use_threads(args.threads)?;
+    let params = params::resolve(&args.config)?;
+    let references = scene::open(&args.scene, args.format.as_deref())?;
+    let others = match &args.queries {
+        Some(queries) => Some(scene::open(queries, args.format.as_deref())?),
+        None => None,
+    };
+    let queries = others.as_deref().unwrap_or(references.as_ref());
     let plan = Plan {
         args,
-        params: params::resolve(&args.config)?,
-        references: scene::open(&args.scene, args.format.as_deref())?,
-        queries: match &args.queries {
-            Some(queries) => Some(scene::open(queries, args.format.as_deref())?),
-            None => None,
-        },
+        params: &params,
+        localizer: Localizer::new(references.as_ref(), queries, &params, args.seed),
     };
     let tasks = plan.tasks()?;
-    let json = match &args.json {
+    let mut json = match &args.json {
         Some(path) => Some(JsonLines::create(path)?),
         None => None,
     };
-    let mut report = Report {
-        json,
-        recorder: plan.recorder(&tasks)?,
-        results: Vec::new(),
-    };
-
-    let runs = tasks
-        .iter()
-        .map(|task| task.references.len())
-        .sum::<usize>()
-        * plan.methods().len();
-    let bar = terminal.bar(runs as u64);
-    let outcome = tasks
-        .iter()
-        .enumerate()
-        .try_for_each(|(index, task)| plan.localize(index, task, &mut report, &bar));
+    let mut results = Vec::new();
+    let methods = plan.methods();
+    let estimates = tasks.iter().map(|task| task.references.len());
+    let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
+    let mut audience = Audience::new(bar.clone(), plan.recorder(&tasks)?);
+    let outcome = tasks.iter().enumerate().try_for_each(|(index, task)| {
+        let request = Request {
+            radius_m: args.radius,
+            references: task.references.clone(),
+            fusions: args.fusion.into_iter().collect(),
+            setting: None,
+        };
+        plan.localizer.localize(
+            index,
+            task.query,
+            &[request],
+            &methods,
+            &mut audience,
+            |result, times| {
+                let written = json.as_mut().map_or(Ok(()), |json| json.write(&result));
+                results.push((result, times.total()));
+                written
+            },
+        )
+    });
     bar.finish_and_clear();
 
     // Whatever went wrong, what was computed is shown and the recording is closed.
-    let mut shown = Ok(());
-    if !terminal.is_quiet() && !report.results.is_empty() {
-        let table = table::results(&report.results);
-        if args.json.as_deref().is_some_and(output::is_stdout) {
-            eprintln!("{table}");
-        } else {
-            shown = output::print(&table);
-        }
-    }
-    let closed = report.recorder.map_or(Ok(()), Recorder::close);
+    let shown = show(args, &results, terminal);
+    let closed = audience.recorder.map_or(Ok(()), Recorder::close);
     outcome?;
     closed?;
     shown?;
@@ -95,18 +87,34 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Where results go.
-struct Report {
-    json: Option<JsonLines>,
-    recorder: Option<Recorder>,
-    results: Vec<(QueryResult, Duration)>,
+/// Restricts parallel work to a number of threads.
+pub fn use_threads(threads: Option<std::num::NonZeroUsize>) -> Result<(), CliError> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.get())
+        .build_global()
+        .map_err(|error| CliError::Usage(error.to_string()))
+}
+
+fn show(
+    args: &RunArgs,
+    results: &[(QueryResult, Duration)],
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    if terminal.is_quiet() || results.is_empty() {
+        return Ok(());
+    }
+    let table = table::results(results);
+    if args.json.as_deref().is_some_and(output::is_stdout) {
+        eprintln!("{table}");
+        return Ok(());
+    }
+    output::print(&table)
 }
 
 impl Plan<'_> {
-    fn query_scene(&self) -> &dyn Scene {
-        self.queries.as_deref().unwrap_or(self.references.as_ref())
-    }
-
     /// In the order of the registry, each once.
     fn methods(&self) -> Vec<Method> {
         Method::ALL
@@ -116,42 +124,54 @@ impl Plan<'_> {
     }
 
     fn tasks(&self) -> Result<Vec<Task>, CliError> {
-        let scene = self.query_scene();
-        let queries = if self.args.all {
-            (0..scene.frames().len()).collect()
+        let args = self.args;
+        let (references, queries) = (self.localizer.references(), self.localizer.queries());
+        let wanted = if args.all {
+            (0..queries.frames().len()).collect()
         } else {
-            self.args
-                .query
+            args.query
                 .iter()
-                .map(|name| scene.find(name))
+                .map(|name| queries.find(name))
                 .collect::<Result<Vec<_>, _>>()?
         };
-        let named = self
-            .args
+        let named = args
             .reference
             .iter()
-            .map(|name| self.references.find(name))
+            .map(|name| references.find(name))
             .collect::<Result<Vec<_>, _>>()?;
-        queries
+        let chooser = Chooser {
+            localizer: &self.localizer,
+            params: self.params,
+            selection: args.references,
+            radius_m: args.radius,
+            seed: args.seed,
+            index: None,
+        };
+        wanted
             .into_iter()
             .map(|query| {
                 let references = if named.is_empty() {
-                    let same_scene = self.queries.is_none();
-                    choose_references(
-                        self.args.references,
-                        self.references.as_ref(),
-                        scene,
-                        query,
-                        same_scene,
-                        self.args.radius,
-                        self.args.seed,
-                    )?
+                    self.chosen(&chooser, query)?
                 } else {
                     named.clone()
                 };
                 Ok(Task { query, references })
             })
             .collect()
+    }
+
+    fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<Vec<usize>, CliError> {
+        let chosen = chooser.choose(query, &|_| false)?;
+        if chosen.is_empty() {
+            let name = &self.localizer.queries().frames()[query];
+            return Err(CliError::NoReference(format!(
+                "{}: no frame with pose and scan within {} m of query {name}; \
+                 raise --radius or name one with --reference",
+                self.localizer.references().name(),
+                self.args.radius
+            )));
+        }
+        Ok(chosen)
     }
 
     fn recorder(&self, tasks: &[Task]) -> Result<Option<Recorder>, CliError> {
@@ -168,95 +188,15 @@ impl Plan<'_> {
         let names = |scene: &dyn Scene, frames: &mut dyn Iterator<Item = usize>| {
             frames.map(|frame| scene.frames()[frame].clone()).collect()
         };
+        let references = tasks.iter().flat_map(|task| task.references.iter());
+        let (from, of) = (self.localizer.references(), self.localizer.queries());
         let identity = Identity {
-            scene: self.references.name().to_owned(),
-            queries: names(self.query_scene(), &mut tasks.iter().map(|task| task.query)),
-            references: names(
-                self.references.as_ref(),
-                &mut tasks
-                    .iter()
-                    .flat_map(|task| task.references.iter().copied()),
-            ),
+            scene: from.name().to_owned(),
+            queries: names(of, &mut tasks.iter().map(|task| task.query)),
+            references: names(from, &mut references.copied()),
             configuration: self.params.to_toml(),
             seed: self.args.seed,
         };
         Ok(Some(Recorder::open(&targets, &identity, &self.methods())?))
-    }
-
-    fn localize(
-        &self,
-        index: usize,
-        task: &Task,
-        report: &mut Report,
-        bar: &indicatif::ProgressBar,
-    ) -> Result<(), CliError> {
-        let scene = self.query_scene();
-        let query = scene.query(task.query)?;
-        let truth = scene.pose(task.query);
-        let problems = task
-            .references
-            .iter()
-            .map(|&reference| {
-                Ok(Problem {
-                    query: Arc::clone(&query),
-                    reference: self.references.reference(reference)?,
-                    uncertainty_radius_m: self.args.radius,
-                    seed: self.args.seed,
-                })
-            })
-            .collect::<Result<Vec<_>, CliError>>()?;
-        if let Some(recorder) = &mut report.recorder {
-            recorder.begin_query(index, &problems, truth.as_ref());
-        }
-        for method in self.methods() {
-            for (position, problem) in problems.iter().enumerate() {
-                let task = format!("{} ← {}", problem.query.name, problem.reference.name);
-                let mut progress = Progress::new(bar.clone(), task);
-                if let Some(recorder) = &mut report.recorder {
-                    recorder.begin_method(position, method);
-                }
-                let (result, times) = self.estimate(
-                    problem,
-                    method,
-                    truth.as_ref(),
-                    report.recorder.as_mut(),
-                    &mut progress,
-                );
-                if let Some(recorder) = &mut report.recorder {
-                    recorder.end_method(&result);
-                }
-                let written = report
-                    .json
-                    .as_mut()
-                    .map_or(Ok(()), |json| json.write(&result));
-                report.results.push((result, times.total()));
-                bar.inc(1);
-                written?;
-            }
-        }
-        Ok(())
-    }
-
-    fn estimate(
-        &self,
-        problem: &Problem,
-        method: Method,
-        truth: Option<&Pose>,
-        recorder: Option<&mut Recorder>,
-        progress: &mut Progress,
-    ) -> (QueryResult, StageTimes) {
-        let estimator = (estimator::entry(method).new)(&self.params);
-        let mut timings = StageTimings::default();
-        let mut sinks: Vec<&mut dyn Sink> = vec![&mut timings, progress];
-        if let Some(recorder) = recorder {
-            sinks.push(recorder);
-        }
-        let mut fanout = Fanout::new(sinks);
-        let outcome = estimator
-            .estimate(problem, &mut Trace::to(&mut fanout))
-            .unwrap_or_else(|_| unreachable!("no sink of this command cancels a run"));
-        let scene = self.references.name();
-        let result = evaluate(scene, problem, method, &self.params, &outcome, truth);
-        (result, timings.into_times())
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
-use posescope::evaluate::QueryResult;
+use posescope::evaluate::{QueryResult, Status};
 
 /// One row per query, reference and method.
 pub fn results(results: &[(QueryResult, Duration)]) -> Table {
@@ -43,7 +43,10 @@ pub fn results(results: &[(QueryResult, Duration)]) -> Table {
             result.query.clone(),
             result.references.join(" "),
             start,
-            result.method.clone(),
+            match &result.fusion {
+                Some(fusion) => format!("{} {fusion}", result.method),
+                None => result.method.clone(),
+            },
             error,
             rotation,
             evidence(result),
@@ -68,6 +71,10 @@ fn evidence(result: &QueryResult) -> String {
             .map(|shuffled| format!(", shuffled {shuffled:.4}"))
             .unwrap_or_default();
         return format!("cost {:.4}{truth}{shuffled}", cost.best);
+    }
+    if let (Some(fusion), Some(alone)) = (&result.fusion, &result.per_reference) {
+        let found = alone.iter().filter(|one| one.status == Status::Ok).count();
+        return format!("{fusion} of {}, {found} with a pose", alone.len());
     }
     result
         .counts

@@ -88,13 +88,40 @@ pub enum Failure {
         /// Hypotheses that could be compared with the query.
         hypotheses: usize,
     },
+    /// There is nothing to localise against.
+    #[error("no reference frame{}", radius_m.map(|radius| format!(" with pose and scan within {radius} m")).unwrap_or_default())]
+    NoReference {
+        /// Where references were sought, around the query's known position \[m\].
+        radius_m: Option<f64>,
+    },
+    /// Of several references that were to be fused, each failed by itself.
+    #[error(
+        "none of {weighed} references gave a pose (of {references}, the others have too few matches); \
+         the best, {best}: {failure}"
+    )]
+    NoReferenceSucceeded {
+        /// References that the fusion gave a weight.
+        weighed: usize,
+        /// References in all.
+        references: usize,
+        /// The name of the one with the most matches.
+        best: String,
+        /// Why that one failed.
+        failure: Box<Failure>,
+    },
+    /// A bug: an estimator panicked.
+    #[error("internal error: {message}")]
+    Internal {
+        /// What it said.
+        message: String,
+    },
 }
 
 impl Failure {
     /// The code of the reason in results.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::NothingInView { .. } => "R1",
+            Self::NothingInView { .. } | Self::NoReference { .. } => "R1",
             Self::TooFewFeatures { .. } => "R2",
             Self::TooFewMatches { .. }
             | Self::NoConsensus { .. }
@@ -102,6 +129,8 @@ impl Failure {
             Self::TooFewDepths { .. } => "R4",
             Self::OutsideRadius { .. } => "R5",
             Self::NothingComparable { .. } | Self::FlatCost { .. } => "D5",
+            Self::NoReferenceSucceeded { failure, .. } => failure.code(),
+            Self::Internal { .. } => "X9",
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::event::{
     LiftedMatch, MatchesDecided, Method, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
+    FeatureCache, Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
 };
 use crate::geometry::Pose;
 use crate::memo::Recalled;
@@ -48,6 +48,7 @@ struct Solved {
 pub struct FeatureBased {
     surf: SurfParams,
     params: FeatureParams,
+    remembered: Option<Arc<FeatureCache>>,
 }
 
 impl Estimator for FeatureBased {
@@ -62,6 +63,10 @@ impl Estimator for FeatureBased {
             cost: None,
         })
     }
+
+    fn remember(&mut self, features: &Arc<FeatureCache>) {
+        self.remembered = Some(Arc::clone(features));
+    }
 }
 
 impl FeatureBased {
@@ -70,6 +75,7 @@ impl FeatureBased {
         Self {
             surf: params.surf,
             params: params.fb.clone(),
+            remembered: None,
         }
     }
 
@@ -187,7 +193,10 @@ impl FeatureBased {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let features = memo.recall(&self.surf, || surf(&photo.gray, &self.surf));
+        let features = memo.recall(&self.surf, || match &self.remembered {
+            Some(cache) => Arc::unwrap_or_clone(cache.surf(&photo.gray, &self.surf)),
+            None => surf(&photo.gray, &self.surf),
+        });
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features.value),
@@ -195,7 +204,6 @@ impl FeatureBased {
         Ok(features)
     }
 
-    /// The best match of each query feature, and whether it stands out.
     fn best_matches(
         &self,
         problem: &Problem,
@@ -204,21 +212,9 @@ impl FeatureBased {
     ) -> Recalled<Decisions> {
         let FeatureParams { ratio, unique, .. } = self.params;
         let key = (Arc::as_ptr(&problem.reference), self.surf, ratio, unique);
-        problem.query.memo.recall(&key, || {
-            let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
-            let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
-            let mut matches = classify(&forward, &backward, ratio as f32);
-            if !unique {
-                for found in matches.iter_mut().flatten() {
-                    if let MatchVerdict::NotUnique { .. } = found.verdict {
-                        found.verdict = MatchVerdict::Candidate;
-                    }
-                }
-            }
-            Decisions {
-                decisions: matches.into(),
-                _reference: Arc::clone(&problem.reference),
-            }
+        problem.query.memo.recall(&key, || Decisions {
+            decisions: best_matches(query, reference, &self.params),
+            _reference: Arc::clone(&problem.reference),
         })
     }
 
@@ -346,4 +342,36 @@ impl FeatureBased {
         verdict?;
         Ok(problem.world_from_query(&reference_from_query))
     }
+}
+
+/// The best match of each query feature, and whether it stands out.
+fn best_matches(
+    query: &Features,
+    reference: &Features,
+    params: &FeatureParams,
+) -> Arc<[Option<Match>]> {
+    let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
+    let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
+    let mut matches = classify(&forward, &backward, params.ratio as f32);
+    if !params.unique {
+        for found in matches.iter_mut().flatten() {
+            if let MatchVerdict::NotUnique { .. } = found.verdict {
+                found.verdict = MatchVerdict::Candidate;
+            }
+        }
+    }
+    matches.into()
+}
+
+/// How many features of the query have a match in the reference: FB's count after the ratio test and
+/// uniqueness, before any depth is looked up. Fusion weighs references by it.
+pub fn count_matches(query: &Features, reference: &Features, params: &FeatureParams) -> usize {
+    if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
+        return 0;
+    }
+    best_matches(query, reference, params)
+        .iter()
+        .flatten()
+        .filter(|found| found.verdict == MatchVerdict::Candidate)
+        .count()
 }

@@ -1,9 +1,12 @@
 //! HY, the hybrid (paper, section 2.5): FB is the more accurate where it finds enough matches, MI
 //! still gives a moderate pose where FB finds none.
 
+use std::sync::Arc;
+
 use super::direct::Direct;
 use super::{Estimator, FeatureBased, Outcome, mutual_information};
 use crate::event::{BranchTaken, Method, Stage};
+use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -26,6 +29,19 @@ impl Hybrid {
     }
 }
 
+/// What the hybrid makes of the outcomes of FB and MI for one problem.
+///
+/// Equal problems have equal answers, so whoever has both need not run the hybrid.
+pub fn hybrid_outcome(feature: &Outcome, mutual_information: &Outcome) -> Outcome {
+    if feature.pose.is_ok() {
+        return feature.clone();
+    }
+    Outcome {
+        counts: feature.counts,
+        ..mutual_information.clone()
+    }
+}
+
 impl Estimator for Hybrid {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         trace.stage(Stage::Estimator(Method::Hybrid), |trace| {
@@ -45,11 +61,12 @@ impl Estimator for Hybrid {
                 why: failure.to_string(),
             })?;
             let direct = self.mutual_information.estimate(problem, trace)?;
-            Ok(Outcome {
-                counts: indirect.counts,
-                ..direct
-            })
+            Ok(hybrid_outcome(&indirect, &direct))
         })
+    }
+
+    fn remember(&mut self, features: &Arc<FeatureCache>) {
+        self.feature.remember(features);
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
-use crate::estimator::{self, CostSummary, FeatureCounts, Outcome};
+use crate::estimator::{self, CostSummary, Failure, FeatureCounts, Outcome};
 use crate::event::Method;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 use crate::params::Params;
@@ -17,8 +17,11 @@ pub const SCHEMA: &str = "posescope.result/1";
 pub struct QueryResult {
     /// [`SCHEMA`].
     pub schema: String,
-    /// The scene's name.
+    /// The name of the references' scene.
     pub scene: String,
+    /// The name of the query's scene, where it is another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub query_scene: Option<String>,
     /// The query frame's name.
     pub query: String,
     /// The reference frames' names.
@@ -29,6 +32,9 @@ pub struct QueryResult {
     pub fusion: Option<String>,
     /// The seed of every random choice.
     pub seed: u64,
+    /// What an experiment varies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<Setting>,
     /// Whether there is a pose.
     pub status: Status,
     /// Why there is none.
@@ -45,6 +51,18 @@ pub struct QueryResult {
     pub cost: Option<CostReport>,
     /// What the run says about its own failure.
     pub diagnosis: Vec<Diagnosis>,
+    /// What each reference alone gave, where several were fused; they have no such list.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub per_reference: Option<Vec<QueryResult>>,
+}
+
+/// What an experiment varies from one result of a query to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// The uncertainty radius \[m\].
+    pub radius_m: f64,
+    /// References asked for; there may be fewer within the radius.
+    pub references: usize,
 }
 
 /// Whether a query was localised.
@@ -157,32 +175,12 @@ pub fn evaluate(
     outcome: &Outcome,
     truth: Option<&Pose>,
 ) -> QueryResult {
-    let pose = outcome.pose.as_ref();
     let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth| {
         let estimator = (estimator::entry(method).new)(params);
         estimator.score_at(problem, truth)?.cost
     });
     QueryResult {
-        schema: SCHEMA.to_owned(),
-        scene: scene.to_owned(),
-        query: problem.query.name.clone(),
         references: vec![problem.reference.name.clone()],
-        method: method.name().to_owned(),
-        fusion: None,
-        seed: problem.seed,
-        status: if pose.is_ok() {
-            Status::Ok
-        } else {
-            Status::Failed
-        },
-        reason: pose.err().map(|failure| Reason {
-            code: failure.code().to_owned(),
-            text: failure.to_string(),
-        }),
-        pose: pose.ok().map(PoseReport::from),
-        error: truth
-            .zip(pose.ok())
-            .map(|(truth, pose)| PoseError::between(truth, pose)),
         initial_error: truth
             .map(|truth| PoseError::between(truth, &problem.reference.world_from_camera)),
         counts: outcome.counts,
@@ -190,6 +188,63 @@ pub fn evaluate(
             .cost
             .as_ref()
             .map(|summary| CostReport::new(summary, cost_at_truth)),
-        diagnosis: Vec::new(),
+        ..QueryResult::new(
+            scene,
+            &problem.query.name,
+            method,
+            problem.seed,
+            outcome.pose.as_ref(),
+            truth,
+        )
+    }
+}
+
+impl QueryResult {
+    /// What follows from the pose alone; without references, counts and costs.
+    pub fn new(
+        scene: &str,
+        query: &str,
+        method: Method,
+        seed: u64,
+        pose: Result<&Pose, &Failure>,
+        truth: Option<&Pose>,
+    ) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            scene: scene.to_owned(),
+            query_scene: None,
+            query: query.to_owned(),
+            references: Vec::new(),
+            method: method.name().to_owned(),
+            fusion: None,
+            seed,
+            setting: None,
+            status: if pose.is_ok() {
+                Status::Ok
+            } else {
+                Status::Failed
+            },
+            reason: pose.err().map(|failure| Reason {
+                code: failure.code().to_owned(),
+                text: failure.to_string(),
+            }),
+            pose: pose.ok().map(PoseReport::from),
+            error: truth
+                .zip(pose.ok())
+                .map(|(truth, pose)| PoseError::between(truth, pose)),
+            initial_error: None,
+            counts: None,
+            cost: None,
+            diagnosis: Vec::new(),
+            per_reference: Some(Vec::new()),
+        }
+    }
+
+    /// The same, as it stands in the list of another result.
+    pub fn nested(&self) -> Self {
+        Self {
+            per_reference: None,
+            ..self.clone()
+        }
     }
 }

@@ -7,11 +7,13 @@
 //! killed leaves a readable recording of everything up to the last view or stage.
 
 mod blueprint;
+mod comparison;
 mod direct;
 mod encode;
 pub mod entities;
 mod feature;
 mod file;
+mod fusion;
 mod layout;
 mod place;
 mod recorder;
@@ -22,6 +24,7 @@ mod surface;
 mod targets;
 mod viewer;
 
+pub use comparison::{ComparisonError, record_comparison};
 pub use recorder::Recorder;
 pub use targets::{Identity, RecordError, Targets};
 

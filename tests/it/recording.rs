@@ -6,7 +6,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use posescope::estimator;
-use posescope::evaluate::evaluate;
+use posescope::evaluate::{Watch as _, evaluate};
 use posescope::event::{FeatureState, Kind, KindSet, Method};
 use posescope::geometry::Pose;
 use posescope::params::Params;

@@ -21,6 +21,11 @@ pub struct SmallSequence {
 
 impl SmallSequence {
     pub fn write() -> Self {
+        Self::of(&[4, 5, 7])
+    }
+
+    /// With these frames; each stands 1 m per frame number along the road.
+    pub fn of(frames: &[usize]) -> Self {
         let sequence = Self {
             root: TempDir::new().expect("a temporary folder"),
         };
@@ -30,20 +35,20 @@ impl SmallSequence {
         }
         fs::create_dir_all(sequence.root.path().join("poses")).expect("writable");
         fs::write(folder.join("calib.txt"), CALIBRATION).expect("writable");
-        fs::write(
-            folder.join("times.txt"),
-            "0.0\n0.1\n0.2\n0.3\n0.4\n0.5\n0.6\n0.7\n",
-        )
-        .expect("writable");
-        let poses: String = (0..8)
+        let count = frames.iter().max().map_or(0, |last| last + 1);
+        let times: String = (0..count)
+            .map(|f| format!("{:.1}\n", f as f64 / 10.0))
+            .collect();
+        fs::write(folder.join("times.txt"), times).expect("writable");
+        let poses: String = (0..count)
             .map(|frame| format!("1 0 0 0 0 1 0 0 0 0 1 {frame}\n"))
             .collect();
         fs::write(sequence.poses(), poses).expect("writable");
-        for name in ["000004", "000005", "000007"] {
+        for name in frames.iter().map(|frame| format!("{frame:06}")) {
             wall(WIDTH, HEIGHT)
-                .save(sequence.image(name))
+                .save(sequence.image(&name))
                 .expect("writable");
-            fs::write(sequence.scan(name), scan_of_the_wall()).expect("writable");
+            fs::write(sequence.scan(&name), scan_of_the_wall()).expect("writable");
         }
         sequence
     }

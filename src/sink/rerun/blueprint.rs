@@ -12,8 +12,8 @@ use crate::palette;
 use crate::problem::Problem;
 
 /// Sends the layout for a run with these methods. The eyes stand where the first reference does.
-pub(super) fn send(stream: &mut Stream, methods: &[Method], first: &Problem) {
-    let root = root(methods, &Eyes(first));
+pub(super) fn send(stream: &mut Stream, methods: &[Method], first: &Problem, references: usize) {
+    let root = root(methods, &Eyes(first), references);
     stream.send_layout(|id, recording| layout::send(&root, id, recording));
 }
 
@@ -44,13 +44,16 @@ fn shows(methods: &[Method], method: Method) -> bool {
 }
 
 /// The world and the words on the left, a row per method on the right.
-fn root(methods: &[Method], eyes: &Eyes<'_>) -> Node {
-    let words = Node::Tabs(vec![
+fn root(methods: &[Method], eyes: &Eyes<'_>, references: usize) -> Node {
+    let mut words: Vec<Node> = vec![
         View::new("TextDocument", "Report", entities::REPORT).into(),
         View::new("TextLog", "Log", entities::LOG).into(),
         View::new("StateTimeline", "Stages", "stage").into(),
-    ]);
-    let left = Node::Column(vec![(3.0, overview(eyes).into()), (2.0, words)]);
+    ];
+    if references > 1 {
+        words.push(View::new("TextDocument", "Fusion", entities::FUSION_TABLE).into());
+    }
+    let left = Node::Column(vec![(3.0, overview(eyes).into()), (2.0, Node::Tabs(words))]);
     let mut rows = Vec::new();
     if shows(methods, Method::Feature) {
         rows.push((1.0, feature_row()));

@@ -15,7 +15,7 @@ pub const EVAL_TIMELINE: &str = "eval";
 /// Everything that has a place in the world.
 pub const WORLD: &str = "world";
 /// The roots of all that belongs to one query.
-pub const OF_A_QUERY: [&str; 6] = [WORLD, "query", "fb", "pm", "mi", "search"];
+pub const OF_A_QUERY: [&str; 7] = [WORLD, "query", "fb", "pm", "mi", "search", "fusion"];
 /// Inliers of the best trial so far, one row per improvement.
 pub const RANSAC_BEST: &str = "fb/ransac/best";
 /// Number of inliers of each trial.
@@ -30,6 +30,8 @@ pub const FUNNEL_TABLE: &str = "fb/funnel/table";
 pub const QUERY_IMAGE: &str = "query/image";
 /// Keypoints of the query before their states are known.
 pub const QUERY_DETECTED: &str = "query/keypoints/detected";
+/// What each reference had to say in the fused poses, as Markdown.
+pub const FUSION_TABLE: &str = "fusion/table";
 /// The results of the query, as Markdown.
 pub const REPORT: &str = "report";
 /// The decisions, in words.
@@ -119,4 +121,14 @@ pub fn direct(method: Method, part: &str) -> String {
 /// The stage that a method is in.
 pub fn stage(method: Method) -> String {
     format!("stage/{}", method.name())
+}
+
+/// The references' weights in a method's fused pose, in the order of the references.
+pub fn fusion_weights(method: Method) -> String {
+    format!("fusion/{}/weights", method.name())
+}
+
+/// Where each reference alone puts the query.
+pub fn fusion_candidates(method: Method) -> String {
+    format!("{WORLD}/fusion/{}", method.name())
 }

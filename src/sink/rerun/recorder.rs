@@ -7,12 +7,13 @@ use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
 use super::direct::DirectStory;
 use super::feature::FeatureStory;
+use super::fusion::FusionStory;
 use super::place::Place;
 use super::scene::{self, Camera, Origin};
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report};
-use crate::evaluate::{PoseReport, QueryResult, Status};
-use crate::event::{Event, Kind, KindSet, Method, Stage};
+use crate::evaluate::{PoseReport, QueryResult, Status, Watch};
+use crate::event::{Event, Kind, KindSet, Method, ReferencesFused, Stage};
 use crate::geometry::Pose;
 use crate::narration;
 use crate::palette;
@@ -49,6 +50,7 @@ struct Query {
     clouds: BTreeSet<usize>,
     stages: Vec<Stage>,
     tellers: Vec<Teller>,
+    fusion: FusionStory,
 }
 
 /// An estimator that is telling.
@@ -85,61 +87,6 @@ impl Recorder {
         })
     }
 
-    /// A query begins. `problems` holds one problem per reference.
-    pub fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        self.query = Query {
-            problems: problems.to_vec(),
-            ..Query::default()
-        };
-        let Some(first) = problems.first() else {
-            return;
-        };
-        self.stream.set_query(query_index);
-        self.stream.advance();
-        let origin = match self.origin {
-            Some(origin) => {
-                self.wipe();
-                origin
-            }
-            None => self.set_up(first),
-        };
-        let stream = &mut self.stream;
-        scene::log_query(stream, &first.query);
-        for (index, problem) in problems.iter().enumerate() {
-            scene::log_reference(stream, index, &problem.reference, origin);
-        }
-        if let Some(truth) = truth {
-            let camera = Camera {
-                owner: &entities::truth(),
-                world_from_camera: truth,
-                intrinsics: &first.query.intrinsics,
-                color: palette::TRUTH,
-                label: "truth".to_owned(),
-            };
-            camera.log(stream, origin);
-        }
-        self.report();
-        self.stream.flush();
-    }
-
-    /// A method begins on one of the query's problems; what it tells comes through [`Sink::accept`].
-    pub fn begin_method(&mut self, reference_index: usize, method: Method) {
-        self.query.reference = reference_index;
-        self.query.method = Some(method);
-        self.query.stages.clear();
-        self.query.tellers.clear();
-    }
-
-    /// The method's result.
-    pub fn end_method(&mut self, result: &QueryResult) {
-        self.stream.advance();
-        self.result_in_words(result);
-        self.estimate(result);
-        self.query.results.push(result.clone());
-        self.report();
-        self.stream.settle();
-    }
-
     /// Completes the recording. With [`Targets::serve`] it goes on serving and does not return.
     ///
     /// # Errors
@@ -149,13 +96,13 @@ impl Recorder {
     }
 
     /// What holds for the whole recording follows from its first problem.
-    fn set_up(&mut self, first: &Problem) -> Origin {
+    fn set_up(&mut self, first: &Problem, references: usize) -> Origin {
         let reference = &first.reference.world_from_camera;
         let origin = Origin(reference.translation.vector);
         self.origin = Some(origin);
         self.stream
             .log_static(entities::WORLD, &ViewCoordinates::RDF());
-        blueprint::send(&mut self.stream, &self.methods, first);
+        blueprint::send(&mut self.stream, &self.methods, first, references);
         blueprint::log_styles(&mut self.stream, &self.methods);
         origin
     }
@@ -281,6 +228,17 @@ impl Recorder {
         color_cloud(&tuple.cloud, &photo.gray, intrinsics, &self.render)
     }
 
+    fn fused(&mut self, event: &ReferencesFused) {
+        let (Some(method), Some(origin)) = (self.query.method, self.origin) else {
+            return;
+        };
+        self.stream.advance();
+        let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
+        self.say(&format!("{}: {words}", method.name()), TextLogLevel::INFO);
+        let story = &mut self.query.fusion;
+        story.tell(event, method, origin, &mut self.stream);
+    }
+
     fn tell(&mut self, event: &Event) {
         let Some(teller) = self.query.tellers.last_mut() else {
             return;
@@ -343,6 +301,68 @@ impl Query {
     }
 }
 
+impl Watch for Recorder {
+    fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
+        self.query = Query {
+            problems: problems.to_vec(),
+            ..Query::default()
+        };
+        let Some(first) = problems.first() else {
+            return;
+        };
+        self.stream.set_query(query_index);
+        self.stream.advance();
+        let origin = match self.origin {
+            Some(origin) => {
+                self.wipe();
+                origin
+            }
+            None => self.set_up(first, problems.len()),
+        };
+        let stream = &mut self.stream;
+        scene::log_query(stream, &first.query);
+        for (index, problem) in problems.iter().enumerate() {
+            scene::log_reference(stream, index, &problem.reference, origin);
+        }
+        if let Some(truth) = truth {
+            let camera = Camera {
+                owner: &entities::truth(),
+                world_from_camera: truth,
+                intrinsics: &first.query.intrinsics,
+                color: palette::TRUTH,
+                label: "truth".to_owned(),
+            };
+            camera.log(stream, origin);
+        }
+        self.report();
+        self.stream.flush();
+    }
+
+    fn begin_method(&mut self, reference_index: usize, method: Method) {
+        self.query.reference = reference_index;
+        self.query.method = Some(method);
+        self.query.stages.clear();
+        self.query.tellers.clear();
+    }
+
+    fn end_method(&mut self, result: &QueryResult) {
+        self.stream.advance();
+        self.result_in_words(result);
+        self.estimate(result);
+        self.query.results.push(result.clone());
+        self.report();
+        self.stream.settle();
+    }
+
+    fn begin_fusion(&mut self, method: Method) {
+        self.begin_method(0, method);
+    }
+
+    fn end_fusion(&mut self, result: &QueryResult) {
+        self.end_method(result);
+    }
+}
+
 impl Sink for Recorder {
     fn wanted(&self) -> KindSet {
         if self.stream.is_broken() {
@@ -361,6 +381,7 @@ impl Sink for Recorder {
         match &record.event {
             Event::StageStarted(started) => self.stage_started(started.stage),
             Event::StageEnded(ended) => self.stage_ended(ended.stage, ended.succeeded),
+            Event::ReferencesFused(event) => self.fused(event),
             event => self.tell(event),
         }
         Ok(())

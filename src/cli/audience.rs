@@ -1,0 +1,87 @@
+//! Who watches the command line's queries: a progress bar, and perhaps a recording.
+
+use posescope::evaluate::{QueryResult, Watch};
+use posescope::event::{Event, KindSet, Method};
+use posescope::geometry::Pose;
+use posescope::problem::Problem;
+use posescope::sink::Progress;
+use posescope::sink::rerun::Recorder;
+use posescope::trace::{Cancelled, Record, Sink};
+
+/// A bar that moves on with every method that is done, and a recorder.
+pub struct Audience {
+    pub recorder: Option<Recorder>,
+    bar: indicatif::ProgressBar,
+    progress: Option<Progress>,
+    /// Query and reference of each problem.
+    tasks: Vec<String>,
+}
+
+impl Audience {
+    pub fn new(bar: indicatif::ProgressBar, recorder: Option<Recorder>) -> Self {
+        Self {
+            recorder,
+            bar,
+            progress: None,
+            tasks: Vec::new(),
+        }
+    }
+}
+
+impl Sink for Audience {
+    fn wanted(&self) -> KindSet {
+        let recorder = self.recorder.as_ref();
+        recorder.map_or(KindSet::NONE, |recorder| recorder.wanted())
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        let is_stage = matches!(record.event, Event::StageStarted(_) | Event::StageEnded(_));
+        if is_stage && let Some(progress) = &mut self.progress {
+            progress.accept(record)?;
+        }
+        match &mut self.recorder {
+            Some(recorder) if is_stage || recorder.wanted().contains(record.event.kind()) => {
+                recorder.accept(record)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Watch for Audience {
+    fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
+        let name =
+            |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);
+        self.tasks = problems.iter().map(name).collect();
+        if let Some(recorder) = &mut self.recorder {
+            recorder.begin_query(index, problems, truth);
+        }
+    }
+
+    fn begin_method(&mut self, problem: usize, method: Method) {
+        let task = self.tasks.get(problem).cloned().unwrap_or_default();
+        self.progress = Some(Progress::new(self.bar.clone(), task));
+        if let Some(recorder) = &mut self.recorder {
+            recorder.begin_method(problem, method);
+        }
+    }
+
+    fn end_method(&mut self, result: &QueryResult) {
+        self.bar.inc(1);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.end_method(result);
+        }
+    }
+
+    fn begin_fusion(&mut self, method: Method) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.begin_fusion(method);
+        }
+    }
+
+    fn end_fusion(&mut self, result: &QueryResult) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.end_fusion(result);
+        }
+    }
+}

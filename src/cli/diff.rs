@@ -1,0 +1,96 @@
+//! `posescope diff`: what changed from one run to another.
+
+use std::fmt::Write as _;
+
+use posescope::evaluate::{Change, Comparison, Row, Tolerance, read_rows, read_run};
+use posescope::sink::rerun::{Targets, record_comparison};
+
+use super::args::DiffArgs;
+use super::failure::CliError;
+use super::output;
+use super::terminal::Terminal;
+
+/// Runs the command.
+pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
+    let tolerance = Tolerance {
+        metres: args.tolerance_m,
+        degrees: args.tolerance_deg,
+    };
+    let (before, after) = (read_run(&args.before)?, read_run(&args.after)?);
+    let comparison = Comparison::of(
+        (&read_rows(&args.before)?, before.failure_radius_m),
+        (&read_rows(&args.after)?, after.failure_radius_m),
+        &tolerance,
+    );
+    if comparison.common == 0 {
+        return Err(CliError::Usage(format!(
+            "{} and {} have no result in common: scenes, queries, methods and settings differ",
+            args.before.display(),
+            args.after.display()
+        )));
+    }
+    output::print(&text(&comparison))?;
+    if let Some(save) = &args.save {
+        let targets = Targets {
+            save: Some(save.clone()),
+            ..Targets::default()
+        };
+        record_comparison(&targets, &args.before, &args.after, &text(&comparison))?;
+        if !terminal.is_quiet() {
+            eprintln!("Recording: {0} (open it with `rerun {0}`)", save.display());
+        }
+    }
+    if comparison.is_regression() {
+        let broken = comparison.count(Change::Broken);
+        return Err(CliError::NotGoodEnough(format!(
+            "{broken} queries are broken"
+        )));
+    }
+    Ok(())
+}
+
+/// The comparison in words, as Markdown.
+pub fn text(comparison: &Comparison) -> String {
+    let mut text = format!(
+        "{} broken, {} fixed, {} worse, {} better, of {} results in both runs",
+        comparison.count(Change::Broken),
+        comparison.count(Change::Fixed),
+        comparison.count(Change::Worse),
+        comparison.count(Change::Better),
+        comparison.common
+    );
+    if comparison.only_before + comparison.only_after > 0 {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            " ({} only in the first, {} only in the second)",
+            comparison.only_before, comparison.only_after
+        );
+    }
+    text += "\n";
+    if !comparison.differences.is_empty() {
+        text +=
+            "\n| change | query | method | before | after | where |\n|:--|:--|:--|--:|--:|:--|\n";
+    }
+    for one in &comparison.differences {
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} |",
+            one.change.name(),
+            one.before.query,
+            one.before.method,
+            error(&one.before),
+            error(&one.after),
+            one.before.group()
+        );
+    }
+    text
+}
+
+fn error(row: &Row) -> String {
+    match (&row.error, row.status) {
+        (Some(error), _) => format!("{:.2} m {:.2}°", error.translation_m, error.rotation_deg),
+        (None, posescope::evaluate::Status::Ok) => "a pose".to_owned(),
+        (None, posescope::evaluate::Status::Failed) => "no pose".to_owned(),
+    }
+}

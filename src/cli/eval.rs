@@ -1,0 +1,225 @@
+//! `posescope eval`: an experiment over many queries, into a run folder.
+
+use std::path::{Path, PathBuf};
+
+use posescope::evaluate::{
+    Change, ChoiceError, Comparison, Draw, Execution, Experiment, Gate, Pair, RUN_SCHEMA, Ranking,
+    Report, RunFile, RunFolder, Scenes, Selection, Tolerance, default_failure_radius_m,
+    default_prior_m, defaults, merge, read_rows, read_run, write_report,
+};
+use posescope::event::Method;
+use posescope::params::Params;
+use posescope::scene::{self, Scene};
+
+use super::args::EvalArgs;
+use super::failure::CliError;
+use super::failures::FailureRecordings;
+use super::output;
+use super::run::use_threads;
+use super::terminal::Terminal;
+use super::{diff, params};
+
+/// Runs the command.
+pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
+    use_threads(args.threads)?;
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
+    let run = if args.merge.is_empty() {
+        execute(args, &folder, terminal)?
+    } else {
+        let run = merge(&args.merge, &folder)?;
+        FailureRecordings::merge(&args.merge, &folder, args, &run)?;
+        run
+    };
+    finish(args, &folder, &run, terminal)
+}
+
+/// Beside each other below `runs`, named after what is asked.
+fn default_folder(args: &EvalArgs) -> PathBuf {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+    let mut name: String = args.scenes.join("-").chars().map(plain).collect();
+    if let Some(experiment) = args.experiment {
+        name = format!("{name}-{experiment:?}").to_lowercase();
+    }
+    if let Some(shard) = args.shard {
+        name = format!("{name}-{}-of-{}", shard.number, shard.of);
+    }
+    Path::new("runs").join(name.trim_matches('-'))
+}
+
+fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFile, CliError> {
+    let params = params::resolve(&args.config)?;
+    let scenes = Scenes {
+        references: open_all(&args.scenes, args)?,
+        queries: open_all(&args.queries, args)?,
+    };
+    let run = describe(args, &scenes, &params)?;
+    let indices = indices(&run)?;
+    let mut folder = if args.resume {
+        RunFolder::resume(folder, &run)?
+    } else {
+        RunFolder::create(folder, &run)?
+    };
+    let bar = terminal.bar(run.items().count() as u64);
+    bar.set_position(folder.done() as u64);
+    let mut companion = FailureRecordings::new(args, &folder, &run, &params, bar.clone())?;
+    let execution = Execution {
+        run: &run,
+        scenes: &scenes,
+        params: &params,
+        indices: &indices,
+    };
+    let outcome = execution.go_on(&mut folder, &mut companion);
+    bar.finish_and_clear();
+    companion.close();
+    outcome?;
+    Ok(run)
+}
+
+fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>, CliError> {
+    let format = args.format.as_deref();
+    let scenes = arguments.iter().map(|scene| scene::open(scene, format));
+    Ok(scenes.collect::<Result<_, _>>()?)
+}
+
+/// Ranked references need an index of each scene.
+fn indices(run: &RunFile) -> Result<Vec<Box<dyn Ranking>>, CliError> {
+    match run.selection() {
+        Selection::Retrieved(_) => Err(ChoiceError::NoIndex.into()),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// What is asked, with everything that was left open filled in.
+fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile, CliError> {
+    let defaults = defaults(args.experiment);
+    let references = args.references.unwrap_or(defaults.references);
+    let first = scenes.references.first();
+    let scene_name = first.map(|scene| scene.name()).unwrap_or_default();
+    let methods = match args.method.as_slice() {
+        [] => defaults.methods.to_vec(),
+        wanted => wanted.to_vec(),
+    };
+    let methods = Method::ALL.into_iter().filter(|m| methods.contains(m));
+    let fusions = match args.fusion.as_slice() {
+        [] if references.count() == 1 && args.experiment != Some(Experiment::Multi) => Vec::new(),
+        [] => defaults.fusions,
+        wanted => wanted.to_vec(),
+    };
+    let radii_m = match args.radius.as_slice() {
+        [] => defaults.radii_m.to_vec(),
+        wanted => wanted.to_vec(),
+    };
+    let is_large = args.experiment == Some(Experiment::Large);
+    let prior_m = match args.prior {
+        None if is_large => Some(default_prior_m(scene_name)),
+        prior => prior,
+    };
+    let share = args.queries_share.unwrap_or(defaults.share);
+    let draw = Draw {
+        share,
+        limit: args.limit.map(|limit| limit as usize),
+        only: &args.only,
+        seed: args.seed,
+    };
+    let table = params.to_toml().parse();
+    Ok(RunFile {
+        schema: RUN_SCHEMA.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        scenes: args.scenes.clone(),
+        queries: args.queries.clone(),
+        format: args.format.clone(),
+        experiment: args.experiment,
+        methods: methods.map(|method| method.name().to_owned()).collect(),
+        references: references.to_string(),
+        fusions: fusions
+            .iter()
+            .map(|fusion| fusion.name.to_owned())
+            .collect(),
+        radii_m,
+        prior_m,
+        share,
+        limit: args.limit.map(|limit| limit as usize),
+        failure_radius_m: args
+            .failure_radius
+            .unwrap_or_else(|| default_failure_radius_m(scene_name)),
+        seed: args.seed,
+        shard: args.shard,
+        pairs: pairs(&draw, scenes)?,
+        params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),
+    })
+}
+
+/// Every scene with itself, or every scene of references with every one of queries.
+fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<Pair>, CliError> {
+    let mut pairs = Vec::new();
+    for (index, references) in scenes.references.iter().enumerate() {
+        let references = references.as_ref();
+        if scenes.queries.is_empty() {
+            pairs.push(draw.pair(index, references, references)?);
+        }
+        for queries in &scenes.queries {
+            pairs.push(draw.pair(index, references, queries.as_ref())?);
+        }
+    }
+    Ok(pairs)
+}
+
+/// Writes what follows from the results, shows it, and says whether it is good enough.
+fn finish(
+    args: &EvalArgs,
+    folder: &Path,
+    run: &RunFile,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    let gates: Vec<Gate> = args.gate.clone();
+    let report = write_report(folder, run, &gates)?;
+    if !terminal.is_quiet() {
+        show(&report, run)?;
+        eprintln!("Run: {}", folder.display());
+    }
+    let mut failures: Vec<String> = report
+        .passages
+        .iter()
+        .filter(|passage| !passage.passed)
+        .map(|passage| format!("gate `{}` failed: {}", passage.gate, passage.found))
+        .collect();
+    if let Some(baseline) = &args.baseline {
+        let comparison = against(baseline, folder, run)?;
+        if !terminal.is_quiet() {
+            output::print(&diff::text(&comparison))?;
+        }
+        if comparison.is_regression() {
+            let broken = comparison.count(Change::Broken);
+            failures.push(format!(
+                "{broken} queries broken since {}",
+                baseline.display()
+            ));
+        }
+    }
+    if failures.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::NotGoodEnough(failures.join("; ")))
+}
+
+fn show(report: &Report, run: &RunFile) -> Result<(), CliError> {
+    // The overview of an experiment has a line for every combination.
+    let skipped = usize::from(run.experiment.is_some());
+    for table in report.tables.iter().skip(skipped) {
+        output::print(&table.markdown())?;
+    }
+    for passage in &report.passages {
+        let verdict = if passage.passed { "passed" } else { "FAILED" };
+        output::print(&format!("{verdict}: {}: {}", passage.gate, passage.found))?;
+    }
+    Ok(())
+}
+
+fn against(baseline: &Path, folder: &Path, run: &RunFile) -> Result<Comparison, CliError> {
+    let before = read_run(baseline)?;
+    Ok(Comparison::of(
+        (&read_rows(baseline)?, before.failure_radius_m),
+        (&read_rows(folder)?, run.failure_radius_m),
+        &Tolerance::default(),
+    ))
+}

@@ -1,0 +1,121 @@
+//! The figures that the paper reports, to stand beside ours.
+//!
+//! Fu, Pertuz, Matas, Kämäräinen, *Performance Analysis and Robustification of Single-query 6-DoF
+//! Camera Pose Estimation*, CVIU 2019, tables 1 to 4. In table 4 the rows are taken as references and
+//! the columns as queries.
+
+use std::sync::LazyLock;
+
+/// `table,scene,query_scene,method,radius_m,references,fusion,measure,value`.
+const FIGURES: &str = include_str!("paper.csv");
+
+struct Figure {
+    key: String,
+    value: f64,
+}
+
+static ALL: LazyLock<Vec<Figure>> = LazyLock::new(|| {
+    let lines = FIGURES.lines().skip(1);
+    lines
+        .filter_map(|line| {
+            let (key, value) = line.rsplit_once(',')?;
+            Some(Figure {
+                key: key.to_owned(),
+                value: value.parse().ok()?,
+            })
+        })
+        .collect()
+});
+
+/// Which figure of the paper is wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct Sought<'a> {
+    /// The table's number.
+    pub table: u8,
+    /// The references' scene.
+    pub scene: &'a str,
+    /// The queries' scene, where it is another one.
+    pub query_scene: Option<&'a str>,
+    /// The method; empty for figures about all of them.
+    pub method: &'a str,
+    /// The uncertainty radius \[m\], where the table says it.
+    pub radius_m: Option<f64>,
+    /// Number of references.
+    pub references: usize,
+    /// The fusion.
+    pub fusion: Option<&'a str>,
+    /// `median_m`, `median_deg`, `rmse_m`, `rmse_deg`, `success_percent`, `common`, `common_percent`.
+    pub measure: &'a str,
+}
+
+/// The figure, if the paper has it for this scene.
+pub fn figure(sought: &Sought<'_>) -> Option<f64> {
+    let radius = sought.radius_m.map(|radius| radius.to_string());
+    let key = format!(
+        "{},{},{},{},{},{},{},{}",
+        sought.table,
+        sought.scene,
+        sought.query_scene.unwrap_or_default(),
+        sought.method,
+        radius.unwrap_or_default(),
+        sought.references,
+        sought.fusion.unwrap_or_default(),
+        sought.measure
+    );
+    ALL.iter()
+        .find(|figure| figure.key == key)
+        .map(|figure| figure.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_found_where_the_paper_has_them_and_nowhere_else() {
+        let single = Sought {
+            table: 1,
+            scene: "kitti/00",
+            query_scene: None,
+            method: "pm",
+            radius_m: Some(25.0),
+            references: 1,
+            fusion: None,
+            measure: "median_m",
+        };
+        assert_eq!(figure(&single), Some(14.85));
+        let multi = Sought {
+            table: 2,
+            method: "fb",
+            radius_m: Some(10.0),
+            references: 5,
+            fusion: Some("r-wavg"),
+            measure: "rmse_m",
+            ..single
+        };
+        assert_eq!(figure(&multi), Some(0.045));
+        let large = Sought {
+            table: 4,
+            scene: "robotcar/night",
+            query_scene: Some("robotcar/rain"),
+            method: "hy",
+            radius_m: None,
+            measure: "success_percent",
+            ..multi
+        };
+        assert_eq!(figure(&large), Some(37.6));
+        assert_eq!(
+            figure(&Sought {
+                scene: "street",
+                ..single
+            }),
+            None
+        );
+    }
+
+    #[test]
+    fn every_figure_of_the_file_is_a_number() {
+        assert_eq!(ALL.len(), FIGURES.lines().count() - 1);
+        assert_eq!(ALL.len(), 616);
+    }
+}

@@ -1,0 +1,94 @@
+//! What a fusion tells: weights, who was left out, what each reference alone gave.
+
+use rerun::{BarChart, Points3D, TextDocument};
+
+use crate::palette;
+use super::entities;
+use super::scene::Origin;
+use super::stream::Stream;
+use crate::event::{Method, ReferencesFused};
+use crate::fusion::{Fate, Share};
+
+/// The fusions of one query so far, as a table each.
+#[derive(Default)]
+pub(super) struct FusionStory {
+    tables: String,
+}
+
+impl FusionStory {
+    /// Records one fusion of a method's poses.
+    pub(super) fn tell(
+        &mut self,
+        event: &ReferencesFused,
+        method: Method,
+        origin: Origin,
+        stream: &mut Stream,
+    ) {
+        let weights = event.shares.iter().map(|share| share.weight);
+        let chart = BarChart::new(weights.collect::<Vec<f64>>());
+        stream.log(&entities::fusion_weights(method), &chart);
+        self.tables += &table(event, method);
+        let document = TextDocument::from_markdown(self.tables.as_str());
+        stream.log(entities::FUSION_TABLE, &document);
+        stream.log(
+            &entities::fusion_candidates(method),
+            &candidates(event, origin),
+        );
+    }
+}
+
+/// Where each reference alone puts the query.
+fn candidates(event: &ReferencesFused, origin: Origin) -> Points3D {
+    let placed = || {
+        event
+            .shares
+            .iter()
+            .filter_map(|share| Some((share, share.pose?)))
+    };
+    Points3D::new(placed().map(|(_, pose)| origin.place(&pose.translation.vector)))
+        .with_colors(placed().map(|(share, _)| {
+            super::color(match share.fate {
+                Fate::Kept => palette::ESTIMATE,
+                Fate::Dropped | Fate::Failed => palette::UNDECIDED,
+            })
+        }))
+        .with_radii([rerun::Radius::new_ui_points(4.0)])
+        .with_labels(placed().map(|(share, _)| format!("{} {}", share.reference, say(share))))
+        .with_show_labels(false)
+}
+
+fn table(event: &ReferencesFused, method: Method) -> String {
+    let mut text = format!(
+        "## {} by {}\n\n| reference | matches | weight | alone |\n|:--|--:|--:|:--|\n",
+        method.name().to_uppercase(),
+        event.fusion
+    );
+    for share in event.shares.iter() {
+        let alone = match (&share.pose, &event.pose) {
+            (None, _) => "no pose".to_owned(),
+            (Some(_), None) => "a pose".to_owned(),
+            (Some(alone), Some(fused)) => {
+                let offset = alone.translation.vector - fused.translation.vector;
+                format!("{:.2} m from the fused pose", offset.norm())
+            }
+        };
+        text += &format!(
+            "| {} | {} | {} | {alone} |\n",
+            share.reference,
+            share.matches,
+            say(share)
+        );
+    }
+    if event.pose.is_none() {
+        text += "\nEvery reference with a weight failed.\n";
+    }
+    text + "\n"
+}
+
+fn say(share: &Share) -> String {
+    match share.fate {
+        Fate::Kept => format!("{:.3}", share.weight),
+        Fate::Dropped => "dropped".to_owned(),
+        Fate::Failed => "failed".to_owned(),
+    }
+}

@@ -1,0 +1,532 @@
+//! `posescope eval` and what follows it: run folders, shards, resumed runs, gates, diff, export.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Stdio};
+
+use assert_cmd::Command;
+use posescope::camera::Intrinsics;
+use posescope::cloud::Cloud;
+use posescope::evaluate::{
+    Companion, Draw, Execution, QueryResult, RUN_SCHEMA, RunFile, RunFolder, Scenes, Unwatched,
+    Watch, read_results,
+};
+use posescope::geometry::Pose;
+use posescope::image::Photo;
+use posescope::params::Params;
+use posescope::scene::{self, Scene, SceneError};
+
+use crate::binary::{CACHE, posescope};
+use crate::small_sequence::SmallSequence;
+
+const FRAMES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
+/// Two methods over all frames of the sequence, with two fused references each.
+const ASKED: [&str; 8] = [
+    "--method",
+    "fb,mi",
+    "--references",
+    "random:2",
+    "--radius",
+    "3",
+    "--seed",
+    "1",
+];
+
+fn eval(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> Command {
+    let mut command = posescope();
+    command.arg("eval").arg(sequence.folder()).args(ASKED);
+    command.arg("--out").arg(out).args(extra);
+    command
+}
+
+fn run(sequence: &SmallSequence, out: &Path, extra: &[&str]) {
+    eval(sequence, out, extra).assert().code(0);
+}
+
+/// Every file of a run that holds no time and is no recording.
+fn timeless(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_none_or(|extension| extension != "rrd") {
+                let name = path.strip_prefix(folder).expect("below").to_owned();
+                files.insert(name, fs::read(&path).expect("readable"));
+            }
+        }
+    }
+    files.remove(Path::new("timings.jsonl"));
+    files
+}
+
+fn assert_same(left: &Path, right: &Path) {
+    let (left, right) = (timeless(left), timeless(right));
+    let names = |files: &BTreeMap<PathBuf, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&left), names(&right));
+    for (name, bytes) in &left {
+        assert!(right[name] == *bytes, "{} differs", name.display());
+    }
+}
+
+#[test]
+fn a_run_folder_holds_what_is_promised() {
+    let sequence = SmallSequence::of(&FRAMES);
+    let out = sequence.path().join("run");
+    // No pose is within a micrometre, so that every query fails and is recorded, but for the limit.
+    let extra = ["--failure-radius", "0.000001", "--max-recordings", "3"];
+    let output = eval(&sequence, &out, &extra)
+        .output()
+        .expect("the binary starts");
+    assert_eq!(output.status.code(), Some(0));
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("success (%)"), "{table}");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        said.contains("21 failed queries have no recording"),
+        "{said}"
+    );
+    for file in [
+        "run.toml",
+        "results.jsonl",
+        "timings.jsonl",
+        "summary.md",
+        "summary.json",
+        "junit.xml",
+        "tables/overview.md",
+        "tables/overview.csv",
+        "tables/overview.tex",
+        "plots/recall-kitti-42.svg",
+        "failures/000000-fb.rrd",
+        "failures/000000-mi.rrd",
+        "failures/000001-fb.rrd",
+        "failures/dropped.txt",
+    ] {
+        let size = fs::metadata(out.join(file)).map(|file| file.len());
+        assert!(size.is_ok_and(|size| size > 0), "{file}");
+    }
+    assert_eq!(
+        fs::read_dir(out.join("failures"))
+            .expect("a folder")
+            .count(),
+        4
+    );
+    let results: Vec<QueryResult> = read_results(&out)
+        .expect("results")
+        .collect::<Result<_, _>>()
+        .expect("one per line");
+    assert_eq!(results.len(), 24);
+    let order = |at: usize| (results[at].query.as_str(), results[at].method.as_str());
+    let expected = [("000000", "fb"), ("000000", "mi"), ("000001", "fb")];
+    assert_eq!([order(0), order(1), order(2)], expected);
+    for result in &results {
+        assert_eq!(result.fusion.as_deref(), Some("r-wavg"));
+        let alone = result.per_reference.as_ref().expect("several were fused");
+        assert_eq!(alone.len(), 2);
+        assert!(alone.iter().all(|one| one.per_reference.is_none()));
+    }
+    let junit = fs::read_to_string(out.join("junit.xml")).expect("text");
+    assert_eq!(junit.matches("<testcase ").count(), 24);
+    assert_eq!(junit.matches("<failure ").count(), 24);
+}
+
+#[test]
+fn threads_and_shards_make_no_difference() {
+    let sequence = SmallSequence::of(&FRAMES);
+    let folder = |name: &str| sequence.path().join(name);
+    let whole = folder("whole");
+    run(&sequence, &whole, &["--threads", "1"]);
+    for threads in ["2", "8"] {
+        let other = folder(&format!("threads-{threads}"));
+        run(&sequence, &other, &["--threads", threads]);
+        assert_same(&whole, &other);
+    }
+    for parts in [1, 3, 7] {
+        let names: Vec<PathBuf> = (1..=parts)
+            .map(|part| folder(&format!("part-{part}-of-{parts}")))
+            .collect();
+        // All parts at once, each a process of its own.
+        let children: Vec<_> = (1..=parts)
+            .zip(&names)
+            .map(|(part, out)| background(&sequence, out, &["--shard", &format!("{part}/{parts}")]))
+            .collect();
+        for mut child in children {
+            assert!(child.wait().expect("it ends").success());
+        }
+        let merged = folder(&format!("merged-{parts}"));
+        posescope()
+            .args(["eval", "--out"])
+            .arg(&merged)
+            .arg("--merge")
+            .args(&names)
+            .assert()
+            .code(0);
+        assert_same(&whole, &merged);
+    }
+}
+
+fn background(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> std::process::Child {
+    Process::new(assert_cmd::cargo::cargo_bin!("posescope"))
+        .env("POSESCOPE_CACHE", CACHE)
+        .arg("eval")
+        .arg(sequence.folder())
+        .args(ASKED)
+        .arg("--out")
+        .arg(out)
+        .args(extra)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary starts")
+}
+
+#[test]
+fn a_killed_run_goes_on_to_the_same_bytes() {
+    let sequence = SmallSequence::of(&FRAMES);
+    let (whole, killed) = (
+        sequence.path().join("whole"),
+        sequence.path().join("killed"),
+    );
+    let started = std::time::Instant::now();
+    run(&sequence, &whole, &["--failure-radius", "0.5"]);
+    let duration = started.elapsed();
+    for part in [1, 3, 4, 6] {
+        let mut child = background(&sequence, &killed, &["--failure-radius", "0.5", "--resume"]);
+        std::thread::sleep(duration * part / 10);
+        child.kill().expect("it may be killed");
+        child.wait().expect("it ends");
+    }
+    run(&sequence, &killed, &["--failure-radius", "0.5", "--resume"]);
+    assert_same(&whole, &killed);
+}
+
+#[test]
+fn a_torn_line_is_cut_off() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let (whole, torn) = (sequence.path().join("whole"), sequence.path().join("torn"));
+    run(&sequence, &whole, &[]);
+    run(&sequence, &torn, &[]);
+    let results = torn.join("results.jsonl");
+    let bytes = fs::read(&results).expect("readable");
+    for length in [0, 1, bytes.len() / 3, bytes.len() - 1] {
+        fs::write(&results, &bytes[..length]).expect("writable");
+        run(&sequence, &torn, &["--resume"]);
+        assert_same(&whole, &torn);
+    }
+}
+
+/// Runs and expects an exit code and one line with all of these words.
+fn expect_line(command: &mut Command, code: i32, words: &[&str]) {
+    let output = command.output().expect("the binary starts");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{message}");
+    let line = message.trim_end().lines().last().unwrap_or_default();
+    for word in words {
+        assert!(line.contains(word), "`{word}` is missing in: {message}");
+    }
+}
+
+#[test]
+fn a_folder_with_something_else_in_it_is_left_alone() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let out = sequence.path().join("run");
+    expect_line(
+        &mut eval(&sequence, &sequence.path().join("sequences"), &[]),
+        2,
+        &["not empty", "--out"],
+    );
+    expect_line(
+        &mut eval(&sequence, &sequence.path().join("sequences"), &["--resume"]),
+        2,
+        &["not empty", "--out"],
+    );
+    run(&sequence, &out, &[]);
+    expect_line(
+        &mut eval(&sequence, &out, &[]),
+        2,
+        &["not empty", "--resume"],
+    );
+    expect_line(
+        &mut eval(&sequence, &out, &["--resume", "--failure-radius", "7"]),
+        2,
+        &["asked for otherwise", "failure_radius_m = 7.0"],
+    );
+}
+
+#[test]
+fn parts_that_do_not_make_a_whole_are_refused() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let part = |name: &str, shard: &str, extra: &[&str]| {
+        let out = sequence.path().join(name);
+        let mut all = vec!["--shard", shard];
+        all.extend(extra);
+        run(&sequence, &out, &all);
+        out
+    };
+    let merge = |parts: &[&PathBuf]| {
+        let mut command = posescope();
+        command
+            .args(["eval", "--out"])
+            .arg(sequence.path().join("merged"));
+        command.arg("--merge").args(parts);
+        command
+    };
+    let (one, two) = (part("one", "1/2", &[]), part("two", "2/2", &[]));
+    expect_line(&mut merge(&[&one]), 3, &["in none of the parts"]);
+    let other = part("other", "2/2", &["--failure-radius", "7"]);
+    expect_line(&mut merge(&[&one, &other]), 2, &["asked for otherwise"]);
+    let results = two.join("results.jsonl");
+    let text = fs::read_to_string(&results).expect("text");
+    let cut = text.lines().next().expect("a line");
+    fs::write(&results, format!("{cut}\n")).expect("writable");
+    expect_line(
+        &mut merge(&[&one, &two]),
+        3,
+        &["0 of 2 queries", "--resume"],
+    );
+}
+
+#[test]
+fn gates_and_regressions_decide_the_exit_code() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let folder = |name: &str| sequence.path().join(name);
+    let (good, bad) = (folder("good"), folder("bad"));
+    run(
+        &sequence,
+        &good,
+        &["--failure-radius", "100", "--gate", "success@mi >= 0.5"],
+    );
+    expect_line(
+        &mut eval(
+            &sequence,
+            &folder("gated"),
+            &["--gate", "recall@0.000001m,5deg@mi > 0.5"],
+        ),
+        1,
+        &["gate", "recall", "failed: 0.0000"],
+    );
+    expect_line(
+        &mut eval(&sequence, &folder("wrong"), &["--gate", "success > 1"]),
+        2,
+        &["--help"],
+    );
+    let baseline = good.to_str().expect("a plain path");
+    let extra = ["--failure-radius", "0.000001", "--baseline", baseline];
+    expect_line(&mut eval(&sequence, &bad, &extra), 1, &["broken since"]);
+    let diff = |a: &Path, b: &Path| {
+        let mut command = posescope();
+        command.arg("diff").arg(a).arg(b);
+        command
+    };
+    diff(&good, &good).assert().code(0);
+    expect_line(&mut diff(&good, &bad), 1, &["broken"]);
+    let recording = folder("diff.rrd");
+    diff(&bad, &good)
+        .arg("--save")
+        .arg(&recording)
+        .assert()
+        .code(0);
+    assert!(fs::metadata(&recording).is_ok_and(|file| file.len() > 1000));
+    expect_line(&mut diff(&good, &folder("nowhere")), 3, &["no run here"]);
+}
+
+#[test]
+fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let out = sequence.path().join("run");
+    run(&sequence, &out, &[]);
+    let export = |format: &str, extra: &[&str]| {
+        let mut command = posescope();
+        command
+            .arg("export")
+            .arg(&out)
+            .args(["--format", format])
+            .args(extra);
+        command
+    };
+    let text = |format: &str| {
+        let output = export(format, &["--method", "mi"])
+            .output()
+            .expect("starts");
+        assert_eq!(output.status.code(), Some(0), "{format}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let results: Vec<QueryResult> = read_results(&out)
+        .expect("results")
+        .collect::<Result<_, _>>()
+        .expect("one per line");
+    let of_mi: Vec<_> = results
+        .iter()
+        .filter(|result| result.method == "mi")
+        .collect();
+    let position = of_mi[1].pose.as_ref().expect("a pose").position_m;
+    let tum = text("tum");
+    let line: Vec<f64> = tum
+        .lines()
+        .nth(2)
+        .expect("a header and two poses")
+        .split(' ')
+        .map(|number| number.parse().expect("a number"))
+        .collect();
+    assert_eq!(line[..4], [0.1, position[0], position[1], position[2]]);
+    let kitti = text("kitti");
+    assert_eq!(kitti.lines().count(), 4);
+    let line: Vec<f64> = kitti
+        .lines()
+        .nth(1)
+        .expect("a line per frame")
+        .split(' ')
+        .map(|number| number.parse().expect("a number"))
+        .collect();
+    assert_eq!([line[3], line[7], line[11]], position);
+    // World to camera: the camera looks along the road, so that its z is minus the position's.
+    let vloc = text("vloc");
+    let line: Vec<&str> = vloc.lines().nth(1).expect("a line").split(' ').collect();
+    assert_eq!(line[0], "000001");
+    assert_eq!(text("csv").lines().count(), 5);
+    expect_line(
+        &mut export("tum", &[]),
+        2,
+        &["several results", "--method (fb, mi)"],
+    );
+    expect_line(
+        &mut export("colmap", &["--method", "mi"]),
+        2,
+        &["cameras.txt", "--out"],
+    );
+    let model = sequence.path().join("model");
+    let arguments = ["--method", "mi", "--out", model.to_str().expect("plain")];
+    export("colmap", &arguments).assert().code(0);
+    let camera = fs::read_to_string(model.join("cameras.txt")).expect("text");
+    assert!(
+        camera.contains("1 PINHOLE 160 64 100 100 80.5 32.5"),
+        "{camera}"
+    );
+
+    let partly = sequence.path().join("partly");
+    run(&sequence, &partly, &["--only", "2", "--only", "3"]);
+    let mut command = posescope();
+    command
+        .arg("export")
+        .arg(&partly)
+        .args(["--format", "kitti", "--method", "mi"]);
+    expect_line(
+        &mut command,
+        2,
+        &["kitti", "frame 0 is none of the queries"],
+    );
+}
+
+/// A scene whose photo of one frame makes the program panic.
+struct Trapped {
+    scene: Box<dyn Scene>,
+    frame: usize,
+}
+
+impl Scene for Trapped {
+    fn name(&self) -> &str {
+        self.scene.name()
+    }
+    fn frames(&self) -> &[String] {
+        self.scene.frames()
+    }
+    fn intrinsics(&self) -> Intrinsics {
+        self.scene.intrinsics()
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.scene.pose(frame)
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.scene.time_s(frame)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.scene.has_cloud(frame) && frame != self.frame
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        assert!(frame != self.frame, "a trap\nfor the photo");
+        self.scene.photo(frame)
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.scene.cloud(frame)
+    }
+}
+
+struct Nobody(Unwatched);
+
+impl Companion for Nobody {
+    fn watch(&mut self) -> &mut dyn Watch {
+        &mut self.0
+    }
+}
+
+#[test]
+fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let folder = sequence.folder();
+    let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
+    let scenes = Scenes {
+        references: vec![Box::new(Trapped { scene, frame: 1 })],
+        queries: Vec::new(),
+    };
+    let draw = Draw {
+        share: 1.0,
+        limit: None,
+        only: &[],
+        seed: 0,
+    };
+    let references = scenes.references[0].as_ref();
+    let run = RunFile {
+        schema: RUN_SCHEMA.to_owned(),
+        version: "0".to_owned(),
+        scenes: vec!["small".to_owned()],
+        queries: Vec::new(),
+        format: None,
+        experiment: None,
+        methods: vec!["fb".to_owned(), "mi".to_owned()],
+        references: "nearest:1".to_owned(),
+        fusions: Vec::new(),
+        radii_m: vec![3.0],
+        prior_m: None,
+        share: 1.0,
+        limit: None,
+        failure_radius_m: 10.0,
+        seed: 0,
+        shard: None,
+        pairs: vec![draw.pair(0, references, references).expect("queries")],
+        params: Params::default().to_toml().parse().expect("a table"),
+    };
+    let out = sequence.path().join("run");
+    let mut folder = RunFolder::create(&out, &run).expect("a new folder");
+    let execution = Execution {
+        run: &run,
+        scenes: &scenes,
+        params: &Params::default(),
+        indices: &[],
+    };
+    execution
+        .go_on(&mut folder, &mut Nobody(Unwatched))
+        .expect("a panic is a result");
+    let results: Vec<QueryResult> = read_results(&out)
+        .expect("results")
+        .collect::<Result<_, _>>()
+        .expect("one per line");
+    assert_eq!(results.len(), 8);
+    for result in &results {
+        let code = result.reason.as_ref().map(|reason| reason.code.as_str());
+        if result.query == "000001" {
+            let reason = result.reason.as_ref().expect("a reason");
+            assert_eq!(reason.code, "X9");
+            assert!(
+                reason.text.contains("a trap for the photo"),
+                "{}",
+                reason.text
+            );
+        } else {
+            assert_ne!(code, Some("X9"), "{result:?}");
+        }
+    }
+}
