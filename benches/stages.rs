@@ -171,7 +171,10 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
     );
     let scorer = Scorer::new(
         &cloud.points,
-        Arc::new(gaussian_smoothed(&query.photo.gray, cost.query_smoothing_px())),
+        Arc::new(gaussian_smoothed(
+            &query.photo.gray,
+            cost.query_smoothing_px(),
+        )),
         &query.intrinsics,
         SPLAT_PX,
         cost.as_ref(),

@@ -15,6 +15,7 @@ mod obey;
 mod prober;
 mod queries;
 mod save;
+mod saved;
 mod scope;
 mod setup;
 mod textures;
@@ -28,7 +29,7 @@ pub use command::{Command, Shortcut, shortcuts};
 pub use desk::{Comparing, Desk, Note};
 pub use scope::{Scope, Shown, ShownAt};
 pub use setup::{ReferencePick, Setup};
-pub use window::{WindowError, open};
+pub use window::{WindowError, has_display, open};
 
 use layout::Layout;
 
@@ -38,6 +39,7 @@ pub struct App {
     layout: Layout,
     commands: command::Queue,
     help: bool,
+    pictures: save::Pictures,
 }
 
 impl App {
@@ -49,6 +51,7 @@ impl App {
             layout: Layout::new(creation.wgpu_render_state.as_ref()),
             commands: command::Queue::default(),
             help: false,
+            pictures: save::Pictures::default(),
         }
     }
 
@@ -67,6 +70,12 @@ impl eframe::App for App {
     /// Runs for a hidden window too, so that a worker is never left unheard.
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.desk.attend();
+        for said in self.pictures.write() {
+            match said {
+                Ok(words) => self.desk.note(words, false),
+                Err(why) => self.desk.note(why, true),
+            }
+        }
         for command in self.commands.take() {
             self.obey(command, ctx);
         }
@@ -79,6 +88,7 @@ impl eframe::App for App {
             layout,
             commands,
             help,
+            ..
         } = self;
         egui::Panel::top("transport").show(ui, |ui| transport::ui(ui, desk, commands));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::ui(ui, desk, commands));

@@ -14,6 +14,8 @@ mod run;
 mod synth;
 mod table;
 mod terminal;
+#[cfg(feature = "app")]
+mod view;
 
 use std::process::ExitCode;
 
@@ -42,6 +44,10 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
     match &arguments.command {
         None => demo::demo(&terminal),
         Some(Command::Run(run)) => run::run(run, &terminal),
+        #[cfg(feature = "app")]
+        Some(Command::View(args)) => {
+            view::view(args, posescope::session::RunMode::Paused, &terminal)
+        }
         Some(Command::Eval(args)) => eval::eval(args, &terminal),
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),

@@ -90,7 +90,25 @@ pub struct Desk {
 
 /// A place in a run that can be found again in another one.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Anchor {
+pub(super) enum Anchor {
+    /// By what it means.
+    Meaning(Meaning),
+    /// By its number.
+    Record(usize),
+}
+
+impl Anchor {
+    fn find(&self, run: &Run) -> Option<usize> {
+        match self {
+            Self::Meaning(meaning) => meaning.find(run),
+            Self::Record(record) => (*record < run.len()).then_some(*record),
+        }
+    }
+}
+
+/// What an estimator was doing at a record.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Meaning {
     method: Method,
     reference: usize,
     /// The stages around it, by name, the outermost first.
@@ -101,7 +119,7 @@ pub(super) struct Anchor {
     is_end: bool,
 }
 
-impl Anchor {
+impl Meaning {
     fn of(run: &Run, cursor: usize) -> Option<Self> {
         let span = run.span_at(cursor)?;
         let stages: Vec<_> = run.stages_at(cursor).collect();
@@ -174,7 +192,7 @@ impl Desk {
             camera_before: None,
             notes: Vec::new(),
             textures: Textures::default(),
-            results: BTreeMap::new(),
+            results: setup.results.clone(),
             setup,
         }
     }
@@ -202,7 +220,7 @@ impl Desk {
     /// The kept run at the place that corresponds to the cursor.
     pub(super) fn kept_scope<'a>(&'a self, commands: &'a command::Queue) -> Option<Scope<'a>> {
         let kept = self.kept.as_ref()?;
-        let same = Anchor::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
+        let same = Meaning::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
         Some(Scope {
             run: &kept.run,
             cursor: same.unwrap_or(kept.cursor),
@@ -311,10 +329,21 @@ impl Desk {
         self.prober.forget();
     }
 
+    /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
+    pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
+        self.results = setup.results.clone();
+        self.setup = setup;
+        self.params = Arc::new(self.setup.params.clone());
+        self.kept = None;
+        self.comparing = Comparing::default();
+        self.begin(RunMode::Running);
+        self.anchor = Some(Anchor::Record(cursor));
+    }
+
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
     pub(super) fn begin_again(&mut self) {
-        let anchor = Anchor::of(self.run(), self.cursor);
+        let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
         let follows = self.follows && self.session.is_alive();
         self.params = Arc::new(self.setup.params.clone());
         self.begin(RunMode::Running);

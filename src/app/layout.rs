@@ -74,6 +74,15 @@ impl Layout {
         self.tree.ui(&mut panes, ui);
     }
 
+    /// Where a view is drawn \[points\], if it is in sight.
+    pub(super) fn place_of(&self, name: &str) -> Option<egui::Rect> {
+        let id = self.tree.tiles.iter().find_map(|(id, tile)| match tile {
+            egui_tiles::Tile::Pane(pane) if pane == name => Some(*id),
+            _ => None,
+        })?;
+        self.tree.tiles.rect(id)
+    }
+
     /// The arrangement, to be saved.
     pub(super) fn to_json(&self) -> serde_json::Result<serde_json::Value> {
         serde_json::to_value(&self.tree)

@@ -1,15 +1,19 @@
 //! Doing what was asked for.
 
+use std::path::Path;
+
 use super::App;
 use super::camera::Place;
 use super::command::Command;
 use super::desk::{Comparing, Desk, Kept};
+use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use crate::evaluate::{QueryResult, Status};
 use crate::event::{Method, PhaseSearched};
 use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::session::{Breakpoint, Breakpoints, RunMode, State};
+use crate::sink::rerun::Targets;
 
 impl App {
     /// Does one thing. What cannot be done is said, not ignored.
@@ -125,14 +129,81 @@ impl App {
                     desk.notes.remove(note);
                 }
             }
-            Command::SaveRecording(_)
-            | Command::StreamRecording
-            | Command::SpawnViewer
-            | Command::SavePicture(_)
-            | Command::SaveSession(_)
-            | Command::RestoreSession(_) => {
-                desk.note("not there yet", true);
+            Command::SaveRecording(path) => {
+                let done = format!("Recording: {}", path.display());
+                let save = Some(path);
+                desk.record_to(
+                    &Targets {
+                        save,
+                        ..Targets::default()
+                    },
+                    done,
+                );
             }
+            Command::StreamRecording => {
+                let connect = Some(String::new());
+                let done = "The run was sent to the Rerun viewer".to_owned();
+                desk.record_to(
+                    &Targets {
+                        connect,
+                        ..Targets::default()
+                    },
+                    done,
+                );
+            }
+            Command::SpawnViewer => {
+                let done = "A Rerun viewer shows the run".to_owned();
+                desk.record_to(
+                    &Targets {
+                        spawn: true,
+                        ..Targets::default()
+                    },
+                    done,
+                );
+            }
+            Command::SavePicture(view) => {
+                let part = view.and_then(|view| self.layout.place_of(view));
+                let name = view.unwrap_or("window");
+                if view.is_some() && part.is_none() {
+                    desk.note(format!("The view {name} is not in sight"), true);
+                    return;
+                }
+                let path = desk.setup.folder.join(format!("{name}.png"));
+                self.pictures.ask(ctx, path, part);
+            }
+            Command::SaveSession(path) => self.save_session(&path),
+            Command::RestoreSession(path) => self.restore_session(&path),
+        }
+    }
+}
+
+impl App {
+    fn save_session(&mut self, path: &Path) {
+        let layout = match self.layout.to_json() {
+            Ok(layout) => layout,
+            Err(error) => return self.desk.note(error.to_string(), true),
+        };
+        let saved = SavedSession::new(&self.desk.setup, self.desk.cursor, layout);
+        match saved.write(path) {
+            Ok(()) => self
+                .desk
+                .note(format!("Session: {}", path.display()), false),
+            Err(why) => self.desk.note(why, true),
+        }
+    }
+
+    fn restore_session(&mut self, path: &Path) {
+        let restored = SavedSession::read(path).and_then(|saved| {
+            let setup = saved.setup(&self.desk.setup)?;
+            let layout = saved.layout.clone();
+            self.layout
+                .restore(layout)
+                .map_err(|error| error.to_string())?;
+            Ok((setup, saved.cursor))
+        });
+        match restored {
+            Ok((setup, cursor)) => self.desk.restore(setup, cursor),
+            Err(why) => self.desk.note(why, true),
         }
     }
 }
@@ -183,15 +254,11 @@ impl Desk {
     }
 
     fn select_query(&mut self, query: usize) {
-        if self.setup.pick != ReferencePick::ByHand {
-            let before = std::mem::replace(&mut self.setup.query, query);
-            match self.setup.choose(query) {
-                Ok(frames) => self.setup.reference_frames = frames,
-                Err(why) => {
-                    self.setup.query = before;
-                    self.note(why, true);
-                    return;
-                }
+        match self.setup.choose(query) {
+            Ok(frames) => self.setup.reference_frames = frames,
+            Err(why) => {
+                self.note(why, true);
+                return;
             }
         }
         self.setup.query = query;

@@ -11,12 +11,9 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 
 use super::setup::Setup;
 use super::textures::color_image;
-use crate::estimator;
-use crate::evaluate::{QueryResult, evaluate};
+use crate::evaluate::{LocalizeError, QueryResult, Request, Unwatched};
 use crate::picture;
-use crate::problem::Problem;
 use crate::scene::Scene;
-use crate::trace::Trace;
 
 /// Width of a thumbnail \[px\].
 const THUMBNAIL_WIDTH: u32 = 124;
@@ -193,40 +190,21 @@ fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
 }
 
 fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
-    let scene = setup.queries.as_ref();
-    let references = match setup.pick {
-        super::ReferencePick::ByHand => setup.reference_frames.clone(),
-        _ => setup.choose(query)?,
+    let request = Request {
+        radius_m: setup.uncertainty_radius_m,
+        references: setup.choose(query)?,
+        fusions: Vec::new(),
+        setting: None,
     };
-    let photo = scene.query(query).map_err(|error| error.to_string())?;
-    let truth = scene.pose(query);
     let mut results = Vec::new();
-    for &method in &setup.methods {
-        let estimator = (estimator::entry(method).new)(&setup.params);
-        for &reference in &references {
-            let problem = Problem {
-                query: Arc::clone(&photo),
-                reference: setup
-                    .references
-                    .reference(reference)
-                    .map_err(|error| error.to_string())?,
-                uncertainty_radius_m: setup.uncertainty_radius_m,
-                seed: setup.seed,
-            };
-            let Ok(outcome) = estimator.estimate(&problem, &mut Trace::off()) else {
-                unreachable!("nobody cancels a run that nobody watches")
-            };
-            let name = setup.references.name();
-            let params = &setup.params;
-            results.push(evaluate(
-                name,
-                &problem,
-                method,
-                params,
-                &outcome,
-                truth.as_ref(),
-            ));
-        }
-    }
+    let keep = |result, _| {
+        results.push(result);
+        Ok::<(), LocalizeError>(())
+    };
+    let methods = &setup.methods;
+    setup
+        .localizer()
+        .localize(0, query, &[request], methods, &mut Unwatched, keep)
+        .map_err(|error| error.to_string())?;
     Ok(results)
 }

@@ -1,6 +1,7 @@
 //! What leaves the window: recordings, pictures, sessions, the command line.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use egui::Ui;
 
@@ -92,19 +93,71 @@ impl Desk {
         recorder.close()
     }
 
-    pub(super) fn save_recording(&mut self, path: &Path) {
-        let folder = path.parent().unwrap_or(Path::new("."));
-        if let Err(error) = std::fs::create_dir_all(folder) {
+    /// Records the run, and says how that went.
+    pub(super) fn record_to(&mut self, targets: &Targets, done: String) {
+        if let Some(folder) = targets.save.as_deref().and_then(Path::parent)
+            && let Err(error) = std::fs::create_dir_all(folder)
+        {
             self.note(format!("{}: {error}", folder.display()), true);
             return;
         }
-        let targets = Targets {
-            save: Some(path.to_owned()),
-            ..Targets::default()
-        };
-        match self.record(&targets) {
-            Ok(()) => self.note(format!("Recording: {}", path.display()), false),
+        match self.record(targets) {
+            Ok(()) => self.note(done, false),
             Err(error) => self.note(error.to_string(), true),
         }
+    }
+}
+
+/// A picture that was asked for and is not there yet.
+#[derive(Clone, Default)]
+pub(super) struct Pictures(Arc<Mutex<Vec<Picture>>>);
+
+struct Picture {
+    path: PathBuf,
+    /// The part of the window \[points\], and pixels per point; `None` for all of it.
+    part: Option<(egui::Rect, f32)>,
+    image: Arc<egui::ColorImage>,
+}
+
+impl Pictures {
+    /// Asks the window for its pixels.
+    pub(super) fn ask(&self, ctx: &egui::Context, path: PathBuf, part: Option<egui::Rect>) {
+        let part = part.map(|rect| (rect, ctx.pixels_per_point()));
+        let (pictures, waker) = (Arc::clone(&self.0), ctx.clone());
+        ctx.request_screenshot(move |image| {
+            let mut pictures = pictures.lock().unwrap_or_else(PoisonError::into_inner);
+            pictures.push(Picture { path, part, image });
+            waker.request_repaint();
+        });
+        ctx.request_repaint();
+    }
+
+    /// Writes what has come. What to say of each.
+    pub(super) fn write(&self) -> Vec<Result<String, String>> {
+        let taken = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
+        taken.iter().map(Picture::write).collect()
+    }
+}
+
+impl Picture {
+    fn write(&self) -> Result<String, String> {
+        let image = match self.part {
+            Some((rect, pixels_per_point)) => self.image.region(&rect, Some(pixels_per_point)),
+            None => egui::ColorImage::clone(&self.image),
+        };
+        let [width, height] = image.size.map(|side| side as u32);
+        let bytes: Vec<u8> = image
+            .pixels
+            .iter()
+            .flat_map(|p| [p.r(), p.g(), p.b()])
+            .collect();
+        let picture = image::RgbImage::from_raw(width, height, bytes)
+            .ok_or_else(|| "the window gave no picture".to_owned())?;
+        let said = |error: &dyn std::fmt::Display| format!("{}: {error}", self.path.display());
+        if let Some(folder) = self.path.parent() {
+            std::fs::create_dir_all(folder).map_err(|error| said(&error))?;
+        }
+        picture.save(&self.path).map_err(|error| said(&error))?;
+        Ok(format!("Picture: {}", self.path.display()))
     }
 }

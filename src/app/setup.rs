@@ -1,9 +1,11 @@
 //! What the window is opened on.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::evaluate::{Chooser, Localizer, QueryResult, Selection};
 use crate::event::Method;
 use crate::params::Params;
 use crate::scene::Scene;
@@ -14,25 +16,18 @@ use crate::session::{Job, Loaded, RunMode};
 pub enum ReferencePick {
     /// The frames that were named, for every query.
     ByHand,
-    /// This many within the radius, drawn by the seed.
-    Random(usize),
-    /// This many, the nearest first.
-    Nearest(usize),
+    /// Anew for every query.
+    By(Selection),
 }
 
 impl fmt::Display for ReferencePick {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ByHand => f.write_str("by hand"),
-            Self::Random(count) => write!(f, "random:{count}"),
-            Self::Nearest(count) => write!(f, "nearest:{count}"),
+            Self::By(selection) => selection.fmt(f),
         }
     }
 }
-
-/// Chooses references by a rule: `(rule, references, queries, query, radius, seed)`.
-pub type Chooser =
-    fn(ReferencePick, &dyn Scene, &dyn Scene, usize, bool, f64, u64) -> Result<Vec<usize>, String>;
 
 /// What is run, and how the window begins.
 #[derive(Clone)]
@@ -53,8 +48,6 @@ pub struct Setup {
     pub reference_frames: Vec<usize>,
     /// How the references of other queries are chosen.
     pub pick: ReferencePick,
-    /// The rule behind `pick`.
-    pub chooser: Chooser,
     /// The methods to run.
     pub methods: Vec<Method>,
     /// Their parameters.
@@ -67,6 +60,8 @@ pub struct Setup {
     pub breakpoints: Vec<String>,
     /// Whether it waits at the first step or runs.
     pub mode: RunMode,
+    /// Results that are known already, by query.
+    pub results: BTreeMap<usize, Vec<QueryResult>>,
     /// Where recordings, pictures and sessions are saved unless somebody names another place.
     pub folder: PathBuf,
 }
@@ -86,17 +81,40 @@ impl Setup {
         }
     }
 
-    /// The references of a query by the present rule.
-    pub(super) fn choose(&self, query: usize) -> Result<Vec<usize>, String> {
-        (self.chooser)(
-            self.pick,
-            self.references.as_ref(),
-            self.queries.as_ref(),
-            query,
-            self.queries_argument.is_none(),
-            self.uncertainty_radius_m,
-            self.seed,
-        )
+    /// The references of a query by the present rule, at least one.
+    ///
+    /// # Errors
+    /// Why there is none, in one line.
+    pub fn choose(&self, query: usize) -> Result<Vec<usize>, String> {
+        let ReferencePick::By(selection) = self.pick else {
+            return Ok(self.reference_frames.clone());
+        };
+        let chooser = Chooser {
+            localizer: &self.localizer(),
+            params: &self.params,
+            selection,
+            radius_m: self.uncertainty_radius_m,
+            seed: self.seed,
+            index: None,
+        };
+        let chosen = chooser
+            .choose(query, &|_| false)
+            .map_err(|error| error.to_string())?;
+        if chosen.is_empty() {
+            let name = &self.queries.frames()[query];
+            return Err(format!(
+                "no frame with pose and scan within {} m of query {name}; raise the radius or \
+                 choose references by hand",
+                self.uncertainty_radius_m
+            ));
+        }
+        Ok(chosen)
+    }
+
+    /// Localises queries without a person.
+    pub(super) fn localizer(&self) -> Localizer<'_> {
+        let (references, queries) = (self.references.as_ref(), self.queries.as_ref());
+        Localizer::new(references, queries, &self.params, self.seed)
     }
 
     /// The command line that repeats this run.

@@ -6,6 +6,7 @@ use super::command::{Command, Queue};
 use super::desk::{Comparing, Desk};
 use super::setup::ReferencePick;
 use super::theme;
+use crate::evaluate::Selection;
 use crate::event::Method;
 use crate::session::State;
 
@@ -118,10 +119,11 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         .on_hover_text("The references");
     ui.menu_button("References", |ui| {
         for pick in [
-            ReferencePick::Random(1),
-            ReferencePick::Random(3),
-            ReferencePick::Nearest(1),
-            ReferencePick::Nearest(3),
+            ReferencePick::By(Selection::Random(1)),
+            ReferencePick::By(Selection::Random(3)),
+            ReferencePick::By(Selection::Nearest(1)),
+            ReferencePick::By(Selection::Nearest(3)),
+            ReferencePick::By(Selection::Matched(1)),
             ReferencePick::ByHand,
         ] {
             if ui.radio(setup.pick == pick, pick.to_string()).clicked() {

@@ -9,6 +9,7 @@ use posescope::evaluate::{Experiment, Format, Gate, Selection, Shard, Tolerance}
 use posescope::event::Method;
 use posescope::fusion;
 use posescope::scene::street::{Size, Street};
+use posescope::session::Breakpoint;
 
 /// See why a camera pose estimate fails.
 ///
@@ -30,6 +31,9 @@ pub struct Arguments {
 pub enum Command {
     /// Localise one query, or several, and record every decision
     Run(Box<RunArgs>),
+    /// Open the window: step through the estimators, see everything, try another pose
+    #[cfg(feature = "app")]
+    View(Box<ViewArgs>),
     /// Run an experiment over many queries into a run folder
     Eval(Box<EvalArgs>),
     /// List the queries that a run fixed, broke or changed against another; exit code 1 if it broke
@@ -118,9 +122,63 @@ pub struct RunArgs {
     pub threads: Option<NonZeroUsize>,
     #[command(flatten)]
     pub recording: RecordingArgs,
+    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10), with the
+    /// recording up to there; repeatable
+    #[arg(long = "break", value_name = "EXPR")]
+    pub breakpoints: Vec<Breakpoint>,
     /// Write the results as JSON, one object per line; - for stdout
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// Where the frames are, or the folder of a run; see `posescope run --help`
+    #[arg(default_value = "street", value_name = "SCENE|RUN")]
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Take the queries from another scene in the same world frame
+    #[arg(long, value_name = "SCENE")]
+    pub queries: Option<String>,
+    /// The frame to begin with
+    #[arg(long, value_name = "FRAME")]
+    pub query: Option<String>,
+    /// A frame with known pose and cloud to localise against; repeatable
+    #[arg(long, value_name = "FRAME")]
+    pub reference: Vec<String>,
+    /// How references are chosen where --reference names none: random:K, nearest:K or maxf:K
+    #[arg(
+        long,
+        value_name = "HOW",
+        default_value = "random:1",
+        conflicts_with = "reference"
+    )]
+    pub references: Selection,
+    /// How far the query may be from its reference: the disc that the direct methods search [m]
+    #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
+    pub radius: f64,
+    /// The methods to run
+    #[arg(
+        long,
+        value_name = "fb,pm,mi,hy",
+        value_delimiter = ',',
+        value_parser = method,
+        default_value = "fb,pm,mi,hy"
+    )]
+    pub method: Vec<Method>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Number of threads [default: one per core]; results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10); repeatable
+    #[arg(long = "break", value_name = "EXPR")]
+    pub breakpoints: Vec<Breakpoint>,
 }
 
 /// Where the recording goes: Rerun's own options, which can be combined.

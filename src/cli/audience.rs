@@ -4,6 +4,7 @@ use posescope::evaluate::{QueryResult, Watch};
 use posescope::event::{Event, KindSet, Method};
 use posescope::geometry::Pose;
 use posescope::problem::Problem;
+use posescope::session::StopAtBreakpoint;
 use posescope::sink::Progress;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
@@ -11,6 +12,8 @@ use posescope::trace::{Cancelled, Record, Sink};
 /// A bar that moves on with every method that is done, and a recorder.
 pub struct Audience {
     pub recorder: Option<Recorder>,
+    /// Ends the run at a breakpoint, if there are any.
+    pub stop: Option<StopAtBreakpoint>,
     bar: indicatif::ProgressBar,
     progress: Option<Progress>,
     /// Query and reference of each problem.
@@ -21,6 +24,7 @@ impl Audience {
     pub fn new(bar: indicatif::ProgressBar, recorder: Option<Recorder>) -> Self {
         Self {
             recorder,
+            stop: None,
             bar,
             progress: None,
             tasks: Vec::new(),
@@ -30,6 +34,9 @@ impl Audience {
 
 impl Sink for Audience {
     fn wanted(&self) -> KindSet {
+        if self.stop.is_some() {
+            return KindSet::ALL;
+        }
         let recorder = self.recorder.as_ref();
         recorder.map_or(KindSet::NONE, |recorder| recorder.wanted())
     }
@@ -41,9 +48,13 @@ impl Sink for Audience {
         }
         match &mut self.recorder {
             Some(recorder) if is_stage || recorder.wanted().contains(record.event.kind()) => {
-                recorder.accept(record)
+                recorder.accept(record)?;
             }
-            _ => Ok(()),
+            _ => {}
+        }
+        match &mut self.stop {
+            Some(stop) => stop.accept(record),
+            None => Ok(()),
         }
     }
 }

@@ -8,10 +8,12 @@ use super::run;
 use super::terminal::Terminal;
 use posescope::evaluate::Selection;
 use posescope::event::Method;
+#[cfg(feature = "app")]
+use posescope::session::RunMode;
 
 /// A place on the street where parked cars hide part of what the reference saw.
-const QUERY: &str = "000070";
-const REFERENCE: &str = "000062";
+pub const QUERY: &str = "000070";
+pub const REFERENCE: &str = "000062";
 const RECORDING: &str = "recordings/demo.rrd";
 
 /// Runs the demonstration and saves its recording.
@@ -39,8 +41,25 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
                 save: Some(recording),
                 ..RecordingArgs::default()
             },
+            breakpoints: Vec::new(),
             json: None,
         },
         terminal,
-    )
+    )?;
+    view_where_there_is_a_display(terminal)
+}
+
+/// Opens the window on the same query.
+#[cfg(feature = "app")]
+fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
+    if !posescope::app::has_display() {
+        return Ok(());
+    }
+    super::view::view(&super::args::ViewArgs::demo(), RunMode::Running, terminal)
+}
+
+/// Without a window there is the recording.
+#[cfg(not(feature = "app"))]
+fn view_where_there_is_a_display(_terminal: &Terminal) -> Result<(), CliError> {
+    Ok(())
 }

@@ -8,6 +8,7 @@ use posescope::evaluate::{ChoiceError, DrawError, FolderError, RunError};
 use posescope::params::ParamError;
 use posescope::scene::SceneError;
 use posescope::sink::rerun::{ComparisonError, RecordError};
+use posescope::trace::Cancelled;
 
 const DONE: u8 = 0;
 const NOT_GOOD_ENOUGH: u8 = 1;
@@ -42,6 +43,9 @@ pub enum CliError {
     /// A gate or a comparison says no.
     #[error("{0}")]
     NotGoodEnough(String),
+    /// A breakpoint ended the run: what was asked for.
+    #[error("{0}")]
+    Stopped(#[from] Cancelled),
     /// Whoever read our stdout, such as `head`, has seen enough: not an error.
     #[error("nobody reads the output any more")]
     ReaderGone,
@@ -55,7 +59,7 @@ impl CliError {
 
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Self::ReaderGone => DONE,
+            Self::ReaderGone | Self::Stopped(_) => DONE,
             Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
             Self::Usage(_)
             | Self::Param(_)
@@ -84,6 +88,7 @@ impl From<RunError> for CliError {
         match error {
             RunError::Scene(error) => error.into(),
             RunError::Choice(error) => error.into(),
+            RunError::Cancelled(cancelled) => Self::Stopped(cancelled),
             RunError::Folder(error) => error.into(),
         }
     }

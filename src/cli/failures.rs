@@ -7,10 +7,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use posescope::evaluate::{
-    Companion, FailedQuery, FolderError, Item, RunError, RunFile, RunFolder, Watch,
+    Companion, FailedQuery, FolderError, Item, LocalizeError, RunError, RunFile, RunFolder, Watch,
 };
 use posescope::params::Params;
-use posescope::scene::SceneError;
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
 use super::args::EvalArgs;
@@ -138,7 +137,7 @@ impl<'a> FailureRecordings<'a> {
                 std::slice::from_ref(query.request),
                 &[query.method],
                 &mut recorder,
-                |_, _| Ok::<(), SceneError>(()),
+                |_, _| Ok::<(), LocalizeError>(()),
             )
         }));
         if let Ok(Err(error)) = localized {

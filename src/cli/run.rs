@@ -6,6 +6,7 @@ use posescope::evaluate::{Chooser, Localizer, QueryResult, Request};
 use posescope::event::Method;
 use posescope::params::Params;
 use posescope::scene::{self, Scene};
+use posescope::session::{Breakpoints, StopAtBreakpoint};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
@@ -53,6 +54,10 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let estimates = tasks.iter().map(|task| task.references.len());
     let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
     let mut audience = Audience::new(bar.clone(), plan.recorder(&tasks)?);
+    if !args.breakpoints.is_empty() {
+        let breakpoints = Breakpoints::new(args.breakpoints.iter().cloned());
+        audience.stop = Some(StopAtBreakpoint::new(breakpoints));
+    }
     let outcome = tasks.iter().enumerate().try_for_each(|(index, task)| {
         let request = Request {
             radius_m: args.radius,
@@ -77,8 +82,15 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
 
     // Whatever went wrong, what was computed is shown and the recording is closed.
     let shown = show(args, &results, terminal);
+    let reached = audience.stop.as_ref().and_then(StopAtBreakpoint::reached);
+    if let (Some(breakpoint), false) = (reached, terminal.is_quiet()) {
+        eprintln!("Stopped at {breakpoint}");
+    }
     let closed = audience.recorder.map_or(Ok(()), Recorder::close);
-    outcome?;
+    match outcome {
+        Ok(()) | Err(CliError::Stopped(_)) => {}
+        Err(error) => return Err(error),
+    }
     closed?;
     shown?;
     if let (Some(path), false) = (&args.recording.save, terminal.is_quiet()) {

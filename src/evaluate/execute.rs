@@ -13,6 +13,7 @@ use crate::estimator::Failure;
 use crate::event::Method;
 use crate::params::Params;
 use crate::scene::{Scene, SceneError};
+use crate::trace::Cancelled;
 
 /// The scenes of a run, opened.
 pub struct Scenes {
@@ -42,6 +43,9 @@ pub enum RunError {
     /// References cannot be chosen.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
+    /// Somebody who watches asked it to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The folder cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),

@@ -49,6 +49,17 @@ pub trait Watch: Sink {
     }
 }
 
+/// Why queries could not be localised, for those who have no error of their own.
+#[derive(Debug, thiserror::Error)]
+pub enum LocalizeError {
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The watcher asked the run to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
 /// Nobody watches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unwatched;
@@ -143,8 +154,8 @@ impl<'a> Localizer<'a> {
     /// A panic of an estimator becomes the result of the query that it met.
     ///
     /// # Errors
-    /// Data that cannot be read, and what `hand_out` returns.
-    pub fn localize<E: From<SceneError>>(
+    /// Data that cannot be read, a run that its watcher cancelled, and what `hand_out` returns.
+    pub fn localize<E: From<SceneError> + From<Cancelled>>(
         &self,
         index: usize,
         query: usize,
@@ -210,7 +221,7 @@ impl<'a> Localizer<'a> {
                     continue;
                 }
                 for &problem in members {
-                    self.solve(&mut work, problem, method, watch);
+                    self.solve(&mut work, problem, method, watch)?;
                     if let (true, Some(candidate)) =
                         (request.fusions.is_empty(), work.candidate(problem, method))
                     {
@@ -221,7 +232,7 @@ impl<'a> Localizer<'a> {
                     self.count_matches(&mut work, members);
                 }
                 for fusion in &request.fusions {
-                    let (result, times) = self.fuse(&work, members, method, fusion, watch);
+                    let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
                     emit(result, times)?;
                 }
             }
@@ -259,9 +270,15 @@ impl<'a> Localizer<'a> {
     }
 
     /// Solves one problem, unless it was solved before.
-    fn solve(&self, work: &mut Work<'_>, problem: usize, method: Method, watch: &mut dyn Watch) {
+    fn solve(
+        &self,
+        work: &mut Work<'_>,
+        problem: usize,
+        method: Method,
+        watch: &mut dyn Watch,
+    ) -> Result<(), Cancelled> {
         if work.candidate(problem, method).is_some() {
-            return;
+            return Ok(());
         }
         watch.begin_method(problem, method);
         let candidate = match work.hybrid_parts(problem, method) {
@@ -274,13 +291,14 @@ impl<'a> Localizer<'a> {
                 let times = StageTimes::inside(method.name(), times);
                 self.judged(work, problem, method, outcome, times)
             }
-            _ => self.estimate(work, problem, method, watch),
+            _ => self.estimate(work, problem, method, watch)?,
         };
         watch.end_method(&candidate.result);
         let row = Method::ALL.iter().position(|known| *known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
         }
+        Ok(())
     }
 
     fn estimate(
@@ -289,7 +307,7 @@ impl<'a> Localizer<'a> {
         problem: usize,
         method: Method,
         watch: &mut dyn Watch,
-    ) -> Candidate {
+    ) -> Result<Candidate, Cancelled> {
         let mut timings = StageTimings::default();
         let estimated = catch_unwind(AssertUnwindSafe(|| {
             let mut estimator = (estimator::entry(method).new)(self.params);
@@ -299,15 +317,12 @@ impl<'a> Localizer<'a> {
             estimator.estimate(&work.problems[problem], &mut Trace::to(&mut fanout))
         }));
         let outcome = match estimated {
-            Ok(Ok(outcome)) => outcome,
-            Ok(Err(cancelled)) => failed(Failure::Internal {
-                message: cancelled.to_string(),
-            }),
+            Ok(outcome) => outcome?,
             Err(panic) => failed(Failure::Internal {
                 message: words_of(panic.as_ref()),
             }),
         };
-        self.judged(work, problem, method, outcome, timings.into_times())
+        Ok(self.judged(work, problem, method, outcome, timings.into_times()))
     }
 
     fn judged(
@@ -365,7 +380,7 @@ impl<'a> Localizer<'a> {
         method: Method,
         fusion: &fusion::Entry,
         watch: &mut dyn Watch,
-    ) -> (QueryResult, StageTimes) {
+    ) -> Result<(QueryResult, StageTimes), Cancelled> {
         let solved: Vec<(&Problem, usize, &Candidate)> = members
             .iter()
             .filter_map(|&problem| {
@@ -384,12 +399,7 @@ impl<'a> Localizer<'a> {
             .collect();
         watch.begin_fusion(method);
         let sink: &mut dyn Sink = watch;
-        let pose =
-            fusion::fuse(fusion, &candidates, &mut Trace::to(sink)).unwrap_or_else(|cancelled| {
-                Err(Failure::Internal {
-                    message: cancelled.to_string(),
-                })
-            });
+        let pose = fusion::fuse(fusion, &candidates, &mut Trace::to(sink))?;
         let truth = work.truth.as_ref();
         // Where one would start from with a single reference: the one with the most matches.
         let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
@@ -419,7 +429,7 @@ impl<'a> Localizer<'a> {
         };
         watch.end_fusion(&result);
         let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
-        (result, times)
+        Ok((result, times))
     }
 }
 

@@ -24,7 +24,7 @@ pub fn setup() -> Setup {
         query: 1,
         reference_frames: vec![0],
         pick: ReferencePick::ByHand,
-        chooser: |_, _, _, _, _, _, _| Err("this scene has one reference".to_owned()),
+        results: Default::default(),
         methods: Method::ALL.to_vec(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,

@@ -6,13 +6,13 @@ use std::path::Path;
 use nalgebra::Vector3;
 use rerun::{Points3D, Scalars, SeriesLines, TextDocument, ViewCoordinates};
 
-use crate::palette::{self, Rgb};
 use super::entities;
 use super::layout::{self, Node, View};
 use super::scene::Origin;
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets};
 use crate::evaluate::{FolderError, QueryResult, read_results};
+use crate::palette::{self, Rgb};
 
 /// The runs' names in the recording, and their colours.
 const RUNS: [(&str, Rgb); 2] = [("a", palette::REFERENCE), ("b", palette::ESTIMATE)];

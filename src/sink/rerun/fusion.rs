@@ -2,12 +2,12 @@
 
 use rerun::{BarChart, Points3D, TextDocument};
 
-use crate::palette;
 use super::entities;
 use super::scene::Origin;
 use super::stream::Stream;
 use crate::event::{Method, ReferencesFused};
 use crate::fusion::{Fate, Share};
+use crate::palette;
 
 /// The fusions of one query so far, as a table each.
 #[derive(Default)]

@@ -1,0 +1,264 @@
+//! `posescope view`: the window; without a display, the same run as a recording.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use posescope::app::{self, ReferencePick, Setup, WindowError};
+use posescope::evaluate::{QueryResult, Selection, read_results, read_run};
+use posescope::event::Method;
+use posescope::params::Params;
+use posescope::scene::{self, Scene};
+use posescope::session::RunMode;
+
+use super::args::{ConfigArgs, RecordingArgs, RunArgs, ViewArgs};
+use super::failure::CliError;
+use super::terminal::Terminal;
+use super::{demo, params, run};
+
+/// Where the window saves things unless somebody says otherwise.
+const FOLDER: &str = "recordings";
+
+impl ViewArgs {
+    /// The window of the bare command.
+    pub fn demo() -> Self {
+        Self {
+            scene: "street".to_owned(),
+            format: None,
+            queries: None,
+            query: None,
+            reference: Vec::new(),
+            references: Selection::Random(1),
+            radius: 15.0,
+            method: Method::ALL.to_vec(),
+            seed: 0,
+            config: ConfigArgs::default(),
+            threads: None,
+            breakpoints: Vec::new(),
+        }
+    }
+}
+
+/// Opens the window, or says why not and does the headless job.
+pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
+    run::use_threads(args.threads)?;
+    let setup = setup(args, mode)?;
+    let headless = setup.clone();
+    match app::open(setup) {
+        Ok(()) => Ok(()),
+        Err(
+            error @ (WindowError::NoDisplay | WindowError::NoAdapter(_) | WindowError::Failed(_)),
+        ) => record_instead(args, &headless, &error, terminal),
+    }
+}
+
+/// The same run, as a recording.
+fn record_instead(
+    args: &ViewArgs,
+    setup: &Setup,
+    why: &WindowError,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    let query = setup.queries.frames()[setup.query].clone();
+    let recording = setup.folder.join(format!("{query}.rrd"));
+    std::fs::create_dir_all(&setup.folder).map_err(CliError::io(&setup.folder))?;
+    eprintln!(
+        "posescope: {why}; recording {} instead",
+        recording.display()
+    );
+    let references = setup.reference_frames.iter();
+    run::run(
+        &RunArgs {
+            scene: setup.scene_argument.clone(),
+            format: args.format.clone(),
+            queries: setup.queries_argument.clone(),
+            query: vec![query],
+            all: false,
+            reference: references
+                .map(|&frame| setup.references.frames()[frame].clone())
+                .collect(),
+            references: Selection::Random(1),
+            radius: setup.uncertainty_radius_m,
+            method: setup.methods.clone(),
+            fusion: None,
+            seed: setup.seed,
+            config: ConfigArgs {
+                config: None,
+                assignments: setup.params.changes(),
+            },
+            threads: None,
+            recording: RecordingArgs {
+                save: Some(recording),
+                ..RecordingArgs::default()
+            },
+            breakpoints: args.breakpoints.clone(),
+            json: None,
+        },
+        terminal,
+    )
+}
+
+fn setup(args: &ViewArgs, mode: RunMode) -> Result<Setup, CliError> {
+    let folder = Path::new(&args.scene);
+    let mut setup = match folder.join("run.toml").is_file() {
+        true => of_a_run(args, folder)?,
+        false => of_a_scene(args)?,
+    };
+    setup.mode = mode;
+    setup.breakpoints = args.breakpoints.iter().map(ToString::to_string).collect();
+    Ok(setup)
+}
+
+fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
+    let references: Arc<dyn Scene> = scene::open(&args.scene, args.format.as_deref())?.into();
+    let queries: Arc<dyn Scene> = match &args.queries {
+        Some(queries) => scene::open(queries, args.format.as_deref())?.into(),
+        None => Arc::clone(&references),
+    };
+    let named: Vec<usize> = args
+        .reference
+        .iter()
+        .map(|name| references.find(name))
+        .collect::<Result<_, _>>()?;
+    let mut setup = Setup {
+        scene_argument: args.scene.clone(),
+        offered: (0..queries.frames().len()).collect(),
+        references,
+        queries_argument: args.queries.clone(),
+        queries,
+        query: 0,
+        pick: match named.as_slice() {
+            [] => ReferencePick::By(args.references),
+            _ => ReferencePick::ByHand,
+        },
+        reference_frames: named,
+        methods: methods(&args.method),
+        params: params::resolve(&args.config)?,
+        uncertainty_radius_m: args.radius,
+        seed: args.seed,
+        breakpoints: Vec::new(),
+        mode: RunMode::Paused,
+        results: BTreeMap::new(),
+        folder: PathBuf::from(FOLDER),
+    };
+    begin_at(args, &mut setup)?;
+    Ok(setup)
+}
+
+/// The query that was named, the demonstration's, or the first that has a reference.
+fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
+    let no_reference = |why: String| CliError::NoReference(format!("{}: {why}", args.scene));
+    if let Some(name) = &args.query {
+        setup.query = setup.queries.find(name)?;
+        setup.reference_frames = setup.choose(setup.query).map_err(no_reference)?;
+        return Ok(());
+    }
+    let is_demo = args.scene == "street" && args.queries.is_none() && args.reference.is_empty();
+    if is_demo {
+        setup.query = setup.queries.find(demo::QUERY)?;
+        setup.reference_frames = vec![setup.references.find(demo::REFERENCE)?];
+        return Ok(());
+    }
+    let mut why = "there is no frame".to_owned();
+    for &query in &setup.offered {
+        match setup.choose(query) {
+            Ok(frames) => {
+                setup.query = query;
+                setup.reference_frames = frames;
+                return Ok(());
+            }
+            Err(reason) => why = reason,
+        }
+    }
+    Err(no_reference(why))
+}
+
+/// In the order of the registry, each once.
+fn methods(asked: &[Method]) -> Vec<Method> {
+    let all = Method::ALL.into_iter();
+    all.filter(|method| asked.contains(method)).collect()
+}
+
+/// The queries of a run, with its results; the first failure is looked at first.
+fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
+    let file = read_run(folder)?;
+    let known: Vec<QueryResult> = read_results(folder)?.collect::<Result<_, _>>()?;
+    let Some(pair) = file.pairs.first() else {
+        return Err(CliError::NoReference(format!(
+            "{}: the run has no scenes",
+            folder.display()
+        )));
+    };
+    let scene_argument = file.scenes[pair.scene_index].clone();
+    let format = args.format.as_deref().or(file.format.as_deref());
+    let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
+    let other = file
+        .queries
+        .iter()
+        .find(|argument| {
+            let scene = scene::open(argument, format);
+            scene.is_ok_and(|scene| scene.name() == pair.query_scene)
+        })
+        .filter(|_| pair.query_scene != pair.scene);
+    let queries: Arc<dyn Scene> = match other {
+        Some(argument) => scene::open(argument, format)?.into(),
+        None => Arc::clone(&references),
+    };
+    let mut params = Params::default();
+    params
+        .merge_toml(&file.params.to_string())
+        .map_err(|source| CliError::Config {
+            path: folder.join("run.toml"),
+            source,
+        })?;
+    let mut results: BTreeMap<usize, Vec<QueryResult>> = BTreeMap::new();
+    for result in known {
+        if let Ok(frame) = queries.find(&result.query) {
+            results.entry(frame).or_default().push(result);
+        }
+    }
+    let is_failure = |results: &&Vec<QueryResult>| results.iter().any(|r| r.pose.is_none());
+    let first = results
+        .iter()
+        .find(|(_, results)| is_failure(results))
+        .or_else(|| results.iter().next());
+    let query = match (&args.query, first) {
+        (Some(name), _) => queries.find(name)?,
+        (None, Some((query, _))) => *query,
+        (None, None) => 0,
+    };
+    let reference_frames = results
+        .get(&query)
+        .and_then(|results| results.first())
+        .map_or(&[][..], |result| &result.references)
+        .iter()
+        .map(|name| references.find(name))
+        .collect::<Result<Vec<_>, _>>()?;
+    let selection = file.references.parse().map_err(CliError::Usage)?;
+    let mut setup = Setup {
+        scene_argument,
+        offered: results.keys().copied().collect(),
+        references,
+        queries_argument: other.cloned(),
+        queries,
+        query,
+        reference_frames,
+        pick: ReferencePick::By(selection),
+        methods: file
+            .methods
+            .iter()
+            .filter_map(|name| Method::from_name(name))
+            .collect(),
+        params,
+        uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.radius),
+        seed: file.seed,
+        breakpoints: Vec::new(),
+        mode: RunMode::Paused,
+        results,
+        folder: PathBuf::from(FOLDER),
+    };
+    if setup.reference_frames.is_empty() {
+        setup.reference_frames = setup.choose(query).map_err(CliError::NoReference)?;
+    }
+    Ok(setup)
+}
