@@ -281,7 +281,10 @@ impl Desk {
                 Err(why) => self.note(why, true),
             }
         }
-        self.queries.paint_thumbnails(&self.setup.queries);
+        // The query at work comes first.
+        if *self.session.state() != State::Loading {
+            self.queries.paint_thumbnails(&self.setup.queries);
+        }
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
         {
@@ -337,6 +340,7 @@ impl Desk {
         self.kept = None;
         self.comparing = Comparing::default();
         self.begin(RunMode::Running);
+        self.follows = false;
         self.anchor = Some(Anchor::Record(cursor));
     }
 

@@ -1,16 +1,19 @@
-//! The window, driven through its accessibility tree and looked at through its pixels.
+//! The window, driven through its keys and its accessibility tree.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, ReferencePick, Setup};
-use posescope::event::Method;
+use posescope::app::{App, Command, Comparing, ReferencePick, Setup};
+use posescope::evaluate::{Localizer, QueryResult, Request, Unwatched};
+use posescope::event::{Event, Method, Stage};
 use posescope::params::Params;
+use posescope::scene::Scene;
 use posescope::session::{RunMode, State};
 
-use crate::walls_scene::Walls;
+use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
 /// The small world, waiting at its first step.
 pub fn setup() -> Setup {
@@ -20,17 +23,17 @@ pub fn setup() -> Setup {
         references: scene.clone(),
         queries_argument: None,
         queries: scene,
-        offered: vec![1, 2, 3],
+        offered: vec![1, 2, GREY],
         query: 1,
         reference_frames: vec![0],
         pick: ReferencePick::ByHand,
-        results: Default::default(),
         methods: Method::ALL.to_vec(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
         seed: 7,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,
+        results: Default::default(),
         folder: std::env::temp_dir(),
     }
 }
@@ -44,49 +47,345 @@ pub fn window(setup: Setup) -> Harness<'static, App> {
 
 /// Draws frames until the worker needs somebody.
 pub fn settle(window: &mut Harness<'_, App>) -> State {
+    wait(window, |app| {
+        !matches!(app.desk().state(), State::Loading | State::Running)
+    });
+    window.step();
+    window.state().desk().state().clone()
+}
+
+/// Draws frames until something is the case.
+pub fn wait(window: &mut Harness<'_, App>, is_so: impl Fn(&App) -> bool) {
     let begun = Instant::now();
     loop {
         window.step();
-        match window.state().desk().state() {
-            State::Loading | State::Running => {}
-            state => {
-                let state = state.clone();
-                window.step();
-                return state;
-            }
+        if is_so(window.state()) {
+            return;
         }
         assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
         std::thread::sleep(Duration::from_millis(2));
     }
 }
 
+/// A window whose run is over.
+pub fn finished(setup: Setup) -> Harness<'static, App> {
+    let mut window = window(Setup {
+        mode: RunMode::Running,
+        ..setup
+    });
+    assert_eq!(settle(&mut window), State::Finished);
+    window
+}
+
+fn press(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) {
+    window.key_press_modifiers(modifiers, key);
+    window.step();
+    window.step();
+}
+
+/// Gives an order by a key, and waits for what comes of it.
+fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event {
+    let before = window.state().desk().run().len();
+    press(window, modifiers, key);
+    wait(window, |app| {
+        app.desk().run().len() > before || matches!(app.desk().state(), State::Finished)
+    });
+    settle(window);
+    let desk = window.state().desk();
+    desk.run().records()[desk.cursor].event.clone()
+}
+
+/// Whether some label of the window holds these words.
+fn is_said(window: &Harness<'_, App>, words: &str) -> bool {
+    window.query_all_by_label_contains(words).next().is_some()
+}
+
+fn stage(event: &Event) -> Option<(Stage, bool)> {
+    match event {
+        Event::StageStarted(started) => Some((started.stage, true)),
+        Event::StageEnded(ended) => Some((ended.stage, false)),
+        _ => None,
+    }
+}
+
+fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
+    window.state().desk().run().results().cloned().collect()
+}
+
+/// The same without a window.
+fn headless(params: &Params) -> Vec<QueryResult> {
+    let scene = Walls::new();
+    let mut results = Vec::new();
+    let request = Request {
+        radius_m: 3.0,
+        references: vec![0],
+        fusions: Vec::new(),
+        setting: None,
+    };
+    Localizer::new(&scene, &scene, params, 7)
+        .localize(
+            0,
+            1,
+            &[request],
+            &Method::ALL,
+            &mut Unwatched,
+            |result, _| {
+                results.push(result);
+                Ok::<(), posescope::evaluate::LocalizeError>(())
+            },
+        )
+        .expect("readable");
+    results
+}
+
 #[test]
-fn the_window_waits_at_the_first_step_and_steps_by_buttons() {
+fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let mut window = window(setup());
     assert_eq!(settle(&mut window), State::Paused { breakpoint: None });
     assert_eq!(window.state().desk().run().len(), 1);
     window.get_by_label("Into").click();
-    window.step();
+    wait(&mut window, |app| app.desk().run().len() == 2);
     settle(&mut window);
-    assert_eq!(window.state().desk().run().len(), 2);
+    let event = order(&mut window, Modifiers::NONE, Key::F10);
+    assert_eq!(stage(&event), Some((Stage::Detect, false)));
+    let event = order(&mut window, Modifiers::NONE, Key::ArrowRight);
+    assert_eq!(stage(&event), Some((Stage::Match, true)));
+    let event = order(&mut window, Modifiers::NONE, Key::I);
+    assert!(matches!(event, Event::MatchesDecided(_)));
+    let event = order(&mut window, Modifiers::SHIFT, Key::F11);
+    assert_eq!(stage(&event), Some((Stage::Match, false)));
+    order(&mut window, Modifiers::NONE, Key::F9);
+    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(results(&window), headless(&Params::default()));
 }
 
 #[test]
-#[ignore = "to be looked at"]
-fn picture() {
-    let mut window = Harness::builder()
-        .with_size([1500.0, 950.0])
-        .wgpu()
-        .build_eframe(|creation| App::new(creation, setup()));
-    settle(&mut window);
-    window.state_mut().send(Command::Run);
-    settle(&mut window);
-    for _ in 0..20 {
+fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
+    let mut window = finished(setup());
+    let last = window.state().desk().run().len() - 1;
+    for cursor in (0..=last).step_by(7).chain([last]) {
+        window.state_mut().send(Command::MoveCursor(cursor));
         window.step();
+        window.step();
+        assert_eq!(window.state().desk().cursor, cursor);
     }
+    assert_eq!(window.state().desk().run().len(), last + 1);
+    press(&mut window, Modifiers::NONE, Key::Home);
+    assert_eq!(window.state().desk().cursor, 0);
+    press(&mut window, Modifiers::SHIFT, Key::ArrowRight);
+    assert_eq!(window.state().desk().cursor, 10);
+    press(&mut window, Modifiers::NONE, Key::ArrowLeft);
+    assert_eq!(window.state().desk().cursor, 9);
+    press(&mut window, Modifiers::NONE, Key::Num3);
+    let desk = window.state().desk();
+    let span = desk.run().span_at(desk.cursor).expect("in a span");
+    assert_eq!(span.method, Method::MutualInformation);
+}
+
+#[test]
+fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
+    let mut window = window(setup());
+    settle(&mut window);
+    window.state_mut().send(Command::ShowView("breakpoints"));
+    window.step();
+    window.step();
+    window.get_by_label("New breakpoint").focus();
+    window.step();
     window
-        .render()
-        .expect("a picture")
-        .save("/tmp/window.png")
-        .expect("saved");
+        .get_by_label("New breakpoint")
+        .type_text("mi.yaw_coarse");
+    window.step();
+    window.get_by_label("Add").click();
+    window.step();
+    window.step();
+    assert_eq!(window.state().desk().setup.breakpoints, ["mi.yaw_coarse"]);
+    press(&mut window, Modifiers::NONE, Key::F5);
+    wait(&mut window, |app| app.desk().run().len() > 10);
+    let stopped = State::Paused {
+        breakpoint: Some("mi.yaw_coarse".to_owned()),
+    };
+    assert_eq!(settle(&mut window), stopped);
+    assert!(is_said(&window, "mi.yaw_coarse"));
+}
+
+#[test]
+fn a_wrong_breakpoint_is_refused_with_what_there_is() {
+    let mut window = window(setup());
+    settle(&mut window);
+    let wrong = vec!["inlers < 3".to_owned()];
+    window.state_mut().send(Command::SetBreakpoints(wrong));
+    window.step();
+    window.step();
+    assert!(is_said(&window, "`inlers` is none of"));
+}
+
+#[test]
+fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
+    let mut window = finished(setup());
+    window
+        .state_mut()
+        .send(Command::SelectMethod(Method::MutualInformation));
+    window.step();
+    window.step();
+    window.state_mut().send(Command::SetParam {
+        key: "grid.yaw_step".to_owned(),
+        value: "2".to_owned(),
+    });
+    window.step();
+    assert_eq!(settle(&mut window), State::Finished);
+    let desk = window.state().desk();
+    let span = desk.run().span_at(desk.cursor).expect("in a span");
+    assert_eq!(span.method, Method::MutualInformation);
+    assert_eq!(desk.cursor + 1, span.records.end);
+    let reused = |name: &str| -> Vec<bool> {
+        let bars = desk.run().stages().iter();
+        bars.filter(|bar| bar.stage.name() == name)
+            .map(|bar| bar.reused)
+            .collect()
+    };
+    assert_eq!(reused("detect"), [true, true]);
+    assert!(reused("position_coarse").iter().all(|reused| *reused));
+    // The hybrid is FB here, so that only PM and MI search.
+    assert_eq!(reused("yaw_coarse"), [false, false]);
+    let mut params = Params::default();
+    params.assign("grid.yaw_step=2").expect("a good value");
+    assert_eq!(results(&window), headless(&params));
+}
+
+#[test]
+fn two_settings_are_compared_and_their_differences_marked() {
+    let mut window = finished(setup());
+    press(&mut window, Modifiers::NONE, Key::P);
+    window.state_mut().send(Command::SetParam {
+        key: "mi.bins".to_owned(),
+        value: "8".to_owned(),
+    });
+    window.step();
+    settle(&mut window);
+    window.state_mut().send(Command::ShowView("report"));
+    window.step();
+    window.step();
+    assert!(window.query_all_by_label_contains("≠").next().is_some());
+    press(&mut window, Modifiers::NONE, Key::X);
+    assert_eq!(window.state().desk().comparing, Comparing::Kept);
+    window
+        .state_mut()
+        .send(Command::Compare(Comparing::SideBySide));
+    window.step();
+    window.step();
+    assert!(is_said(&window, "A, kept"));
+    window.state_mut().send(Command::ShowView("parameters"));
+    press(&mut window, Modifiers::NONE, Key::D);
+    assert!(window.query_all_by_label("bins").next().is_some());
+    // What is equal in both is not listed.
+    assert!(window.query_all_by_label("splat_px").next().is_none());
+}
+
+#[test]
+fn the_next_failure_is_found_once_all_queries_were_run() {
+    let mut window = finished(setup());
+    press(&mut window, Modifiers::NONE, Key::N);
+    assert_eq!(window.state().desk().setup.query, 1);
+    window.get_by_label("Run all").click();
+    wait(&mut window, |app| app.desk().results.len() == 3);
+    press(&mut window, Modifiers::NONE, Key::N);
+    assert_eq!(window.state().desk().setup.query, GREY);
+    settle(&mut window);
+    press(&mut window, Modifiers::NONE, Key::K);
+    assert_eq!(window.state().desk().setup.query, 2);
+}
+
+#[test]
+fn what_goes_wrong_is_said_and_the_window_lives_on() {
+    let mut setup = setup();
+    setup.offered.push(UNREADABLE);
+    let mut window = finished(setup);
+    window.state_mut().send(Command::SelectQuery(UNREADABLE));
+    window.step();
+    assert!(matches!(settle(&mut window), State::Broken(_)));
+    assert!(is_said(&window, "000004"));
+    // Frame 2 has no cloud, and the scene of this test panics when it is asked for it.
+    window.state_mut().send(Command::SelectQuery(1));
+    window.state_mut().send(Command::SetReferences(vec![2]));
+    window.step();
+    assert!(matches!(settle(&mut window), State::Broken(_)));
+    assert!(is_said(&window, "internal error"));
+    window.state_mut().send(Command::SetReferences(vec![0]));
+    window.step();
+    assert_eq!(settle(&mut window), State::Finished);
+}
+
+#[test]
+fn a_session_is_saved_and_restored() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("session.json");
+    let mut window = finished(setup());
+    window.state_mut().send(Command::SetParam {
+        key: "fb.ratio".to_owned(),
+        value: "0.8".to_owned(),
+    });
+    window.step();
+    settle(&mut window);
+    window.state_mut().send(Command::MoveCursor(40));
+    window.state_mut().send(Command::SaveSession(path.clone()));
+    window.step();
+    window.state_mut().send(Command::ResetParams);
+    window.state_mut().send(Command::SelectQuery(2));
+    window.step();
+    settle(&mut window);
+    window
+        .state_mut()
+        .send(Command::RestoreSession(path.clone()));
+    window.step();
+    settle(&mut window);
+    let desk = window.state().desk();
+    assert_eq!(desk.setup.query, 1);
+    assert_eq!(desk.setup.params.changes(), ["fb.ratio=0.8"]);
+    assert_eq!(desk.cursor, 40);
+    std::fs::write(&path, "{}").expect("writable");
+    window.state_mut().send(Command::RestoreSession(path));
+    window.step();
+    window.step();
+    assert!(is_said(&window, "session.json"));
+}
+
+#[test]
+fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.rrd");
+    let mut window = finished(setup());
+    window
+        .state_mut()
+        .send(Command::SaveRecording(path.clone()));
+    window.step();
+    window.step();
+    assert!(path.metadata().expect("written").len() > 10_000);
+    assert_eq!(
+        window.state().desk().setup.command_line(),
+        "posescope run walls --query 000001 --reference 000000 --radius 3 --seed 7"
+    );
+}
+
+#[test]
+fn the_camera_in_hand_has_costs_of_its_own() {
+    let mut window = finished(setup());
+    press(&mut window, Modifiers::NONE, Key::Num9);
+    let truth = Walls::new().pose(1).expect("known");
+    assert_eq!(window.state().desk().camera, Some(truth));
+    wait(&mut window, |app| !app.desk().is_probing());
+    let desk = window.state().desk();
+    let probe = desk.probe().expect("answered");
+    for (method, comparison) in &probe.comparisons {
+        let results = results(&window);
+        let result = results.iter().find(|result| result.method == method.name());
+        let report = result
+            .and_then(|result| result.cost.as_ref())
+            .expect("a cost");
+        assert_eq!(comparison.score.cost, report.truth);
+    }
+    press(&mut window, Modifiers::ALT, Key::ArrowUp);
+    let moved = window.state().desk().camera.expect("in hand");
+    assert!((moved.translation.z - truth.translation.z - 0.2).abs() < 1e-9);
+    press(&mut window, Modifiers::NONE, Key::Escape);
+    assert_eq!(window.state().desk().camera, None);
 }

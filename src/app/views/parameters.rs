@@ -252,8 +252,9 @@ fn remember<T: Clone + Send + Sync + 'static>(
     response: &egui::Response,
     edited: T,
 ) {
+    let is_edited = response.dragged() || response.has_focus();
     ui.data_mut(|data| {
-        if response.dragged() || response.has_focus() {
+        if is_edited {
             data.insert_temp(memory, edited);
         } else {
             data.remove::<T>(memory);
