@@ -298,7 +298,7 @@ pub struct DiffArgs {
     /// Changes of the rotation error up to this are none [°]
     #[arg(long, value_name = "DEGREES", default_value_t = Tolerance::default().degrees)]
     pub tolerance_deg: f64,
-    /// Save a recording with both runs on the same timelines
+    /// Where to save the recording with both runs on the same timelines [default: RUN_B/diff.rrd]
     #[arg(long, value_name = "FILE.rrd")]
     pub save: Option<PathBuf>,
 }

@@ -1,6 +1,7 @@
 //! `posescope diff`: what changed from one run to another.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use posescope::evaluate::{Change, Comparison, Row, Tolerance, read_rows, read_run};
 use posescope::sink::rerun::{Targets, record_comparison};
@@ -30,21 +31,36 @@ pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
         )));
     }
     output::print(&text(&comparison))?;
-    if let Some(save) = &args.save {
-        let targets = Targets {
-            save: Some(save.clone()),
-            ..Targets::default()
-        };
-        record_comparison(&targets, &args.before, &args.after, &text(&comparison))?;
-        if !terminal.is_quiet() {
-            eprintln!("Recording: {0} (open it with `rerun {0}`)", save.display());
-        }
-    }
+    record(
+        &comparison,
+        (&args.before, &args.after),
+        args.save.as_deref(),
+        terminal,
+    )?;
     if comparison.is_regression() {
         let broken = comparison.count(Change::Broken);
         return Err(CliError::NotGoodEnough(format!(
             "{broken} queries are broken"
         )));
+    }
+    Ok(())
+}
+
+/// Records both runs on the same timelines, in the second one's folder unless told otherwise.
+pub fn record(
+    comparison: &Comparison,
+    (before, after): (&Path, &Path),
+    save: Option<&Path>,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    let save = save.map_or_else(|| after.join("diff.rrd"), Path::to_owned);
+    let targets = Targets {
+        save: Some(save.clone()),
+        ..Targets::default()
+    };
+    record_comparison(&targets, before, after, &text(comparison))?;
+    if !terminal.is_quiet() {
+        eprintln!("Recording: {0} (open it with `rerun {0}`)", save.display());
     }
     Ok(())
 }

@@ -188,6 +188,7 @@ fn finish(
         if !terminal.is_quiet() {
             output::print(&diff::text(&comparison))?;
         }
+        diff::record(&comparison, (baseline, folder), None, terminal)?;
         if comparison.is_regression() {
             let broken = comparison.count(Change::Broken);
             failures.push(format!(

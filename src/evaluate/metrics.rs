@@ -231,7 +231,7 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
             of_successes: errors_of(&success),
             of_common: errors_of(&|row| success(row) && is_common(&row.query)),
             recall: None,
-            errors: has_truth.then(|| rows.iter().map(|row| error(&row)).collect()),
+            errors: has_truth.then(|| rows.iter().map(error).collect()),
         };
         measures.recall = has_truth
             .then(|| RECALL_LIMITS.map(|(m, deg)| measures.recall_within(m, deg).unwrap_or(0.0)));

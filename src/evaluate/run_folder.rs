@@ -148,6 +148,7 @@ impl RunFolder {
         }
         let there = fs::read_to_string(&file).map_err(FolderError::io(&file))?;
         same_run(path, &there, &toml_of(run))?;
+        sweep(path).map_err(FolderError::io(path))?;
         let mut folder = Self::open(path)?;
         let results: Prefix = folder.prefix(RESULTS)?;
         let timings: Prefix = folder.prefix(TIMINGS)?;
@@ -326,6 +327,23 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
         }
     }
     Ok(false)
+}
+
+/// Removes files that a killed process did not finish.
+fn sweep(folder: &Path) -> io::Result<()> {
+    for below in ["", "tables", "plots"] {
+        let entries = match fs::read_dir(folder.join(below)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            entries => entries?,
+        };
+        for entry in entries {
+            let entry = entry?;
+            if entry.file_name().to_string_lossy().starts_with("tmp-") {
+                fs::remove_file(entry.path())?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Reads the description of the run in a folder.

@@ -80,7 +80,7 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
         (&["--query", "5", "--method", "xx"], "fb, pm, mi or hy"),
         (
             &["--query", "5", "--references", "best:1"],
-            "random:K or nearest:K",
+            "random:K, nearest:K",
         ),
         (&["--query", "5", "--radius=-1"], "a positive number"),
         (&[], "--query"),
@@ -183,4 +183,31 @@ fn a_reader_that_has_seen_enough_is_no_error() {
         .expect("bash is there");
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && message.is_empty(), "{message}");
+}
+
+#[test]
+fn fused_references_give_one_result_with_each_reference_below_it() {
+    let sequence = SmallSequence::write();
+    let output = posescope()
+        .arg("run")
+        .arg(sequence.folder())
+        .args(["--query", "5", "--reference", "4", "--reference", "7"])
+        .args(["--method", "mi", "--fusion", "avg", "--json", "-", "-q"])
+        .output()
+        .expect("the binary starts");
+    assert!(output.status.success());
+    let results = json_lines(&output.stdout);
+    assert_eq!(results.len(), 1);
+    let fused = &results[0];
+    assert_eq!(fused["fusion"], "avg");
+    assert_eq!(fused["references"], serde_json::json!(["000004", "000007"]));
+    let alone = fused["per_reference"].as_array().expect("a list");
+    assert_eq!(alone.len(), 2);
+    let z = |result: &Value| result["pose"]["position_m"][2].as_f64().expect("a pose");
+    let mean = (z(&alone[0]) + z(&alone[1])) / 2.0;
+    assert!((z(fused) - mean).abs() < 1e-9);
+    for one in alone {
+        assert!(one["fusion"].is_null() && one.get("per_reference").is_none());
+        assert!(one["cost"]["evaluations"].as_u64().is_some_and(|n| n > 0));
+    }
 }

@@ -15,6 +15,8 @@ use posescope::trace::{Sink as _, Trace};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 
+use crate::binary::posescope;
+use crate::small_sequence::SmallSequence;
 use crate::two_walls::solvable;
 
 const STEP: &str = entities::STEP_TIMELINE;
@@ -321,4 +323,28 @@ fn a_full_disk_is_reported_with_the_name_of_the_file() {
         line.contains("/dev/full: No space left on device"),
         "{line}"
     );
+}
+
+#[test]
+fn a_fusion_is_recorded_with_weights_and_candidates() {
+    let sequence = SmallSequence::write();
+    let path = sequence.path().join("fused.rrd");
+    posescope()
+        .arg("run")
+        .arg(sequence.folder())
+        .args(["--query", "5", "--reference", "4", "--reference", "7"])
+        .args(["--method", "mi,fb", "--fusion", "r-wavg", "--save"])
+        .arg(&path)
+        .assert()
+        .code(0);
+    let found = timelines(&chunks(&path));
+    for entity in [
+        entities::FUSION_TABLE.to_owned(),
+        entities::fusion_weights(Method::Feature),
+        entities::fusion_weights(Method::MutualInformation),
+        entities::fusion_candidates(Method::MutualInformation),
+    ] {
+        let timelines = found.get(&entity).unwrap_or_else(|| panic!("{entity}"));
+        assert!(timelines.contains(STEP), "{entity}: {timelines:?}");
+    }
 }
