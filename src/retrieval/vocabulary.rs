@@ -182,7 +182,7 @@ mod tests {
         words: 4,
         iterations: 20,
         trees: 4,
-        checks: 4,
+        checks: 32,
         seed: 1,
     };
 

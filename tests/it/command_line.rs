@@ -80,7 +80,7 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
         (&["--query", "5", "--method", "xx"], "fb, pm, mi or hy"),
         (
             &["--query", "5", "--references", "best:1"],
-            "random:K or nearest:K",
+            "maxf:K or retrieve:K",
         ),
         (&["--query", "5", "--radius=-1"], "a positive number"),
         (&[], "--query"),
