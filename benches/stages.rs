@@ -12,16 +12,17 @@ use posescope::camera::Intrinsics;
 use posescope::cost::{self, Cost};
 use posescope::estimator;
 use posescope::event::Method;
-use posescope::features::{Features, SurfParams, nearest_neighbours, surf};
+use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
 use posescope::grid::Offset;
 use posescope::image::gaussian_smoothed;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::render::{ColoredCloud, Scorer, color_cloud};
+use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
-use posescope::scene;
 use posescope::scene::street::Street;
+use posescope::scene::{self, IndexOptions, Retriever};
 use posescope::solver::{Correspondence, p3p};
 use posescope::trace::Trace;
 use rand::{RngExt, SeedableRng};
@@ -214,4 +215,51 @@ fn street_cloud(bencher: Bencher, frame: usize) {
     let street = Street::open("street").expect("is built in");
     let drive = street.traversal();
     bencher.bench(|| drive.cloud(black_box(frame)));
+}
+
+/// Random words of unit length, and as many descriptors near them.
+fn words_and_descriptors(count: usize) -> (Vec<Descriptor>, Vec<Descriptor>) {
+    let mut rng = Pcg64::seed_from_u64(3);
+    let words: Vec<Descriptor> = (0..count)
+        .map(|_| std::array::from_fn(|_| rng.random_range(-0.2..0.2)))
+        .collect();
+    let descriptors = words
+        .iter()
+        .map(|word| word.map(|value| value + rng.random_range(-0.05..0.05)))
+        .collect();
+    (words, descriptors)
+}
+
+/// The nearest of 10,000 visual words, for 1,000 descriptors.
+#[divan::bench(args = [32, 128, 512])]
+fn nearest_words_by_checks(bencher: Bencher, checks: usize) {
+    let (words, descriptors) = words_and_descriptors(10_000);
+    let vocabulary = Vocabulary::new(words, RetrievalParams::default().trees, checks, 0);
+    bencher
+        .counter(divan::counter::ItemsCount::new(1000_usize))
+        .bench(|| vocabulary.quantize(black_box(&descriptors[..1000])));
+}
+
+/// A query after its features were made: an index of 20 frames of the street, 2,000 words.
+#[divan::bench(args = [0, 20])]
+fn retrieval_query_verifying(bencher: Bencher, verify: usize) {
+    let street = scene::open("street", None).expect("is built in");
+    let params = Params::default();
+    let options = IndexOptions {
+        words: 2000,
+        every: 40,
+        seed: 0,
+    };
+    let mut request = Retriever::request(street.as_ref(), &options, &params);
+    request.frames.truncate(20);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("street");
+    Retriever::build(street.as_ref(), &path, &request, &params, |_| ()).expect("is built");
+    let index = Index::open(&path, params.retrieval.checks).expect("just built");
+    let features = surf(&PAIR.query.photo.gray, &params.retrieval.surf(&params.surf));
+    let params = RetrievalParams {
+        verify,
+        ..params.retrieval
+    };
+    bencher.bench(|| index.query(black_box(&features), &params, |_| true));
 }

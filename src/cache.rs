@@ -8,7 +8,7 @@ mod memory;
 
 use std::sync::Arc;
 
-pub(crate) use disk::DiskCache;
+pub(crate) use disk::{DiskCache, user_folder};
 pub(crate) use memory::Recent;
 
 /// A value that can be kept as bytes.

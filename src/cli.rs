@@ -8,6 +8,7 @@ mod eval;
 mod export;
 mod failure;
 mod failures;
+mod index;
 mod output;
 mod params;
 mod run;
@@ -51,6 +52,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Eval(args)) => eval::eval(args, &terminal),
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),
+        Some(Command::Index(args)) => index::index(args, &terminal),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params),
     }

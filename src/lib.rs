@@ -44,6 +44,7 @@ pub mod params;
 mod picture;
 pub mod problem;
 pub mod render;
+pub mod retrieval;
 pub mod robust;
 pub mod scene;
 pub mod session;

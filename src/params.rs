@@ -11,6 +11,7 @@ use crate::estimator::FeatureParams;
 use crate::features::SurfParams;
 use crate::grid::GridParams;
 use crate::render::RenderParams;
+use crate::retrieval::RetrievalParams;
 
 /// What a parameter is called, measured in and good for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +67,8 @@ pub struct Params {
     pub pm: PhotometricParams,
     /// `mi`: the mutual-information cost.
     pub mi: MutualInformationParams,
+    /// `retrieval`: visual words, and the verification of what they find.
+    pub retrieval: RetrievalParams,
 }
 
 /// The value of a parameter.
@@ -174,6 +177,7 @@ impl Params {
         visit("grid", &mut self.grid);
         visit("pm", &mut self.pm);
         visit("mi", &mut self.mi);
+        visit("retrieval", &mut self.retrieval);
     }
 
     /// All parameters with their present values.

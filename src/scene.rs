@@ -4,12 +4,16 @@
 
 mod error;
 mod kitti;
+mod retriever;
 pub mod street;
 
 use std::sync::Arc;
 
+use xxhash_rust::xxh3::Xxh3;
+
 pub use error::SceneError;
 pub use kitti::{KittiOdometry, SequenceWriter};
+pub use retriever::{IndexOptions, Retriever};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -50,6 +54,27 @@ pub trait Scene: Send + Sync {
     /// # Errors
     /// When there is none, or it cannot be used.
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError>;
+
+    /// A number that changes with the photos, as far as can be told without reading them: what was
+    /// made from them before is stale then.
+    fn fingerprint(&self) -> u64 {
+        fingerprint(self, &[])
+    }
+}
+
+/// A number for what a scene is and holds, and whatever else its format knows.
+fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
+    let mut sum = Xxh3::new();
+    let parts = [scene.name(), &format!("{:?}", scene.intrinsics())];
+    for part in parts
+        .into_iter()
+        .chain(scene.frames().iter().map(String::as_str))
+    {
+        sum.update(part.as_bytes());
+        sum.update(b"\n");
+    }
+    sum.update(more);
+    sum.digest()
 }
 
 impl dyn Scene + '_ {

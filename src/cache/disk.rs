@@ -43,13 +43,7 @@ impl DiskCache {
     /// The cache `name` where the environment or else the system says; `None` where it is turned
     /// off or the user has no cache directory.
     pub(crate) fn of_user(name: &str, limit: u64) -> Option<Self> {
-        let folder = match env::var_os(VARIABLE) {
-            Some(folder) => PathBuf::from(folder),
-            None => ProjectDirs::from("", "", "posescope")?
-                .cache_dir()
-                .to_owned(),
-        };
-        (!folder.as_os_str().is_empty()).then(|| Self::new(folder.join(name), limit))
+        Some(Self::new(user_folder(name)?, limit))
     }
 
     /// The bytes of a key, if they are there and undamaged.
@@ -122,6 +116,18 @@ impl DiskCache {
     fn path(&self, key: &str) -> PathBuf {
         self.folder.join(format!("{key}.{EXTENSION}"))
     }
+}
+
+/// The folder `name` where the environment or else the system says; `None` where caching is turned
+/// off or the user has no cache directory.
+pub(crate) fn user_folder(name: &str) -> Option<PathBuf> {
+    let folder = match env::var_os(VARIABLE) {
+        Some(folder) => PathBuf::from(folder),
+        None => ProjectDirs::from("", "", "posescope")?
+            .cache_dir()
+            .to_owned(),
+    };
+    (!folder.as_os_str().is_empty()).then(|| folder.join(name))
 }
 
 /// Over the key too, so that a file under another's name is not taken for it.

@@ -43,6 +43,8 @@ pub enum Command {
     Export(ExportArgs),
     /// Write the built-in street to disk in KITTI odometry layout, one sequence per condition
     Synth(SynthArgs),
+    /// Build the retrieval index of a scene, which --references retrieve:K asks
+    Index(IndexArgs),
     /// List all parameters with unit, range, default and meaning
     Params(ConfigArgs),
 }
@@ -88,8 +90,9 @@ pub struct RunArgs {
     /// A frame with known pose and cloud to localise against; repeatable
     #[arg(long, value_name = "FRAME")]
     pub reference: Vec<String>,
-    /// How references are chosen where --reference names none: random:K, nearest:K or maxf:K (those
-    /// with the most feature matches) of the frames within the radius of the query's known position
+    /// How references are chosen where --reference names none: random:K, nearest:K, maxf:K (those
+    /// with the most feature matches) or retrieve:K (those that the index of `posescope index` ranks
+    /// first) of the frames within the radius of the query's known position
     #[arg(
         long,
         value_name = "HOW",
@@ -97,6 +100,9 @@ pub struct RunArgs {
         conflicts_with = "reference"
     )]
     pub references: Selection,
+    /// The index that retrieve:K asks [default: where `posescope index` puts it]
+    #[arg(long, value_name = "FILE")]
+    pub index: Option<PathBuf>,
     /// How far the query may be from its reference: the disc that the direct methods search [m]
     #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
     pub radius: f64,
@@ -356,6 +362,35 @@ pub struct SynthArgs {
     /// Write into a folder that is not empty, replacing sequences of the same names
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct IndexArgs {
+    /// Where the frames are, as for `run`
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Number of visual words
+    #[arg(long, value_name = "N", default_value = "10000")]
+    pub words: NonZeroUsize,
+    /// Index every Nth frame only
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub every: NonZeroUsize,
+    /// The file to write [default: in the user's cache directory, where `run` finds it]
+    #[arg(long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Build it even if it is up to date, and replace whatever the file is
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Number of threads [default: one per core]; the index does not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
 }
 
 fn fusion(name: &str) -> Result<&'static fusion::Entry, String> {

@@ -31,6 +31,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
             all: false,
             reference: vec![REFERENCE.to_owned()],
             references: Selection::Random(1),
+            index: None,
             radius: 15.0,
             method: Method::ALL.to_vec(),
             fusion: None,

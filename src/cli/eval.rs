@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use posescope::evaluate::{
-    Change, ChoiceError, Comparison, Draw, Execution, Experiment, Gate, Pair, RUN_SCHEMA, Ranking,
-    Report, RunFile, RunFolder, Scenes, Selection, Tolerance, default_failure_radius_m,
-    default_prior_m, defaults, merge, read_rows, read_run, write_report,
+    Change, Comparison, Draw, Execution, Experiment, Gate, Pair, RUN_SCHEMA, Ranking, Report,
+    RunFile, RunFolder, Scenes, Selection, Tolerance, default_failure_radius_m, default_prior_m,
+    defaults, merge, read_rows, read_run, write_report,
 };
 use posescope::event::Method;
 use posescope::params::Params;
@@ -17,7 +17,7 @@ use super::failures::FailureRecordings;
 use super::output;
 use super::run::use_threads;
 use super::terminal::Terminal;
-use super::{diff, params};
+use super::{diff, index, params};
 
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
@@ -53,7 +53,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         queries: open_all(&args.queries, args)?,
     };
     let run = describe(args, &scenes, &params)?;
-    let indices = indices(&run)?;
+    let indices = indices(&run, &scenes, &params)?;
     let mut folder = if args.resume {
         RunFolder::resume(folder, &run)?
     } else {
@@ -82,11 +82,21 @@ fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>
 }
 
 /// Ranked references need an index of each scene.
-fn indices(run: &RunFile) -> Result<Vec<Box<dyn Ranking>>, CliError> {
-    match run.selection() {
-        Selection::Retrieved(_) => Err(ChoiceError::NoIndex.into()),
-        _ => Ok(Vec::new()),
-    }
+fn indices(
+    run: &RunFile,
+    scenes: &Scenes,
+    params: &Params,
+) -> Result<Vec<Box<dyn Ranking>>, CliError> {
+    let Selection::Retrieved(_) = run.selection() else {
+        return Ok(Vec::new());
+    };
+    let named = scenes.references.iter().zip(&run.scenes);
+    named
+        .map(|(scene, argument)| {
+            let index = index::open(None, scene.as_ref(), argument, params)?;
+            Ok(Box::new(index) as Box<dyn Ranking>)
+        })
+        .collect()
 }
 
 /// What is asked, with everything that was left open filled in.

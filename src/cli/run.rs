@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use posescope::evaluate::{Chooser, Localizer, QueryResult, Request};
+use posescope::evaluate::{Chooser, Localizer, QueryResult, Ranking, Request, Selection};
 use posescope::event::Method;
 use posescope::params::Params;
 use posescope::scene::{self, Scene};
@@ -14,7 +14,7 @@ use super::audience::Audience;
 use super::failure::CliError;
 use super::output::{self, JsonLines};
 use super::terminal::Terminal;
-use super::{params, table};
+use super::{index, params, table};
 
 /// What is asked of every query.
 struct Plan<'a> {
@@ -151,13 +151,22 @@ impl Plan<'_> {
             .iter()
             .map(|name| references.find(name))
             .collect::<Result<Vec<_>, _>>()?;
+        let index = match args.references {
+            Selection::Retrieved(_) if named.is_empty() => Some(index::open(
+                args.index.as_deref(),
+                references,
+                &args.scene,
+                self.params,
+            )?),
+            _ => None,
+        };
         let chooser = Chooser {
             localizer: &self.localizer,
             params: self.params,
             selection: args.references,
             radius_m: args.radius,
             seed: args.seed,
-            index: None,
+            index: index.as_ref().map(|index| index as &dyn Ranking),
         };
         wanted
             .into_iter()

@@ -1,5 +1,6 @@
 //! Choosing references by where they are.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::str::FromStr;
 
@@ -13,7 +14,7 @@ use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Query;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Retriever, Scene, SceneError};
 
 /// How references are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,14 +177,22 @@ impl Chooser<'_> {
     ) -> Result<Vec<usize>, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
-        let Some(place) = queries.pose(query) else {
-            return Err(ChoiceError::UnknownPosition {
-                query: name.clone(),
-            });
-        };
+        let place = queries.pose(query);
         let is_same_scene = references.name() == queries.name();
         let excluded = |frame| is_same_scene && frame == query || left_out(frame);
-        let mut within = frames_within(references, &place, self.radius_m, &excluded);
+        let mut within = match (place, self.selection) {
+            (Some(place), _) => frames_within(references, &place, self.radius_m, &excluded),
+            // What a place looks like is known even where nobody knows where it is.
+            (None, Selection::Retrieved(_)) => (0..references.frames().len())
+                .filter(|&frame| !excluded(frame) && references.has_cloud(frame))
+                .filter(|&frame| references.pose(frame).is_some())
+                .collect(),
+            (None, _) => {
+                return Err(ChoiceError::UnknownPosition {
+                    query: name.clone(),
+                });
+            }
+        };
         let count = self.selection.count();
         let ranked = |ranking: &dyn Ranking| -> Result<Vec<usize>, ChoiceError> {
             Ok(ranking.rank(&*queries.query(query)?, &within, count)?)
@@ -201,6 +210,20 @@ impl Chooser<'_> {
             }),
             Selection::Retrieved(_) => ranked(self.index.ok_or(ChoiceError::NoIndex)?),
         }
+    }
+}
+
+impl Ranking for Retriever {
+    fn rank(
+        &self,
+        query: &Query,
+        candidates: &[usize],
+        count: usize,
+    ) -> Result<Vec<usize>, SceneError> {
+        let candidates: HashSet<usize> = candidates.iter().copied().collect();
+        let retrieval = self.retrieve(&query.photo, |frame| candidates.contains(&frame));
+        let ranked = retrieval.ranked.into_iter().take(count);
+        Ok(ranked.map(|ranked| ranked.frame).collect())
     }
 }
 

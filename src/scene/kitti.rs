@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, Vector3};
 
 pub use writer::SequenceWriter;
 
-use super::{Entry, Scene, SceneError};
+use super::{Entry, Scene, SceneError, fingerprint};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, matrix_from_pose, pose_from_matrix};
@@ -113,6 +113,12 @@ impl KittiOdometry {
         })
     }
 
+    fn photo_path(&self, frame: usize) -> PathBuf {
+        self.folder
+            .join(&self.camera)
+            .join(format!("{}.png", self.frames[frame]))
+    }
+
     fn scan_path(&self, frame: usize) -> PathBuf {
         self.folder
             .join("velodyne")
@@ -159,10 +165,7 @@ impl Scene for KittiOdometry {
     }
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let path = self
-            .folder
-            .join(&self.camera)
-            .join(format!("{}.png", self.frames[frame]));
+        let path = self.photo_path(frame);
         let photo = Photo::read(&path).map_err(|source| SceneError::Image {
             path: path.clone(),
             source,
@@ -212,6 +215,15 @@ impl Scene for KittiOdometry {
                 self.camera_from_camera0.translation.vector,
             ]);
         read_scan(&path, &camera_from_velodyne)
+    }
+
+    /// With the sizes of the files: photos of the same size in bytes are hardly ever different ones,
+    /// and times change when data are copied.
+    fn fingerprint(&self) -> u64 {
+        let size = |frame| std::fs::metadata(self.photo_path(frame)).map_or(0, |file| file.len());
+        let sizes = (0..self.frames.len()).map(size);
+        let bytes: Vec<u8> = sizes.flat_map(u64::to_le_bytes).collect();
+        fingerprint(self, &bytes)
     }
 }
 

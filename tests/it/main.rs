@@ -11,6 +11,7 @@ mod frame_cache;
 mod kitti;
 mod real_pair;
 mod recording;
+mod retrieval;
 mod robust_pose;
 mod session;
 mod small_sequence;

@@ -10,7 +10,7 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
-use crate::scene::{Entry, Scene, SceneError};
+use crate::scene::{Entry, Scene, SceneError, fingerprint};
 
 pub(in crate::scene) const ENTRY: Entry = Entry {
     name: "street",
@@ -181,6 +181,10 @@ impl Scene for Street {
         let key = self.frame_key(frame, "cloud");
         let cloud = self.cache.clouds.get_or_make(&key, make);
         Ok(Cloud::clone(&cloud))
+    }
+
+    fn fingerprint(&self) -> u64 {
+        fingerprint(self, self.key.as_bytes())
     }
 }
 

@@ -1,0 +1,109 @@
+//! `posescope index`: the retrieval index of a scene.
+
+use std::path::{Path, PathBuf};
+
+use posescope::params::Params;
+use posescope::retrieval::{BuildError, Index, IndexError, Progress};
+use posescope::scene::{self, IndexOptions, Retriever, Scene};
+
+use super::args::IndexArgs;
+use super::failure::CliError;
+use super::params;
+use super::run::use_threads;
+use super::terminal::Terminal;
+
+/// Runs the command. An index that is there and what is asked for is left as it is.
+pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
+    use_threads(args.threads)?;
+    let params = params::resolve(&args.config)?;
+    let scene = scene::open(&args.scene, args.format.as_deref())?;
+    let path = path(args.output.as_deref(), scene.as_ref(), &args.scene)?;
+    let options = IndexOptions {
+        words: args.words.get(),
+        every: args.every.get(),
+        seed: args.seed,
+    };
+    let request = Retriever::request(scene.as_ref(), &options, &params);
+    if !args.force {
+        let there = Index::open(&path, params.retrieval.checks);
+        match there.and_then(|index| index.check_request(&request)) {
+            Ok(()) => {
+                say(terminal, || {
+                    format!("{}: up to date; --force builds it again", path.display())
+                });
+                return Ok(());
+            }
+            Err(IndexError::NotFound { .. }) => {}
+            // Ours, so it may be replaced; anything else may be dear to somebody.
+            Err(
+                error @ (IndexError::Stale { .. }
+                | IndexError::Damaged { .. }
+                | IndexError::Version { .. }),
+            ) => say(terminal, || format!("{error}; building it again")),
+            Err(error) => return Err(CliError::Usage(format!("{error}; --force replaces it"))),
+        }
+    }
+    let bar = terminal.bar(0);
+    let built = Retriever::build(scene.as_ref(), &path, &request, &params, |progress| {
+        let Progress { step, done, total } = progress;
+        bar.set_message(step.name());
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    let summary = built.map_err(|error| match error {
+        BuildError::Frame(error) => CliError::Scene(error),
+        BuildError::Io { path, source } => CliError::Io { path, source },
+        BuildError::TooFewDescriptors { .. } => {
+            CliError::Usage(format!("{}: {error}; see --words", scene.name()))
+        }
+    })?;
+    say(terminal, || {
+        format!(
+            "{} frames, {} features, {} words, {:.1} MB: {}",
+            summary.frames,
+            summary.features,
+            summary.words,
+            summary.bytes as f64 / 1e6,
+            path.display()
+        )
+    });
+    Ok(())
+}
+
+/// Opens the index of a scene, or says which command builds it.
+pub fn open(
+    given: Option<&Path>,
+    scene: &dyn Scene,
+    argument: &str,
+    params: &Params,
+) -> Result<Retriever, CliError> {
+    let path = path(given, scene, argument)?;
+    Retriever::open(&path, scene, params).map_err(|source| {
+        let output = given.map_or(String::new(), |path| {
+            format!(" --output {}", path.display())
+        });
+        CliError::Index {
+            source,
+            command: format!("posescope index {argument}{output}"),
+        }
+    })
+}
+
+fn path(given: Option<&Path>, scene: &dyn Scene, argument: &str) -> Result<PathBuf, CliError> {
+    let path = given.map(Path::to_owned);
+    path.or_else(|| Retriever::default_path(scene, argument))
+        .ok_or_else(|| {
+            CliError::Usage(
+                "there is no cache directory for the retrieval index; name a file with --output \
+                 of `posescope index` and --index of `posescope run`"
+                    .to_owned(),
+            )
+        })
+}
+
+fn say(terminal: &Terminal, message: impl FnOnce() -> String) {
+    if !terminal.is_quiet() {
+        eprintln!("{}", message());
+    }
+}

@@ -1,0 +1,355 @@
+//! Building an index with little memory: features are made once, wait on disk, and are turned into
+//! words as a stream.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, Read, Seek as _, Write};
+use std::path::Path;
+
+use rand::SeedableRng as _;
+use rand::seq::index;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::error::BuildError;
+use super::layout::{Counts, Description, IndexedFeature, Writer};
+use super::tf_idf::Occurrences;
+use super::vocabulary::{Clustering, Vocabulary};
+use crate::features::{Descriptor, Features};
+use crate::files::write_whole_with;
+
+/// Frames that are worked on at a time; all their features are in memory.
+const BATCH: usize = 16;
+/// Numbers of a feature that waits on disk: x, y, scale, angle, descriptor.
+const NUMBERS: usize = 4 + 64;
+
+/// What is to be indexed, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// The scene's name.
+    pub scene: String,
+    /// Changes with the scene's frames.
+    pub fingerprint: u64,
+    /// The positions of the frames in the scene.
+    pub frames: Vec<usize>,
+    /// Number of visual words.
+    pub words: usize,
+    /// Of every random choice.
+    pub seed: u64,
+    /// As in [`super::RetrievalParams`].
+    pub sample: usize,
+    /// As in [`super::RetrievalParams`].
+    pub iterations: usize,
+    /// As in [`super::RetrievalParams`].
+    pub trees: usize,
+    /// As in [`super::RetrievalParams`].
+    pub checks: usize,
+    /// All that decides what the index holds, by name; kept with it and compared when it is used.
+    pub recipe: BTreeMap<String, String>,
+}
+
+/// A part of the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Features of each frame.
+    Features,
+    /// Rounds of k-means.
+    Vocabulary,
+    /// The words of each frame.
+    Words,
+}
+
+impl Step {
+    /// What is being done.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Features => "features",
+            Self::Vocabulary => "vocabulary",
+            Self::Words => "words",
+        }
+    }
+}
+
+/// How far the work is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// The part.
+    pub step: Step,
+    /// Of the part.
+    pub done: usize,
+    /// Of the part; k-means may settle sooner.
+    pub total: usize,
+}
+
+/// What came of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// Frames in the index.
+    pub frames: usize,
+    /// Their features.
+    pub features: usize,
+    /// Visual words.
+    pub words: usize,
+    /// Size of the file.
+    pub bytes: u64,
+}
+
+/// Builds an index and writes it to a file, whole or not at all.
+///
+/// The bytes depend on the request and the features only, not on the number of threads. Beside the
+/// features of a batch of frames, memory holds the sample that the vocabulary is learnt from and 8
+/// bytes per feature.
+///
+/// # Errors
+/// [`BuildError`]: a frame's own, a vocabulary too large for the features, or a file that cannot be
+/// written.
+pub fn build<E: std::error::Error + Send + 'static>(
+    path: &Path,
+    request: &Request,
+    features_of: impl Fn(usize) -> Result<Features, E> + Sync,
+    mut progress: impl FnMut(Progress),
+) -> Result<Summary, BuildError<E>> {
+    let io = |source| BuildError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let folder = match path.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
+        Some(folder) => folder,
+        None => Path::new("."),
+    };
+    fs::create_dir_all(folder).map_err(io)?;
+    let mut waiting = Waiting::new(folder).map_err(io)?;
+    let total = request.frames.len();
+    for batch in request.frames.chunks(BATCH) {
+        let features: Result<Vec<_>, _> =
+            batch.par_iter().map(|&frame| features_of(frame)).collect();
+        for features in features.map_err(BuildError::Frame)? {
+            waiting.push(&features).map_err(io)?;
+        }
+        let done = waiting.counts.len();
+        progress(Progress {
+            step: Step::Features,
+            done,
+            total,
+        });
+    }
+    let mut waiting = waiting.complete().map_err(io)?;
+    let found: usize = waiting.counts.iter().sum();
+    if found < request.words.max(1) {
+        return Err(BuildError::TooFewDescriptors {
+            found: found as u64,
+            words: request.words,
+        });
+    }
+    let vocabulary = learn(&mut waiting, request, &mut progress).map_err(io)?;
+    write_whole_with(path, |file| {
+        write(file, waiting, request, &vocabulary, &mut progress)
+    })
+    .map_err(io)?;
+    Ok(Summary {
+        frames: total,
+        features: found,
+        words: vocabulary.words().len(),
+        bytes: fs::metadata(path).map_err(io)?.len(),
+    })
+}
+
+/// A seed for one random choice.
+pub(super) fn seed_for(seed: u64, purpose: &str) -> u64 {
+    xxh3_64(format!("{seed}/retrieval/{purpose}").as_bytes())
+}
+
+/// Words from a sample of the descriptors, drawn without regard to frames.
+fn learn(
+    waiting: &mut Complete,
+    request: &Request,
+    progress: &mut impl FnMut(Progress),
+) -> io::Result<Vocabulary> {
+    let total: usize = waiting.counts.iter().sum();
+    let wanted = request.words.saturating_mul(request.sample.max(1));
+    let mut rng = Pcg64::seed_from_u64(seed_for(request.seed, "sample"));
+    let mut chosen = index::sample(&mut rng, total, wanted.min(total)).into_vec();
+    chosen.sort_unstable();
+    let mut sample = Vec::with_capacity(chosen.len());
+    let mut before = 0;
+    waiting.rewind()?;
+    for frame in 0..waiting.counts.len() {
+        let (_, descriptors) = waiting.next(frame)?;
+        let end = before + descriptors.len();
+        while let Some(&index) = chosen.get(sample.len())
+            && index < end
+        {
+            sample.push(descriptors[index - before]);
+        }
+        before = end;
+    }
+    let clustering = Clustering {
+        words: request.words,
+        iterations: request.iterations,
+        trees: request.trees,
+        checks: request.checks,
+        seed: seed_for(request.seed, "vocabulary"),
+    };
+    Ok(Vocabulary::learn(&sample, &clustering, |done| {
+        progress(Progress {
+            step: Step::Vocabulary,
+            done,
+            total: request.iterations,
+        });
+    }))
+}
+
+fn write(
+    file: &mut File,
+    mut waiting: Complete,
+    request: &Request,
+    vocabulary: &Vocabulary,
+    progress: &mut impl FnMut(Progress),
+) -> io::Result<()> {
+    let mut writer = Writer::new(BufWriter::new(file))?;
+    let mut counts = Counts {
+        documents: request.frames.len(),
+        words: vocabulary.words().len(),
+        ..Counts::default()
+    };
+    let mut occurrences = Occurrences::new(counts.words);
+    let mut starts = vec![0];
+    waiting.rewind()?;
+    for done in 0..counts.documents {
+        let (places, descriptors) = waiting.next(done)?;
+        let words = vocabulary.quantize(&descriptors);
+        let mut features: Vec<IndexedFeature> = words
+            .iter()
+            .zip(&places)
+            .filter_map(|(word, &[x, y, scale, angle])| {
+                Some(IndexedFeature {
+                    word: (*word)?,
+                    x,
+                    y,
+                    scale,
+                    angle,
+                })
+            })
+            .collect();
+        // Stable: of one word, the strongest stays first.
+        features.sort_by_key(|feature| feature.word);
+        for feature in &features {
+            writer.feature(feature)?;
+        }
+        let words: Vec<u32> = features.iter().map(|feature| feature.word).collect();
+        occurrences.push(&words);
+        counts.features += features.len();
+        starts.push(number(counts.features)?);
+        progress(Progress {
+            step: Step::Words,
+            done: done + 1,
+            total: counts.documents,
+        });
+    }
+    let frames = request.frames.iter().copied().chain([0]);
+    for (frame, start) in frames.zip(starts) {
+        writer.pair(number(frame)?, start.to_le_bytes())?;
+    }
+    for word in vocabulary.words() {
+        writer.word(word)?;
+    }
+    let inverted = occurrences.weighted();
+    for (list, idf) in inverted.lists.iter().zip(&inverted.idf) {
+        writer.pair(number(counts.postings)?, idf.to_le_bytes())?;
+        counts.postings += list.len();
+    }
+    writer.pair(number(counts.postings)?, 0_f32.to_le_bytes())?;
+    for (document, weight) in inverted.lists.iter().flatten() {
+        writer.pair(*document, weight.to_le_bytes())?;
+    }
+    writer.finish(&Description {
+        scene: request.scene.clone(),
+        fingerprint: fingerprint_text(request.fingerprint),
+        recipe: request.recipe.clone(),
+        trees: request.trees,
+        seed: seed_for(request.seed, "vocabulary"),
+        counts,
+    })
+}
+
+/// As a description has it.
+pub(super) fn fingerprint_text(fingerprint: u64) -> String {
+    format!("{fingerprint:016x}")
+}
+
+/// As a record has it.
+fn number(count: usize) -> io::Result<u32> {
+    u32::try_from(count).map_err(|_| {
+        io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            format!("{count} is more than an index can hold"),
+        )
+    })
+}
+
+/// Features that wait on disk, in a file without a name.
+struct Waiting {
+    file: BufWriter<File>,
+    /// Features of each frame.
+    counts: Vec<usize>,
+}
+
+impl Waiting {
+    fn new(folder: &Path) -> io::Result<Self> {
+        Ok(Self {
+            file: BufWriter::new(tempfile::tempfile_in(folder)?),
+            counts: Vec::new(),
+        })
+    }
+
+    fn push(&mut self, features: &Features) -> io::Result<()> {
+        for (keypoint, descriptor) in features.keypoints.iter().zip(&features.descriptors) {
+            let place = [keypoint.x, keypoint.y, keypoint.scale, keypoint.angle];
+            for number in place.iter().chain(descriptor) {
+                self.file.write_all(&number.to_le_bytes())?;
+            }
+        }
+        self.counts
+            .push(features.keypoints.len().min(features.descriptors.len()));
+        Ok(())
+    }
+
+    fn complete(self) -> io::Result<Complete> {
+        Ok(Complete {
+            file: BufReader::new(self.file.into_inner()?),
+            counts: self.counts,
+        })
+    }
+}
+
+/// The features of all frames, to be read in their order.
+struct Complete {
+    file: BufReader<File>,
+    counts: Vec<usize>,
+}
+
+impl Complete {
+    fn rewind(&mut self) -> io::Result<()> {
+        self.file.rewind()
+    }
+
+    /// Places and descriptors of a frame, which must be the next.
+    fn next(&mut self, frame: usize) -> io::Result<(Vec<[f32; 4]>, Vec<Descriptor>)> {
+        let count = self.counts[frame];
+        let mut bytes = vec![0; count * NUMBERS * size_of::<f32>()];
+        self.file.read_exact(&mut bytes)?;
+        let (numbers, _) = bytes.as_chunks::<4>();
+        Ok(numbers
+            .chunks_exact(NUMBERS)
+            .map(|numbers| {
+                let number = |i: usize| f32::from_le_bytes(numbers[i]);
+                (
+                    std::array::from_fn(number),
+                    std::array::from_fn(|i| number(4 + i)),
+                )
+            })
+            .unzip())
+    }
+}

@@ -1,0 +1,202 @@
+//! Asking an index.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::build::{Request, fingerprint_text};
+use super::error::IndexError;
+use super::layout::{Description, Stored};
+use super::params::RetrievalParams;
+use super::tf_idf::query_weights;
+use super::verification::{Pair, Verification, verify};
+use super::vocabulary::Vocabulary;
+use crate::features::Features;
+
+/// Pairs of one word at most: a word that a wall of equal bricks has many times in both images says
+/// nothing about where each of them is.
+const PAIRS_PER_WORD: usize = 16;
+
+/// An indexed frame and how much it resembles the query.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ranked {
+    /// Its position in the scene.
+    pub frame: usize,
+    /// Cosine of the tf-idf weights, in 0 … 1.
+    pub score: f32,
+    /// What verification found; `None` where it found nothing or was not asked.
+    pub verified: Option<Verification>,
+}
+
+/// What the index answers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Retrieval {
+    /// The word of each feature of the query.
+    pub words: Vec<Option<u32>>,
+    /// The frames that share words with the query and are allowed: first those verified, by their
+    /// inliers, then the others by their scores.
+    pub ranked: Vec<Ranked>,
+}
+
+/// An index, open to queries from any thread.
+pub struct Index {
+    path: PathBuf,
+    stored: Stored,
+    vocabulary: Vocabulary,
+}
+
+impl Index {
+    /// Opens an index after checking every byte of it; its vocabulary comes into memory, the rest is
+    /// mapped.
+    ///
+    /// # Errors
+    /// [`IndexError`] when there is none, or it is damaged or of another layout.
+    pub fn open(path: &Path, checks: usize) -> Result<Self, IndexError> {
+        let stored = Stored::open(path)?;
+        let Description { trees, seed, .. } = *stored.description();
+        Ok(Self {
+            path: path.to_owned(),
+            vocabulary: Vocabulary::new(stored.words(), trees, checks, seed),
+            stored,
+        })
+    }
+
+    /// What the index was made from and how.
+    pub fn description(&self) -> &Description {
+        self.stored.description()
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the index is of this scene as it is now, and made as asked as far as `recipe` says.
+    ///
+    /// # Errors
+    /// [`IndexError::Stale`] names what differs.
+    pub fn check<'a>(
+        &self,
+        scene: &str,
+        fingerprint: u64,
+        recipe: impl IntoIterator<Item = (&'a String, &'a String)>,
+    ) -> Result<(), IndexError> {
+        let made = self.description();
+        let stale = |why| {
+            Err(IndexError::Stale {
+                path: self.path.clone(),
+                why,
+            })
+        };
+        if made.scene != scene {
+            return stale(format!("it is of {}, not of {scene}", made.scene));
+        }
+        if made.fingerprint != fingerprint_text(fingerprint) {
+            return stale(format!("the frames of {scene} have changed since"));
+        }
+        for (key, asked) in recipe {
+            let made = made.recipe.get(key).map_or("nothing", String::as_str);
+            if made != asked {
+                return stale(format!("it was made with {key} = {made}, not {asked}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether [`super::build`] would make the same index again.
+    ///
+    /// # Errors
+    /// [`IndexError::Stale`] names what differs.
+    pub fn check_request(&self, request: &Request) -> Result<(), IndexError> {
+        self.check(&request.scene, request.fingerprint, &request.recipe)
+    }
+
+    /// The frames that resemble the query most, of those that are allowed.
+    ///
+    /// Philbin et al. 2007: the words of the features (section 3.1), the cosine of tf-idf weights
+    /// from the inverted index (section 3), and the order of the best by the inliers of an affine
+    /// transform (section 4). A frame that shares no word of any weight is not ranked.
+    pub fn query(
+        &self,
+        features: &Features,
+        params: &RetrievalParams,
+        allowed: impl Fn(usize) -> bool,
+    ) -> Retrieval {
+        let words = self.vocabulary.quantize(&features.descriptors);
+        let mut by_word: Vec<(u32, u32)> = words
+            .iter()
+            .zip(0..)
+            .filter_map(|(word, feature)| Some(((*word)?, feature)))
+            .collect();
+        by_word.sort_unstable();
+        let sorted: Vec<u32> = by_word.iter().map(|(word, _)| *word).collect();
+        let mut scored = self.scored(&sorted, allowed);
+        scored.sort_unstable_by(|a, b| (b.1.total_cmp(&a.1)).then(a.0.cmp(&b.0)));
+        let tolerance = params.tolerance();
+        let verified: Vec<Option<Verification>> = scored
+            .par_iter()
+            .take(params.verify)
+            .map(|&(document, _)| verify(&self.pairs(features, &by_word, document), &tolerance))
+            .collect();
+        let mut ranked: Vec<Ranked> = scored
+            .into_iter()
+            .zip(verified.into_iter().chain(std::iter::repeat(None)))
+            .filter_map(|((document, score), verified)| {
+                Some(Ranked {
+                    frame: self.stored.frame(document)?,
+                    score,
+                    verified,
+                })
+            })
+            .collect();
+        // Stable: of as many inliers, or none, the better score stays first.
+        ranked.sort_by_key(|ranked| {
+            let inliers = ranked.verified.as_ref().map(|found| found.inliers);
+            std::cmp::Reverse(inliers)
+        });
+        Retrieval { words, ranked }
+    }
+
+    /// The allowed documents with a score.
+    fn scored(&self, words: &[u32], allowed: impl Fn(usize) -> bool) -> Vec<(usize, f32)> {
+        let mut scores = vec![0.0_f32; self.description().counts.documents];
+        for (word, weight) in query_weights(words, |word| self.stored.idf(word)) {
+            for (document, there) in self.stored.postings(word) {
+                if let Some(score) = scores.get_mut(document) {
+                    *score += weight * there;
+                }
+            }
+        }
+        scores
+            .into_iter()
+            .enumerate()
+            .filter(|(_, score)| *score > 0.0)
+            .filter(|(document, _)| self.stored.frame(*document).is_some_and(&allowed))
+            .collect()
+    }
+
+    /// The features of query and document that share a word, those of one query feature together.
+    fn pairs(&self, features: &Features, by_word: &[(u32, u32)], document: usize) -> Vec<Pair> {
+        let theirs: Vec<_> = self.stored.features(document).collect();
+        let mut theirs = theirs.chunk_by(|a, b| a.word == b.word).peekable();
+        let mut pairs = Vec::new();
+        for ours in by_word.chunk_by(|a, b| a.0 == b.0) {
+            let word = ours[0].0;
+            while theirs.next_if(|run| run[0].word < word).is_some() {}
+            let Some(run) = theirs.next_if(|run| run[0].word == word) else {
+                continue;
+            };
+            if ours.len() * run.len() > PAIRS_PER_WORD {
+                continue;
+            }
+            for &(_, query) in ours {
+                pairs.extend(run.iter().map(|feature| Pair {
+                    query,
+                    query_keypoint: features.keypoints[query as usize],
+                    reference_keypoint: feature.keypoint(),
+                }));
+            }
+        }
+        pairs
+    }
+}

@@ -1,0 +1,133 @@
+//! Retrieval in a scene: from photos to an index, and from a photo to the frames that resemble it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::{Scene, SceneError};
+use crate::cache::user_folder;
+use crate::features::{SurfParams, surf};
+use crate::image::Photo;
+use crate::params::Params;
+use crate::retrieval::{
+    BuildError, Index, IndexError, Progress, Request, Retrieval, RetrievalParams, Summary, build,
+};
+
+/// The extension of the files.
+const EXTENSION: &str = "posescope-index";
+
+/// What is asked of an index beside the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IndexOptions {
+    /// Number of visual words.
+    pub words: usize,
+    /// Every Nth frame is indexed, from 1.
+    pub every: usize,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+/// A scene's index.
+pub struct Retriever {
+    index: Index,
+    surf: SurfParams,
+    params: RetrievalParams,
+}
+
+impl Retriever {
+    /// Where the index of a scene is unless the user says otherwise: in the user's cache directory,
+    /// by the scene's name and the folder that the argument names. `None` where there is no such
+    /// directory or it is turned off.
+    pub fn default_path(scene: &dyn Scene, argument: &str) -> Option<PathBuf> {
+        let mut name: String = scene
+            .name()
+            .chars()
+            .map(|c| if c.is_alphanumeric() { c } else { '-' })
+            .collect();
+        if let Ok(folder) = Path::new(argument).canonicalize() {
+            let hash = xxh3_64(folder.as_os_str().as_encoded_bytes());
+            name.push_str(&format!("-{hash:016x}"));
+        }
+        Some(user_folder("index")?.join(name).with_extension(EXTENSION))
+    }
+
+    /// What the index of a scene is to hold.
+    pub fn request(scene: &dyn Scene, options: &IndexOptions, params: &Params) -> Request {
+        let IndexOptions { words, every, seed } = *options;
+        let mut recipe = recipe(params, &RetrievalParams::BUILDING);
+        let numbers = [("words", words), ("every", every)];
+        recipe.extend(numbers.map(|(key, value)| (key.to_owned(), value.to_string())));
+        recipe.insert("seed".to_owned(), seed.to_string());
+        Request {
+            scene: scene.name().to_owned(),
+            fingerprint: scene.fingerprint(),
+            frames: (0..scene.frames().len()).step_by(every.max(1)).collect(),
+            words,
+            seed,
+            sample: params.retrieval.sample,
+            iterations: params.retrieval.iterations,
+            trees: params.retrieval.trees,
+            checks: params.retrieval.checks,
+            recipe,
+        }
+    }
+
+    /// Builds an index of the scene's photos.
+    ///
+    /// # Errors
+    /// As [`build`]; of the frames, when a photo cannot be read.
+    pub fn build(
+        scene: &dyn Scene,
+        path: &Path,
+        request: &Request,
+        params: &Params,
+        progress: impl FnMut(Progress),
+    ) -> Result<Summary, BuildError<SceneError>> {
+        let features = params.retrieval.surf(&params.surf);
+        let features_of = |frame| Ok(surf(&scene.photo(frame)?.gray, &features));
+        build(path, request, features_of, progress)
+    }
+
+    /// Opens the index of a scene.
+    ///
+    /// # Errors
+    /// [`IndexError`] when there is none, it is damaged, or it is of other frames or features than
+    /// the scene and the parameters have now.
+    pub fn open(path: &Path, scene: &dyn Scene, params: &Params) -> Result<Self, IndexError> {
+        let index = Index::open(path, params.retrieval.checks)?;
+        // The vocabulary may be of any kind, but features of another kind have other words.
+        let features = recipe(params, &["features"]);
+        index.check(scene.name(), scene.fingerprint(), &features)?;
+        Ok(Self {
+            index,
+            surf: params.retrieval.surf(&params.surf),
+            params: params.retrieval,
+        })
+    }
+
+    /// The frames that resemble a photo, of those that are allowed.
+    pub fn retrieve(&self, photo: &Photo, allowed: impl Fn(usize) -> bool) -> Retrieval {
+        let features = surf(&photo.gray, &self.surf);
+        self.index.query(&features, &self.params, allowed)
+    }
+
+    /// The index.
+    pub fn index(&self) -> &Index {
+        &self.index
+    }
+}
+
+/// The parameters of the features, and some of retrieval.
+fn recipe(params: &Params, retrieval: &[&str]) -> BTreeMap<String, String> {
+    params
+        .list()
+        .into_iter()
+        .filter(|row| match row.key.split_once('.') {
+            Some(("surf", _)) => true,
+            Some(("retrieval", name)) => retrieval.contains(&name),
+            _ => false,
+        })
+        .map(|row| (row.key, row.value.to_string()))
+        .collect()
+}
