@@ -78,6 +78,7 @@ fn record_instead(
                 .map(|&frame| setup.references.frames()[frame].clone())
                 .collect(),
             references: Selection::Random(1),
+            index: None,
             radius: setup.uncertainty_radius_m,
             method: setup.methods.clone(),
             fusion: None,

@@ -185,7 +185,7 @@ impl Consensus<'_> {
 mod tests {
     use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
-    use rand::{RngExt as _, SeedableRng as _};
+    use rand::SeedableRng as _;
     use rand_pcg::Pcg64;
 
     use super::*;
