@@ -121,10 +121,9 @@ fn near_pixel(picture: &image::RgbaImage, x: f64, y: f64) -> Color32 {
 #[test]
 fn points_are_drawn_where_the_lens_sees_them_and_the_nearer_one_wins() {
     let Some(card) = Card::any() else { return };
-    let mut picture = Picture::default();
     let places = (
-        4.0..316.0,
-        4.0..236.0,
+        4.0..316.0_f64,
+        4.0..236.0_f64,
         1.0..80.0_f64,
         0.05..0.5_f64,
         prop::bool::ANY,
@@ -143,6 +142,7 @@ fn points_are_drawn_where_the_lens_sees_them_and_the_nearer_one_wins() {
                 color: RED,
             };
             let points = if first { [near, far] } else { [far, near] };
+            let mut picture = Picture::default();
             card.draw(&mut picture, &frame(&points, Vec::new()));
             prop_assert_eq!(picture.trouble(), None);
             let pixels = card.pixels(&picture);
