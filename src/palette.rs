@@ -34,6 +34,12 @@ pub(crate) fn viridis(value: f64) -> Rgb {
     on(colorous::VIRIDIS, value)
 }
 
+/// Turbo, for depths and heights: from dark blue (0) over green to dark red (1).
+#[cfg(feature = "app")]
+pub(crate) fn turbo(value: f64) -> Rgb {
+    on(colorous::TURBO, value)
+}
+
 /// From blue (−1) over white (0) to vermillion (1).
 pub(crate) fn diverging(value: f64) -> Rgb {
     let end = if value < 0.0 { REFERENCE } else { ESTIMATE };

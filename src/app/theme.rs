@@ -39,6 +39,11 @@ pub fn viridis(value: f64) -> Color32 {
     rgb(palette::viridis(value))
 }
 
+/// Turbo, for depths and heights: 0 the least, 1 the greatest.
+pub fn turbo(value: f64) -> Color32 {
+    rgb(palette::turbo(value))
+}
+
 pub(super) fn install(ctx: &egui::Context) {
     // The font for text has no arrows and no shapes; that for code has.
     let mut fonts = egui::FontDefinitions::default();

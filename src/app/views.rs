@@ -8,6 +8,7 @@ mod log;
 mod parameters;
 mod queries;
 mod report;
+mod space;
 
 use eframe::egui_wgpu::RenderState;
 
@@ -55,6 +56,12 @@ pub const ALL: &[Entry] = &[
         title: "Breakpoints",
         about: "where a run is to stop",
         new: |_| Box::<breakpoints::BreakpointList>::default(),
+    },
+    Entry {
+        name: "space",
+        title: "3-D",
+        about: "cloud, cameras, rays and costs in space",
+        new: |state| Box::new(space::Space::new(state)),
     },
     Entry {
         name: "report",

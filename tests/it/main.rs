@@ -15,6 +15,7 @@ mod retrieval;
 mod robust_pose;
 mod session;
 mod small_sequence;
+mod space;
 mod surf_warp;
 mod synth;
 mod two_walls;

@@ -1,0 +1,238 @@
+//! The cameras of the scene: the reference's, the estimates, the true one, that in hand.
+
+use egui::Color32;
+use nalgebra::{Point2, Point3};
+
+use super::gpu::Line;
+use super::site::{Site, spot};
+use super::story::{FeatureStory, SearchStory};
+use crate::app::{Scope, theme};
+use crate::camera::Intrinsics;
+use crate::event::Method;
+use crate::geometry::{Pose, PoseError};
+
+/// Whose camera it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Who {
+    Reference,
+    Truth,
+    Estimate(Method),
+    /// The best pose of a method that is still at work.
+    BestSoFar(Method),
+    /// The camera in hand.
+    Hand,
+    /// The pose under the pointer, in another view.
+    Pointer,
+}
+
+impl Who {
+    /// All that one may want to look through, in the order of the buttons.
+    pub(super) const TO_LOOK_THROUGH: [Self; 7] = [
+        Self::Reference,
+        Self::Truth,
+        Self::Estimate(Method::Feature),
+        Self::Estimate(Method::Photometric),
+        Self::Estimate(Method::MutualInformation),
+        Self::Estimate(Method::Hybrid),
+        Self::Hand,
+    ];
+
+    /// The name on a button.
+    pub(super) fn name(self) -> String {
+        match self {
+            Self::Reference => "Reference".to_owned(),
+            Self::Truth => "Truth".to_owned(),
+            Self::Estimate(method) => method.name().to_uppercase(),
+            Self::BestSoFar(method) => format!("{}, best so far", method.name().to_uppercase()),
+            Self::Hand => "In hand".to_owned(),
+            Self::Pointer => "Under the pointer".to_owned(),
+        }
+    }
+
+    /// Its shape: no two cameras are told apart by colour alone.
+    pub(super) fn shape(self) -> &'static str {
+        match self {
+            Self::Reference => "○",
+            Self::Truth => "×",
+            Self::Estimate(method) | Self::BestSoFar(method) => match method {
+                Method::Feature => "●",
+                Method::Photometric => "▲",
+                Method::MutualInformation => "■",
+                Method::Hybrid => "◆",
+            },
+            Self::Hand => "▶",
+            Self::Pointer => "↓",
+        }
+    }
+
+    pub(super) fn color(self) -> Color32 {
+        match self {
+            Self::Reference => theme::REFERENCE,
+            Self::Truth => theme::TRUTH,
+            Self::Estimate(_) | Self::BestSoFar(_) => theme::ESTIMATE,
+            Self::Hand | Self::Pointer => theme::CAMERA,
+        }
+    }
+
+    /// Frusta at the same place are nested, not on top of each other.
+    fn size(self) -> f64 {
+        match self {
+            Self::Reference | Self::Hand => 1.0,
+            Self::Truth => 1.24,
+            Self::Estimate(method) => 1.0 + 0.08 * f64::from(method as u8),
+            Self::BestSoFar(_) | Self::Pointer => 0.7,
+        }
+    }
+
+    fn stroke_width(self) -> f32 {
+        match self {
+            Self::Reference | Self::Truth | Self::Estimate(_) => 2.0,
+            Self::Hand => 3.0,
+            Self::BestSoFar(_) | Self::Pointer => 1.0,
+        }
+    }
+
+    /// Whether it takes the query photo; the reference camera took the reference photo.
+    pub(super) fn is_query(self) -> bool {
+        self != Self::Reference
+    }
+}
+
+/// A camera somewhere in the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Camera {
+    pub(super) who: Who,
+    /// `world_from_camera`.
+    pub(super) world: Pose,
+    pub(super) scene_from_camera: Pose,
+    pub(super) intrinsics: Intrinsics,
+    /// How far the image plane is drawn from the centre \[m\].
+    pub(super) depth_m: f64,
+    /// Where it is and how good, in words.
+    pub(super) about: String,
+}
+
+impl Camera {
+    pub(super) fn centre(&self) -> Point3<f64> {
+        self.scene_from_camera.translation.vector.into()
+    }
+
+    /// The corners of its image, from the upper left one clockwise.
+    pub(super) fn corners(&self) -> [Point3<f64>; 4] {
+        let (right, below) = (
+            f64::from(self.intrinsics.width) - 0.5,
+            f64::from(self.intrinsics.height) - 0.5,
+        );
+        [(-0.5, -0.5), (right, -0.5), (right, below), (-0.5, below)].map(|(x, y)| {
+            let seen = self.intrinsics.unproject(&Point2::new(x, y), self.depth_m);
+            self.scene_from_camera * seen
+        })
+    }
+
+    /// The frustum, with a roof that shows where up is.
+    pub(super) fn lines(&self) -> Vec<Line> {
+        let centre = self.centre();
+        let corners = self.corners();
+        let middle = nalgebra::center(&corners[0], &corners[1]);
+        let up = 0.35 * (corners[0] - corners[3]);
+        let roof = middle + up;
+        let line = |from: Point3<f64>, to: Point3<f64>| Line {
+            ends: [spot(&from), spot(&to)],
+            color: self.who.color(),
+            width: self.who.stroke_width(),
+        };
+        let mut lines = Vec::with_capacity(10);
+        for side in 0..4 {
+            lines.push(line(centre, corners[side]));
+            lines.push(line(corners[side], corners[(side + 1) % 4]));
+        }
+        lines.push(line(corners[0], roof));
+        lines.push(line(roof, corners[1]));
+        lines
+    }
+}
+
+/// Every camera there is at the cursor.
+pub(super) fn cameras(
+    scope: &Scope<'_>,
+    site: &Site,
+    features: &FeatureStory<'_>,
+    search: &SearchStory<'_>,
+) -> Vec<Camera> {
+    let Some(problem) = scope.problem() else {
+        return Vec::new();
+    };
+    let truth = scope.truth();
+    let camera = |who: Who, world: Pose| {
+        let offset = site.offset(&world);
+        let mut about = format!(
+            "{:.2} m right, {:.2} m ahead, {:.2}° left of the reference",
+            offset.right_m,
+            offset.forward_m,
+            offset.yaw_rad.to_degrees()
+        );
+        if let Some(truth) = truth
+            && who != Who::Truth
+        {
+            let error = PoseError::between(truth, &world);
+            about.push_str(&format!(
+                "; {:.2} m and {:.2}° from the truth",
+                error.translation_m, error.rotation_deg
+            ));
+        }
+        Camera {
+            who,
+            world,
+            scene_from_camera: site.scene_from_world * world,
+            intrinsics: match who.is_query() {
+                true => problem.query.intrinsics,
+                false => problem.reference.intrinsics,
+            },
+            depth_m: who.size() * site.camera_m(),
+            about,
+        }
+    };
+    let mut all = vec![camera(Who::Reference, problem.reference.world_from_camera)];
+    all.extend(truth.map(|pose| camera(Who::Truth, *pose)));
+    for method in Method::ALL {
+        if let Some(pose) = estimate(scope, method) {
+            all.push(camera(Who::Estimate(method), pose));
+        }
+    }
+    all.extend(
+        best_so_far(scope, features, search).map(|(method, reference_from_query)| {
+            let pose = problem.world_from_query(&reference_from_query);
+            camera(Who::BestSoFar(method), pose)
+        }),
+    );
+    all.extend(scope.desk.hovered.map(|pose| camera(Who::Pointer, pose)));
+    all.extend(scope.desk.camera.map(|pose| camera(Who::Hand, pose)));
+    all
+}
+
+/// The estimate of a method: of that at the cursor only once the cursor has come to its end.
+fn estimate(scope: &Scope<'_>, method: Method) -> Option<Pose> {
+    let (span, cursor) = scope.of(method)?;
+    (cursor + 1 >= span.records.end)
+        .then(|| scope.estimate(method))
+        .flatten()
+}
+
+/// Where the estimator at the cursor stands, in the reference camera's frame, until it has ended.
+fn best_so_far(
+    scope: &Scope<'_>,
+    features: &FeatureStory<'_>,
+    search: &SearchStory<'_>,
+) -> Option<(Method, Pose)> {
+    let span = scope.span()?;
+    if span.result.is_some() && scope.cursor + 1 >= span.records.end {
+        return None;
+    }
+    let by_search = search.path.last().map(|best| best.reference_from_camera());
+    let best = match span.method {
+        Method::Feature => features.reference_from_query,
+        Method::Photometric | Method::MutualInformation => by_search,
+        Method::Hybrid => by_search.or(features.reference_from_query),
+    };
+    Some((span.method, best?))
+}

@@ -1,0 +1,172 @@
+//! The bars above the picture: what is shown, where one looks from, where the camera goes.
+
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{PopupCloseBehavior, RichText, Slider, Ui};
+
+use super::cameras::{Camera, Who};
+use super::cloud::Coloring;
+use crate::app::camera::Place;
+use crate::app::{Command, Scope, shortcuts};
+
+/// What is shown.
+#[derive(Clone, Debug)]
+pub(super) struct Layers {
+    pub(super) cloud: bool,
+    pub(super) coloring: Coloring,
+    pub(super) cost: bool,
+    pub(super) relief: bool,
+    pub(super) path: bool,
+    pub(super) rays: bool,
+    pub(super) grid: bool,
+    /// How much of the photo covers what one sees through its camera.
+    pub(super) photo: f32,
+}
+
+impl Default for Layers {
+    fn default() -> Self {
+        Self {
+            cloud: true,
+            coloring: Coloring::default(),
+            cost: true,
+            relief: false,
+            path: true,
+            rays: true,
+            grid: true,
+            photo: 0.25,
+        }
+    }
+}
+
+/// What a button asks of the view itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Wish {
+    /// The first look.
+    Reset,
+    /// From above.
+    Top,
+    /// Through a camera.
+    Through(Who),
+    /// Blink, or stop to.
+    Blink,
+}
+
+/// Where one looks from.
+pub(super) fn looks(
+    ui: &mut Ui,
+    layers: &mut Layers,
+    cameras: &[Camera],
+    through: Option<Who>,
+) -> Option<Wish> {
+    let mut wish = None;
+    let mut button = |ui: &mut Ui, text: &str, help: &str, wanted: Wish| {
+        if ui.button(text).on_hover_text(help).clicked() {
+            wish = Some(wanted);
+        }
+    };
+    layers_menu(ui, layers);
+    let help = "From behind and above. Drag to turn, with Shift or the right button to shift, wheel to zoom";
+    button(ui, "Reset view", help, Wish::Reset);
+    button(ui, "Top", "From straight above", Wish::Top);
+    ui.weak("through");
+    for who in Who::TO_LOOK_THROUGH {
+        let camera = cameras.iter().find(|camera| camera.who == who);
+        let text = format!("{} {}", who.shape(), who.name());
+        let selected = through == Some(who);
+        let response = ui.add_enabled(
+            camera.is_some() || selected,
+            egui::Button::selectable(selected, text),
+        );
+        let response = match camera {
+            Some(camera) => response.on_hover_text(format!("Look through it\n{}", camera.about)),
+            None => response.on_disabled_hover_text("There is no such pose at this step"),
+        };
+        if response.clicked() {
+            wish = Some(Wish::Through(who));
+        }
+    }
+    if through.is_some() {
+        let slider = Slider::new(&mut layers.photo, 0.0..=1.0)
+            .show_value(false)
+            .text("photo");
+        ui.add(slider)
+            .on_hover_text("How much of the photo lies over the cloud");
+    }
+    wish
+}
+
+fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    MenuButton::new("Layers").config(config).ui(ui, |ui| {
+        ui.checkbox(&mut layers.cloud, "Cloud");
+        ui.horizontal(|ui| {
+            ui.add_space(18.0);
+            for coloring in Coloring::ALL {
+                ui.add_enabled_ui(layers.cloud, |ui| {
+                    ui.selectable_value(&mut layers.coloring, coloring, coloring.name());
+                });
+            }
+        });
+        ui.checkbox(&mut layers.cost, "Cost on the ground");
+        ui.add_enabled(
+            layers.cost,
+            egui::Checkbox::new(&mut layers.relief, "Cost as height"),
+        );
+        ui.checkbox(&mut layers.path, "Way of the search");
+        ui.checkbox(&mut layers.rays, "Rays to lifted points");
+        ui.checkbox(&mut layers.grid, "Grid");
+    });
+}
+
+/// Where the camera in hand goes.
+pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish> {
+    let keys = shortcuts();
+    ui.weak("camera to");
+    for place in Place::ALL {
+        let command = Command::JumpCamera(place);
+        let key = keys.iter().find(|shortcut| shortcut.command == command);
+        let key = key.map_or(String::new(), |shortcut| {
+            ui.ctx().format_shortcut(&shortcut.keys)
+        });
+        let is_there =
+            scope.desk.place(place).is_some() && (place != Place::Truth || scope.desk.shows_truth);
+        let mut text = egui::text::LayoutJob::default();
+        let style = ui.style();
+        RichText::new(place.name()).append_to(
+            &mut text,
+            style,
+            egui::FontSelection::Default,
+            egui::Align::Center,
+        );
+        RichText::new(format!(" {key}")).weak().small().append_to(
+            &mut text,
+            style,
+            egui::FontSelection::Default,
+            egui::Align::Center,
+        );
+        let response = ui.add_enabled(is_there, egui::Button::new(text));
+        let response = response.on_disabled_hover_text("There is no such pose at this step");
+        if response.clicked() {
+            scope.send(command);
+        }
+    }
+    let mut wish = None;
+    let can_blink = scope.desk.camera.is_some() && scope.desk.place(Place::Last).is_some();
+    let response = ui.add_enabled(
+        can_blink || blinks,
+        egui::Button::selectable(blinks, "Blink poses"),
+    );
+    let help = "Change between this pose and the last one, again and again";
+    if response
+        .on_hover_text(help)
+        .on_disabled_hover_text("Jump to two poses first")
+        .clicked()
+    {
+        wish = Some(Wish::Blink);
+    }
+    let release = ui.add_enabled(scope.desk.camera.is_some(), egui::Button::new("Let go"));
+    let release = release.on_hover_text("Put the camera in hand away (Esc)");
+    if release.clicked() {
+        scope.send(Command::TakeCamera(None));
+    }
+    wish
+}

@@ -1,0 +1,273 @@
+//! How the view projects: an eye in the scene, and where in the pane it sees what.
+
+use egui::{Pos2, Vec2, pos2};
+use nalgebra::{Point2, Point3, Unit, Vector3};
+
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+
+/// What is nearer to the eye than this is not drawn \[m\].
+pub(super) const NEAR_M: f64 = 0.05;
+
+/// A pinhole camera that looks at the scene, with the pane as its image.
+///
+/// Positions in the pane are in egui's points from its upper left corner; a pixel of a photo covers
+/// an area there, so that its centre lies half a pixel inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lens {
+    /// Where the eye is: x right, y down, z ahead, like every camera.
+    pub(super) scene_from_eye: Pose,
+    /// Focal lengths \[points\].
+    pub(super) focal: [f64; 2],
+    /// Where the optical axis meets the pane \[points\].
+    pub(super) centre: [f64; 2],
+    /// Size of the pane \[points\].
+    pub(super) size: Vec2,
+}
+
+impl Lens {
+    /// A lens with the optical axis in the middle, for a vertical angle of view.
+    pub(super) fn centred(scene_from_eye: Pose, vertical_rad: f64, size: Vec2) -> Self {
+        let focal = 0.5 * f64::from(size.y) / (0.5 * vertical_rad).tan();
+        Self {
+            scene_from_eye,
+            focal: [focal; 2],
+            centre: [0.5 * f64::from(size.x), 0.5 * f64::from(size.y)],
+            size,
+        }
+    }
+
+    /// The lens of a camera: its whole image in the middle of the pane, as large as fits.
+    pub(super) fn of_camera(scene_from_eye: Pose, intrinsics: &Intrinsics, size: Vec2) -> Self {
+        let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
+        let (across, down) = (f64::from(size.x), f64::from(size.y));
+        let scale = (across / width).min(down / height);
+        Self {
+            scene_from_eye,
+            focal: [scale * intrinsics.fx, scale * intrinsics.fy],
+            centre: [
+                scale * (intrinsics.cx + 0.5 - 0.5 * width) + 0.5 * across,
+                scale * (intrinsics.cy + 0.5 - 0.5 * height) + 0.5 * down,
+            ],
+            size,
+        }
+    }
+
+    /// The same eye with a longer or shorter focal length; what is seen at `fixed` stays there.
+    pub(super) fn magnified(self, factor: f64, fixed: Pos2) -> Self {
+        let about = [f64::from(fixed.x), f64::from(fixed.y)];
+        Self {
+            focal: self.focal.map(|focal| factor * focal),
+            centre: [0, 1].map(|axis| about[axis] + factor * (self.centre[axis] - about[axis])),
+            ..self
+        }
+    }
+
+    /// The same eye with its picture moved across the pane.
+    pub(super) fn shifted(self, by: Vec2) -> Self {
+        Self {
+            centre: [
+                self.centre[0] + f64::from(by.x),
+                self.centre[1] + f64::from(by.y),
+            ],
+            ..self
+        }
+    }
+
+    /// Where a point of the scene is seen; `None` where it is not in front of the eye.
+    pub(super) fn project(&self, point: &Point3<f64>) -> Option<Pos2> {
+        self.project_from_eye(&self.in_eye(point))
+    }
+
+    /// A point of the scene in the frame of the eye.
+    pub(super) fn in_eye(&self, point: &Point3<f64>) -> Point3<f64> {
+        self.scene_from_eye.inverse_transform_point(point)
+    }
+
+    /// Where a point in the frame of the eye is seen.
+    pub(super) fn project_from_eye(&self, point: &Point3<f64>) -> Option<Pos2> {
+        (point.z >= NEAR_M).then(|| {
+            pos2(
+                (self.focal[0] * point.x / point.z + self.centre[0]) as f32,
+                (self.focal[1] * point.y / point.z + self.centre[1]) as f32,
+            )
+        })
+    }
+
+    /// Where the pixel of a camera is seen that the eye looks through.
+    pub(super) fn place_pixel(&self, intrinsics: &Intrinsics, pixel: &Point2<f64>) -> Pos2 {
+        let seen = intrinsics.unproject(pixel, 1.0);
+        pos2(
+            (self.focal[0] * seen.x + self.centre[0]) as f32,
+            (self.focal[1] * seen.y + self.centre[1]) as f32,
+        )
+    }
+
+    /// The direction in which a place of the pane looks, in the scene.
+    pub(super) fn ray(&self, at: Pos2) -> Ray {
+        let in_eye = Vector3::new(
+            (f64::from(at.x) - self.centre[0]) / self.focal[0],
+            (f64::from(at.y) - self.centre[1]) / self.focal[1],
+            1.0,
+        );
+        Ray {
+            origin: self.scene_from_eye.translation.vector.into(),
+            direction: self.scene_from_eye.rotation * Unit::new_normalize(in_eye),
+        }
+    }
+
+    /// The projection as the graphics card takes it, column by column.
+    ///
+    /// The depth is `NEAR_M / z`: 1 at the near plane, 0 at infinity, so that a floating-point
+    /// depth buffer is equally sharp everywhere.
+    pub(super) fn clip_from_scene(&self) -> [[f32; 4]; 4] {
+        let (across, down) = (f64::from(self.size.x), f64::from(self.size.y));
+        let eye_from_scene = self.scene_from_eye.inverse().to_homogeneous();
+        #[rustfmt::skip]
+        let clip_from_eye = nalgebra::Matrix4::new(
+            2.0 * self.focal[0] / across, 0.0, 2.0 * self.centre[0] / across - 1.0, 0.0,
+            0.0, -2.0 * self.focal[1] / down, 1.0 - 2.0 * self.centre[1] / down, 0.0,
+            0.0, 0.0, 0.0, NEAR_M,
+            0.0, 0.0, 1.0, 0.0,
+        );
+        (clip_from_eye * eye_from_scene).cast::<f32>().into()
+    }
+}
+
+/// A half line in the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ray {
+    pub(super) origin: Point3<f64>,
+    pub(super) direction: Unit<Vector3<f64>>,
+}
+
+impl Ray {
+    /// Where the ray meets a plane; `None` where it does so behind its origin, in a flat angle or
+    /// beyond all that is of interest.
+    pub(super) fn meets(
+        &self,
+        in_plane: &Point3<f64>,
+        normal: &Unit<Vector3<f64>>,
+    ) -> Option<Point3<f64>> {
+        /// Sine of the least angle between ray and plane.
+        const FLATTEST: f64 = 0.01;
+        const FARTHEST_M: f64 = 1000.0;
+        let towards = normal.dot(&self.direction);
+        let distance = normal.dot(&(in_plane - self.origin)) / towards;
+        let is_sound = towards.abs() > FLATTEST && (0.0..FARTHEST_M).contains(&distance);
+        is_sound.then(|| self.origin + distance * self.direction.into_inner())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector4;
+    use proptest::prelude::*;
+
+    const KITTI: Intrinsics = Intrinsics {
+        fx: 718.856,
+        fy: 690.0,
+        cx: 607.1928,
+        cy: 185.2157,
+        width: 1241,
+        height: 376,
+    };
+
+    fn pose(shift: [f64; 3], turn: [f64; 3]) -> Pose {
+        Pose::new(shift.into(), turn.into())
+    }
+
+    /// Where the matrix puts a point, in points of the pane, and its depth.
+    fn by_matrix(lens: &Lens, point: &Point3<f64>) -> (Pos2, f32) {
+        let matrix = nalgebra::Matrix4::from(lens.clip_from_scene());
+        let clip = matrix * Vector4::from(point.to_homogeneous().cast::<f32>());
+        let [x, y] = [clip.x / clip.w, clip.y / clip.w];
+        let at = pos2(0.5 * (x + 1.0) * lens.size.x, 0.5 * (1.0 - y) * lens.size.y);
+        (at, clip.z / clip.w)
+    }
+
+    proptest! {
+        /// What a camera sees at a pixel, the view that looks through it shows there.
+        #[test]
+        fn looking_through_a_camera_shows_what_its_intrinsics_project(
+            x in -20.0..20.0, y in -5.0..5.0, z in 0.5..80.0,
+            shift in prop::array::uniform3(-50.0..50.0),
+            turn in prop::array::uniform3(-3.0..3.0),
+            size in (50.0_f32..2000.0, 50.0_f32..1500.0),
+        ) {
+            let scene_from_camera = pose(shift, turn);
+            let size = Vec2::from(size);
+            let lens = Lens::of_camera(scene_from_camera, &KITTI, size);
+            let in_camera = Point3::new(x, y, z);
+            let pixel = KITTI.project(&in_camera).expect("in front");
+            let scale = (size.x / 1241.0).min(size.y / 376.0);
+            // The image is centred; pixel centres lie half a pixel inside.
+            let expected = pos2(
+                0.5 * size.x + scale * (pixel.x as f32 + 0.5 - 620.5),
+                0.5 * size.y + scale * (pixel.y as f32 + 0.5 - 188.0),
+            );
+            let (seen, _) = by_matrix(&lens, &(scene_from_camera * in_camera));
+            // Half a pixel of the photo; far outside of the pane single precision is coarser.
+            let near = 0.5 * scale * (1.0 + 1e-3 * (expected - size.to_pos2()).length() / scale);
+            prop_assert!((seen - expected).length() < near, "{seen:?} {expected:?}");
+            let straight = lens.project(&(scene_from_camera * in_camera)).expect("in front");
+            prop_assert!((straight - expected).length() < near);
+            prop_assert!((lens.place_pixel(&KITTI, &pixel) - expected).length() < near);
+        }
+
+        /// A ray goes through all that is seen where it begins.
+        #[test]
+        fn a_ray_meets_the_ground_where_the_ground_is_seen(
+            x in -20.0..20.0, z in -20.0..20.0,
+            turn in -3.0..3.0_f64, down in 0.2..1.4_f64, height in 2.0..30.0_f64,
+        ) {
+            let eye = Pose::translation(1.0, -height, -3.0)
+                * crate::geometry::yaw(turn)
+                * nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -down);
+            let lens = Lens::centred(eye, 0.9, Vec2::new(640.0, 480.0));
+            let ground = Point3::new(x, 1.6, z);
+            if let Some(at) = lens.project(&ground)
+                && egui::Rect::from_min_size(Pos2::ZERO, lens.size).contains(at)
+                && let Some(met) = lens.ray(at).meets(&Point3::new(0.0, 1.6, 0.0), &Vector3::y_axis())
+            {
+                let far = (ground - lens.ray(at).origin).norm();
+                prop_assert!((met - ground).norm() < 1e-3 * far, "{met} {ground}");
+            }
+        }
+
+        #[test]
+        fn magnifying_keeps_what_is_under_the_pointer(
+            at in (0.0_f32..640.0, 0.0_f32..480.0), factor in 0.2..5.0,
+        ) {
+            let at = Pos2::from(at);
+            let before = Lens::of_camera(Pose::identity(), &KITTI, Vec2::new(640.0, 480.0));
+            let after = before.magnified(factor, at);
+            let seen = before.ray(at).direction.into_inner();
+            prop_assert!((after.ray(at).direction.into_inner() - seen).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_ray_that_leaves_the_ground_or_grazes_it_meets_nothing() {
+        let ground = Point3::new(0.0, 1.6, 0.0);
+        let up = Vector3::y_axis();
+        let ray = |x: f64, y: f64, z: f64| Ray {
+            origin: Point3::origin(),
+            direction: Unit::new_normalize(Vector3::new(x, y, z)),
+        };
+        assert!(ray(0.0, 1.0, 1.0).meets(&ground, &up).is_some());
+        assert_eq!(ray(0.0, -1.0, 1.0).meets(&ground, &up), None);
+        assert_eq!(ray(0.0, 1e-4, 1.0).meets(&ground, &up), None);
+        assert_eq!(ray(0.0, 0.0, 1.0).meets(&ground, &up), None);
+    }
+
+    #[test]
+    fn nearer_things_have_the_greater_depth() {
+        let lens = Lens::centred(Pose::identity(), 1.0, Vec2::new(100.0, 100.0));
+        let depth = |z: f64| by_matrix(&lens, &Point3::new(0.0, 0.0, z)).1;
+        assert!((depth(NEAR_M) - 1.0).abs() < 1e-6);
+        assert!(depth(1.0) > depth(1.001) && depth(900.0) > depth(901.0));
+        assert!(depth(1e6) > 0.0);
+    }
+}

@@ -1,0 +1,68 @@
+//! Rays from a camera to the points that FB lifted from the reference keypoints.
+
+use egui::Color32;
+use nalgebra::Point3;
+
+use super::gpu::Line;
+use super::site::Site;
+use super::story::FeatureStory;
+use crate::app::theme;
+use crate::event::FeatureState;
+
+/// The rays, and how many of each kind.
+#[derive(Default)]
+pub(super) struct Rays {
+    pub(super) lines: Vec<Line>,
+    pub(super) inliers: usize,
+    pub(super) outliers: usize,
+    pub(super) undecided: usize,
+}
+
+/// From the estimated camera; before there is one, from the reference camera that saw the points.
+/// Those of inliers are drawn through, those of outliers dashed. `selected` is drawn broad.
+pub(super) fn rays(site: &Site, story: &FeatureStory<'_>, selected: Option<usize>) -> Rays {
+    let centre = match &story.reference_from_query {
+        Some(pose) => Point3::from(pose.translation.vector),
+        None => Point3::origin(),
+    };
+    let mut rays = Rays::default();
+    for ray in story.rays() {
+        let is_selected = selected == Some(ray.query);
+        let (color, count) = match ray.is_inlier {
+            Some(true) => (inlier_color(), &mut rays.inliers),
+            Some(false) => (outlier_color(), &mut rays.outliers),
+            None => (theme::CAMERA, &mut rays.undecided),
+        };
+        *count += 1;
+        let (color, width) = match is_selected {
+            true => (color, 4.0),
+            false => (color.gamma_multiply(0.55), 1.0),
+        };
+        let along = |share: f64| site.spot(&(centre + share * (ray.point - centre)));
+        let mut piece = |from: f64, to: f64| {
+            rays.lines.push(Line {
+                ends: [along(from), along(to)],
+                color,
+                width,
+            });
+        };
+        if ray.is_inlier == Some(false) {
+            const DASHES: u32 = 12;
+            for dash in 0..DASHES {
+                let from = f64::from(dash) / f64::from(DASHES);
+                piece(from, from + 0.5 / f64::from(DASHES));
+            }
+        } else {
+            piece(0.0, 1.0);
+        }
+    }
+    rays
+}
+
+pub(super) fn inlier_color() -> Color32 {
+    theme::state(FeatureState::Inlier { residual_px: 0.0 }.index())
+}
+
+pub(super) fn outlier_color() -> Color32 {
+    theme::state(FeatureState::Outlier { residual_px: 0.0 }.index())
+}

@@ -1,0 +1,126 @@
+//! Where things are in the scene.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::app::Scope;
+use crate::geometry::Pose;
+use crate::grid::Offset;
+
+/// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's camera.
+pub(super) const GROUND_M: f64 = 1.6;
+
+/// The scene's frame, seen from the world and from the reference at the cursor.
+///
+/// It is that of the first reference camera, so that it stays while the cursor moves, and so that
+/// single precision suffices for what is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Site {
+    pub(super) scene_from_world: Pose,
+    pub(super) scene_from_reference: Pose,
+    /// How far from the reference the query may be \[m\].
+    pub(super) radius_m: f64,
+}
+
+impl Site {
+    /// The site of a run; `None` before its frames are read.
+    pub(super) fn of(scope: &Scope<'_>) -> Option<Self> {
+        let first = scope.run.loaded.as_deref()?.problems.first()?;
+        let here = scope.problem()?;
+        let scene_from_world = first.reference.world_from_camera.inverse();
+        Some(Self {
+            scene_from_world,
+            scene_from_reference: scene_from_world * here.reference.world_from_camera,
+            radius_m: here.uncertainty_radius_m,
+        })
+    }
+
+    /// A place in the reference camera's frame, as it is drawn.
+    pub(super) fn spot(&self, in_reference: &Point3<f64>) -> [f32; 3] {
+        spot(&(self.scene_from_reference * in_reference))
+    }
+
+    /// A place on the ground, raised by some metres.
+    pub(super) fn on_ground(&self, right_m: f64, forward_m: f64, above_m: f64) -> Point3<f64> {
+        self.scene_from_reference * Point3::new(right_m, GROUND_M - above_m, forward_m)
+    }
+
+    /// What is straight up, seen from the reference camera.
+    pub(super) fn up(&self) -> Unit<Vector3<f64>> {
+        self.scene_from_reference.rotation * -Vector3::y_axis()
+    }
+
+    /// Where a camera is, seen from the reference camera, as the search would say it.
+    pub(super) fn offset(&self, world_from_camera: &Pose) -> Offset {
+        let scene_from_camera = self.scene_from_world * world_from_camera;
+        let reference_from_camera = self.scene_from_reference.inverse() * scene_from_camera;
+        let ahead = reference_from_camera.rotation * Vector3::z();
+        Offset {
+            right_m: reference_from_camera.translation.x,
+            forward_m: reference_from_camera.translation.z,
+            yaw_rad: (-ahead.x).atan2(ahead.z),
+        }
+    }
+
+    /// How large cameras are drawn \[m\].
+    pub(super) fn camera_m(&self) -> f64 {
+        (0.1 * self.radius_m).clamp(0.15, 1.5)
+    }
+
+    /// Distance of the grid's lines \[m\]: a round number, about six of them within the radius.
+    pub(super) fn grid_m(&self) -> f64 {
+        let wanted = self.radius_m / 6.0;
+        let tens = 10_f64.powf(wanted.max(1e-3).log10().floor());
+        let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * tens);
+        steps
+            .into_iter()
+            .find(|step| *step >= wanted)
+            .unwrap_or(10.0 * tens)
+    }
+}
+
+/// As the graphics card takes it.
+pub(super) fn spot(in_scene: &Point3<f64>) -> [f32; 3] {
+    in_scene.coords.cast::<f32>().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn site(radius_m: f64) -> Site {
+        Site {
+            scene_from_world: Pose::new([3.0, 1.0, -2.0].into(), [0.1, 0.7, 0.0].into()),
+            scene_from_reference: Pose::new([1.0, 0.0, 5.0].into(), [0.0, 0.3, 0.02].into()),
+            radius_m,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_camera_is_where_the_search_would_put_it(
+            right_m in -20.0..20.0, forward_m in -20.0..20.0, yaw_rad in -3.0..3.0,
+        ) {
+            let offset = Offset { right_m, forward_m, yaw_rad };
+            let site = site(15.0);
+            let scene_from_camera = site.scene_from_reference * offset.reference_from_camera();
+            let found = site.offset(&(site.scene_from_world.inverse() * scene_from_camera));
+            prop_assert!((found.right_m - right_m).abs() < 1e-9);
+            prop_assert!((found.forward_m - forward_m).abs() < 1e-9);
+            prop_assert!((found.yaw_rad - yaw_rad).abs() < 1e-9);
+        }
+
+        #[test]
+        fn the_grid_has_a_few_lines_for_any_radius(radius_m in 0.01..2000.0) {
+            let lines = radius_m / site(radius_m).grid_m();
+            prop_assert!((2.0..=6.0 + 1e-9).contains(&lines), "{lines}");
+        }
+    }
+
+    #[test]
+    fn the_grid_is_round() {
+        assert_eq!(site(15.0).grid_m(), 5.0);
+        assert_eq!(site(3.0).grid_m(), 0.5);
+        assert_eq!(site(10.0).grid_m(), 2.0);
+    }
+}

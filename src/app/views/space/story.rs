@@ -1,0 +1,163 @@
+//! What the run told up to the cursor, as far as it has a place in the scene.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use crate::app::Scope;
+use crate::event::{CloudColored, Event, FeatureState, LiftedMatch, Method, PoseScored};
+use crate::geometry::Pose;
+use crate::grid::{Offset, ScoredLattice};
+use crate::render::ColoredCloud;
+use crate::session::Run;
+
+/// The matches that FB lifts into space, and the camera that it finds with them.
+#[derive(Default)]
+pub(super) struct FeatureStory<'a> {
+    lifted: &'a [LiftedMatch],
+    states: Option<&'a [FeatureState]>,
+    /// The best pose so far: that of MLESAC, then the refined one.
+    pub(super) reference_from_query: Option<Pose>,
+}
+
+/// A ray from a camera to a lifted point.
+pub(super) struct Ray {
+    /// In the reference camera's frame \[m\].
+    pub(super) point: Point3<f64>,
+    /// Index of the query keypoint.
+    pub(super) query: usize,
+    /// Whether the estimated pose explains it; `None` before that is decided.
+    pub(super) is_inlier: Option<bool>,
+}
+
+impl<'a> FeatureStory<'a> {
+    /// From the estimator at the cursor, if it lifts matches; else from FB's part.
+    pub(super) fn at(scope: &Scope<'a>) -> Self {
+        let here = match scope.method() {
+            Some(Method::Hybrid) => Self::told(scope.run, scope.cursor),
+            _ => Self::default(),
+        };
+        if !here.lifted.is_empty() {
+            return here;
+        }
+        match scope.of(Method::Feature) {
+            Some((_, cursor)) => Self::told(scope.run, cursor),
+            None => here,
+        }
+    }
+
+    fn told(run: &'a Run, cursor: usize) -> Self {
+        let mut story = Self::default();
+        for event in events(run, cursor) {
+            match event {
+                Event::DepthsLifted(event) => story.lifted = &event.matches,
+                Event::FeaturesClassified(event) => story.states = Some(&event.states),
+                Event::HypothesisTried(event) => {
+                    if let Some(best) = &event.trial.best {
+                        story.reference_from_query = Some(best.pose.inverse());
+                    }
+                }
+                Event::PoseRefined(event) => {
+                    story.reference_from_query = Some(event.reference_from_query);
+                }
+                _ => {}
+            }
+        }
+        story
+    }
+
+    pub(super) fn rays(&self) -> impl Iterator<Item = Ray> {
+        self.lifted.iter().filter_map(|lifted| {
+            let state = self.states.and_then(|states| states.get(lifted.query));
+            Some(Ray {
+                point: lifted.point?,
+                query: lifted.query,
+                is_inlier: state.map(|state| matches!(state, FeatureState::Inlier { .. })),
+            })
+        })
+    }
+}
+
+/// The grid search of a direct method.
+#[derive(Default)]
+pub(super) struct SearchStory<'a> {
+    /// Complete phases up to the cursor: the coarse positions and those after them.
+    pub(super) surfaces: Vec<&'a Arc<ScoredLattice>>,
+    /// Hypotheses of a phase that is not complete.
+    pub(super) scored: Vec<&'a PoseScored>,
+    /// Where the search stood: the start, and each best so far.
+    pub(super) path: Vec<Offset>,
+    /// Least and greatest cost of the run's first surface, complete or not: the ends of the colours.
+    pub(super) costs: Option<(f64, f64)>,
+}
+
+impl<'a> SearchStory<'a> {
+    /// From the direct method whose pictures are shown.
+    pub(super) fn at(scope: &Scope<'a>) -> Self {
+        let place = match scope.method() {
+            Some(Method::Hybrid) => scope.span().map(|span| (span, scope.cursor)),
+            _ => scope.of(scope.direct_method()),
+        };
+        let Some((span, cursor)) = place else {
+            return Self::default();
+        };
+        let mut story = Self::default();
+        for event in events(scope.run, cursor) {
+            match event {
+                Event::ViewRendered(event) => story.path.push(event.offset),
+                Event::PoseScored(event) => story.scored.push(event),
+                Event::PhaseSearched(event) => {
+                    story.scored.clear();
+                    story.surfaces.push(&event.surface);
+                }
+                _ => {}
+            }
+        }
+        let last = span.records.end.saturating_sub(1);
+        let first_surface = events(scope.run, last).find_map(|event| match event {
+            Event::PhaseSearched(event) => Some(&event.surface),
+            _ => None,
+        });
+        story.costs = match first_surface {
+            Some(surface) => {
+                ends((0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell)))
+            }
+            None => ends(story.scored.iter().filter_map(|scored| scored.score.cost)),
+        };
+        story
+    }
+}
+
+/// The reference's cloud in the photo's grey values, if a direct method has coloured it.
+pub(super) fn colored<'a>(scope: &Scope<'a>) -> Option<&'a Arc<ColoredCloud>> {
+    let here = scope.latest::<CloudColored>();
+    let other = || {
+        [
+            Method::Photometric,
+            Method::MutualInformation,
+            Method::Hybrid,
+        ]
+        .into_iter()
+        .find_map(|method| scope.latest_of::<CloudColored>(method))
+    };
+    here.or_else(other).map(|event| &event.cloud)
+}
+
+/// What the estimator at a cursor has told up to there.
+fn events(run: &Run, cursor: usize) -> impl Iterator<Item = &Event> {
+    let records = run.span_at(cursor).map_or(&[][..], |span| {
+        let end = span.records.end.min(cursor + 1);
+        &run.records()[span.records.start.min(end)..end]
+    });
+    records.iter().map(|record| &record.event)
+}
+
+/// The least and the greatest of some numbers.
+pub(super) fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values
+        .filter(|value| value.is_finite())
+        .fold(None, |ends, value| match ends {
+            None => Some((value, value)),
+            Some((least, greatest)) => Some((least.min(value), greatest.max(value))),
+        })
+}
