@@ -111,6 +111,8 @@ pub enum Command {
     RestoreSession(std::path::PathBuf),
     /// Bring a view to the front.
     ShowView(&'static str),
+    /// All the room for a view; for none, for that under the pointer, or back to all views.
+    Maximize(Option<&'static str>),
     /// The first layout.
     ResetLayout,
     /// Dark or light.
@@ -311,6 +313,7 @@ pub fn shortcuts() -> Vec<Shortcut> {
             Command::SavePicture(None),
             "Save the window as a picture",
         ),
+        keys(NONE, Key::M, Command::Maximize(None), "All the room for the view under the pointer"),
         keys(NONE, Key::L, Command::SwitchTheme, "Light or dark"),
         keys(NONE, Key::Questionmark, Command::Help, "This list"),
         keys(NONE, Key::F1, Command::Help, "This list"),

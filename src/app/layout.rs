@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use eframe::egui_wgpu::RenderState;
 use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
 
-use super::command::Queue;
+use super::command::{Command, Queue};
 use super::desk::{Comparing, Desk};
 use super::scope::Scope;
 use super::views::{self, View};
@@ -14,6 +14,8 @@ use super::views::{self, View};
 pub(super) struct Layout {
     tree: Tree<String>,
     views: BTreeMap<&'static str, Panel>,
+    /// The view that has all the room, if one has.
+    alone: Option<String>,
 }
 
 /// A view has what it remembers once for each of two runs.
@@ -37,15 +39,40 @@ impl Layout {
         Self {
             tree: first_tree(),
             views,
+            alone: None,
         }
     }
 
     pub(super) fn reset(&mut self) {
         self.tree = first_tree();
+        self.alone = None;
+    }
+
+    /// Gives a view all the room; without one, that under the pointer, or goes back.
+    pub(super) fn maximize(&mut self, view: Option<&str>, pointer: Option<egui::Pos2>) {
+        self.alone = match (view, &self.alone) {
+            (Some(view), _) => Some(view.to_owned()),
+            (None, Some(_)) => None,
+            (None, None) => self.view_at(pointer),
+        };
+    }
+
+    fn view_at(&self, pointer: Option<egui::Pos2>) -> Option<String> {
+        let pointer = pointer?;
+        let visible = self.tree.active_tiles().into_iter();
+        let mut panes = visible.filter_map(|id| match self.tree.tiles.get(id)? {
+            egui_tiles::Tile::Pane(pane) => Some((self.tree.tiles.rect(id)?, pane)),
+            egui_tiles::Tile::Container(_) => None,
+        });
+        let (_, pane) = panes.find(|(rect, _)| rect.contains(pointer))?;
+        Some(pane.clone())
     }
 
     /// Brings a view to the front; a view that was closed comes back.
     pub(super) fn show(&mut self, name: &str) {
+        if self.alone.is_some() {
+            self.alone = Some(name.to_owned());
+        }
         let is_wanted = |pane: &String| pane == name;
         let found = self.tree.tiles.iter().find_map(|(id, tile)| match tile {
             egui_tiles::Tile::Pane(pane) if is_wanted(pane) => Some(*id),
@@ -71,7 +98,18 @@ impl Layout {
             desk,
             commands,
         };
-        self.tree.ui(&mut panes, ui);
+        if let Some(name) = &mut self.alone {
+            ui.horizontal(|ui| {
+                ui.strong(title(name));
+                let restore = ui.small_button("All views").on_hover_text("Back (M)");
+                if restore.clicked() {
+                    commands.send(Command::Maximize(None));
+                }
+            });
+            panes.draw_pane(ui, name);
+        } else {
+            self.tree.ui(&mut panes, ui);
+        }
     }
 
     /// Where a view is drawn \[points\], if it is in sight.
@@ -132,11 +170,16 @@ struct Panes<'a> {
     commands: &'a Queue,
 }
 
-impl Behavior<String> for Panes<'_> {
-    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut String) -> UiResponse {
-        let Some(panel) = self.views.get_mut(pane.as_str()) else {
+fn title(name: &str) -> &str {
+    let entry = views::ALL.iter().find(|entry| entry.name == name);
+    entry.map_or(name, |entry| entry.title)
+}
+
+impl Panes<'_> {
+    fn draw_pane(&mut self, ui: &mut egui::Ui, pane: &str) {
+        let Some(panel) = self.views.get_mut(pane) else {
             ui.weak(format!("There is no view `{pane}`"));
-            return UiResponse::None;
+            return;
         };
         egui::Frame::NONE.inner_margin(6.0).show(ui, |ui| {
             let present = self.desk.scope(self.commands);
@@ -150,12 +193,38 @@ impl Behavior<String> for Panes<'_> {
                 _ => draw(ui, "B", &mut panel.present, &present),
             }
         });
+    }
+}
+
+impl Behavior<String> for Panes<'_> {
+    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut String) -> UiResponse {
+        self.draw_pane(ui, pane);
         UiResponse::None
     }
 
     fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
-        let entry = views::ALL.iter().find(|entry| entry.name == pane);
-        entry.map_or(pane.as_str(), |entry| entry.title).into()
+        title(pane).into()
+    }
+
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<String>,
+        ui: &mut egui::Ui,
+        _tile: TileId,
+        tabs: &egui_tiles::Tabs,
+        _scroll_offset: &mut f32,
+    ) {
+        let active = tabs.active.and_then(|id| tiles.get(id));
+        if let Some(egui_tiles::Tile::Pane(pane)) = active {
+            let help = format!("All the room for {} (M)", title(pane));
+            let button = ui.small_button("■").on_hover_text(&help);
+            button.widget_info(|| {
+                egui::WidgetInfo::labeled(egui::Role::Button, true, &help)
+            });
+            if button.clicked() {
+                self.commands.send(Command::Maximize(views::name_of(pane)));
+            }
+        }
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

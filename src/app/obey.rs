@@ -114,6 +114,10 @@ impl App {
                 desk.note("The command line is on the clipboard", false);
             }
             Command::ShowView(name) => self.layout.show(name),
+            Command::Maximize(view) => {
+                let pointer = ctx.input(|input| input.pointer.hover_pos());
+                self.layout.maximize(view, pointer);
+            }
             Command::ResetLayout => self.layout.reset(),
             Command::SwitchTheme => {
                 let is_dark = ctx.global_style().visuals.dark_mode;

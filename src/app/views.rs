@@ -37,6 +37,12 @@ pub(super) const QUERIES: &str = "queries";
 /// Name of the list of parameters.
 pub(super) const PARAMETERS: &str = "parameters";
 
+/// The registered name that equals a name from elsewhere.
+pub(super) fn name_of(name: &str) -> Option<&'static str> {
+    let mut names = ALL.iter().map(|entry| entry.name);
+    names.find(|known| *known == name)
+}
+
 /// Every view, in the order of the menu.
 pub const ALL: &[Entry] = &[
     Entry {
