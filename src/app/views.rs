@@ -9,6 +9,7 @@ mod parameters;
 mod queries;
 mod report;
 mod space;
+mod surface;
 
 use eframe::egui_wgpu::RenderState;
 
@@ -62,6 +63,12 @@ pub const ALL: &[Entry] = &[
         title: "3-D",
         about: "cloud, cameras, rays and costs in space",
         new: |state| Box::new(space::Space::new(state)),
+    },
+    Entry {
+        name: "surface",
+        title: "Cost surface",
+        about: "cost and coverage of every position tried, minima, slices",
+        new: |_| Box::<surface::Surface>::default(),
     },
     Entry {
         name: "report",
