@@ -6,9 +6,10 @@ mod scale;
 mod search;
 mod slices;
 
-use egui::{RichText, ScrollArea, Slider, Ui};
+use egui::{ScrollArea, Slider, Ui};
 
 use super::View;
+use super::readout::Readout;
 use crate::app::{Command, Scope};
 use crate::event::Method;
 use crate::geometry::Pose;
@@ -17,6 +18,9 @@ use maps::{Maps, Shown, progress};
 use marks::{Mark, legend, moved, place};
 use scale::{NO_SAY, Scale, number, swatch};
 use search::Search;
+
+/// What could be done with the maps.
+const HELP: &str = "Point at a cell; click, drag: camera; wheel: zoom; Shift+drag: pan";
 
 /// Maps of a direct method's search, and slices through its minimum.
 #[derive(Default)]
@@ -82,6 +86,7 @@ impl Surface {
     fn content(&mut self, ui: &mut Ui, scope: &Scope<'_>, search: &Search<'_>) -> Option<Pose> {
         let run_floor = scope.run.params.grid.coverage_floor;
         let floor = self.floor.unwrap_or(run_floor);
+        let width = ui.available_width();
         let scale = Scale::of(scope.run, search);
         let marks = Mark::all(scope, search, floor);
         let shown = Shown {
@@ -90,15 +95,14 @@ impl Surface {
             marks: &marks,
             floor,
         };
-        // Above the maps, where it does not jump; its words are those of the last frame otherwise.
-        let line = ui.available_rect_before_wrap().min;
-        ui.add_space(ui.text_style_height(&egui::TextStyle::Body) + ui.spacing().item_spacing.y);
+        let readout = Readout::reserve(ui);
         let under_pointer = self.maps.ui(ui, scope, &shown);
-        readout(ui, line, under_pointer.as_ref().map(|(_, words)| words));
+        let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
+        readout.say(ui, words, HELP);
         let pointed_at = legend(ui, scope, &marks);
         self.floor_ui(ui, scope, search, run_floor);
         ui.separator();
-        slices::ui(ui, scope, search, floor);
+        slices::ui(ui, scope, search, floor, width);
         under_pointer.map(|(pose, _)| pose).or(pointed_at)
     }
 
@@ -106,6 +110,7 @@ impl Surface {
     fn floor_ui(&mut self, ui: &mut Ui, scope: &Scope<'_>, search: &Search<'_>, run_floor: f64) {
         let mut floor = self.floor.unwrap_or(run_floor);
         ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().slider_width = 80.0;
             swatch(ui, NO_SAY);
             ui.label("below the floor");
             let slider = Slider::new(&mut floor, 0.0..=1.0)
@@ -135,14 +140,19 @@ impl Surface {
         });
         let floor = self.floor.unwrap_or(run_floor);
         if floor != run_floor {
-            let (own, other) = [run_floor, floor].map(|floor| search.least_covered(floor)).into();
+            let (own, other) = [run_floor, floor]
+                .map(|floor| search.least_covered(floor))
+                .into();
             let words = match moved(search, own, other) {
                 Some(minimum) => format!(
                     "The minimum moves to {} at this floor, cost {}",
                     place(&minimum.offset),
                     number(minimum.cost)
                 ),
-                None if search.positions().all(|searched| searched.minimum(other).is_none()) => {
+                None if search
+                    .positions()
+                    .all(|searched| searched.minimum(other).is_none()) =>
+                {
                     "No position may win at this floor".to_owned()
                 }
                 None => "The minimum stays where it is at this floor".to_owned(),
@@ -162,21 +172,4 @@ impl Surface {
         }
         self.is_hovering = pointed_at.is_some();
     }
-}
-
-/// What is known about the cell under the pointer.
-fn readout(ui: &mut Ui, at: egui::Pos2, words: Option<&String>) {
-    let size = egui::vec2(
-        ui.available_width(),
-        ui.text_style_height(&egui::TextStyle::Body),
-    );
-    let text = match words {
-        Some(words) => RichText::new(words).strong(),
-        None => RichText::new(
-            "Point at a cell; click or drag: camera · wheel: zoom · Shift+drag: pan · twice: whole",
-        )
-        .weak(),
-    };
-    let rect = egui::Rect::from_min_size(at, size);
-    ui.put(rect, egui::Label::new(text).truncate().halign(egui::Align::LEFT));
 }

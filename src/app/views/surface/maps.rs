@@ -271,7 +271,11 @@ fn small(ui: &Ui, text: &str) -> egui::RichText {
 /// How far a lattice is.
 pub(super) fn progress(searched: &Searched) -> String {
     let all = searched.surface.lattice.hypotheses().count();
-    format!("{}, {} of {all} tried", searched.phase().name(), searched.tried)
+    format!(
+        "{}, {} of {all} tried",
+        searched.phase().name(),
+        searched.tried
+    )
 }
 
 /// All lattices with a margin.
@@ -297,18 +301,22 @@ fn whole(search: &Search<'_>) -> PlotBounds {
 fn cell_at(search: &Search<'_>, transform: &PlotTransform, at: Pos2) -> Option<Cell> {
     let point = transform.value_from_position(at);
     let lattices: Vec<&Searched> = search.positions().collect();
-    lattices.iter().enumerate().rev().find_map(|(index, searched)| {
-        let lattice = &searched.surface.lattice;
-        let cell = cell_of(lattice, point.x, point.y)?;
-        // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
-        let is_seen = index == 0 || searched.surface.scores[cell].is_some();
-        let offset = lattice.offset(cell).filter(|_| is_seen)?;
-        Some(Cell {
-            lattice: index,
-            cell,
-            offset,
+    lattices
+        .iter()
+        .enumerate()
+        .rev()
+        .find_map(|(index, searched)| {
+            let lattice = &searched.surface.lattice;
+            let cell = cell_of(lattice, point.x, point.y)?;
+            // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
+            let is_seen = index == 0 || searched.surface.scores[cell].is_some();
+            let offset = lattice.offset(cell).filter(|_| is_seen)?;
+            Some(Cell {
+                lattice: index,
+                cell,
+                offset,
+            })
         })
-    })
 }
 
 /// The cell that a position lies in.
@@ -359,12 +367,17 @@ fn colours(ui: &mut Ui, scale: &Scale, map: Map, width: f32) {
 
 /// Outlines and marks on top of a map.
 fn overlay(ui: &Ui, shown: &Shown<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
-    let painter = ui.painter().with_clip_rect(transform.frame().intersect(ui.clip_rect()));
+    let painter = ui
+        .painter()
+        .with_clip_rect(transform.frame().intersect(ui.clip_rect()));
     let screen = |offset: &Offset| {
         transform.position_from_point(&PlotPoint::new(offset.right_m, offset.forward_m))
     };
     let outline = |offset: &Offset, columns: f64, rows: f64, color: Color32, width: f32| {
-        let size = [columns * transform.dpos_dvalue_x(), rows * transform.dpos_dvalue_y()];
+        let size = [
+            columns * transform.dpos_dvalue_x(),
+            rows * transform.dpos_dvalue_y(),
+        ];
         let size = egui::vec2(size[0].abs() as f32, size[1].abs() as f32);
         let rect = Rect::from_center_size(screen(offset), size);
         let stroke = Stroke::new(width, color);
@@ -387,7 +400,9 @@ fn overlay(ui: &Ui, shown: &Shown<'_>, transform: &PlotTransform, pointed_at: Op
         outline(&hypothesis.offset, step, step, strong, 1.5);
     }
     for mark in shown.marks {
-        mark.paint(&painter, screen(&mark.offset));
+        // A small map is not to vanish under its marks.
+        let reach = (transform.frame().width() / 35.0).clamp(3.0, 6.0);
+        mark.paint(&painter, screen(&mark.offset), reach);
     }
     if let Some(cell) = pointed_at
         && let Some(searched) = shown.search.positions().nth(cell.lattice)

@@ -24,7 +24,7 @@ pub(super) enum Kind {
     Floored,
 }
 
-/// Half the size of a mark \[points\].
+/// Half the size of a mark in the legend \[points\].
 const REACH: f32 = 5.0;
 /// Local minima that are shown.
 const RANKED: usize = 5;
@@ -50,7 +50,13 @@ impl Mark {
             });
         };
         let start = Offset::default();
-        add(Kind::Start, start, search.pose(&start), "start", String::new());
+        add(
+            Kind::Start,
+            start,
+            search.pose(&start),
+            "start",
+            String::new(),
+        );
         let own_floor = search.least_covered(scope.run.params.grid.coverage_floor);
         for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
             let note = format!(", +{}", number(margin));
@@ -67,16 +73,32 @@ impl Mark {
             {
                 let so_far = if searched.is_complete { "" } else { " so far" };
                 let note = format!(", {}{so_far}", number(minimum.cost));
-                add(kind, minimum.offset, search.pose(&minimum.offset), name, note);
+                add(
+                    kind,
+                    minimum.offset,
+                    search.pose(&minimum.offset),
+                    name,
+                    note,
+                );
             }
         }
         if let Some(moved) = moved(search, own_floor, search.least_covered(floor)) {
             let note = format!(", {}", number(moved.cost));
             let pose = search.pose(&moved.offset);
-            add(Kind::Floored, moved.offset, pose, "minimum at this floor", note);
+            add(
+                Kind::Floored,
+                moved.offset,
+                pose,
+                "minimum at this floor",
+                note,
+            );
         }
         let cameras = [
-            (Kind::Feature, scope.estimate(Method::Feature), "FB's estimate"),
+            (
+                Kind::Feature,
+                scope.estimate(Method::Feature),
+                "FB's estimate",
+            ),
             (Kind::Truth, scope.truth().copied(), "truth"),
             (Kind::Camera, scope.desk.camera, "camera in hand"),
         ];
@@ -88,15 +110,15 @@ impl Mark {
         marks
     }
 
-    /// Paints the mark with its heading.
-    pub(super) fn paint(&self, painter: &Painter, at: Pos2) {
+    /// Paints the mark with its heading; `reach` is half its size \[points\].
+    pub(super) fn paint(&self, painter: &Painter, at: Pos2, reach: f32) {
         if matches!(self.kind, Kind::Feature | Kind::Truth | Kind::Camera) {
             let (sin, cos) = (self.offset.yaw_rad as f32).sin_cos();
-            let tip = at + 2.4 * REACH * vec2(-sin, -cos);
+            let tip = at + 2.4 * reach * vec2(-sin, -cos);
             painter.line_segment([at, tip], Stroke::new(3.0, Color32::WHITE));
             painter.line_segment([at, tip], Stroke::new(1.5, self.kind.color()));
         }
-        self.kind.paint(painter, at);
+        self.kind.paint(painter, at, reach);
     }
 }
 
@@ -137,7 +159,8 @@ pub(super) fn moved(search: &Search<'_>, own: u32, other: u32) -> Option<Minimum
 /// An offset's position in words.
 pub(super) fn place(offset: &Offset) -> String {
     // A negative zero is no place of its own.
-    let [right, forward] = [offset.right_m, offset.forward_m].map(|m| (100.0 * m).round() / 100.0 + 0.0);
+    let [right, forward] =
+        [offset.right_m, offset.forward_m].map(|m| (100.0 * m).round() / 100.0 + 0.0);
     let is_round = |m: f64| ((10.0 * m).round() - 10.0 * m).abs() < 1e-9;
     match is_round(right) && is_round(forward) {
         true => format!("({right:.1}, {forward:.1}) m"),
@@ -158,19 +181,19 @@ impl Kind {
     }
 
     /// The shape at a place, with a light rim that shows on dark cells.
-    fn paint(self, painter: &Painter, at: Pos2) {
+    fn paint(self, painter: &Painter, at: Pos2, reach: f32) {
         let color = self.color();
         let outlined = |points: &[(f32, f32)], fill: Color32, line: Color32| {
-            let points = points.iter().map(|(x, y)| at + REACH * vec2(*x, *y));
+            let points = points.iter().map(|(x, y)| at + reach * vec2(*x, *y));
             Shape::convex_polygon(points.collect(), fill, Stroke::new(1.5, line))
         };
         match self {
             Self::Start => {
-                painter.circle(at, REACH * 0.8, color, Stroke::new(1.5, Color32::WHITE));
+                painter.circle(at, reach * 0.8, color, Stroke::new(1.5, Color32::WHITE));
             }
             Self::Coarse => {
                 let square = [(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)];
-                let size = Vec2::splat(1.8 * REACH);
+                let size = Vec2::splat(1.8 * reach);
                 let rect = egui::Rect::from_center_size(at, size);
                 let white = Stroke::new(3.5, Color32::WHITE);
                 painter.rect_stroke(rect, 0.0, white, egui::StrokeKind::Middle);
@@ -187,8 +210,8 @@ impl Kind {
             Self::Truth => {
                 for (width, color) in [(4.5, Color32::WHITE), (2.5, color)] {
                     let stroke = Stroke::new(width, color);
-                    painter.hline(at.x - REACH..=at.x + REACH, at.y, stroke);
-                    painter.vline(at.x, at.y - REACH..=at.y + REACH, stroke);
+                    painter.hline(at.x - reach..=at.x + reach, at.y, stroke);
+                    painter.vline(at.x, at.y - reach..=at.y + reach, stroke);
                 }
             }
             Self::Camera => {
@@ -196,13 +219,13 @@ impl Kind {
                 painter.add(outlined(&wedge, color, Color32::WHITE));
             }
             Self::Ranked(rank) => {
-                painter.circle(at, REACH, Color32::WHITE, Stroke::new(1.0, color));
-                let font = FontId::proportional(9.0);
+                painter.circle(at, reach, Color32::WHITE, Stroke::new(1.0, color));
+                let font = FontId::proportional(1.9 * reach);
                 painter.text(at, Align2::CENTER_CENTER, rank.to_string(), font, color);
             }
             Self::Floored => {
-                painter.circle_stroke(at, REACH * 1.3, Stroke::new(4.0, Color32::WHITE));
-                painter.circle_stroke(at, REACH * 1.3, Stroke::new(2.0, color));
+                painter.circle_stroke(at, reach * 1.3, Stroke::new(4.0, Color32::WHITE));
+                painter.circle_stroke(at, reach * 1.3, Stroke::new(2.0, color));
             }
         }
     }
@@ -223,7 +246,7 @@ pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<P
             });
             let response = response.inner;
             let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
-            mark.kind.paint(ui.painter(), at);
+            mark.kind.paint(ui.painter(), at, REACH);
             if response.hovered() {
                 pointed_at = Some(mark.pose);
             }

@@ -47,7 +47,9 @@ impl Scale {
     /// The colour of a cost; grey where it is no number.
     pub(super) fn cost(&self, cost: f64) -> Color32 {
         match self.costs {
-            Some((least, greatest)) if !cost.is_nan() => theme::viridis(merit(least, greatest, cost)),
+            Some((least, greatest)) if !cost.is_nan() => {
+                theme::viridis(merit(least, greatest, cost))
+            }
             _ => NO_SAY,
         }
     }
@@ -119,8 +121,20 @@ fn ends(ui: &Ui, rect: Rect, dark: &str, bright: &str) {
     let font = egui::FontId::proportional(10.0);
     let color = ui.visuals().weak_text_color();
     let painter = ui.painter();
-    painter.text(rect.left_top(), egui::Align2::LEFT_TOP, dark, font.clone(), color);
-    painter.text(rect.right_top(), egui::Align2::RIGHT_TOP, bright, font, color);
+    painter.text(
+        rect.left_top(),
+        egui::Align2::LEFT_TOP,
+        dark,
+        font.clone(),
+        color,
+    );
+    painter.text(
+        rect.right_top(),
+        egui::Align2::RIGHT_TOP,
+        bright,
+        font,
+        color,
+    );
 }
 
 /// A square of a colour, for a legend.
@@ -135,7 +149,10 @@ mod tests {
 
     #[test]
     fn the_least_cost_is_the_brightest_and_a_flat_surface_all_bright() {
-        assert_eq!([2.0, 4.0, 6.0].map(|cost| merit(2.0, 6.0, cost)), [1.0, 0.5, 0.0]);
+        assert_eq!(
+            [2.0, 4.0, 6.0].map(|cost| merit(2.0, 6.0, cost)),
+            [1.0, 0.5, 0.0]
+        );
         assert_eq!(merit(3.0, 3.0, 3.0), 1.0);
         let scale = Scale {
             costs: Some((2.0, 6.0)),
@@ -147,6 +164,9 @@ mod tests {
 
     #[test]
     fn numbers_have_about_as_many_digits() {
-        assert_eq!([0.81234, 12.3456, 2301.25].map(number), ["0.8123", "12.35", "2301.2"]);
+        assert_eq!(
+            [0.81234, 12.3456, 2301.25].map(number),
+            ["0.8123", "12.35", "2301.2"]
+        );
     }
 }

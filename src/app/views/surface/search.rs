@@ -96,7 +96,9 @@ impl<'a> Search<'a> {
 
     /// The lattices of positions, in the order in which they are drawn.
     pub(super) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
-        self.lattices.iter().filter(|searched| !searched.phase().is_yaw())
+        self.lattices
+            .iter()
+            .filter(|searched| !searched.phase().is_yaw())
     }
 
     /// The last lattice of a phase.
@@ -119,7 +121,8 @@ impl<'a> Search<'a> {
 
     /// The camera at an offset (`world_from_camera`).
     pub(super) fn pose(&self, offset: &Offset) -> Pose {
-        self.problem.world_from_query(&offset.reference_from_camera())
+        self.problem
+            .world_from_query(&offset.reference_from_camera())
     }
 
     /// The offset of a camera `world_from_camera`.

@@ -179,25 +179,25 @@ impl<'a> Curve<'a> {
 
 /// Draws the slices. `shown` is the method of the maps, whose minimum is marked; the floor is that
 /// of the slider.
-pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) {
+pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64, width: f32) {
     let methods = [Method::Photometric, Method::MutualInformation];
     let curves: Vec<Curve<'_>> = methods
         .into_iter()
         .filter_map(|method| Curve::of(scope, method, floor))
         .collect();
-    ui.horizontal_wrapped(|ui| {
-        ui.label("Slices through each minimum:");
-        for curve in &curves {
+    ui.label("Slices through each minimum");
+    for curve in &curves {
+        ui.horizontal_wrapped(|ui| {
             let name = curve.search.method.name().to_uppercase();
             let color = theme::method(curve.search.method);
             key(ui, color, LineStyle::Solid);
             ui.label(egui::RichText::new(name).strong());
             ui.weak(curve.range.words());
-        }
-    });
+        });
+    }
     let marks = marks(ui, scope, shown, floor);
     let gap = ui.spacing().item_spacing.x;
-    let width = ((ui.available_width() - 2.0 * gap) / 3.0).max(60.0);
+    let width = ((width - 2.0 * gap - 2.0) / 3.0).max(60.0);
     ui.horizontal_top(|ui| {
         for along in Along::ALL {
             slice(ui, along, width, &curves, &marks);
@@ -235,7 +235,12 @@ fn marks(ui: &Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) -> Vec<Line
         ("minimum", theme::ESTIMATE, LineStyle::Solid, lowest),
         ("truth", theme::TRUTH, dashed, truth),
         ("hypothesis", strong, LineStyle::dotted_dense(), hypothesis),
-        ("camera in hand", theme::CAMERA, LineStyle::dotted_loose(), camera),
+        (
+            "camera in hand",
+            theme::CAMERA,
+            LineStyle::dotted_loose(),
+            camera,
+        ),
     ]
     .into_iter()
     .filter_map(|(name, color, style, offset)| Some((name, color, style, offset?)))
@@ -258,7 +263,10 @@ fn slice(ui: &mut Ui, along: Along, width: f32, curves: &[Curve<'_>], marks: &[L
         } => {
             let cost = number(cost_of(plot_name, position.y)?);
             let (name, unit) = (along.name(), along.unit());
-            Some(format!("{plot_name} {cost} at {name} {:.2} {unit}", position.x))
+            Some(format!(
+                "{plot_name} {cost} at {name} {:.2} {unit}",
+                position.x
+            ))
         }
         HoverPosition::Elsewhere { .. } => None,
     };
@@ -271,7 +279,9 @@ fn slice(ui: &mut Ui, along: Along, width: f32, curves: &[Curve<'_>], marks: &[L
         .label_formatter(label)
         .show(ui, |plot| {
             for (name, color, style, offset) in marks {
-                let line = VLine::new(*name, along.of(offset)).color(*color).style(*style);
+                let line = VLine::new(*name, along.of(offset))
+                    .color(*color)
+                    .style(*style);
                 plot.vline(line.allow_hover(false));
             }
             for curve in curves {
