@@ -113,6 +113,12 @@ impl Describe for GridParams {
     }
 }
 
+/// Pixels that a hypothesis must cover to have a say, for a coverage floor as in
+/// [`GridParams::coverage_floor`].
+pub fn least_covered(coverage_floor: f64, covered_at_reference: u32) -> u32 {
+    (coverage_floor * f64::from(covered_at_reference)).ceil() as u32
+}
+
 /// Where a camera is, seen from the reference camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Offset {
@@ -125,6 +131,18 @@ pub struct Offset {
 }
 
 impl Offset {
+    /// The offset of a camera `reference_from_camera`. What no offset has is left out: height, pitch
+    /// and roll.
+    pub fn of(reference_from_camera: &Pose) -> Self {
+        let centre = &reference_from_camera.translation;
+        let ahead = reference_from_camera.rotation * Vector3::z();
+        Self {
+            right_m: centre.x,
+            forward_m: centre.z,
+            yaw_rad: (-ahead.x).atan2(ahead.z),
+        }
+    }
+
     /// The camera's pose in the reference camera's frame.
     pub fn reference_from_camera(&self) -> Pose {
         Pose::from_parts(
@@ -269,9 +287,14 @@ impl ScoredLattice {
 
     /// The cell of least cost; of equal ones the first in scan order.
     pub fn minimum(&self) -> Option<usize> {
+        self.minimum_with(self.least_covered)
+    }
+
+    /// What [`Self::minimum`] would be if a hypothesis had to cover `least_covered` pixels.
+    pub fn minimum_with(&self, least_covered: u32) -> Option<usize> {
         let mut best: Option<(usize, f64)> = None;
-        for cell in 0..self.scores.len() {
-            if let Some(cost) = self.eligible_cost(cell)
+        for (cell, score) in self.scores.iter().enumerate() {
+            if let Some(cost) = score.and_then(|score| score.eligible_cost(least_covered))
                 && best.is_none_or(|(_, least)| cost < least)
             {
                 best = Some((cell, cost));
@@ -299,11 +322,17 @@ impl ScoredLattice {
     ///
     /// A cell at the rim of the lattice counts: it may be the foot of a basin outside.
     pub fn local_minima(&self) -> Vec<(usize, f64)> {
+        self.local_minima_with(self.least_covered)
+    }
+
+    /// What [`Self::local_minima`] would be if a hypothesis had to cover `least_covered` pixels.
+    pub fn local_minima_with(&self, least_covered: u32) -> Vec<(usize, f64)> {
+        let eligible_cost = |cell: usize| self.scores[cell]?.eligible_cost(least_covered);
         let mut minima: Vec<(usize, f64)> = (0..self.scores.len())
-            .filter_map(|cell| Some((cell, self.eligible_cost(cell)?)))
+            .filter_map(|cell| Some((cell, eligible_cost(cell)?)))
             .filter(|&(cell, cost)| {
                 self.neighbours(cell).all(|neighbour| {
-                    self.eligible_cost(neighbour)
+                    eligible_cost(neighbour)
                         .is_none_or(|other| cost < other || (cost == other && cell < neighbour))
                 })
             })
@@ -327,6 +356,7 @@ impl ScoredLattice {
 mod tests {
     use super::*;
     use nalgebra::Point3;
+    use proptest::prelude::*;
 
     #[test]
     fn the_fine_lattice_reaches_both_ends_and_contains_its_centre() {
@@ -429,5 +459,65 @@ mod tests {
         let surface = scored(&costs, 20, 8);
         let cells: Vec<_> = surface.local_minima().into_iter().map(|m| m.0).collect();
         assert_eq!(cells, [4, 1, 7]);
+    }
+
+    fn any_surface() -> impl Strategy<Value = ScoredLattice> {
+        // Few different costs, so that equal ones meet.
+        let cost = prop_oneof![
+            5 => (0_u8..6).prop_map(|cost| Some(f64::from(cost))),
+            1 => Just(Some(f64::NAN)),
+            1 => Just(None),
+        ];
+        let score = (cost, 0_u32..40).prop_map(|(cost, covered)| Score { cost, covered });
+        let cell = prop::option::weighted(0.9, score);
+        (prop::collection::vec(cell, 12), 0_u32..40).prop_map(|(scores, least_covered)| {
+            ScoredLattice {
+                scores,
+                least_covered,
+                ..scored(&[None; 12], 0, 4)
+            }
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_minimum_under_another_floor_is_the_first_of_the_least_costs_that_may_win(
+            surface in any_surface(), floor in 0_u32..45,
+        ) {
+            let may_win = |score: &Option<Score>| {
+                let Score { cost, covered } = (*score)?;
+                cost.filter(|cost| covered >= floor && !cost.is_nan())
+            };
+            let costs = surface.scores.iter().map(may_win);
+            let least = costs.clone().flatten().min_by(f64::total_cmp);
+            let first = costs.clone().position(|cost| cost.is_some() && cost == least);
+            prop_assert_eq!(surface.minimum_with(floor), first);
+            let ranked = surface.local_minima_with(floor);
+            prop_assert_eq!(ranked.first().map(|minimum| minimum.0), first);
+        }
+
+        #[test]
+        fn the_own_floor_gives_the_own_minimum_and_a_higher_one_never_a_lower_cost(
+            surface in any_surface(), floor in 0_u32..45, raised_by in 0_u32..45,
+        ) {
+            prop_assert_eq!(surface.minimum_with(surface.least_covered), surface.minimum());
+            let cost = |floor| {
+                let cell: usize = surface.minimum_with(floor)?;
+                surface.scores[cell]?.cost
+            };
+            let (low, high) = (cost(floor), cost(floor + raised_by));
+            prop_assert!(high.is_none_or(|high| low.is_some_and(|low| low <= high)));
+        }
+
+        #[test]
+        fn an_offset_is_read_back_from_its_pose(
+            right_m in -50.0..50.0, forward_m in -50.0..50.0, yaw_rad in -3.0..3.0,
+        ) {
+            let offset = Offset { right_m, forward_m, yaw_rad };
+            let read = Offset::of(&offset.reference_from_camera());
+            prop_assert!((read.right_m - right_m).abs() < 1e-9);
+            prop_assert!((read.forward_m - forward_m).abs() < 1e-9);
+            prop_assert!((read.yaw_rad - yaw_rad).abs() < 1e-9);
+        }
     }
 }

@@ -4,11 +4,15 @@
 //! is how a person looks at it: a zoom, a filter.
 
 mod breakpoints;
+mod histogram;
 mod log;
 mod parameters;
 mod queries;
+mod ransac;
+mod readout;
 mod report;
 mod space;
+mod surface;
 
 use eframe::egui_wgpu::RenderState;
 
@@ -68,6 +72,24 @@ pub const ALL: &[Entry] = &[
         title: "3-D",
         about: "cloud, cameras, rays and costs in space",
         new: |state| Box::new(space::Space::new(state)),
+    },
+    Entry {
+        name: "ransac",
+        title: "RANSAC",
+        about: "likelihood and inliers of every hypothesis, the test of the best",
+        new: |_| Box::<ransac::Ransac>::default(),
+    },
+    Entry {
+        name: "surface",
+        title: "Cost surface",
+        about: "cost and coverage of every position tried, minima, slices",
+        new: |_| Box::<surface::Surface>::default(),
+    },
+    Entry {
+        name: "histogram",
+        title: "Histogram",
+        about: "joint histogram and entropies of MI, residuals of PM",
+        new: |_| Box::<histogram::Histogram>::default(),
     },
     Entry {
         name: "report",

@@ -13,7 +13,7 @@ use crate::event::{
     CloudColored, Method, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
 };
 use crate::geometry::Pose;
-use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice};
+use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
 use crate::image::gaussian_smoothed;
 use crate::memo::Recalled;
 use crate::problem::{Problem, ReferenceTuple};
@@ -89,7 +89,7 @@ impl Direct {
                 problem,
             },
             covered_at_reference: initial.covered,
-            least_covered: (self.grid.coverage_floor * f64::from(initial.covered)).ceil() as u32,
+            least_covered: least_covered(self.grid.coverage_floor, initial.covered),
             evaluations: 1,
             best: start,
             best_score: initial,

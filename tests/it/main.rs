@@ -14,6 +14,7 @@ mod real_pair;
 mod recording;
 mod retrieval;
 mod robust_pose;
+mod search_views;
 mod session;
 mod small_sequence;
 mod space;

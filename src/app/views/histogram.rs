@@ -1,0 +1,135 @@
+//! Why a cost is what it is: how grey values of query and synthetic view fall together (MI), or how
+//! far they differ (PM).
+
+mod joint;
+mod residuals;
+
+use egui::{RichText, ScrollArea, Ui};
+
+use super::View;
+use crate::app::{Scope, Shown};
+use crate::cost::Explanation;
+use crate::event::Method;
+use crate::grid::Offset;
+
+/// The joint histogram, or the residuals, of the synthetic view that is shown.
+#[derive(Default)]
+pub struct Histogram {
+    /// The method that was asked for; that at the cursor otherwise.
+    method: Option<Method>,
+    /// The method at the cursor when `method` was asked for.
+    asked_at: Option<Method>,
+}
+
+impl View for Histogram {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            let method = self.choose(ui, scope);
+            let Some(shown) = scope.shown(method) else {
+                ui.weak(
+                    "No synthetic view yet: PM (2) and MI (3) render some, and so does a camera \
+                     in hand",
+                );
+                return;
+            };
+            caption(ui, scope, &shown);
+            match &shown.comparison.explanation {
+                Some(Explanation::MutualInformation(histogram)) => {
+                    joint::ui(ui, scope, &shown.comparison, histogram);
+                }
+                Some(Explanation::Photometric(weights)) => {
+                    residuals::ui(ui, scope, &shown.comparison, weights);
+                }
+                None => {
+                    ui.weak("This view has no cost: too little of it is covered, or it is all of one grey");
+                }
+            }
+        });
+    }
+}
+
+impl Histogram {
+    /// What a person chose holds until the cursor comes to another method.
+    fn choose(&mut self, ui: &mut Ui, scope: &Scope<'_>) -> Method {
+        if self.asked_at != scope.method() {
+            self.asked_at = scope.method();
+            self.method = None;
+        }
+        let shown = self.method.unwrap_or_else(|| scope.direct_method());
+        ui.horizontal_wrapped(|ui| {
+            let choices = [
+                (Method::Photometric, "PM residuals"),
+                (Method::MutualInformation, "MI joint histogram"),
+            ];
+            for (method, name) in choices {
+                if ui.selectable_label(method == shown, name).clicked() {
+                    self.method = Some(method);
+                }
+            }
+        });
+        self.method.unwrap_or(shown)
+    }
+}
+
+/// Why this view is shown, and where its camera is.
+fn caption(ui: &mut Ui, scope: &Scope<'_>, shown: &Shown) {
+    ui.horizontal_wrapped(|ui| {
+        let mut words = shown.at.name().to_owned();
+        if let Some(problem) = scope.problem() {
+            let offset = Offset::of(&problem.reference_from_query(&shown.pose));
+            let numbers = [
+                offset.right_m,
+                offset.forward_m,
+                offset.yaw_rad.to_degrees(),
+            ];
+            // A sum is no negative zero.
+            let [right, ahead, left] = numbers.map(|number| (100.0 * number).round() / 100.0 + 0.0);
+            words.push_str(&format!(
+                ": {right:.2} m right, {ahead:.2} m ahead, {left:.2}° left"
+            ));
+        }
+        ui.weak(words);
+        let is_old = scope
+            .desk
+            .looking_at()
+            .is_some_and(|(pose, _)| pose != shown.pose);
+        if is_old && scope.desk.is_probing() {
+            ui.label(RichText::new("the next one is worked out").italics());
+        }
+    });
+}
+
+/// The cost here beside those it can be compared with. `quality` turns a cost into what is shown
+/// with it, if anything is.
+fn comparison(
+    ui: &mut Ui,
+    scope: &Scope<'_>,
+    method: Method,
+    cost: Option<f64>,
+    quality: Option<(&str, fn(f64) -> f64)>,
+) {
+    let bounds = scope.cost_bounds(method);
+    let rows = [
+        ("here", cost),
+        ("result of the search", bounds.best),
+        ("truth", bounds.truth),
+        ("shuffled pixels", bounds.shuffled),
+    ];
+    egui::Grid::new("comparison").striped(true).show(ui, |ui| {
+        ui.label("");
+        ui.label(RichText::new("cost").weak().small());
+        if let Some((name, _)) = quality {
+            ui.label(RichText::new(name).weak().small());
+        }
+        ui.end_row();
+        for (name, cost) in rows {
+            let Some(cost) = cost else { continue };
+            ui.label(name);
+            ui.monospace(format!("{cost:.4}"));
+            if let Some((_, quality)) = quality {
+                ui.monospace(format!("{:.4}", quality(cost)));
+            }
+            ui.end_row();
+        }
+    });
+}

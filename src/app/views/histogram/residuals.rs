@@ -1,0 +1,136 @@
+//! How far query and synthetic view differ, and which half of the differences PM counts.
+
+use egui::{Color32, Ui};
+use egui_plot::{Bar, BarChart, HoverPosition, LineStyle, Plot, VLine};
+
+use super::comparison;
+use crate::app::{Scope, theme};
+use crate::cost::{IntensityPair, PhotometricWeights};
+use crate::event::Method;
+use crate::render::Comparison;
+
+/// Width of a bar \[grey values\].
+const WIDTH: usize = 4;
+/// Bars from -256 to 256.
+const BARS: usize = 512 / WIDTH;
+
+/// Draws the residuals of a comparison.
+pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Comparison, weights: &PhotometricWeights) {
+    let counts = counts(&shown.pairs, weights);
+    let median = f64::from(weights.threshold).sqrt();
+    let ignored = ui.visuals().weak_text_color();
+    let counted = theme::method(Method::Photometric);
+    let label = |position: &HoverPosition<'_>| match position {
+        HoverPosition::NearDataPoint { plot_name, .. } => Some((*plot_name).to_owned()),
+        HoverPosition::Elsewhere { .. } => None,
+    };
+    let answer = Plot::new("residuals")
+        .height(ui.available_width().clamp(120.0, 260.0))
+        .allow_scroll(false)
+        .x_axis_label("query less synthetic view [grey values]")
+        .y_axis_label("pixels")
+        .label_formatter(label)
+        .include_y(0.0)
+        .show(ui, |plot| {
+            let inside = bars(&counts, 0);
+            let inside = BarChart::new("counted", inside).color(counted);
+            let outside = BarChart::new("ignored", bars(&counts, 1))
+                .color(ignored)
+                .stack_on(&[&inside]);
+            plot.bar_chart(inside.element_formatter(Box::new(describe)));
+            plot.bar_chart(outside.element_formatter(Box::new(describe)));
+            for side in [-median, median] {
+                let line = VLine::new("median", side).color(theme::ESTIMATE);
+                plot.vline(line.style(LineStyle::dashed_loose()).allow_hover(false));
+            }
+        });
+    let name = format!("Residuals of {} pixels", shown.pairs.len());
+    answer
+        .response
+        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    let kept = weights.counted.iter().filter(|counted| **counted).count();
+    let left_out = weights.counted.len() - kept;
+    ui.horizontal_wrapped(|ui| {
+        legend(ui, counted, &format!("{kept} pixels count"));
+        legend(ui, ignored, &format!("{left_out} are ignored"));
+    });
+    ui.label(format!(
+        "The median difference is {median:.2} grey values (dashed); whatever differs more is ignored"
+    ));
+    if let Some(cost) = shown.score.cost {
+        let power = scope.run.params.pm.power;
+        let mean = match power {
+            1 => "mean square of those that count",
+            _ => "mean fourth power of those that count",
+        };
+        let throughout = cost.powf(0.5 / power as f64);
+        ui.label(format!(
+            "cost = {mean} = {cost:.4}, as if all differed by {throughout:.2} grey values"
+        ));
+    }
+    ui.separator();
+    let method = Method::Photometric;
+    ui.label(egui::RichText::new("PM").color(counted).strong());
+    comparison(ui, scope, method, shown.score.cost, None);
+}
+
+fn legend(ui: &mut Ui, color: Color32, words: &str) {
+    let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());
+    ui.painter().rect_filled(rect, 1.0, color);
+    ui.label(words);
+}
+
+/// Per bar, the pixels that count and those that are ignored.
+fn counts(pairs: &[IntensityPair], weights: &PhotometricWeights) -> Vec<[u32; 2]> {
+    let mut counts = vec![[0; 2]; BARS];
+    for (pair, &counted) in pairs.iter().zip(&weights.counted) {
+        let bar = ((pair.query - pair.synthetic + 256.0) as usize / WIDTH).min(BARS - 1);
+        counts[bar][usize::from(!counted)] += 1;
+    }
+    counts
+}
+
+fn bars(counts: &[[u32; 2]], which: usize) -> Vec<Bar> {
+    let bar = |(index, count): (usize, &[u32; 2])| {
+        let middle = (index * WIDTH) as f64 + 0.5 * WIDTH as f64 - 256.0;
+        Bar::new(middle, f64::from(count[which])).width(WIDTH as f64)
+    };
+    counts
+        .iter()
+        .enumerate()
+        .filter(|(_, count)| **count != [0; 2])
+        .map(bar)
+        .collect()
+}
+
+fn describe(bar: &Bar, chart: &BarChart) -> String {
+    let half = 0.5 * WIDTH as f64;
+    let (from, to) = (bar.argument - half, bar.argument + half);
+    let name = egui_plot::PlotItem::name(chart);
+    format!("{from} to {to} grey values: {} {name}", bar.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_falls_into_one_bar() {
+        let differences = [-255.0_f32, -1.0, 0.0, 3.9, 4.0, 255.0];
+        let pairs = differences.map(|difference| IntensityPair {
+            query: difference.max(0.0),
+            synthetic: (-difference).max(0.0),
+        });
+        let weights = PhotometricWeights {
+            threshold: 16.0,
+            counted: vec![false, true, true, true, true, false],
+        };
+        let counts = counts(&pairs, &weights);
+        let of = |difference: i32| counts[(difference + 256) as usize / WIDTH];
+        assert_eq!(
+            [of(-255), of(-1), of(0), of(4), of(255)],
+            [[0, 1], [1, 0], [2, 0], [1, 0], [0, 1]]
+        );
+        assert_eq!(counts.iter().flatten().sum::<u32>(), 6);
+    }
+}

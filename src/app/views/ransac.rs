@@ -1,0 +1,223 @@
+//! MLESAC: every hypothesis, the best so far, and what became of it.
+
+mod trials;
+mod verdict;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use egui::{Color32, Ui};
+use egui_plot::{GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
+
+use super::View;
+use crate::app::{Command, Scope, theme};
+use crate::event::{HypothesisTried, Method};
+use crate::session::{Loaded, Span};
+
+use trials::Trials;
+
+/// Likelihood and inliers by hypothesis, the sample at the cursor, and the test of the result.
+#[derive(Default)]
+pub struct Ransac {
+    known: Option<(Key, Trials)>,
+}
+
+/// What the trials were read from.
+struct Key {
+    /// Kept alive, so that its address stays its own: each run has one.
+    loaded: Arc<Loaded>,
+    records: Range<usize>,
+}
+
+/// Which numbers of the trials a plot shows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Shows {
+    Likelihood,
+    Inliers,
+    Needed,
+}
+
+impl Shows {
+    const ALL: [Self; 3] = [Self::Likelihood, Self::Inliers, Self::Needed];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Likelihood => "log likelihood",
+            Self::Inliers => "inliers",
+            Self::Needed => "trials needed",
+        }
+    }
+}
+
+impl View for Ransac {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        egui::ScrollArea::vertical()
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                let source = source(scope);
+                let trials =
+                    source.and_then(|(span, end)| self.read(scope, span.records.start..end));
+                let (Some((span, end)), Some(trials)) = (source, trials) else {
+                    ui.weak("No hypothesis yet: FB (1) tries some in its stage ransac");
+                    return;
+                };
+                head(ui, scope, span, trials);
+                plots(ui, scope, trials);
+                verdict::ui(ui, scope, span, end, trials);
+            });
+    }
+}
+
+/// Where the trials of the cursor are: the part of the run, and behind its last record to show. That
+/// of FB, unless the cursor is in the hybrid, which runs FB inside itself.
+fn source<'a>(scope: &Scope<'a>) -> Option<(&'a Span, usize)> {
+    let is_inside =
+        scope.method() == Some(Method::Hybrid) && scope.latest::<HypothesisTried>().is_some();
+    let (span, cursor) = match is_inside {
+        true => (scope.span()?, scope.cursor),
+        false => scope.of(Method::Feature)?,
+    };
+    Some((span, span.records.end.min(cursor + 1)))
+}
+
+impl Ransac {
+    /// The trials among some records. They are read once as long as the cursor stays.
+    fn read(&mut self, scope: &Scope<'_>, records: Range<usize>) -> Option<&Trials> {
+        let loaded = scope.run.loaded.as_ref()?;
+        let is_known = self
+            .known
+            .as_ref()
+            .is_some_and(|(key, _)| Arc::ptr_eq(&key.loaded, loaded) && key.records == records);
+        if !is_known {
+            let key = Key {
+                loaded: Arc::clone(loaded),
+                records: records.clone(),
+            };
+            let trials = Trials::read(scope.run.records().get(records.clone())?, records.start);
+            self.known = Some((key, trials));
+        }
+        let (_, trials) = self.known.as_ref()?;
+        (trials.made() > 0).then_some(trials)
+    }
+}
+
+fn head(ui: &mut Ui, scope: &Scope<'_>, span: &Span, trials: &Trials) {
+    ui.horizontal_wrapped(|ui| {
+        if span.method == Method::Hybrid {
+            ui.weak("inside HY");
+        }
+        let needed = trials
+            .needed()
+            .unwrap_or(scope.run.params.fb.mlesac.max_trials);
+        ui.label(format!("{} trials made, {needed} needed", trials.made()));
+        if trials.without_pose > 0 {
+            ui.weak(format!("{} samples have no pose", trials.without_pose));
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        let legend = |ui: &mut Ui, color: Color32, words: &str| {
+            let (rect, _) = ui.allocate_exact_size(egui::vec2(14.0, 3.0), egui::Sense::hover());
+            ui.painter().rect_filled(rect, 0.0, color);
+            ui.weak(words);
+        };
+        legend(ui, hypothesis_color(), "hypothesis");
+        legend(ui, theme::ESTIMATE, "best so far, refined");
+        legend(ui, ui.visuals().strong_text_color(), "cursor");
+        ui.weak("(click a point to go there)");
+    });
+}
+
+fn hypothesis_color() -> Color32 {
+    theme::method(Method::Feature)
+}
+
+fn plots(ui: &mut Ui, scope: &Scope<'_>, trials: &Trials) {
+    let group = ui.make_persistent_id("trials");
+    for shows in Shows::ALL {
+        let height = if shows == Shows::Needed { 110.0 } else { 130.0 };
+        let is_last = shows == Shows::Needed;
+        let mut plot = Plot::new(shows.name())
+            .height(height)
+            .link_axis(group, [true, false])
+            .allow_scroll(false)
+            .show_x(false)
+            .show_y(false)
+            .y_axis_min_width(62.0)
+            .y_axis_label(shows.name());
+        if is_last {
+            plot = plot
+                .x_axis_label("trial")
+                .y_grid_spacer(decades)
+                .y_axis_formatter(|mark, _| format!("{:.0}", 10_f64.powf(mark.value)));
+        }
+        let answer = plot.show(ui, |plot| draw(plot, trials, shows));
+        let name = format!("{} by trial, {} trials", shows.name(), trials.made());
+        answer
+            .response
+            .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+        if let (true, Some(at)) = (
+            answer.response.clicked(),
+            answer.response.interact_pointer_pos(),
+        ) {
+            let distance = |[trial, value]: [f64; 2]| {
+                let point = PlotPoint::new(trial, value);
+                answer.transform.position_from_point(&point).distance_sq(at)
+            };
+            if let Some(record) = trials.nearest(points_of(trials, shows), distance) {
+                scope.send(Command::MoveCursor(record));
+            }
+        }
+    }
+}
+
+/// The drawn points of a plot; the last one has none, and is clicked at its line.
+fn points_of(trials: &Trials, shows: Shows) -> &[[f64; 2]] {
+    match shows {
+        Shows::Likelihood => &trials.likelihood.points,
+        Shows::Inliers => &trials.inliers.points,
+        Shows::Needed => &trials.needed_steps,
+    }
+}
+
+fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, shows: Shows) {
+    let line = |name: &str, points: &'p [[f64; 2]]| // Bands would fill the corners of steps.
+        Line::new(name, points.to_vec())
+            .allow_band(false)
+            .allow_hover(false);
+    if let Some(trial) = trials.at_cursor() {
+        let color = plot.ctx().global_style().visuals.strong_text_color();
+        let cursor = VLine::new("cursor", trial.index as f64).color(color);
+        plot.vline(cursor.width(1.0).allow_hover(false));
+    }
+    let series = match shows {
+        Shows::Likelihood => &trials.likelihood,
+        Shows::Inliers => &trials.inliers,
+        Shows::Needed => {
+            let needed = line("needed", &trials.needed_steps);
+            plot.line(needed.color(theme::ESTIMATE).width(1.5));
+            let made = line("made", &trials.made_curve);
+            let color = plot.ctx().global_style().visuals.weak_text_color();
+            plot.line(made.color(color).style(LineStyle::dashed_loose()));
+            return;
+        }
+    };
+    let points = Points::new("hypotheses", series.points.clone());
+    plot.points(
+        points
+            .radius(1.6)
+            .color(hypothesis_color())
+            .allow_hover(false),
+    );
+    plot.line(line("best", &series.best).color(theme::ESTIMATE).width(1.5));
+}
+
+/// Lines at 1, 10, 100 …, for logarithms to base ten.
+fn decades(input: GridInput) -> Vec<GridMark> {
+    let (from, to) = input.bounds;
+    (from.ceil().max(0.0) as i32..=to.floor().min(12.0) as i32)
+        .map(|decade| GridMark {
+            value: f64::from(decade),
+            step_size: 1.0,
+        })
+        .collect()
+}

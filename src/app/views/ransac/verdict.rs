@@ -1,0 +1,228 @@
+//! In words: the sample at the cursor, the refined pose, the test of it.
+
+use egui::{Grid, RichText, Ui};
+use nalgebra::{Point2, Point3};
+
+use super::trials::Trials;
+use crate::app::{Command, Scope};
+use crate::evaluate::Status;
+use crate::event::{
+    ConsensusJudged, DepthsLifted, FeaturesDetected, LiftedMatch, PoseRefined, Side,
+};
+use crate::geometry::Pose;
+use crate::robust::{AcceptanceRule, Hypothesis, Trial};
+use crate::session::Span;
+
+/// Draws what is known at the end of the records that are shown.
+pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trials: &Trials) {
+    ui.separator();
+    if let Some(trial) = trials.at_cursor() {
+        sample(ui, scope, span, end, trial);
+    }
+    if let Some(refined) = scope.run.latest_in::<PoseRefined>(span, end - 1) {
+        ui.separator();
+        refinement(ui, refined, trials.best.as_ref());
+    }
+    if let Some(judged) = scope.run.latest_in::<ConsensusJudged>(span, end - 1) {
+        acceptance(ui, scope, span, judged);
+    } else if let Some(result) = &span.result
+        && end == span.records.end
+        && result.status == Status::Failed
+        && let Some(reason) = &result.reason
+    {
+        ui.label(format!("{} {}", reason.code, reason.text));
+    }
+}
+
+fn sample(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trial: &Trial) {
+    let score = |hypothesis: &Option<Hypothesis>| match hypothesis {
+        Some(Hypothesis { score, .. }) => format!(
+            "log likelihood {:.1}, {} inliers, share of true matches {:.2}",
+            score.log_likelihood, score.inliers, score.mixing
+        ),
+        None => "no pose".to_owned(),
+    };
+    let is_best = if trial.is_best { ", a new best" } else { "" };
+    ui.label(RichText::new(format!("Trial {}{is_best}", trial.index)).strong());
+    Grid::new("trial").show(ui, |ui| {
+        ui.weak("its hypothesis");
+        ui.label(score(&trial.hypothesis));
+        ui.end_row();
+        ui.weak("the best so far");
+        ui.label(score(&trial.best));
+        ui.end_row();
+    });
+    let Some(lifted) = scope.run.latest_in::<DepthsLifted>(span, end - 1) else {
+        return;
+    };
+    let correspondences: Vec<&LiftedMatch> = lifted
+        .matches
+        .iter()
+        .filter(|lifted| lifted.point.is_some())
+        .collect();
+    let features = Features::of(scope, span, end);
+    Grid::new("sample").striped(true).show(ui, |ui| {
+        let columns = [
+            "sample",
+            "query [px]",
+            "reference [px]",
+            "depth [m]",
+            "here [px]",
+            "best [px]",
+        ];
+        for column in columns {
+            ui.label(RichText::new(column).weak().small());
+        }
+        ui.end_row();
+        for &index in &trial.sample {
+            let Some(lifted) = correspondences.get(index) else {
+                continue;
+            };
+            let help = "Look at this feature";
+            if ui
+                .link(format!("match {index}"))
+                .on_hover_text(help)
+                .clicked()
+            {
+                scope.send(Command::SelectFeature(Some(lifted.query)));
+            }
+            row(ui, scope, &features, lifted, trial);
+            ui.end_row();
+        }
+    });
+    ui.weak("here, best: reprojection errors for this hypothesis and for the best so far");
+}
+
+/// The keypoints that a sample's indices refer to.
+struct Features<'a> {
+    query: Option<&'a FeaturesDetected>,
+    reference: Option<&'a FeaturesDetected>,
+}
+
+impl<'a> Features<'a> {
+    fn of(scope: &Scope<'a>, span: &Span, end: usize) -> Self {
+        let records = scope.run.records().get(span.records.start..end);
+        let of = |side: Side| {
+            let mut detected = records.unwrap_or_default().iter().filter_map(|record| {
+                let detected: &FeaturesDetected =
+                    crate::event::DebugEvent::from_event(&record.event)?;
+                (detected.side == side).then_some(detected)
+            });
+            detected.next()
+        };
+        Self {
+            query: of(Side::Query),
+            reference: of(Side::Reference),
+        }
+    }
+
+    fn pixel(detected: Option<&FeaturesDetected>, index: usize) -> Option<Point2<f64>> {
+        let keypoint = detected?.features.keypoints.get(index)?;
+        Some(keypoint.pixel())
+    }
+}
+
+fn row(
+    ui: &mut Ui,
+    scope: &Scope<'_>,
+    features: &Features<'_>,
+    lifted: &LiftedMatch,
+    trial: &Trial,
+) {
+    let seen = Features::pixel(features.query, lifted.query);
+    let pixel = |pixel: Option<Point2<f64>>| {
+        pixel.map_or("–".to_owned(), |p| format!("({:.0}, {:.0})", p.x, p.y))
+    };
+    ui.label(pixel(seen));
+    ui.label(pixel(Features::pixel(features.reference, lifted.reference)));
+    let Some(point) = lifted.point else { return };
+    ui.label(format!("{:.1}", point.z));
+    for hypothesis in [&trial.hypothesis, &trial.best] {
+        let error = hypothesis
+            .as_ref()
+            .zip(seen)
+            .and_then(|(hypothesis, seen)| residual_px(scope, &hypothesis.pose, &point, &seen));
+        let inlier_px = scope.run.params.fb.mlesac.inlier_threshold_px;
+        ui.label(match error {
+            Some(error) if error <= inlier_px => format!("{error:.1} inlier"),
+            Some(error) => format!("{error:.1} outlier"),
+            None => "–".to_owned(),
+        });
+    }
+}
+
+/// The reprojection error of a point \[px\]; `None` behind the camera.
+fn residual_px(
+    scope: &Scope<'_>,
+    camera_from_points: &Pose,
+    point: &Point3<f64>,
+    seen: &Point2<f64>,
+) -> Option<f64> {
+    let intrinsics = &scope.problem()?.query.intrinsics;
+    let projected = intrinsics.project(&(camera_from_points * point))?;
+    Some((projected - seen).norm())
+}
+
+fn refinement(ui: &mut Ui, refined: &PoseRefined, best: Option<&Trial>) {
+    ui.label(RichText::new("Refined").strong());
+    let sampled = best
+        .and_then(|trial| Some((trial.index, trial.hypothesis?.score.inliers)))
+        .map_or(String::new(), |(index, inliers)| {
+            format!("; the sample of trial {index} alone had {inliers}")
+        });
+    ui.label(format!(
+        "{} of {} correspondences are inliers after {} trials{sampled}",
+        refined.inliers, refined.correspondences, refined.trials
+    ));
+}
+
+fn acceptance(ui: &mut Ui, scope: &Scope<'_>, span: &Span, judged: &ConsensusJudged) {
+    let verdict = if judged.accepted {
+        "Accepted"
+    } else {
+        "Refused"
+    };
+    ui.label(RichText::new(verdict).strong());
+    let ConsensusJudged {
+        acceptance,
+        distance_m,
+        ..
+    } = judged;
+    let params = &scope.run.params.fb;
+    let compared = |is_met| if is_met { "≥" } else { "<" };
+    let inliers = acceptance.inliers;
+    let is_met = params.accept.accepts(acceptance);
+    ui.label(match (params.accept, acceptance.needed) {
+        (AcceptanceRule::Consensus, Some(needed)) => format!(
+            "{inliers} inliers {} {needed} needed to be more than chance (false alarms expected: \
+             10^{:.1})",
+            compared(is_met),
+            acceptance.log10_nfa
+        ),
+        (AcceptanceRule::Consensus, None) => {
+            format!("{inliers} inliers; so few correspondences are never more than chance")
+        }
+        (AcceptanceRule::Paper, _) => {
+            format!("{inliers} inliers {} 4, the paper's rule", compared(is_met))
+        }
+    });
+    let Some(problem) = scope
+        .run
+        .loaded
+        .as_deref()
+        .and_then(|loaded| loaded.problems.get(span.reference))
+    else {
+        return;
+    };
+    let radius_m = problem.uncertainty_radius_m;
+    let limit_m = radius_m * (1.0 + params.radius_slack);
+    let note = match params.accept {
+        AcceptanceRule::Consensus => "",
+        AcceptanceRule::Paper => " (the paper's rule does not ask)",
+    };
+    ui.label(format!(
+        "{distance_m:.2} m from the reference {} {limit_m:.2} m, the radius of {radius_m:.1} m and {:.0} %{note}",
+        if *distance_m > limit_m { ">" } else { "≤" },
+        100.0 * params.radius_slack
+    ));
+}

@@ -1,0 +1,175 @@
+//! The cost surface: where the search has been, what it found there, and where it went.
+
+mod maps;
+mod marks;
+mod scale;
+mod search;
+mod slices;
+
+use egui::{ScrollArea, Slider, Ui};
+
+use super::View;
+use super::readout::Readout;
+use crate::app::{Command, Scope};
+use crate::event::Method;
+use crate::geometry::Pose;
+
+use maps::{Maps, Shown, progress};
+use marks::{Mark, legend, moved, place};
+use scale::{NO_SAY, Scale, number, swatch};
+use search::Search;
+
+/// What could be done with the maps.
+const HELP: &str = "Point at a cell; click, drag: camera; wheel: zoom; Shift+drag: pan";
+
+/// Maps of a direct method's search, and slices through its minimum.
+#[derive(Default)]
+pub struct Surface {
+    /// The method that was asked for; that at the cursor otherwise.
+    method: Option<Method>,
+    /// The method at the cursor when `method` was asked for.
+    asked_at: Option<Method>,
+    /// The coverage floor that is tried; the run's own otherwise.
+    floor: Option<f64>,
+    maps: Maps,
+    /// Whether this view has said that the pointer is over a pose.
+    is_hovering: bool,
+}
+
+impl View for Surface {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        let method = self.method(scope);
+        let mut pointed_at = None;
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            let search = Search::at(scope, method);
+            self.head(ui, method, search.as_ref());
+            let Some(search) = search else {
+                ui.weak("Nothing is searched yet: the direct methods search, PM (2) and MI (3)");
+                return;
+            };
+            pointed_at = self.content(ui, scope, &search);
+        });
+        self.hover(scope, pointed_at);
+    }
+}
+
+impl Surface {
+    /// The method that is shown. What a person chose holds until the cursor comes to another method.
+    fn method(&mut self, scope: &Scope<'_>) -> Method {
+        if self.asked_at != scope.method() {
+            self.asked_at = scope.method();
+            self.method = None;
+        }
+        self.method.unwrap_or_else(|| scope.direct_method())
+    }
+
+    fn head(&mut self, ui: &mut Ui, shown: Method, search: Option<&Search<'_>>) {
+        ui.horizontal_wrapped(|ui| {
+            for method in [Method::Photometric, Method::MutualInformation] {
+                let name = method.name().to_uppercase();
+                let button = ui.selectable_label(method == shown, name);
+                if button.on_hover_text("Show this method's search").clicked() {
+                    self.method = Some(method);
+                }
+            }
+            let Some(search) = search else { return };
+            if search.span.method != shown {
+                ui.weak("inside HY");
+            }
+            match search.lattices.last() {
+                Some(searched) => ui.weak(progress(searched)),
+                None => ui.weak("no position tried yet"),
+            };
+        });
+    }
+
+    fn content(&mut self, ui: &mut Ui, scope: &Scope<'_>, search: &Search<'_>) -> Option<Pose> {
+        let run_floor = scope.run.params.grid.coverage_floor;
+        let floor = self.floor.unwrap_or(run_floor);
+        let width = ui.available_width();
+        let scale = Scale::of(scope.run, search);
+        let marks = Mark::all(scope, search, floor);
+        let shown = Shown {
+            search,
+            scale: &scale,
+            marks: &marks,
+            floor,
+        };
+        let readout = Readout::reserve(ui);
+        let under_pointer = self.maps.ui(ui, scope, &shown);
+        let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
+        readout.say(ui, words, HELP);
+        let pointed_at = legend(ui, scope, &marks);
+        self.floor_ui(ui, scope, search, run_floor);
+        ui.separator();
+        slices::ui(ui, scope, search, floor, width);
+        under_pointer.map(|(pose, _)| pose).or(pointed_at)
+    }
+
+    /// The floor and what it would change.
+    fn floor_ui(&mut self, ui: &mut Ui, scope: &Scope<'_>, search: &Search<'_>, run_floor: f64) {
+        let mut floor = self.floor.unwrap_or(run_floor);
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().slider_width = 80.0;
+            swatch(ui, NO_SAY);
+            ui.label("below the floor");
+            let slider = Slider::new(&mut floor, 0.0..=1.0)
+                .step_by(0.005)
+                .fixed_decimals(3)
+                .text("coverage floor");
+            let help = "Least coverage of a position that may win, as a share of the reference's";
+            ui.add(slider).on_hover_text(help);
+            // The slider's own step leaves a tail of digits.
+            let floor = (1000.0 * floor).round() / 1000.0;
+            let is_other = floor != run_floor;
+            self.floor = is_other.then_some(floor);
+            if !is_other {
+                return;
+            }
+            if ui.button("Reset floor").clicked() {
+                self.floor = None;
+            }
+            let is_present = std::ptr::eq(scope.run, scope.desk.run());
+            let apply = ui.add_enabled(is_present, egui::Button::new("Run with this floor"));
+            if apply.on_hover_text("Sets grid.coverage_floor").clicked() {
+                scope.send(Command::SetParam {
+                    key: "grid.coverage_floor".to_owned(),
+                    value: floor.to_string(),
+                });
+            }
+        });
+        let floor = self.floor.unwrap_or(run_floor);
+        if floor != run_floor {
+            let (own, other) = [run_floor, floor]
+                .map(|floor| search.least_covered(floor))
+                .into();
+            let words = match moved(search, own, other) {
+                Some(minimum) => format!(
+                    "The minimum moves to {} at this floor, cost {}",
+                    place(&minimum.offset),
+                    number(minimum.cost)
+                ),
+                None if search
+                    .positions()
+                    .all(|searched| searched.minimum(other).is_none()) =>
+                {
+                    "No position may win at this floor".to_owned()
+                }
+                None => "The minimum stays where it is at this floor".to_owned(),
+            };
+            ui.label(words);
+        }
+    }
+
+    /// Says where the pointer is, once when it comes and once when it leaves.
+    fn hover(&mut self, scope: &Scope<'_>, pointed_at: Option<Pose>) {
+        if pointed_at.is_some() {
+            if scope.desk.hovered != pointed_at {
+                scope.send(Command::Hover(pointed_at));
+            }
+        } else if self.is_hovering {
+            scope.send(Command::Hover(None));
+        }
+        self.is_hovering = pointed_at.is_some();
+    }
+}

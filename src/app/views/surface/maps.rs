@@ -1,0 +1,440 @@
+//! Three maps of the positions beside each other: cost, coverage, and the cost of those that may
+//! win.
+
+use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
+use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
+
+use super::marks::{Mark, place};
+use super::scale::{NO_SAY, Scale, bar, number};
+use super::search::{Search, Searched};
+use crate::app::{Command, Scope};
+use crate::geometry::Pose;
+use crate::grid::{Lattice, Offset};
+use crate::render::Score;
+
+/// The maps, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Map {
+    Cost,
+    Coverage,
+    Floored,
+}
+
+impl Map {
+    const ALL: [Self; 3] = [Self::Cost, Self::Coverage, Self::Floored];
+
+    fn title(self, floor: f64) -> String {
+        match self {
+            Self::Cost => "Cost".to_owned(),
+            Self::Coverage => "Coverage".to_owned(),
+            Self::Floored => format!("Cost, floor {floor:.3}"),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Cost => "Cost map",
+            Self::Coverage => "Coverage map",
+            Self::Floored => "Map of costs above the floor",
+        }
+    }
+}
+
+/// The width of the numbers left of the first map \[points\].
+const LEFT_AXIS: f32 = 34.0;
+/// The height of the numbers below each map \[points\].
+const LOWER_AXIS: f32 = 30.0;
+
+/// The pictures of the maps. They change with the cursor and with the floor, so each has a texture
+/// that is painted anew where its pixels differ.
+#[derive(Default)]
+pub(super) struct Maps {
+    painted: Vec<(ColorImage, TextureHandle)>,
+}
+
+/// A cell of a lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cell {
+    /// Position among the lattices of positions.
+    lattice: usize,
+    cell: usize,
+    offset: Offset,
+}
+
+/// What the maps are drawn from.
+pub(super) struct Shown<'a> {
+    pub(super) search: &'a Search<'a>,
+    pub(super) scale: &'a Scale,
+    pub(super) marks: &'a [Mark],
+    /// The floor of the slider.
+    pub(super) floor: f64,
+}
+
+impl Maps {
+    /// Draws the maps; answers the pose under the pointer, with its cost in words.
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        scope: &Scope<'_>,
+        shown: &Shown<'_>,
+    ) -> Option<(Pose, String)> {
+        let gap = ui.spacing().item_spacing.x;
+        let side = ((ui.available_width() - LEFT_AXIS - 2.0 * gap - 2.0) / 3.0).max(60.0);
+        let group = ui.make_persistent_id("maps");
+        let mut transforms = Vec::new();
+        let mut pointed_at = None;
+        let mut takes_camera = false;
+        let mut texture = 0;
+        ui.horizontal_top(|ui| {
+            for map in Map::ALL {
+                ui.vertical(|ui| {
+                    let left = if map == Map::Cost { LEFT_AXIS } else { 0.0 };
+                    ui.horizontal(|ui| {
+                        ui.add_space(left);
+                        ui.add(egui::Label::new(map.title(shown.floor)).truncate());
+                    });
+                    let images = self.images(ui, shown, map, &mut texture);
+                    let answer = plot(ui, shown, map, group, side, images);
+                    let at = answer.response.interact_pointer_pos();
+                    if let Some(at) = answer.response.hover_pos().or(at) {
+                        let frame = answer.transform.frame();
+                        pointed_at = frame
+                            .contains(at)
+                            .then(|| cell_at(shown.search, &answer.transform, at))
+                            .flatten();
+                    }
+                    let is_panning = ui.input(|input| input.modifiers.shift);
+                    takes_camera |= !is_panning
+                        && (answer.response.clicked()
+                            || answer.response.dragged_by(PointerButton::Primary));
+                    transforms.push(answer.transform);
+                    ui.horizontal(|ui| {
+                        ui.spacing_mut().item_spacing.x = 0.0;
+                        ui.add_space(left);
+                        ui.vertical(|ui| colours(ui, shown.scale, map, side));
+                    });
+                });
+            }
+        });
+        for transform in &transforms {
+            overlay(ui, shown, transform, pointed_at);
+        }
+        let Cell {
+            lattice,
+            cell,
+            offset,
+        } = pointed_at?;
+        let pose = shown.search.pose(&offset);
+        if takes_camera && scope.desk.camera != Some(pose) {
+            scope.send(Command::TakeCamera(Some(pose)));
+        }
+        let searched = shown.search.positions().nth(lattice)?;
+        let least_covered = shown.search.least_covered(shown.floor);
+        let words = readout(shown.search, searched, cell, least_covered, &offset);
+        Some((pose, words))
+    }
+
+    /// The textures of one map with their places.
+    fn images(
+        &mut self,
+        ui: &Ui,
+        shown: &Shown<'_>,
+        map: Map,
+        texture: &mut usize,
+    ) -> Vec<PlotImage> {
+        let least_covered = shown.search.least_covered(shown.floor);
+        let color = |score: &Score| match map {
+            Map::Coverage => shown.scale.coverage(shown.search.coverage(score.covered)),
+            Map::Cost => score.cost.map_or(NO_SAY, |cost| shown.scale.cost(cost)),
+            Map::Floored => score
+                .eligible_cost(least_covered)
+                .map_or(NO_SAY, |cost| shown.scale.cost(cost)),
+        };
+        let mut images = Vec::new();
+        for (index, searched) in shown.search.positions().enumerate() {
+            let image = picture(searched, color);
+            let id = self.paint(ui, *texture, image);
+            *texture += 1;
+            let Lattice {
+                columns,
+                rows,
+                step,
+                centre,
+                ..
+            } = &searched.surface.lattice;
+            let size = [*columns, *rows].map(|count| (count as f64 * step) as f32);
+            let middle = PlotPoint::new(centre.right_m, centre.forward_m);
+            images.push(PlotImage::new(format!("{index}"), id, middle, size));
+        }
+        images
+    }
+
+    fn paint(&mut self, ui: &Ui, index: usize, image: ColorImage) -> egui::TextureId {
+        const OPTIONS: egui::TextureOptions = egui::TextureOptions::NEAREST;
+        match self.painted.get_mut(index) {
+            Some((before, texture)) => {
+                if before.size != image.size || before.pixels != image.pixels {
+                    texture.set(image.clone(), OPTIONS);
+                    *before = image;
+                }
+                texture.id()
+            }
+            None => {
+                let texture = ui.ctx().load_texture("surface", image.clone(), OPTIONS);
+                let id = texture.id();
+                self.painted.push((image, texture));
+                id
+            }
+        }
+    }
+}
+
+/// One pixel per cell, the row farthest ahead first; what is not tried is left out.
+fn picture(searched: &Searched, color: impl Fn(&Score) -> Color32) -> ColorImage {
+    let Lattice { columns, rows, .. } = searched.surface.lattice;
+    let cells = (0..rows)
+        .rev()
+        .flat_map(|row| (0..columns).map(move |column| row * columns + column));
+    let pixels = cells.map(|cell| {
+        let score = searched.surface.scores[cell].as_ref();
+        score.map_or(Color32::TRANSPARENT, &color)
+    });
+    ColorImage::new([columns, rows], pixels.collect())
+}
+
+/// One map. The wheel zooms, Shift and drag or the middle button pan.
+fn plot(
+    ui: &mut Ui,
+    shown: &Shown<'_>,
+    map: Map,
+    group: Id,
+    side: f32,
+    images: Vec<PlotImage>,
+) -> egui_plot::PlotResponse<()> {
+    let is_first = map == Map::Cost;
+    let pan = match ui.input(|input| input.modifiers.shift) {
+        true => PointerButton::Primary,
+        false => PointerButton::Middle,
+    };
+    // The numbers are kept from pushing the maps about.
+    let narrow = |axis: AxisHints<'static>, thickness| {
+        axis.min_thickness(thickness)
+            .label_spacing(egui::Rangef::new(24.0, 40.0))
+            .tick_label_font(egui::FontId::proportional(10.0))
+            .formatter(|mark, _| format!("{}", (1000.0 * mark.value).round() / 1000.0))
+    };
+    let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
+    let forward = narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, "forward [m]"));
+    let bounds = whole(shown.search);
+    let answer = Plot::new(map.name())
+        .width(side + if is_first { LEFT_AXIS } else { 0.0 })
+        .height(side + LOWER_AXIS)
+        .data_aspect(1.0)
+        .link_axis(group, true)
+        .show_x(false)
+        .show_y(false)
+        .show_grid(false)
+        .show_axes([true, is_first])
+        .custom_x_axes(vec![right])
+        .custom_y_axes(vec![forward])
+        .default_x_bounds(bounds.min()[0], bounds.max()[0])
+        .default_y_bounds(bounds.min()[1], bounds.max()[1])
+        .allow_scroll(false)
+        .allow_axis_zoom_drag(false)
+        .pan_pointer_button(pan)
+        .show(ui, |plot| {
+            let wheel = plot.ctx().input(|input| input.smooth_scroll_delta.y);
+            if plot.response().hovered() && wheel != 0.0 {
+                // Taken from the scroll area around.
+                plot.ctx()
+                    .input_mut(|input| input.smooth_scroll_delta = egui::Vec2::ZERO);
+                plot.zoom_bounds_around_hovered(egui::Vec2::splat((wheel / 200.0).exp()));
+            }
+            for image in images {
+                plot.add(image);
+            }
+        });
+    answer.response.widget_info(|| {
+        let tried: Vec<String> = shown.search.positions().map(progress).collect();
+        let name = format!("{}: {}", map.name(), tried.join("; "));
+        egui::WidgetInfo::labeled(egui::Role::Image, true, name)
+    });
+    answer
+}
+
+fn small(ui: &Ui, text: &str) -> egui::RichText {
+    egui::RichText::new(text)
+        .size(10.0)
+        .color(ui.visuals().weak_text_color())
+}
+
+/// How far a lattice is.
+pub(super) fn progress(searched: &Searched) -> String {
+    let all = searched.surface.lattice.hypotheses().count();
+    format!(
+        "{}, {} of {all} tried",
+        searched.phase().name(),
+        searched.tried
+    )
+}
+
+/// All lattices with a margin.
+fn whole(search: &Search<'_>) -> PlotBounds {
+    const MARGIN: f64 = 1.04;
+    let radius = search.problem.uncertainty_radius_m;
+    let half = search.positions().fold(radius, |half, searched| {
+        let Lattice {
+            columns,
+            rows,
+            step,
+            centre,
+            ..
+        } = &searched.surface.lattice;
+        let reach = |middle: f64, count: usize| middle.abs() + 0.5 * count as f64 * step;
+        half.max(reach(centre.right_m, *columns))
+            .max(reach(centre.forward_m, *rows))
+    });
+    PlotBounds::new_symmetrical(MARGIN * half)
+}
+
+/// The cell at a place of the screen, of the lattice that lies on top there.
+fn cell_at(search: &Search<'_>, transform: &PlotTransform, at: Pos2) -> Option<Cell> {
+    let point = transform.value_from_position(at);
+    let lattices: Vec<&Searched> = search.positions().collect();
+    lattices
+        .iter()
+        .enumerate()
+        .rev()
+        .find_map(|(index, searched)| {
+            let lattice = &searched.surface.lattice;
+            let cell = cell_of(lattice, point.x, point.y)?;
+            // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
+            let is_seen = index == 0 || searched.surface.scores[cell].is_some();
+            let offset = lattice.offset(cell).filter(|_| is_seen)?;
+            Some(Cell {
+                lattice: index,
+                cell,
+                offset,
+            })
+        })
+}
+
+/// The cell that a position lies in.
+fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
+    let index = |value: f64, count: usize| {
+        let index = (value / lattice.step).round() + (count / 2) as f64;
+        (0.0 <= index && index < count as f64).then_some(index as usize)
+    };
+    let column = index(right_m - lattice.centre.right_m, lattice.columns)?;
+    let row = index(forward_m - lattice.centre.forward_m, lattice.rows)?;
+    Some(row * lattice.columns + column)
+}
+
+fn readout(
+    search: &Search<'_>,
+    searched: &Searched,
+    cell: usize,
+    least_covered: u32,
+    offset: &Offset,
+) -> String {
+    let at = place(offset);
+    let Some(score) = &searched.surface.scores[cell] else {
+        return format!("not tried yet at {at}");
+    };
+    let cost = match score.cost {
+        Some(cost) => format!("cost {}", number(cost)),
+        None => "no cost".to_owned(),
+    };
+    let coverage = search.coverage(score.covered);
+    let note = match score.covered < least_covered {
+        true => ", below the floor",
+        false => "",
+    };
+    format!("{cost}, coverage {coverage:.2} at {at}{note}")
+}
+
+fn colours(ui: &mut Ui, scale: &Scale, map: Map, width: f32) {
+    match map {
+        Map::Coverage => bar(ui, width, "coverage", &scale.coverage_ends()),
+        Map::Cost | Map::Floored => match scale.cost_ends() {
+            Some(ends) => bar(ui, width, "cost", &ends),
+            None => {
+                ui.weak("no cost yet");
+            }
+        },
+    }
+}
+
+/// Outlines and marks on top of a map.
+fn overlay(ui: &Ui, shown: &Shown<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
+    let painter = ui
+        .painter()
+        .with_clip_rect(transform.frame().intersect(ui.clip_rect()));
+    let screen = |offset: &Offset| {
+        transform.position_from_point(&PlotPoint::new(offset.right_m, offset.forward_m))
+    };
+    let outline = |offset: &Offset, columns: f64, rows: f64, color: Color32, width: f32| {
+        let size = [
+            columns * transform.dpos_dvalue_x(),
+            rows * transform.dpos_dvalue_y(),
+        ];
+        let size = egui::vec2(size[0].abs() as f32, size[1].abs() as f32);
+        let rect = Rect::from_center_size(screen(offset), size);
+        let stroke = Stroke::new(width, color);
+        painter.rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
+    };
+    let strong = ui.visuals().strong_text_color();
+    for (index, searched) in shown.search.positions().enumerate() {
+        let lattice = &searched.surface.lattice;
+        if index > 0 {
+            let (width, height) = (lattice.columns as f64, lattice.rows as f64);
+            let Lattice { centre, step, .. } = lattice;
+            outline(centre, width * step, height * step, Color32::WHITE, 1.0);
+        }
+    }
+    if let Some(hypothesis) = shown.search.hypothesis
+        && let Some(searched) = shown.search.positions().last()
+        && searched.phase() == hypothesis.phase
+    {
+        let step = searched.surface.lattice.step;
+        outline(&hypothesis.offset, step, step, strong, 1.5);
+    }
+    for mark in shown.marks {
+        // A small map is not to vanish under its marks.
+        let reach = (transform.frame().width() / 35.0).clamp(3.0, 6.0);
+        mark.paint(&painter, screen(&mark.offset), reach);
+    }
+    if let Some(cell) = pointed_at
+        && let Some(searched) = shown.search.positions().nth(cell.lattice)
+    {
+        let step = searched.surface.lattice.step;
+        outline(&cell.offset, step, step, Color32::BLACK, 3.0);
+        outline(&cell.offset, step, step, Color32::WHITE, 1.5);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::{GridParams, Phase};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_point_of_a_cell_finds_the_cell(
+            right in -0.49..0.49, forward in -0.49..0.49, x in -3.0..3.0, y in -9.0..9.0,
+        ) {
+            let centre = Offset { right_m: x, forward_m: y, yaw_rad: 0.0 };
+            let params = GridParams::default();
+            for phase in [Phase::PositionCoarse, Phase::PositionFine] {
+                let lattice = Lattice::new(phase, centre, 4.0, &params);
+                for (cell, offset) in lattice.hypotheses() {
+                    let right_m = offset.right_m + right * lattice.step;
+                    let forward_m = offset.forward_m + forward * lattice.step;
+                    prop_assert_eq!(cell_of(&lattice, right_m, forward_m), Some(cell));
+                }
+                prop_assert_eq!(cell_of(&lattice, x + 4.6, y), None);
+            }
+        }
+    }
+}

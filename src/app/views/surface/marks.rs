@@ -1,0 +1,278 @@
+//! Places on the maps, each with a shape of its own, and their legend.
+
+use egui::{Align2, Color32, FontId, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
+
+use super::scale::number;
+use super::search::{Minimum, Search};
+use crate::app::{Command, Scope, theme};
+use crate::event::Method;
+use crate::geometry::Pose;
+use crate::grid::{Offset, Phase};
+
+/// What is at a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Start,
+    Coarse,
+    Fine,
+    Feature,
+    Truth,
+    Camera,
+    /// A local minimum of the coarse positions, the best being 1.
+    Ranked(usize),
+    /// The minimum under the floor of the slider.
+    Floored,
+}
+
+/// Half the size of a mark in the legend \[points\].
+const REACH: f32 = 5.0;
+/// Local minima that are shown.
+const RANKED: usize = 5;
+
+/// A place on the maps.
+pub(super) struct Mark {
+    pub(super) kind: Kind,
+    pub(super) offset: Offset,
+    pose: Pose,
+    words: String,
+}
+
+impl Mark {
+    /// Everything that is to be marked, what matters most last. `floor` is what the slider says.
+    pub(super) fn all(scope: &Scope<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
+        let mut marks = Vec::new();
+        let mut add = |kind, offset, pose, name: &str, note: String| {
+            marks.push(Self {
+                kind,
+                offset,
+                pose,
+                words: format!("{name} {}{note}", place(&offset)),
+            });
+        };
+        let start = Offset::default();
+        add(
+            Kind::Start,
+            start,
+            search.pose(&start),
+            "start",
+            String::new(),
+        );
+        let own_floor = search.least_covered(scope.run.params.grid.coverage_floor);
+        for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
+            let note = format!(", +{}", number(margin));
+            let pose = search.pose(&minimum.offset);
+            add(Kind::Ranked(rank), minimum.offset, pose, "minimum", note);
+        }
+        let phases = [
+            (Kind::Coarse, Phase::PositionCoarse, "coarse minimum"),
+            (Kind::Fine, Phase::PositionFine, "fine minimum"),
+        ];
+        for (kind, phase, name) in phases {
+            if let Some(searched) = search.last(phase)
+                && let Some(minimum) = searched.minimum(own_floor)
+            {
+                let so_far = if searched.is_complete { "" } else { " so far" };
+                let note = format!(", {}{so_far}", number(minimum.cost));
+                add(
+                    kind,
+                    minimum.offset,
+                    search.pose(&minimum.offset),
+                    name,
+                    note,
+                );
+            }
+        }
+        if let Some(moved) = moved(search, own_floor, search.least_covered(floor)) {
+            let note = format!(", {}", number(moved.cost));
+            let pose = search.pose(&moved.offset);
+            add(
+                Kind::Floored,
+                moved.offset,
+                pose,
+                "minimum at this floor",
+                note,
+            );
+        }
+        let cameras = [
+            (
+                Kind::Feature,
+                scope.estimate(Method::Feature),
+                "FB's estimate",
+            ),
+            (Kind::Truth, scope.truth().copied(), "truth"),
+            (Kind::Camera, scope.desk.camera, "camera in hand"),
+        ];
+        for (kind, pose, name) in cameras {
+            if let Some(pose) = pose {
+                add(kind, search.offset(&pose), pose, name, String::new());
+            }
+        }
+        marks
+    }
+
+    /// Paints the mark with its heading; `reach` is half its size \[points\].
+    pub(super) fn paint(&self, painter: &Painter, at: Pos2, reach: f32) {
+        if matches!(self.kind, Kind::Feature | Kind::Truth | Kind::Camera) {
+            let (sin, cos) = (self.offset.yaw_rad as f32).sin_cos();
+            let tip = at + 2.4 * reach * vec2(-sin, -cos);
+            painter.line_segment([at, tip], Stroke::new(3.0, Color32::WHITE));
+            painter.line_segment([at, tip], Stroke::new(1.5, self.kind.color()));
+        }
+        self.kind.paint(painter, at, reach);
+    }
+}
+
+/// The local minima of the complete coarse positions behind the best one: rank, place, and how much
+/// more they cost than it.
+fn ranked(search: &Search<'_>, least_covered: u32) -> Vec<(usize, Minimum, f64)> {
+    let Some(searched) = search.last(Phase::PositionCoarse) else {
+        return Vec::new();
+    };
+    if !searched.is_complete {
+        return Vec::new();
+    }
+    let minima = searched.surface.local_minima_with(least_covered);
+    let Some(&(_, best)) = minima.first() else {
+        return Vec::new();
+    };
+    let ranked = minima.into_iter().enumerate().skip(1).take(RANKED);
+    ranked
+        .filter_map(|(index, (cell, cost))| {
+            let offset = searched.surface.lattice.offset(cell)?;
+            Some((index + 1, Minimum { cell, offset, cost }, cost - best))
+        })
+        .collect()
+}
+
+/// The minimum under another floor, where it is not that of the run's own: among the coarse
+/// positions, or, where those keep theirs, among the fine ones.
+pub(super) fn moved(search: &Search<'_>, own: u32, other: u32) -> Option<Minimum> {
+    [Phase::PositionCoarse, Phase::PositionFine]
+        .into_iter()
+        .filter_map(|phase| search.last(phase))
+        .find_map(|searched| {
+            let there = searched.minimum(other)?;
+            (searched.minimum(own) != Some(there)).then_some(there)
+        })
+}
+
+/// An offset's position in words.
+pub(super) fn place(offset: &Offset) -> String {
+    // A negative zero is no place of its own.
+    let [right, forward] =
+        [offset.right_m, offset.forward_m].map(|m| (100.0 * m).round() / 100.0 + 0.0);
+    let is_round = |m: f64| ((10.0 * m).round() - 10.0 * m).abs() < 1e-9;
+    match is_round(right) && is_round(forward) {
+        true => format!("({right:.1}, {forward:.1}) m"),
+        false => format!("({right:.2}, {forward:.2}) m"),
+    }
+}
+
+impl Kind {
+    fn color(self) -> Color32 {
+        match self {
+            Self::Start => theme::REFERENCE,
+            Self::Coarse | Self::Fine => theme::ESTIMATE,
+            Self::Feature => theme::method(Method::Feature),
+            Self::Truth => theme::TRUTH,
+            Self::Camera => theme::CAMERA,
+            Self::Ranked(_) | Self::Floored => Color32::BLACK,
+        }
+    }
+
+    /// The shape at a place, with a light rim that shows on dark cells.
+    fn paint(self, painter: &Painter, at: Pos2, reach: f32) {
+        let color = self.color();
+        let outlined = |points: &[(f32, f32)], fill: Color32, line: Color32| {
+            let points = points.iter().map(|(x, y)| at + reach * vec2(*x, *y));
+            Shape::convex_polygon(points.collect(), fill, Stroke::new(1.5, line))
+        };
+        match self {
+            Self::Start => {
+                painter.circle(at, reach * 0.8, color, Stroke::new(1.5, Color32::WHITE));
+            }
+            Self::Coarse => {
+                let square = [(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)];
+                let size = Vec2::splat(1.8 * reach);
+                let rect = egui::Rect::from_center_size(at, size);
+                let white = Stroke::new(3.5, Color32::WHITE);
+                painter.rect_stroke(rect, 0.0, white, egui::StrokeKind::Middle);
+                painter.add(outlined(&square, Color32::TRANSPARENT, color));
+            }
+            Self::Fine => {
+                let diamond = [(0.0, -1.1), (1.1, 0.0), (0.0, 1.1), (-1.1, 0.0)];
+                painter.add(outlined(&diamond, color, Color32::WHITE));
+            }
+            Self::Feature => {
+                let triangle = [(0.0, -1.0), (1.0, 0.8), (-1.0, 0.8)];
+                painter.add(outlined(&triangle, color, Color32::BLACK));
+            }
+            Self::Truth => {
+                for (width, color) in [(4.5, Color32::WHITE), (2.5, color)] {
+                    let stroke = Stroke::new(width, color);
+                    painter.hline(at.x - reach..=at.x + reach, at.y, stroke);
+                    painter.vline(at.x, at.y - reach..=at.y + reach, stroke);
+                }
+            }
+            Self::Camera => {
+                let wedge = [(-1.0, -0.8), (1.0, -0.8), (0.0, 1.0)];
+                painter.add(outlined(&wedge, color, Color32::WHITE));
+            }
+            Self::Ranked(rank) => {
+                painter.circle(at, reach, Color32::WHITE, Stroke::new(1.0, color));
+                let font = FontId::proportional(1.9 * reach);
+                painter.text(at, Align2::CENTER_CENTER, rank.to_string(), font, color);
+            }
+            Self::Floored => {
+                painter.circle_stroke(at, reach * 1.3, Stroke::new(4.0, Color32::WHITE));
+                painter.circle_stroke(at, reach * 1.3, Stroke::new(2.0, color));
+            }
+        }
+    }
+}
+
+/// The marks in words. Pointing at one looks at its pose, which is answered; a click takes the
+/// camera there.
+pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<Pose> {
+    let mut pointed_at = None;
+    ui.horizontal_wrapped(|ui| {
+        for mark in marks {
+            let button = egui::Button::new(egui::RichText::new(&mark.words).small());
+            // The room for the mark is part of the button, so that both wrap together.
+            let icon = ui.spacing().icon_width;
+            let response = ui.scope(|ui| {
+                ui.spacing_mut().button_padding = vec2(0.5 * icon + 4.0, 1.0);
+                ui.add(button.frame(false).sense(Sense::click()))
+            });
+            let response = response.inner;
+            let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
+            mark.kind.paint(ui.painter(), at, REACH);
+            if response.hovered() {
+                pointed_at = Some(mark.pose);
+            }
+            if response.clicked() {
+                scope.send(Command::TakeCamera(Some(mark.pose)));
+            }
+        }
+    });
+    pointed_at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_has_as_many_decimals_as_it_needs_and_no_negative_zero() {
+        let at = |right_m, forward_m| {
+            place(&Offset {
+                right_m,
+                forward_m,
+                yaw_rad: 0.0,
+            })
+        };
+        assert_eq!(at(1.0, 2.0), "(1.0, 2.0) m");
+        assert_eq!(at(-1e-12, -0.2), "(0.0, -0.2) m");
+        assert_eq!(at(0.25, 3.0), "(0.25, 3.00) m");
+    }
+}

@@ -1,0 +1,208 @@
+//! The grid search of a direct method, as far as the cursor.
+
+use std::sync::Arc;
+
+use crate::app::Scope;
+use crate::event::{Event, Method, MinimumAssessed, Moment, PoseScored};
+use crate::geometry::Pose;
+use crate::grid::{self, Lattice, Offset, Phase, ScoredLattice};
+use crate::problem::Problem;
+use crate::session::Span;
+
+/// What a direct method has told about its search.
+pub(super) struct Search<'a> {
+    pub(super) method: Method,
+    pub(super) problem: &'a Problem,
+    /// The part of the run that it is read from: the method's own, or the hybrid's.
+    pub(super) span: &'a Span,
+    /// Pixels covered at the reference pose, which all coverages are shares of.
+    pub(super) covered_at_reference: u32,
+    /// The lattices, in the order of the search; the last one may be incomplete.
+    pub(super) lattices: Vec<Searched>,
+    /// The hypothesis of the cursor, while a lattice is being searched.
+    pub(super) hypothesis: Option<&'a PoseScored>,
+    pub(super) assessed: Option<&'a MinimumAssessed>,
+}
+
+/// A lattice with the scores that were told.
+pub(super) struct Searched {
+    /// Cells without a score are not tried yet, or no hypotheses.
+    pub(super) surface: Arc<ScoredLattice>,
+    pub(super) tried: usize,
+    /// Whether its minimum was told.
+    pub(super) is_complete: bool,
+}
+
+impl<'a> Search<'a> {
+    /// The search of `method` on the reference at the cursor; `None` before its first view.
+    pub(super) fn at(scope: &Scope<'a>, method: Method) -> Option<Self> {
+        let (span, cursor) = part(scope, method)?;
+        let problem = scope.run.loaded.as_deref()?.problems.get(span.reference)?;
+        let end = span.records.end.min(cursor + 1);
+        let records = scope.run.records().get(span.records.start..end)?;
+        let mut events = records.iter().map(|record| &record.event);
+        let covered_at_reference = events.find_map(|event| match event {
+            Event::ViewRendered(view) if view.moment == Moment::Start => {
+                Some(view.comparison.score.covered)
+            }
+            _ => None,
+        })?;
+        let mut search = Self {
+            method,
+            problem,
+            span,
+            covered_at_reference,
+            lattices: Vec::new(),
+            hypothesis: None,
+            assessed: None,
+        };
+        let params = &scope.run.params.grid;
+        let least_covered = grid::least_covered(params.coverage_floor, covered_at_reference);
+        let mut centre = Offset::default();
+        let mut filling: Option<Filling> = None;
+        for event in events {
+            match event {
+                Event::PoseScored(scored) => {
+                    // What is told of a lattice before its end are its hypotheses, one by one; where
+                    // they are follows from the parameters.
+                    let radius_m = problem.uncertainty_radius_m;
+                    filling
+                        .get_or_insert_with(|| {
+                            Filling::new(Lattice::new(scored.phase, centre, radius_m, params))
+                        })
+                        .take(scored);
+                    search.hypothesis = Some(scored);
+                }
+                Event::PhaseSearched(searched) => {
+                    filling = None;
+                    search.hypothesis = None;
+                    centre = searched.best.unwrap_or(centre);
+                    let surface = Arc::clone(&searched.surface);
+                    search.lattices.push(Searched {
+                        tried: surface.scores.iter().flatten().count(),
+                        surface,
+                        is_complete: true,
+                    });
+                }
+                Event::MinimumAssessed(assessed) => search.assessed = Some(assessed),
+                _ => {}
+            }
+        }
+        search
+            .lattices
+            .extend(filling.map(|filling| filling.done(least_covered)));
+        Some(search)
+    }
+
+    /// The lattices of positions, in the order in which they are drawn.
+    pub(super) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
+        self.lattices
+            .iter()
+            .filter(|searched| !searched.phase().is_yaw())
+    }
+
+    /// The last lattice of a phase.
+    pub(super) fn last(&self, phase: Phase) -> Option<&Searched> {
+        self.lattices
+            .iter()
+            .rev()
+            .find(|searched| searched.phase() == phase)
+    }
+
+    /// Pixels that a hypothesis must cover under a floor.
+    pub(super) fn least_covered(&self, floor: f64) -> u32 {
+        grid::least_covered(floor, self.covered_at_reference)
+    }
+
+    /// Covered pixels as a share of those at the reference pose.
+    pub(super) fn coverage(&self, covered: u32) -> f64 {
+        f64::from(covered) / f64::from(self.covered_at_reference.max(1))
+    }
+
+    /// The camera at an offset (`world_from_camera`).
+    pub(super) fn pose(&self, offset: &Offset) -> Pose {
+        self.problem
+            .world_from_query(&offset.reference_from_camera())
+    }
+
+    /// The offset of a camera `world_from_camera`.
+    pub(super) fn offset(&self, pose: &Pose) -> Offset {
+        Offset::of(&self.problem.reference_from_query(pose))
+    }
+}
+
+impl Searched {
+    pub(super) fn phase(&self) -> Phase {
+        self.surface.lattice.phase
+    }
+
+    /// The cell of least cost under a floor, with its offset and cost.
+    pub(super) fn minimum(&self, least_covered: u32) -> Option<Minimum> {
+        let cell = self.surface.minimum_with(least_covered)?;
+        Some(Minimum {
+            cell,
+            offset: self.surface.lattice.offset(cell)?,
+            cost: self.surface.scores[cell]?.cost?,
+        })
+    }
+}
+
+/// A cell with the least cost of its surroundings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Minimum {
+    pub(super) cell: usize,
+    pub(super) offset: Offset,
+    pub(super) cost: f64,
+}
+
+/// The part of the run to read a direct method's search from, and the cursor in it. The hybrid runs
+/// MI inside itself, which is then the one at the cursor.
+fn part<'a>(scope: &Scope<'a>, method: Method) -> Option<(&'a Span, usize)> {
+    let is_inside = scope.method() == Some(Method::Hybrid)
+        && method == Method::MutualInformation
+        && scope.latest::<PoseScored>().is_some();
+    match is_inside {
+        true => Some((scope.span()?, scope.cursor)),
+        false => scope.of(method),
+    }
+}
+
+/// A lattice whose scores come in one by one.
+struct Filling {
+    lattice: Lattice,
+    cells: Vec<(usize, Offset)>,
+    told: usize,
+    scores: Vec<Option<crate::render::Score>>,
+}
+
+impl Filling {
+    fn new(lattice: Lattice) -> Self {
+        Self {
+            cells: lattice.hypotheses().collect(),
+            told: 0,
+            scores: vec![None; lattice.cells()],
+            lattice,
+        }
+    }
+
+    fn take(&mut self, scored: &PoseScored) {
+        if let Some(&(cell, offset)) = self.cells.get(self.told)
+            && offset == scored.offset
+        {
+            self.scores[cell] = Some(scored.score);
+        }
+        self.told += 1;
+    }
+
+    fn done(self, least_covered: u32) -> Searched {
+        Searched {
+            tried: self.told,
+            is_complete: false,
+            surface: Arc::new(ScoredLattice {
+                lattice: self.lattice,
+                scores: self.scores,
+                least_covered,
+            }),
+        }
+    }
+}
