@@ -13,8 +13,8 @@ use posescope::session::Breakpoint;
 
 /// See why a camera pose estimate fails.
 ///
-/// Without a command: runs all four estimators on the built-in street, prints the table of results
-/// and saves recordings/demo.rrd for the Rerun viewer.
+/// Without a command: runs all four estimators on the built-in street, prints the table of results,
+/// saves recordings/demo.rrd for the Rerun viewer, and opens the window where there is a display.
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 #[command(after_help = "\

@@ -7,14 +7,11 @@ use posescope::app::{App, Command, Setup, views};
 use posescope::event::Method;
 use posescope::session::RunMode;
 
-use crate::window::{settle, setup, wait};
+use crate::window::{has_adapter, settle, setup, wait};
 
 /// A window that is painted, or `None` where there is nothing to paint with.
 fn painted(setup: Setup) -> Option<Harness<'static, App>> {
-    let instance = eframe::wgpu::Instance::default();
-    let adapters = pollster::block_on(instance.enumerate_adapters(eframe::wgpu::Backends::all()));
-    if adapters.is_empty() {
-        println!("skipped: no graphics adapter; Mesa's software Vulkan is one");
+    if !has_adapter() {
         return None;
     }
     Some(

@@ -306,6 +306,7 @@ fn the_residuals_of_pm_say_what_was_ignored() {
 #[test]
 fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     let mut window = finished();
+    window.state_mut().send(Command::ShowView("ransac"));
     let trials = told::<HypothesisTried>(&window, Method::Feature);
     for (made, (at, tried)) in trials.iter().enumerate().step_by(trials.len() / 5 + 1) {
         move_to(&mut window, *at);
@@ -335,6 +336,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
 #[test]
 fn the_acceptance_test_is_told_in_words() {
     let mut window = finished();
+    window.state_mut().send(Command::ShowView("ransac"));
     let (at, judged) = told::<ConsensusJudged>(&window, Method::Feature)[0].clone();
     assert!(judged.accepted);
     move_to(&mut window, at);
@@ -354,6 +356,7 @@ fn the_acceptance_test_is_told_in_words() {
 fn every_moment_of_a_run_can_be_drawn() {
     // From the first frame on, when nothing is read yet.
     let mut window = finished();
+    window.state_mut().send(Command::ShowView("ransac"));
     let records = window.state().desk().run().len();
     for cursor in (0..records).step_by(9).chain([records - 1]) {
         move_to(&mut window, cursor);

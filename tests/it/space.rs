@@ -9,7 +9,7 @@ use posescope::geometry::Pose;
 use posescope::grid::Phase;
 use posescope::session::RunMode;
 
-use crate::window::{settle, setup, window};
+use crate::window::{has_adapter, settle, setup, window};
 
 fn finished() -> Harness<'static, App> {
     let mut setup = setup();
@@ -43,7 +43,6 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
         pressed,
         modifiers: held,
     };
-    window.input_mut().modifiers = held;
     window.hover_at(from);
     window.step();
     window.event(button(from, true));
@@ -54,7 +53,6 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
     }
     window.event(button(from + by, false));
     window.step();
-    window.input_mut().modifiers = egui::Modifiers::NONE;
     window.step();
 }
 
@@ -137,7 +135,8 @@ fn shifting_takes_the_labels_along() {
 fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
     let mut window = finished();
     click(&mut window, "Top");
-    window.state_mut().send(Command::TakeCamera(Some(start(&window))));
+    let pose = start(&window);
+    window.state_mut().send(Command::TakeCamera(Some(pose)));
     window.step();
     window.step();
     let before = in_hand(&window);
@@ -252,14 +251,7 @@ fn without_a_graphics_card_the_view_says_so() {
 
 /// The window drawn by any adapter there is; `None`, and a line that says so, without one.
 fn drawn() -> Option<Harness<'static, App>> {
-    use eframe::wgpu;
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let options = wgpu::RequestAdapterOptions::default();
-    let mut future = std::pin::pin!(instance.request_adapter(&options));
-    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
-    let found = std::future::Future::poll(future.as_mut(), &mut context);
-    if !matches!(found, std::task::Poll::Ready(Ok(_))) {
-        println!("skipped: no graphics adapter");
+    if !has_adapter() {
         return None;
     }
     let mut setup = setup();
@@ -310,7 +302,7 @@ fn the_layers_are_drawn_and_can_be_taken_away() {
 fn pictures_of_space() {
     let folder = std::env::var("POSESCOPE_PICTURES").expect("names a folder");
     let Some(mut window) = drawn() else { return };
-    let mut save = |window: &mut Harness<'_, App>, name: &str| {
+    let save = |window: &mut Harness<'_, App>, name: &str| {
         window.step();
         window.step();
         let picture = window.render().expect("a picture");
