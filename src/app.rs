@@ -93,7 +93,7 @@ impl eframe::App for App {
         egui::Panel::top("transport").show(ui, |ui| transport::ui(ui, desk, commands));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::ui(ui, desk, commands));
         egui::CentralPanel::default()
-            .frame(egui::Frame::NONE)
+            .frame(egui::Frame::NONE.fill(ui.visuals().panel_fill))
             .show(ui, |ui| layout.ui(ui, desk, commands));
         if *help {
             command::help_ui(ui.ctx(), help);
