@@ -4,11 +4,16 @@
 //! is how a person looks at it: a zoom, a filter.
 
 mod breakpoints;
+mod canvas;
+mod images;
+mod ink;
+mod legend;
 mod log;
 mod parameters;
 mod queries;
 mod report;
 mod space;
+mod synthetic;
 
 use eframe::egui_wgpu::RenderState;
 
@@ -56,6 +61,18 @@ pub const ALL: &[Entry] = &[
         title: "Breakpoints",
         about: "where a run is to stop",
         new: |_| Box::<breakpoints::BreakpointList>::default(),
+    },
+    Entry {
+        name: "images",
+        title: "Images",
+        about: "both photos, their matches, and where each feature ended",
+        new: |_| Box::<images::Images>::default(),
+    },
+    Entry {
+        name: "synthetic",
+        title: "Synthetic",
+        about: "the synthetic view beside the query, and what the cost makes of them",
+        new: |_| Box::<synthetic::Synthetic>::default(),
     },
     Entry {
         name: "space",

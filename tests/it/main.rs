@@ -9,6 +9,7 @@ mod decisions;
 mod evaluation;
 mod frame_cache;
 mod kitti;
+mod picture_views;
 mod real_pair;
 mod recording;
 mod retrieval;
