@@ -40,6 +40,24 @@ pub(crate) fn turbo(value: f64) -> Rgb {
     on(colorous::TURBO, value)
 }
 
+/// The nearest and the farthest depth that have colours of their own \[m\].
+#[cfg(feature = "app")]
+const DEPTH_RANGE_M: (f64, f64) = (2.0, 80.0);
+
+/// The place of a depth \[m\] among the colours of depths, 0 … 1: by its logarithm, because a metre
+/// means less far away.
+#[cfg(feature = "app")]
+pub(crate) fn depth_share(depth_m: f64) -> f64 {
+    let (near, far) = DEPTH_RANGE_M;
+    ((depth_m / near).ln() / (far / near).ln()).clamp(0.0, 1.0)
+}
+
+/// The colour of a depth \[m\] in the pictures of a run.
+#[cfg(feature = "app")]
+pub(crate) fn depth(depth_m: f64) -> Rgb {
+    turbo(depth_share(depth_m))
+}
+
 /// From blue (−1) over white (0) to vermillion (1).
 pub(crate) fn diverging(value: f64) -> Rgb {
     let end = if value < 0.0 { REFERENCE } else { ESTIMATE };
@@ -64,6 +82,15 @@ fn mix(from: Rgb, to: Rgb, share: f64) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "app")]
+    #[test]
+    fn depths_have_colours_by_their_logarithm_and_ends_that_bear_any_depth() {
+        assert_eq!(depth(0.1), turbo(0.0));
+        assert_eq!(depth(500.0), turbo(1.0));
+        assert_eq!(depth_share(-1.0), 0.0);
+        assert!((depth_share((2.0_f64 * 80.0).sqrt()) - 0.5).abs() < 1e-12);
+    }
 
     #[test]
     fn the_colour_maps_meet_their_ends_and_bear_any_number() {

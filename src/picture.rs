@@ -5,10 +5,19 @@ use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 use crate::cost::{IntensityPair, JointHistogram, PhotometricWeights};
 use crate::image::Photo;
 use crate::palette;
+#[cfg(feature = "app")]
+use crate::render::SplattedPixel;
 use crate::render::SyntheticView;
 
 /// Differences from −64 to 64 grey values have colours of their own; greater ones look like these.
 const RESIDUAL_RANGE: f64 = 64.0;
+
+/// Contributions to mutual information from −2 to 2 nat have colours of their own.
+#[cfg(feature = "app")]
+const CONTRIBUTION_RANGE: f64 = 2.0;
+
+/// The grey of a pixel that the photometric cost ignored, and of one that it counted.
+pub(crate) const WEIGHT_GRAYS: [u8; 2] = [90, 255];
 
 /// A photo, in colour where it has any.
 pub(crate) fn photo(photo: &Photo) -> DynamicImage {
@@ -59,8 +68,52 @@ pub(crate) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> Gra
     let values = weights
         .counted
         .iter()
-        .map(|&counted| Luma([if counted { 255 } else { 90 }]));
+        .map(|&counted| Luma([WEIGHT_GRAYS[usize::from(counted)]]));
     painted(view, Luma([0]), values)
+}
+
+/// What each pixel says about mutual information, in −2 … 2 nat: orange where the pair of grey values
+/// is more frequent than chance would have it, blue where it is rarer.
+#[cfg(feature = "app")]
+pub(crate) fn contributions(
+    view: &SyntheticView,
+    pairs: &[IntensityPair],
+    histogram: &JointHistogram,
+) -> RgbImage {
+    let pointwise = histogram.pointwise();
+    let values = pairs
+        .iter()
+        .map(|pair| pointwise[histogram.cell(pair)] / CONTRIBUTION_RANGE)
+        .map(|share| Rgb(palette::diverging(share)));
+    painted(view, Rgb(palette::NOTHING), values)
+}
+
+/// The covered pixels in the colours of their depths over the darkened query. Their uncovered
+/// neighbours take a shade of it, so that the few are seen in a small picture.
+#[cfg(feature = "app")]
+pub(crate) fn coverage(query: &GrayImage, view: &SyntheticView) -> RgbImage {
+    let color = |pixel: &SplattedPixel| palette::depth(f64::from(pixel.depth));
+    let place = |pixel: &SplattedPixel| (pixel.index % view.width, pixel.index / view.width);
+    let ground = |x: u32, y: u32| query.get_pixel(x, y).0[0] / 3;
+    let (width, height) = query.dimensions();
+    let mut picture = RgbImage::from_fn(width, height, |x, y| Rgb([ground(x, y); 3]));
+    for pixel in &view.pixels {
+        let (x, y) = place(pixel);
+        for row in y.saturating_sub(1)..(y + 2).min(height) {
+            for column in x.saturating_sub(1)..(x + 2).min(width) {
+                let below = ground(column, row);
+                let shade = color(pixel).map(|value| value / 2 + below / 2);
+                picture.put_pixel(column, row, Rgb(shade));
+            }
+        }
+    }
+    for pixel in &view.pixels {
+        let (x, y) = place(pixel);
+        if let Some(here) = picture.get_pixel_mut_checked(x, y) {
+            *here = Rgb(color(pixel));
+        }
+    }
+    picture
 }
 
 /// How often grey values meet: the synthetic view's to the right, the query's upwards.
@@ -111,6 +164,7 @@ fn gray(value: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(not(feature = "app"))]
     use crate::render::SplattedPixel;
 
     #[test]
@@ -128,6 +182,51 @@ mod tests {
         let values = view.pixels.iter().map(|p| Luma([gray(p.intensity)]));
         let picture = painted(&view, Luma([0]), values);
         assert_eq!(picture.as_raw(), &[50, 50, 50, 70, 70]);
+    }
+
+    #[cfg(feature = "app")]
+    fn view(width: u32, height: u32, indices: &[u32]) -> SyntheticView {
+        let pixels = indices.iter().map(|&index| SplattedPixel {
+            index,
+            depth: 10.0,
+            intensity: 50.0,
+        });
+        SyntheticView {
+            width,
+            height,
+            pixels: pixels.collect(),
+        }
+    }
+
+    #[cfg(feature = "app")]
+    #[test]
+    fn coverage_marks_the_covered_pixels_and_shades_their_neighbours() {
+        let query = GrayImage::from_pixel(6, 2, Luma([90]));
+        let picture = coverage(&query, &view(6, 2, &[6, 7]));
+        let color = palette::depth(10.0);
+        let is = |wanted: [u8; 3]| picture.pixels().filter(|p| p.0 == wanted).count();
+        assert_eq!(picture.get_pixel(0, 1).0, color);
+        assert_eq!(picture.get_pixel(1, 1).0, color);
+        let shade = color.map(|value| value / 2 + 15);
+        assert_eq!([is(color), is(shade), is([30; 3])], [2, 4, 6]);
+        // A view of another size than the query marks what both have.
+        assert_eq!(coverage(&query, &view(100, 1, &[99])).dimensions(), (6, 2));
+    }
+
+    #[cfg(feature = "app")]
+    #[test]
+    fn a_frequent_pair_of_grey_values_contributes_and_a_rare_one_takes_away() {
+        let pair = |query, synthetic| IntensityPair { query, synthetic };
+        // Bright meets bright and dark meets dark, but for one pixel.
+        let mut pairs = vec![pair(250.0, 250.0); 40];
+        pairs.extend(vec![pair(5.0, 5.0); 40]);
+        pairs.push(pair(5.0, 250.0));
+        let histogram = JointHistogram::of(&pairs, 16);
+        let indices: Vec<u32> = (0..81).map(|i| 3 * i + 1).collect();
+        let picture = contributions(&view(243, 1, &indices), &pairs, &histogram);
+        let [first, last] = [1, 241].map(|x| picture.get_pixel(x, 0).0);
+        assert!(first[0] > first[2], "more than chance: {first:?}");
+        assert!(last[2] > last[0], "less than chance: {last:?}");
     }
 
     #[test]

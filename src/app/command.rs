@@ -313,7 +313,12 @@ pub fn shortcuts() -> Vec<Shortcut> {
             Command::SavePicture(None),
             "Save the window as a picture",
         ),
-        keys(NONE, Key::M, Command::Maximize(None), "All the room for the view under the pointer"),
+        keys(
+            NONE,
+            Key::M,
+            Command::Maximize(None),
+            "All the room for the view under the pointer",
+        ),
         keys(NONE, Key::L, Command::SwitchTheme, "Light or dark"),
         keys(NONE, Key::Questionmark, Command::Help, "This list"),
         keys(NONE, Key::F1, Command::Help, "This list"),

@@ -218,9 +218,7 @@ impl Behavior<String> for Panes<'_> {
         if let Some(egui_tiles::Tile::Pane(pane)) = active {
             let help = format!("All the room for {} (M)", title(pane));
             let button = ui.small_button("■").on_hover_text(&help);
-            button.widget_info(|| {
-                egui::WidgetInfo::labeled(egui::Role::Button, true, &help)
-            });
+            button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &help));
             if button.clicked() {
                 self.commands.send(Command::Maximize(views::name_of(pane)));
             }

@@ -144,10 +144,12 @@ impl<'a> Scope<'a> {
                 at,
             });
         }
-        let event: &ViewRendered = match self.method() {
-            Some(Method::Hybrid) => self.latest(),
-            _ => self.latest_of(method),
-        }?;
+        // The hybrid's views are those of MI inside it. Where it kept FB's pose, and for PM, it has none.
+        let within_hybrid = match (self.method(), method) {
+            (Some(Method::Hybrid), Method::MutualInformation) => self.latest(),
+            _ => None,
+        };
+        let event: &ViewRendered = within_hybrid.or_else(|| self.latest_of(method))?;
         let problem = self.problem()?;
         Some(Shown {
             comparison: Arc::clone(&event.comparison),

@@ -5,10 +5,17 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use egui::{ColorImage, TextureHandle, TextureOptions};
+use egui::{ColorImage, TextureFilter, TextureHandle, TextureOptions};
+
+use super::theme::rgb;
 
 /// Frames for which an unused picture is kept: blinking must not upload it anew each time.
 const KEPT_FRAMES: u64 = 120;
+
+const OPTIONS: TextureOptions = TextureOptions {
+    minification: TextureFilter::Linear,
+    ..TextureOptions::NEAREST
+};
 
 /// Textures by what they show.
 #[derive(Default)]
@@ -26,7 +33,7 @@ struct Entry {
 
 impl Textures {
     /// The texture `what` of `source`; `make` is called when it is new. Pixels are magnified as
-    /// they are, so that a person can count them.
+    /// they are, so that a person can count them, and blended where they are too small to see.
     pub fn of<T: Any + Send + Sync>(
         &self,
         ctx: &egui::Context,
@@ -37,7 +44,7 @@ impl Textures {
         let key = (what, Arc::as_ptr(source) as usize);
         let mut entries = self.entries.borrow_mut();
         let entry = entries.entry(key).or_insert_with(|| Entry {
-            texture: ctx.load_texture(what, make(source), TextureOptions::NEAREST),
+            texture: ctx.load_texture(what, make(source), OPTIONS),
             last_used: 0,
             _source: Arc::clone(source) as Arc<dyn Any + Send + Sync>,
         });
@@ -58,5 +65,8 @@ impl Textures {
 /// An image as egui takes it.
 pub fn color_image(image: &image::DynamicImage) -> ColorImage {
     let size = [image.width() as usize, image.height() as usize];
-    ColorImage::from_rgb(size, image.to_rgb8().as_raw())
+    let pixels = image.to_rgb8();
+    // Not `ColorImage::from_rgb`, which is third-party code and slow where that is not optimised.
+    let pixels = pixels.pixels().map(|pixel| rgb(pixel.0)).collect();
+    ColorImage::new(size, pixels)
 }

@@ -4,7 +4,11 @@
 //! is how a person looks at it: a zoom, a filter.
 
 mod breakpoints;
+mod canvas;
 mod histogram;
+mod images;
+mod ink;
+mod legend;
 mod log;
 mod parameters;
 mod queries;
@@ -13,6 +17,7 @@ mod readout;
 mod report;
 mod space;
 mod surface;
+mod synthetic;
 
 use eframe::egui_wgpu::RenderState;
 
@@ -66,6 +71,18 @@ pub const ALL: &[Entry] = &[
         title: "Breakpoints",
         about: "where a run is to stop",
         new: |_| Box::<breakpoints::BreakpointList>::default(),
+    },
+    Entry {
+        name: "images",
+        title: "Images",
+        about: "both photos, their matches, and where each feature ended",
+        new: |_| Box::<images::Images>::default(),
+    },
+    Entry {
+        name: "synthetic",
+        title: "Synthetic",
+        about: "the synthetic view beside the query, and what the cost makes of them",
+        new: |_| Box::<synthetic::Synthetic>::default(),
     },
     Entry {
         name: "space",

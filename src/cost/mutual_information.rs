@@ -71,10 +71,8 @@ impl JointHistogram {
     /// Counts the pairs; values fall into `bins` equal intervals of 0 … 255, 255 into the last one.
     pub fn of(pairs: &[IntensityPair], bins: usize) -> Self {
         let mut counts = vec![0_u32; bins * bins];
-        let scale = bins as f32 / 256.0;
-        let bin = |value: f32| ((value * scale) as usize).min(bins - 1);
         for pair in pairs {
-            counts[bin(pair.query) * bins + bin(pair.synthetic)] += 1;
+            counts[cell(pair, bins)] += 1;
         }
         let rows = counts.chunks(bins).map(|row| row.iter().sum());
         let columns = (0..bins).map(|column| counts.iter().skip(column).step_by(bins).sum());
@@ -87,12 +85,46 @@ impl JointHistogram {
         }
     }
 
+    /// The position in [`Self::counts`] of the cell that a pair falls into.
+    pub fn cell(&self, pair: &IntensityPair) -> usize {
+        cell(pair, self.bins)
+    }
+
+    /// ln p(q, s) / (p(q) p(s)) of each cell \[nat\]: what a pair in it says about whether the images
+    /// belong together. Its mean over all pairs is their mutual information. 0 where no pair is.
+    pub fn pointwise(&self) -> Vec<f64> {
+        let Self { bins, counts, .. } = self;
+        let sum = |cells: &mut dyn Iterator<Item = &u32>| cells.map(|&c| f64::from(c)).sum::<f64>();
+        let rows: Vec<f64> = counts
+            .chunks(*bins)
+            .map(|row| sum(&mut row.iter()))
+            .collect();
+        let columns: Vec<f64> = (0..*bins)
+            .map(|column| sum(&mut counts.iter().skip(column).step_by(*bins)))
+            .collect();
+        let all: f64 = rows.iter().sum();
+        counts
+            .iter()
+            .enumerate()
+            .map(|(cell, &count)| match count {
+                0 => 0.0,
+                _ => (f64::from(count) * all / (rows[cell / bins] * columns[cell % bins])).ln(),
+            })
+            .collect()
+    }
+
     /// NMI in 0 … 1, normalised by the larger entropy; `None` where both images are constant.
     pub fn normalized_mutual_information(&self) -> Option<f64> {
         let larger = self.query_entropy.max(self.synthetic_entropy);
         let shared = self.query_entropy + self.synthetic_entropy - self.joint_entropy;
         (larger > 0.0).then(|| (shared / larger).clamp(0.0, 1.0))
     }
+}
+
+fn cell(pair: &IntensityPair, bins: usize) -> usize {
+    let scale = bins as f32 / 256.0;
+    let bin = |value: f32| ((value * scale) as usize).min(bins - 1);
+    bin(pair.query) * bins + bin(pair.synthetic)
 }
 
 /// H = log n − (Σ c log c) / n, with n = Σ c \[nat\].
@@ -154,6 +186,23 @@ mod tests {
         let histogram = JointHistogram::of(&pairs([(255.0, 0.0), (0.0, 255.0)]), 16);
         assert_eq!(histogram.counts[15 * 16], 1);
         assert_eq!(histogram.counts[15], 1);
+    }
+
+    #[test]
+    fn the_mean_over_the_pairs_of_what_each_says_is_their_mutual_information() {
+        let pairs = pairs((0..500_u32).map(|i| {
+            let value = (i.wrapping_mul(2_654_435_761) >> 24) as f32;
+            (value, (0.7 * value + (i % 64) as f32).min(255.0))
+        }));
+        let histogram = JointHistogram::of(&pairs, 16);
+        let pointwise = histogram.pointwise();
+        let sum: f64 = pairs
+            .iter()
+            .map(|pair| pointwise[histogram.cell(pair)])
+            .sum();
+        let shared =
+            histogram.query_entropy + histogram.synthetic_entropy - histogram.joint_entropy;
+        assert!(shared > 0.5 && (sum / 500.0 - shared).abs() < 1e-9);
     }
 
     #[test]

@@ -44,9 +44,13 @@ fn every_view_looks_as_it_did() {
     window.state_mut().send(Command::Run);
     window.step();
     settle(&mut window);
-    window.state_mut().send(Command::SelectMethod(Method::Feature));
+    window
+        .state_mut()
+        .send(Command::SelectMethod(Method::Feature));
     shoot(&mut window, "features");
-    window.state_mut().send(Command::SelectMethod(Method::MutualInformation));
+    window
+        .state_mut()
+        .send(Command::SelectMethod(Method::MutualInformation));
     shoot(&mut window, "search");
     window.state_mut().send(Command::SwitchTheme);
     shoot(&mut window, "light");

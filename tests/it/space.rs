@@ -64,10 +64,14 @@ fn in_hand(window: &Harness<'_, App>) -> Pose {
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let mut window = finished();
     let run = window.state().desk().run().clone();
-    let ends: Vec<usize> = run.spans().iter().map(|span| span.records.end - 1).collect();
+    let ends: Vec<usize> = run
+        .spans()
+        .iter()
+        .map(|span| span.records.end - 1)
+        .collect();
     // Every hundredth record, and all around the ends of the estimators.
-    let moments = (0..run.len())
-        .filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
+    let moments =
+        (0..run.len()).filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
     for cursor in moments {
         window.state_mut().send(Command::MoveCursor(cursor));
         window.step();
@@ -77,7 +81,10 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     window.state_mut().send(Command::First);
     window.step();
     window.step();
-    assert!(window.query_by_label_contains("FB: ").is_none(), "FB has no pose yet");
+    assert!(
+        window.query_by_label_contains("FB: ").is_none(),
+        "FB has no pose yet"
+    );
     window.state_mut().send(Command::MoveCursor(ends[0]));
     window.step();
     window.step();
@@ -103,7 +110,12 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     click(&mut window, "● FB");
     assert!(headline(&window).contains("Through FB"));
     let pane = window.get_by_label_contains("3-D view of").rect();
-    drag(&mut window, pane.center(), egui::vec2(30.0, 0.0), egui::Modifiers::NONE);
+    drag(
+        &mut window,
+        pane.center(),
+        egui::vec2(30.0, 0.0),
+        egui::Modifiers::NONE,
+    );
     assert!(headline(&window).contains("From outside"));
     click(&mut window, "× Truth");
     window.state_mut().send(Command::ShowTruth);
@@ -118,9 +130,7 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
 fn shifting_takes_the_labels_along() {
     let mut window = finished();
     click(&mut window, "Top");
-    let place = |window: &Harness<'_, App>| {
-        window.get_by_label_contains("Reference: ").rect().min
-    };
+    let place = |window: &Harness<'_, App>| window.get_by_label_contains("Reference: ").rect().min;
     let before = place(&window);
     let pane = window.get_by_label_contains("3-D view of").rect();
     let by = egui::vec2(25.0, 15.0);
@@ -128,7 +138,10 @@ fn shifting_takes_the_labels_along() {
     drag(&mut window, corner, by, egui::Modifiers::SHIFT);
     let moved = place(&window) - before;
     // The camera is nearer to the eye than the ground that the pointer holds.
-    assert!(moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0, "{moved}");
+    assert!(
+        moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0,
+        "{moved}"
+    );
 }
 
 #[test]
@@ -140,16 +153,32 @@ fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
     window.step();
     window.step();
     let before = in_hand(&window);
-    let handle = window.get_by_label_contains("Camera in hand").rect().center();
-    drag(&mut window, handle, egui::vec2(40.0, 0.0), egui::Modifiers::NONE);
+    let handle = window
+        .get_by_label_contains("Camera in hand")
+        .rect()
+        .center();
+    drag(
+        &mut window,
+        handle,
+        egui::vec2(40.0, 0.0),
+        egui::Modifiers::NONE,
+    );
     let moved = before.inverse() * in_hand(&window);
     assert!(moved.translation.x > 0.1, "to the right: {moved}");
     assert!(moved.translation.y.abs() < 1e-6 && moved.translation.z.abs() < 0.05);
     assert!(moved.rotation.angle() < 1e-6);
 
     let before = in_hand(&window);
-    let handle = window.get_by_label_contains("Camera in hand").rect().center();
-    drag(&mut window, handle, egui::vec2(40.0, 0.0), egui::Modifiers::ALT);
+    let handle = window
+        .get_by_label_contains("Camera in hand")
+        .rect()
+        .center();
+    drag(
+        &mut window,
+        handle,
+        egui::vec2(40.0, 0.0),
+        egui::Modifiers::ALT,
+    );
     let turned = before.inverse() * in_hand(&window);
     assert!(turned.translation.vector.norm() < 1e-9);
     let ahead = turned.rotation * nalgebra::Vector3::z();
@@ -157,7 +186,13 @@ fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
 }
 
 fn start(window: &Harness<'_, App>) -> Pose {
-    let loaded = window.state().desk().run().loaded.as_deref().expect("is read");
+    let loaded = window
+        .state()
+        .desk()
+        .run()
+        .loaded
+        .as_deref()
+        .expect("is read");
     loaded.problems[0].reference.world_from_camera
 }
 
@@ -236,7 +271,9 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
             })
             .collect::<Vec<_>>();
         assert!(
-            at_place.iter().any(|recorded| (recorded - cost).abs() < 5.1e-5),
+            at_place
+                .iter()
+                .any(|recorded| (recorded - cost).abs() < 5.1e-5),
             "{words}: {at_place:?}"
         );
     }

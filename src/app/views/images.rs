@@ -1,0 +1,263 @@
+//! Both photos, their features, and where each feature ended.
+
+mod arrangement;
+mod detail;
+mod funnel;
+mod lidar;
+mod photos;
+mod sight;
+mod story;
+mod truth;
+
+use egui::{Color32, Ui, UiBuilder};
+
+use self::detail::{Detail, Subject};
+use self::photos::{Lenses, Photos, Shown};
+use self::sight::Sights;
+use self::story::{KINDS, Story, UNDECIDED};
+use self::truth::TrueMatch;
+use super::View;
+use super::canvas::Placement;
+use super::ink::{Ink, Mark};
+use crate::app::{Command, Scope, theme};
+use crate::camera::Intrinsics;
+use crate::event::Method;
+use crate::features::Keypoint;
+use crate::problem::Problem;
+use crate::session::Run;
+
+/// How strong features are drawn while the pointer is on another one.
+const PALE: f32 = 0.2;
+
+/// Query above or beside reference.
+pub struct Images {
+    /// Which states are shown.
+    shown: [bool; KINDS],
+    lenses: Lenses,
+    detail: Detail,
+}
+
+impl Default for Images {
+    fn default() -> Self {
+        let mut shown = [true; KINDS];
+        // Most features fail the first two tests; their lines would bury all others.
+        shown[..2].fill(false);
+        Self {
+            shown,
+            lenses: Lenses::default(),
+            detail: Detail::default(),
+        }
+    }
+}
+
+impl View for Images {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        let Some(problem) = scope.problem() else {
+            ui.weak("The photos are being read");
+            return;
+        };
+        let photos = Photos::of(ui, scope, problem);
+        let story = Story::at(scope);
+        let kinds = story.kinds();
+        let differing = differing(scope, &story);
+        self.toolbar(ui, scope, &story, differing.as_deref());
+        if !kinds.is_empty() {
+            let mut counts = [0; KINDS];
+            for &kind in &kinds {
+                counts[kind] += 1;
+            }
+            funnel::ui(ui, &counts, &mut self.shown);
+        }
+
+        let selected = scope.desk.selected_feature.filter(|&i| i < kinds.len());
+        let area = ui.available_rect_before_wrap();
+        let (pictures, panel) = match selected {
+            Some(_) => {
+                let (query, reference) = (photos.query.size(), photos.reference.size());
+                let (pictures, panel) = arrangement::split(area, query, reference);
+                (pictures, Some(panel))
+            }
+            None => (area, None),
+        };
+        let (query, reference) = self.lenses.show(ui, problem, &photos, pictures);
+
+        let is_wanted = |feature: usize| {
+            self.shown[kinds[feature]] && differing.as_ref().is_none_or(|differ| differ[feature])
+        };
+        let is_shown = |feature: usize| selected == Some(feature) || is_wanted(feature);
+        let sights = Sights::new(&story, &kinds, &query.at, &reference.at, is_shown);
+        let hovered = point_at(ui, scope, &sights, &story, [&query, &reference]);
+        let truth = selected.and_then(|feature| true_match(scope, &story, problem, feature));
+
+        let mut ink = Ink::new(ui.pixels_per_point());
+        let strength = if hovered.is_some() { PALE } else { 1.0 };
+        if story.is_unmatched() || self.shown[0] {
+            sights.draw_unmatched(&mut ink, &story, &reference.at, strength);
+        }
+        for sight in sights.all() {
+            sight.draw(&mut ink, strength, query.at.scale);
+        }
+        for feature in [selected, hovered].into_iter().flatten() {
+            sights.draw_accent(&mut ink, feature);
+        }
+        ink.dry(ui.painter());
+        if let Some(truth) = &truth {
+            draw_truth(&mut ink, &query.at, &problem.query.intrinsics, truth);
+            ink.dry(&query.at.painter(ui.painter()));
+        }
+        photos::name(ui, problem, &query.at, &reference.at);
+
+        if let (Some(feature), Some(panel)) = (selected, panel) {
+            let params = &scope.run.params.fb;
+            let subject = Subject {
+                feature,
+                story: &story,
+                problem,
+                photos: &photos,
+                truth,
+                inlier_px: params.mlesac.inlier_threshold_px,
+                depth_radius_px: params.depth_radius_px,
+            };
+            ui.scope_builder(UiBuilder::new().max_rect(panel.area), |ui| {
+                ui.shrink_clip_rect(panel.area);
+                self.detail.ui(ui, scope, &subject, panel.is_wide);
+            });
+        }
+        ui.advance_cursor_after_rect(area);
+    }
+}
+
+impl Images {
+    fn toolbar(
+        &mut self,
+        ui: &mut Ui,
+        scope: &Scope<'_>,
+        story: &Story<'_>,
+        differing: Option<&[bool]>,
+    ) {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(summary(story));
+            self.lenses.ui(ui);
+            if scope.desk.only_differences {
+                ui.weak(match differing {
+                    Some(differing) => {
+                        let count = differing.iter().filter(|differs| **differs).count();
+                        format!("{count} features end in another state than in the other run")
+                    }
+                    None => "Differences need another run: keep one as A (P)".to_owned(),
+                });
+            }
+        });
+    }
+}
+
+/// What was found, in words.
+fn summary(story: &Story<'_>) -> String {
+    let (query, reference) = (story.query().len(), story.reference().len());
+    let by = match story.method {
+        Some(Method::Hybrid) => "FB within HY",
+        _ => "FB",
+    };
+    match (query, reference) {
+        (0, 0) => "No features yet: FB finds them first".to_owned(),
+        _ => format!("{by}: {query} query keypoints, {reference} reference keypoints"),
+    }
+}
+
+/// The run that this one is compared with.
+fn other_run<'a>(scope: &Scope<'a>) -> Option<&'a Run> {
+    let desk = scope.desk;
+    let kept = &desk.kept.as_ref()?.run;
+    Some(if std::ptr::eq(scope.run, desk.run()) {
+        kept
+    } else {
+        desk.run()
+    })
+}
+
+/// Which features differ from the other run, where only those are wanted.
+fn differing(scope: &Scope<'_>, story: &Story<'_>) -> Option<Vec<bool>> {
+    let wanted = scope.desk.only_differences;
+    let other = other_run(scope).filter(|_| wanted)?;
+    let other = Story::counterpart(scope, story.method?, other)?;
+    Some(story.differing(&other))
+}
+
+/// What the ground truth says about a feature's match, if it is shown.
+fn true_match(
+    scope: &Scope<'_>,
+    story: &Story<'_>,
+    problem: &Problem,
+    feature: usize,
+) -> Option<TrueMatch> {
+    let found = story.matched(feature)?;
+    let lifted = story.lifted(feature);
+    Some(TrueMatch::of(
+        problem,
+        scope.truth()?,
+        &story.query().get(feature)?.pixel(),
+        &story.reference().get(found.reference)?.pixel(),
+        lifted.and_then(|lifted| lifted.point.as_ref()),
+    ))
+}
+
+/// The feature under the pointer; a click selects it.
+fn point_at(
+    ui: &Ui,
+    scope: &Scope<'_>,
+    sights: &Sights,
+    story: &Story<'_>,
+    photos: [&Shown; 2],
+) -> Option<usize> {
+    let over = photos.into_iter().find(|photo| photo.response.hovered())?;
+    let hovered = sights.nearest(over.response.hover_pos()?);
+    if over.response.clicked() && scope.desk.selected_feature != hovered {
+        scope.send(Command::SelectFeature(hovered));
+    }
+    if let Some(feature) = hovered {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+        let words = story.words(feature);
+        let response = over.response.clone();
+        response.on_hover_text_at_pointer(format!("query feature {feature}, {words}"));
+    }
+    hovered
+}
+
+/// The epipolar line, and where the true pose sees the lifted point.
+fn draw_truth(ink: &mut Ink, at: &Placement, camera: &Intrinsics, truth: &TrueMatch) {
+    let place = |pixel: &nalgebra::Point2<f64>| at.to_screen(pixel.cast::<f32>().into());
+    let shade = Color32::from_black_alpha(140);
+    if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
+        ink.line(place(&from), place(&to), 3.5, shade);
+        ink.line(place(&from), place(&to), 1.8, theme::TRUTH);
+    }
+    if let Some(pixel) = &truth.place {
+        ink.disc(place(pixel), 8.0, shade);
+        ink.mark(Mark::Plus, place(pixel), 6.0, theme::TRUTH);
+    }
+}
+
+/// The colour of a state, or of none yet.
+fn color(kind: usize) -> Color32 {
+    if kind == UNDECIDED {
+        theme::CAMERA
+    } else {
+        theme::state(kind)
+    }
+}
+
+/// The mark of a state, or of none yet.
+fn mark(kind: usize) -> Mark {
+    const MARKS: [Mark; UNDECIDED] = [
+        Mark::Cross,
+        Mark::Triangle,
+        Mark::Ring,
+        Mark::Diamond,
+        Mark::Disc,
+    ];
+    MARKS.get(kind).copied().unwrap_or(Mark::Square)
+}
+
+fn position(keypoint: &Keypoint) -> [f32; 2] {
+    [keypoint.x, keypoint.y]
+}

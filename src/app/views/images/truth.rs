@@ -1,0 +1,199 @@
+//! What the true pose says about a match.
+
+use nalgebra::{Point2, Point3, Vector3};
+
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+use crate::problem::Problem;
+
+/// A line in an image: `normal · (u, v, 1) = 0`, the normal's first two entries of unit length, so
+/// that the product is a distance \[px\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Line {
+    normal: Vector3<f64>,
+}
+
+impl Line {
+    /// The query pixels at which the point behind a reference pixel may be seen, whatever its depth:
+    /// `l = K_Q⁻ᵀ (t × R x)` with `query_from_reference = [R|t]` and the bearing `x` of the pixel
+    /// (Hartley and Zisserman, *Multiple View Geometry*, section 9.2). `None` where the cameras share
+    /// their centre, or the pixel looks along the line between them.
+    pub(super) fn epipolar(
+        query: &Intrinsics,
+        reference: &Intrinsics,
+        query_from_reference: &Pose,
+        pixel: &Point2<f64>,
+    ) -> Option<Self> {
+        let bearing = query_from_reference.rotation * reference.bearing(pixel).into_inner();
+        let plane = query_from_reference.translation.vector.cross(&bearing);
+        let (a, b) = (plane.x / query.fx, plane.y / query.fy);
+        let normal = Vector3::new(a, b, plane.z - a * query.cx - b * query.cy);
+        let length = a.hypot(b);
+        (length > 1e-12).then(|| Self {
+            normal: normal / length,
+        })
+    }
+
+    /// How far a pixel is from the line \[px\].
+    pub(super) fn distance_px(&self, pixel: &Point2<f64>) -> f64 {
+        self.normal.dot(&pixel.to_homogeneous()).abs()
+    }
+
+    /// The part of the line inside a camera's image.
+    pub(super) fn within(&self, camera: &Intrinsics) -> Option<[Point2<f64>; 2]> {
+        let foot = -self.normal.z * self.normal.xy();
+        let along = Vector3::new(-self.normal.y, self.normal.x, 0.0).xy();
+        let size = [f64::from(camera.width), f64::from(camera.height)];
+        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in [0, 1] {
+            let (least, greatest) = (-0.5 - foot[axis], size[axis] - 0.5 - foot[axis]);
+            if along[axis].abs() < 1e-12 {
+                if least > 0.0 || greatest < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (enters, leaves) = (least / along[axis], greatest / along[axis]);
+            start = start.max(enters.min(leaves));
+            end = end.min(enters.max(leaves));
+        }
+        (start < end).then(|| [start, end].map(|step| Point2::from(foot + step * along)))
+    }
+}
+
+/// A match as the true pose sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TrueMatch {
+    /// Where the reference keypoint may be seen in the query.
+    pub(super) line: Option<Line>,
+    /// How far the query keypoint is from that line \[px\].
+    pub(super) line_px: Option<f64>,
+    /// Where the lifted point is seen in the query.
+    pub(super) place: Option<Point2<f64>>,
+    /// How far the query keypoint is from there \[px\].
+    pub(super) place_px: Option<f64>,
+}
+
+impl TrueMatch {
+    /// Looks at the match of a query and a reference pixel with the query's true pose
+    /// (`world_from_camera`); `point` is its lifted point in the reference camera's frame.
+    pub(super) fn of(
+        problem: &Problem,
+        truth: &Pose,
+        query: &Point2<f64>,
+        reference: &Point2<f64>,
+        point: Option<&Point3<f64>>,
+    ) -> Self {
+        let query_from_reference = problem.reference_from_query(truth).inverse();
+        let camera = &problem.query.intrinsics;
+        let line = Line::epipolar(
+            camera,
+            &problem.reference.intrinsics,
+            &query_from_reference,
+            reference,
+        );
+        let place = point.and_then(|point| camera.project(&(query_from_reference * point)));
+        Self {
+            line,
+            line_px: line.map(|line| line.distance_px(query)),
+            place,
+            place_px: place.map(|place| (place - query).norm()),
+        }
+    }
+
+    /// Whether the match is true, as far as that can be told; `within_px` is the inlier threshold.
+    /// A match without a depth is false where its epipolar line is too far; on the line it may be
+    /// either.
+    pub(super) fn is_true(&self, within_px: f64) -> Option<bool> {
+        match (self.place_px, self.line_px) {
+            (Some(distance), _) => Some(distance <= within_px),
+            (None, Some(distance)) if distance > within_px => Some(false),
+            _ => None,
+        }
+    }
+
+    /// The same in words.
+    pub(super) fn verdict(&self, within_px: f64) -> String {
+        let seen = self
+            .place_px
+            .map(|distance| format!("{distance:.2} px from where the true pose sees its point"));
+        match (self.is_true(within_px), seen) {
+            (Some(true), Some(seen)) => format!("true match: {seen}"),
+            (Some(false), Some(seen)) => format!("false match: {seen}"),
+            (Some(false), None) => "false match: off its epipolar line".to_owned(),
+            _ => "on its epipolar line, and no depth to tell more".to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion};
+    use proptest::prelude::*;
+
+    const CAMERA: Intrinsics = Intrinsics {
+        fx: 700.0,
+        fy: 710.0,
+        cx: 600.0,
+        cy: 180.0,
+        width: 1241,
+        height: 376,
+    };
+
+    #[test]
+    fn a_sideways_camera_sees_the_row_and_one_that_turns_in_place_no_line() {
+        let sideways = Pose::translation(-1.0, 0.0, 0.0);
+        let pixel = Point2::new(300.0, 100.0);
+        let line = Line::epipolar(&CAMERA, &CAMERA, &sideways, &pixel).expect("a line");
+        assert!(line.distance_px(&Point2::new(900.0, 100.0)) < 1e-9);
+        assert!((line.distance_px(&Point2::new(900.0, 107.0)) - 7.0).abs() < 1e-9);
+        let [from, to] = line.within(&CAMERA).expect("in the image");
+        let mut ends = [from.x, to.x];
+        ends.sort_by(f64::total_cmp);
+        assert!((ends[0] + 0.5).abs() < 1e-9 && (ends[1] - 1240.5).abs() < 1e-9);
+
+        let turned = Pose::rotation(Vector3::new(0.0, 0.1, 0.0));
+        assert_eq!(Line::epipolar(&CAMERA, &CAMERA, &turned, &pixel), None);
+    }
+
+    #[test]
+    fn a_line_beside_the_image_has_no_part_in_it() {
+        let sideways = Pose::translation(-1.0, 0.0, 0.0);
+        let above = Point2::new(300.0, -40.0);
+        let line = Line::epipolar(&CAMERA, &CAMERA, &sideways, &above).expect("a line");
+        assert_eq!(line.within(&CAMERA), None);
+    }
+
+    proptest! {
+        #[test]
+        fn the_line_meets_the_true_match_at_any_depth(
+            x in 0.0..1240.0, y in 0.0..375.0, depth in 3.0..80.0,
+            right in -3.0..3.0, ahead in 0.5..2.5, yaw in -0.2..0.2,
+        ) {
+            let reference_from_query = Pose::from_parts(
+                Translation3::new(right, 0.1, ahead),
+                UnitQuaternion::from_euler_angles(0.01, yaw, -0.02),
+            );
+            let query_from_reference = reference_from_query.inverse();
+            let pixel = Point2::new(x, y);
+            let seen = query_from_reference * CAMERA.unproject(&pixel, depth);
+            let (Some(seen), Some(line)) = (
+                CAMERA.project(&seen),
+                Line::epipolar(&CAMERA, &CAMERA, &query_from_reference, &pixel),
+            ) else {
+                return Ok(());
+            };
+            prop_assume!(seen.coords.norm() < 1e5);
+            prop_assert!(line.distance_px(&seen) < 1e-5);
+            if let Some(ends) = line.within(&CAMERA) {
+                for end in ends {
+                    prop_assert!(line.distance_px(&end) < 1e-6);
+                    prop_assert!(end.x > -0.51 && end.x < 1240.51 && end.y > -0.51 && end.y < 375.51);
+                }
+            } else {
+                prop_assert!(!CAMERA.contains(&seen));
+            }
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! The synthetic view beside the query, and what the cost of PM or MI makes of the two.
+
+mod cost_bar;
+mod mode;
+
+use std::time::Duration;
+
+use egui::{Color32, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
+
+use self::mode::Mode;
+use super::View;
+use super::canvas::{self, Lens};
+use crate::app::textures::color_image;
+use crate::app::{Command, Scope, Shown};
+use crate::event::{Method, Moment, ViewRendered};
+use crate::geometry::Pose;
+use crate::problem::Problem;
+
+/// How long each of two blinking pictures is shown \[s\].
+const BLINK_S: f64 = 0.4;
+/// Squares of the checkerboard from left to right.
+const CHECKS: u32 = 12;
+
+/// One picture of a direct method at a time.
+pub struct Synthetic {
+    /// The method a person has chosen; `None` follows the cursor.
+    chosen: Option<Method>,
+    mode: Mode,
+    /// Share of the view in the blend.
+    blend: f32,
+    lens: Lens,
+}
+
+impl Default for Synthetic {
+    fn default() -> Self {
+        Self {
+            chosen: None,
+            mode: Mode::View,
+            blend: 0.5,
+            lens: Lens::default(),
+        }
+    }
+}
+
+impl View for Synthetic {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        let Some(problem) = scope.problem() else {
+            ui.weak("The photos are being read");
+            return;
+        };
+        let method = self.chosen.unwrap_or_else(|| scope.direct_method());
+        self.toolbar(ui, scope, method);
+        let shown = scope.shown(method);
+        match &shown {
+            Some(shown) => {
+                caption(ui, scope, problem, method, shown);
+                costs(ui, scope, method, shown);
+            }
+            None => {
+                let name = method.name().to_uppercase();
+                ui.weak(format!(
+                    "{name} has rendered nothing at this step; take the camera in hand or go on"
+                ));
+            }
+        }
+        self.legend(ui, method, shown.as_ref());
+        self.picture(ui, scope, problem, method, shown.as_ref());
+    }
+}
+
+impl Synthetic {
+    fn toolbar(&mut self, ui: &mut Ui, scope: &Scope<'_>, method: Method) {
+        ui.horizontal_wrapped(|ui| {
+            for candidate in [Method::Photometric, Method::MutualInformation] {
+                let name = candidate.name().to_uppercase();
+                let response = ui.selectable_label(candidate == method, &name);
+                let help = format!("Show {name} whatever the cursor is in");
+                let response = response.accessible_name(format!("{name} pictures"));
+                if response.on_hover_text(help).clicked() {
+                    self.chosen = Some(candidate);
+                }
+            }
+            let mut follows = self.chosen.is_none();
+            let help = "Show the direct method at the cursor";
+            let follow = ui.checkbox(&mut follows, "Follow").on_hover_text(help);
+            if follow.accessible_name("Follow the estimator").changed() {
+                self.chosen = (!follows).then_some(method);
+            }
+            ui.separator();
+            for mode in Mode::ALL {
+                let name = mode.name(method);
+                let response = ui.selectable_label(self.mode == mode, name);
+                let spoken = format!("Show {}", name.to_lowercase());
+                let response = response.accessible_name(spoken);
+                if response.on_hover_text(mode.about(method)).clicked() {
+                    self.mode = mode;
+                }
+            }
+            let mut blinks = scope.desk.blinking;
+            let blink = ui.toggle_value(&mut blinks, "Blink");
+            let help = "Query and picture in turn (B)";
+            let blink = blink.accessible_name("Blink pictures").on_hover_text(help);
+            if blink.clicked() {
+                scope.send(Command::Blink);
+            }
+        });
+    }
+
+    /// What the picture's colours mean; always of one height, so that the picture stays in its place.
+    fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&Shown>) {
+        let size = Vec2::new(ui.available_width(), 24.0);
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(size, layout, |ui| {
+            ui.set_min_size(size);
+            if self.mode == Mode::Blend {
+                let slider = egui::Slider::new(&mut self.blend, 0.0..=1.0).show_value(false);
+                ui.label("query");
+                ui.add(slider).accessible_name("Share of the view");
+                ui.label("view");
+            } else {
+                self.mode.legend(ui, method, shown);
+            }
+        });
+    }
+
+    fn picture(
+        &mut self,
+        ui: &mut Ui,
+        scope: &Scope<'_>,
+        problem: &Problem,
+        method: Method,
+        shown: Option<&Shown>,
+    ) {
+        let area = ui.available_rect_before_wrap();
+        let (mode, blinks) = match (shown, scope.desk.blinking) {
+            (None, _) => (Mode::Query, false),
+            (Some(_), true) => (blinking(ui, self.mode), true),
+            (Some(_), false) => (self.mode, false),
+        };
+        let name = mode.name(method).to_lowercase();
+        let response = ui.allocate_rect(area, Sense::click_and_drag());
+        let spoken = format!("{} picture: {name}", method.name().to_uppercase());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+
+        let query = gray_query(ui, scope, problem);
+        // At the top, below its legend.
+        let place = |lens: &Lens| lens.place(area, query.size_vec2(), vec2(0.5, 0.0));
+        let before = place(&self.lens);
+        self.lens.obey(ui, &response, &before);
+        let at = place(&self.lens);
+        let painter = ui.painter_at(area);
+        let made = shown.and_then(|shown| mode.texture(ui, scope, problem, shown));
+        match (mode, made) {
+            (Mode::Query, _) | (_, None) => at.paint(&painter, query.id(), Color32::WHITE),
+            (Mode::Blend, Some(view)) => {
+                at.paint(&painter, query.id(), Color32::WHITE);
+                let tint = Color32::WHITE.gamma_multiply(self.blend);
+                at.paint(&painter, view.id(), tint);
+            }
+            (Mode::Checkerboard, Some(view)) => {
+                at.paint(&painter, query.id(), Color32::WHITE);
+                at.paint_checks(&painter, view.id(), CHECKS);
+            }
+            (_, Some(picture)) => at.paint(&painter, picture.id(), Color32::WHITE),
+        }
+        let words = match (shown, blinks) {
+            (None, _) => format!("query {}", problem.query.name),
+            (Some(_), true) => format!("{name} (blinking)"),
+            (Some(_), false) => name,
+        };
+        canvas::tag(&painter, at.visible().min, &words, Color32::WHITE);
+    }
+}
+
+/// The picture of this moment: the query and the chosen one in turn. The next frame is asked for when
+/// it is time for the other one.
+fn blinking(ui: &Ui, mode: Mode) -> Mode {
+    let turns = ui.input(|input| input.time) / BLINK_S;
+    let rest = (turns.floor() + 1.0 - turns) * BLINK_S;
+    ui.ctx()
+        .request_repaint_after(Duration::from_secs_f64(rest));
+    match (turns.rem_euclid(2.0) < 1.0, mode) {
+        (true, _) => Mode::Query,
+        (false, Mode::Query) => Mode::View,
+        (false, mode) => mode,
+    }
+}
+
+/// The query in grey values, as the costs see it but for their smoothing.
+fn gray_query(ui: &Ui, scope: &Scope<'_>, problem: &Problem) -> TextureHandle {
+    let textures = &scope.desk.textures;
+    textures.of(ui.ctx(), "gray photo", &problem.query, |query| {
+        color_image(&query.photo.gray.clone().into())
+    })
+}
+
+/// Why the view is shown, where its camera is, what it costs and covers.
+fn caption(ui: &mut Ui, scope: &Scope<'_>, problem: &Problem, method: Method, shown: &Shown) {
+    let name = method.name().to_uppercase();
+    let place = place(&problem.reference_from_query(&shown.pose));
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(format!("{name}, {}", shown.at.name()));
+        ui.label(place);
+        if scope.desk.is_probing() {
+            ui.weak("the pose asked for is being worked out");
+        }
+    });
+    let score = &shown.comparison.score;
+    let cost = score
+        .cost
+        .map_or("no cost".to_owned(), |cost| format!("cost {cost:.4}"));
+    let share = 100.0 * f64::from(score.covered) / problem.query.intrinsics.area();
+    let mut covered = format!("{} px covered, {share:.2} % of the query", score.covered);
+    if let Some(at_reference) = covered_at_reference(scope, method).filter(|&covered| covered > 0) {
+        let share = f64::from(score.covered) / f64::from(at_reference);
+        covered.push_str(&format!(", {share:.2} of the coverage at the reference"));
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(cost);
+        ui.label(covered);
+    });
+}
+
+/// A camera's place in the reference camera's frame, in words.
+fn place(reference_from_camera: &Pose) -> String {
+    let along = |value: f64, positive: &str, negative: &str| {
+        let word = if value <= -0.005 { negative } else { positive };
+        format!("{:.2} m {word}", value.abs())
+    };
+    let shift = &reference_from_camera.translation.vector;
+    let ahead = reference_from_camera.rotation * nalgebra::Vector3::z();
+    let yaw = (-ahead.x).atan2(ahead.z).to_degrees();
+    let mut words = vec![
+        along(shift.x, "right", "left"),
+        along(shift.z, "ahead", "behind"),
+    ];
+    // The search leaves the height alone; a camera in hand may have another.
+    if shift.y.abs() >= 0.005 {
+        words.push(along(-shift.y, "up", "down"));
+    }
+    let turn = if yaw <= -0.005 { "right" } else { "left" };
+    words.push(format!("turned {:.2}° {turn}", yaw.abs()));
+    words.join(", ")
+}
+
+/// Pixels that the method's view covered at the reference pose.
+fn covered_at_reference(scope: &Scope<'_>, method: Method) -> Option<u32> {
+    let start = |cursor: usize| {
+        let mut events = scope.run.all_until::<ViewRendered>(cursor);
+        let start = events.find(|(_, event)| event.moment == Moment::Start)?;
+        Some(start.1.comparison.score.covered)
+    };
+    match scope.of(method).and_then(|(_, cursor)| start(cursor)) {
+        None => start(scope.cursor),
+        covered => covered,
+    }
+}
+
+/// The place of the cost between that of shuffled pixels and that of the truth; for both methods
+/// where a pose of one's own was tried.
+fn costs(ui: &mut Ui, scope: &Scope<'_>, method: Method, shown: &Shown) {
+    let probe = scope.desk.looking_at().and_then(|_| scope.desk.probe());
+    match probe {
+        Some(probe) => {
+            for (method, comparison) in &probe.comparisons {
+                let bounds = scope.cost_bounds(*method);
+                cost_bar::ui(ui, *method, &bounds, comparison.score.cost);
+            }
+        }
+        None => {
+            let bounds = scope.cost_bounds(method);
+            cost_bar::ui(ui, method, &bounds, shown.comparison.score.cost);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::yaw;
+    use nalgebra::Translation3;
+
+    #[test]
+    fn a_place_is_told_in_words_with_the_height_only_where_it_differs() {
+        let turned = Pose::from_parts(Translation3::new(-0.4, 0.0, 1.2), yaw(0.01));
+        assert_eq!(
+            place(&turned),
+            "0.40 m left, 1.20 m ahead, turned 0.57° left"
+        );
+        let raised = Pose::translation(0.0, -0.2, -3.0);
+        let words = "0.00 m right, 3.00 m behind, 0.20 m up, turned 0.00° left";
+        assert_eq!(place(&raised), words);
+    }
+}

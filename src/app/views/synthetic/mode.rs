@@ -1,0 +1,176 @@
+//! The pictures there are of a query and a synthetic view.
+
+use std::sync::Arc;
+
+use egui::{Color32, Sense, TextureHandle, Ui, Vec2};
+use image::DynamicImage;
+
+use crate::app::textures::color_image;
+use crate::app::views::legend;
+use crate::app::{Scope, Shown, theme};
+use crate::cost::Explanation;
+use crate::event::Method;
+use crate::problem::Problem;
+use crate::render::Comparison;
+use crate::{palette, picture};
+
+/// What is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    Query,
+    View,
+    Blend,
+    Checkerboard,
+    Residual,
+    /// What each pixel has to say in the cost.
+    Weights,
+    Coverage,
+}
+
+/// Width of a legend \[points\].
+const LEGEND: f32 = 260.0;
+
+impl Mode {
+    pub(super) const ALL: [Self; 7] = [
+        Self::Query,
+        Self::View,
+        Self::Blend,
+        Self::Checkerboard,
+        Self::Residual,
+        Self::Weights,
+        Self::Coverage,
+    ];
+
+    pub(super) fn name(self, method: Method) -> &'static str {
+        match self {
+            Self::Query => "Query",
+            Self::View => "View",
+            Self::Blend => "Blend",
+            Self::Checkerboard => "Checkerboard",
+            Self::Residual => "Residual",
+            Self::Weights if method == Method::Photometric => "Weights",
+            Self::Weights => "Contributions",
+            Self::Coverage => "Coverage",
+        }
+    }
+
+    pub(super) fn about(self, method: Method) -> &'static str {
+        match self {
+            Self::Query => "The query in grey values",
+            Self::View => {
+                "The reference cloud in the reference photo's grey values, seen from this pose; \
+                 covered pixels spread over uncovered neighbours to be seen"
+            }
+            Self::Blend => "View over query",
+            Self::Checkerboard => "Query and view in alternate squares",
+            Self::Residual => "Query minus view: orange where the query is brighter",
+            Self::Weights if method == Method::Photometric => {
+                "Which pixels the photometric cost counts, and which it ignores"
+            }
+            Self::Weights => "What each pixel's pair of grey values adds to mutual information",
+            Self::Coverage => "The covered pixels over the query, in the colours of their depths",
+        }
+    }
+
+    /// The picture, made once for each view; `None` where the query alone is shown, or there is
+    /// nothing to make it of.
+    pub(super) fn texture(
+        self,
+        ui: &Ui,
+        scope: &Scope<'_>,
+        problem: &Problem,
+        shown: &Shown,
+    ) -> Option<TextureHandle> {
+        let of = |what, make: &dyn Fn(&Comparison) -> DynamicImage| {
+            let textures = &scope.desk.textures;
+            let made = |comparison: &Comparison| color_image(&make(comparison));
+            textures.of(ui.ctx(), what, &shown.comparison, made)
+        };
+        let picture = match self {
+            Self::Query => return None,
+            Self::View | Self::Blend | Self::Checkerboard => of("synthetic/view", &|made| {
+                picture::synthetic(&made.view).into()
+            }),
+            Self::Residual => of("synthetic/residual", &|made| {
+                picture::residual(&made.view, &made.pairs).into()
+            }),
+            Self::Weights => {
+                shown.comparison.explanation.as_ref()?;
+                of("synthetic/weights", &weights)
+            }
+            Self::Coverage => {
+                let query = Arc::clone(&problem.query);
+                of("synthetic/coverage", &move |made| {
+                    picture::coverage(&query.photo.gray, &made.view).into()
+                })
+            }
+        };
+        Some(picture)
+    }
+
+    pub(super) fn legend(self, ui: &mut Ui, method: Method, shown: Option<&Shown>) {
+        let explanation = shown.and_then(|shown| shown.comparison.explanation.as_ref());
+        match (self, explanation) {
+            (Self::Residual, _) => {
+                let ends = [
+                    (0.0, "-64"),
+                    (0.25, "-32"),
+                    (0.5, "0"),
+                    (0.75, "32"),
+                    (1.0, "64"),
+                ];
+                diverging_bar(ui, "query minus view, grey values", &ends);
+                ui.weak("query darker ← → query brighter");
+            }
+            (Self::Weights, Some(Explanation::Photometric(weights))) => {
+                let most = weights.threshold.sqrt();
+                swatch(ui, 1);
+                ui.label(format!("counted: off by at most {most:.1} grey values"));
+                swatch(ui, 0);
+                ui.label("ignored");
+            }
+            (Self::Weights, Some(Explanation::MutualInformation(_))) => {
+                let ends = [(0.0, "-2"), (0.5, "0"), (1.0, "2 nat")];
+                diverging_bar(ui, "contribution to mutual information, nat", &ends);
+                ui.weak("rarer ← → more frequent than by chance");
+            }
+            (Self::Weights, None) => {
+                ui.weak("There is no cost to explain");
+            }
+            (Self::Coverage, _) => {
+                legend::depth_bar(ui, LEGEND);
+                ui.weak("depth of the covered pixels");
+            }
+            _ => {
+                ui.weak(self.about(method));
+            }
+        }
+    }
+}
+
+fn weights(made: &Comparison) -> DynamicImage {
+    match &made.explanation {
+        Some(Explanation::Photometric(weights)) => picture::weights(&made.view, weights).into(),
+        Some(Explanation::MutualInformation(histogram)) => {
+            picture::contributions(&made.view, &made.pairs, histogram).into()
+        }
+        None => picture::synthetic(&made.view).into(),
+    }
+}
+
+fn diverging_bar(ui: &mut Ui, name: &str, ticks: &[(f64, &str)]) {
+    let color = |share: f64| theme::rgb(palette::diverging(2.0 * share - 1.0));
+    legend::color_bar(ui, LEGEND, name, color, ticks);
+}
+
+fn swatch(ui: &mut Ui, counted: usize) {
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(12.0), Sense::hover());
+    let gray = Color32::from_gray(picture::WEIGHT_GRAYS[counted]);
+    ui.painter().rect(
+        rect,
+        1.0,
+        gray,
+        (1.0, ui.visuals().weak_text_color()),
+        egui::StrokeKind::Inside,
+    );
+}

@@ -1,0 +1,329 @@
+//! The views of the photos and of the synthetic views.
+
+use std::sync::Arc;
+
+use egui::{Pos2, Rect, Vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use posescope::app::{App, Command};
+use posescope::event::{
+    DebugEvent, DepthsLifted, FeatureState, FeaturesClassified, FeaturesDetected, MatchesDecided,
+    Method, MinimumAssessed, Side, ViewRendered,
+};
+use posescope::features::Features;
+use posescope::session::{RunMode, State};
+
+use crate::two_walls::CAMERA;
+use crate::window::{settle, setup, window};
+
+/// The small world after its run, at the end of a method, with a view in front.
+fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
+    let mut setup = setup();
+    setup.mode = RunMode::Running;
+    let mut window = window(setup);
+    assert_eq!(settle(&mut window), State::Finished);
+    order(&mut window, Command::SelectMethod(method));
+    order(&mut window, Command::ShowView(view));
+    window
+}
+
+fn order(window: &mut Harness<'_, App>, command: Command) {
+    window.state_mut().send(command);
+    window.step();
+    window.step();
+}
+
+fn latest<E: DebugEvent + Clone + 'static>(window: &Harness<'_, App>) -> E {
+    let desk = window.state().desk();
+    let event: Option<&E> = desk.run().latest(desk.cursor);
+    event.expect("it was told").clone()
+}
+
+fn query_features(window: &Harness<'_, App>) -> Arc<Features> {
+    let desk = window.state().desk();
+    let mut events = desk.run().all_until::<FeaturesDetected>(desk.cursor);
+    let event = events.find(|(_, event)| event.side == Side::Query);
+    Arc::clone(&event.expect("detected").1.features)
+}
+
+/// The place of a pixel in a photo that is shown whole.
+fn on_screen(photo: Rect, x: f32, y: f32) -> Pos2 {
+    let scale = photo.width() / CAMERA.width as f32;
+    photo.min + scale * Vec2::new(x + 0.5, y + 0.5)
+}
+
+fn click(window: &mut Harness<'_, App>, pos: Pos2) {
+    window.hover_at(pos);
+    window.step();
+    for pressed in [true, false] {
+        window.event(egui::Event::PointerButton {
+            pos,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        });
+        window.step();
+    }
+    window.step();
+}
+
+/// An inlier that stands alone in the query, and its place on the screen.
+fn lonely_inlier(window: &Harness<'_, App>) -> (usize, Pos2) {
+    let states = latest::<FeaturesClassified>(window).states;
+    let features = query_features(window);
+    let area = window.get_by_label("query photo 000001").rect();
+    let place = |i: usize| on_screen(area, features.keypoints[i].x, features.keypoints[i].y);
+    let is_inlier = |i: &usize| matches!(states[*i], FeatureState::Inlier { .. });
+    let is_lonely = |i: &usize| {
+        (0..states.len()).all(|other| other == *i || place(other).distance(place(*i)) > 8.0)
+    };
+    let mut all = (0..states.len()).filter(is_inlier);
+    let found = all.find(is_lonely).expect("an inlier that stands alone");
+    (found, place(found))
+}
+
+#[test]
+fn before_detection_there_are_just_the_photos() {
+    let mut window = window(setup());
+    settle(&mut window);
+    order(&mut window, Command::ShowView("images"));
+    window.get_by_label("No features yet: FB finds them first");
+    window.get_by_label("query photo 000001");
+    window.get_by_label("reference photo 000000");
+    assert!(window.query_by_label_contains("inlier: ").is_none());
+}
+
+#[test]
+fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
+    let mut window = finished(Method::Feature, "images");
+    let states = latest::<FeaturesClassified>(&window).states;
+    let count = |name: &str| states.iter().filter(|state| state.name() == name).count();
+    for name in FeatureState::NAMES {
+        window.get_by_label_contains(&format!("{name}: {}, ", count(name)));
+    }
+    assert!(window.query_by_label_contains("undecided: ").is_none());
+
+    let (_, place) = lonely_inlier(&window);
+    let inliers = count("inlier");
+    window
+        .get_by_label(&format!("inlier: {inliers}, shown"))
+        .click();
+    window.step();
+    window.step();
+    window.get_by_label(&format!("inlier: {inliers}, hidden"));
+    click(&mut window, place);
+    let selected = window.state().desk().selected_feature;
+    let is_inlier = |i: usize| matches!(states[i], FeatureState::Inlier { .. });
+    assert!(!selected.is_some_and(is_inlier), "it is hidden");
+
+    let outliers = count("outlier");
+    let label = format!("outlier: {outliers}, shown");
+    window.get_by_label(&label).click_secondary();
+    window.step();
+    window.step();
+    window.get_by_label(&label);
+    window.get_by_label(&format!("no_depth: {}, hidden", count("no_depth")));
+}
+
+#[test]
+fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
+    let mut window = finished(Method::Feature, "images");
+    let (feature, place) = lonely_inlier(&window);
+    click(&mut window, place);
+    assert_eq!(window.state().desk().selected_feature, Some(feature));
+    window.get_by_label(&format!("query feature {feature}: inlier"));
+
+    let decisions = latest::<MatchesDecided>(&window).decisions;
+    let found = decisions[feature].expect("a match");
+    window.get_by_label(&format!("ratio {:.4}", found.ratio));
+    window.get_by_label(&format!("distance {:.4}", found.distance));
+    let lifted = latest::<DepthsLifted>(&window).matches;
+    let lifted = lifted.iter().find(|l| l.query == feature).expect("lifted");
+    window.get_by_label(&format!("LiDAR {:.2} px away", lifted.lidar_distance_px));
+    let (least, greatest) = lifted.depth_range_m.expect("a depth");
+    window.get_by_label(&format!("depths {least:.2} … {greatest:.2} m"));
+    let p = lifted.point.expect("a point");
+    window.get_by_label(&format!("3-D point ({:.2}, {:.2}, {:.2}) m", p.x, p.y, p.z));
+    let states = latest::<FeaturesClassified>(&window).states;
+    let FeatureState::Inlier { residual_px } = states[feature] else {
+        panic!("an inlier");
+    };
+    window.get_by_label(&format!("residual {residual_px:.2} px"));
+    window.get_by_label("query patch");
+    window.get_by_label("reference patch");
+
+    window.get_by_label("Close feature").click();
+    window.step();
+    window.step();
+    assert_eq!(window.state().desk().selected_feature, None);
+}
+
+#[test]
+fn the_epipolar_line_of_a_true_match_passes_through_its_query_keypoint() {
+    let mut window = finished(Method::Feature, "images");
+    let (feature, _) = lonely_inlier(&window);
+    order(&mut window, Command::SelectFeature(Some(feature)));
+    window.get_by_label_contains("true match: ");
+    let node = window.get_by_label_contains("epipolar line ");
+    let words = node.accesskit_node().value().expect("a label");
+    let distance: f64 = words
+        .trim_start_matches("epipolar line ")
+        .trim_end_matches(" px off")
+        .parse()
+        .expect("a distance");
+    assert!(distance <= 1.0, "{words}");
+    order(&mut window, Command::ShowTruth);
+    assert!(window.query_by_label_contains("epipolar line ").is_none());
+    assert!(window.query_by_label_contains("true match: ").is_none());
+}
+
+#[test]
+fn only_differences_leaves_the_features_that_ended_in_another_state() {
+    let mut window = finished(Method::Feature, "images");
+    order(&mut window, Command::OnlyDifferences);
+    window.get_by_label("Differences need another run: keep one as A (P)");
+    order(&mut window, Command::Pin);
+    let before = latest::<FeaturesClassified>(&window).states;
+    let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
+    order(&mut window, Command::SetParam { key, value });
+    assert_eq!(settle(&mut window), State::Finished);
+    order(&mut window, Command::SelectMethod(Method::Feature));
+    let after = latest::<FeaturesClassified>(&window).states;
+    let pairs = before.iter().zip(after.iter());
+    let differ = pairs.filter(|(a, b)| a.name() != b.name()).count();
+    assert!(differ > 0, "a stricter ratio test throws features out");
+    let words = format!("{differ} features end in another state than in the other run");
+    window.get_by_label(&words);
+}
+
+#[test]
+fn linked_photos_zoom_together_and_a_double_click_shows_them_whole() {
+    let mut window = finished(Method::Feature, "images");
+    let area = window.get_by_label("query photo 000001").rect();
+    let whole = |window: &Harness<'_, App>| {
+        let button = window.get_by_label("Whole photos");
+        button.accesskit_node().is_disabled()
+    };
+    assert!(whole(&window));
+    window.hover_at(area.center());
+    window.step();
+    window.event(egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: Vec2::new(0.0, 120.0),
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Unknown,
+        modifiers: egui::Modifiers::NONE,
+    });
+    for _ in 0..20 {
+        window.step();
+    }
+    assert!(!whole(&window));
+    window.get_by_label("Whole photos").click();
+    window.step();
+    window.step();
+    assert!(whole(&window));
+}
+
+#[test]
+fn the_synthetic_view_shows_the_recorded_cost_and_place() {
+    let mut window = finished(Method::MutualInformation, "synthetic");
+    for method in [Method::MutualInformation, Method::Photometric] {
+        order(&mut window, Command::SelectMethod(method));
+        let event = latest::<ViewRendered>(&window);
+        let cost = event.comparison.score.cost.expect("a cost");
+        window.get_by_label(&format!("cost {cost:.4}"));
+        window.get_by_label(&format!("{}, result", method.name().to_uppercase()));
+        let ahead = event.offset.forward_m;
+        window.get_by_label_contains(&format!("{ahead:.2} m ahead"));
+        let covered = event.comparison.score.covered;
+        window.get_by_label_contains(&format!("{covered} px covered, "));
+        let assessed = latest::<MinimumAssessed>(&window);
+        window.get_by_label(&format!(
+            "shuffled {:.4}",
+            assessed.shuffled.expect("a cost")
+        ));
+        window.get_by_label(&format!("best {:.4}", assessed.best));
+        window.get_by_label_contains("truth ");
+    }
+}
+
+#[test]
+fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
+    let mut window = finished(Method::MutualInformation, "synthetic");
+    let truth = window
+        .state()
+        .desk()
+        .run()
+        .loaded
+        .as_ref()
+        .expect("loaded")
+        .truth;
+    order(&mut window, Command::TakeCamera(truth));
+    let begun = std::time::Instant::now();
+    while window.state().desk().probe().is_none() {
+        assert!(begun.elapsed().as_secs() < 60, "it hangs");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        window.step();
+    }
+    window.step();
+    window.get_by_label("MI, camera in hand");
+    let probe = window.state().desk().probe().expect("an answer").clone();
+    for (_, comparison) in &probe.comparisons {
+        let cost = comparison.score.cost.expect("a cost");
+        window.get_by_label(&format!("present {cost:.4}"));
+    }
+    window.get_by_label("PM cost from shuffled pixels to the least");
+    window.get_by_label("MI cost from shuffled pixels to the least");
+}
+
+#[test]
+fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_query() {
+    let mut window = finished(Method::MutualInformation, "synthetic");
+    let common = [
+        "query",
+        "view",
+        "blend",
+        "checkerboard",
+        "residual",
+        "coverage",
+    ];
+    for (method, own) in [("MI", "contributions"), ("PM", "weights")] {
+        window.get_by_label(&format!("{method} pictures")).click();
+        window.step();
+        window.step();
+        for name in common.into_iter().chain([own]) {
+            window.get_by_label(&format!("Show {name}")).click();
+            window.step();
+            window.step();
+            window.get_by_label(&format!("{method} picture: {name}"));
+        }
+    }
+    order(&mut window, Command::Blink);
+    let mut seen = [0, 0];
+    for _ in 0..200 {
+        window.step();
+        for (count, name) in seen.iter_mut().zip(["query", "weights"]) {
+            let label = format!("PM picture: {name}");
+            *count += usize::from(window.query_by_label(&label).is_some());
+        }
+    }
+    assert!(seen[0] > 0 && seen[1] > 0, "{seen:?}");
+}
+
+#[test]
+fn both_views_draw_at_every_moment_of_a_run() {
+    let mut window = finished(Method::Feature, "images");
+    order(&mut window, Command::SelectFeature(Some(0)));
+    let len = window.state().desk().run().len();
+    // Every moment of FB's story, and some of the long searches.
+    let mut cursor = 0;
+    while cursor < len {
+        for view in ["images", "synthetic"] {
+            window.state_mut().send(Command::ShowView(view));
+            window.state_mut().send(Command::MoveCursor(cursor));
+            window.step();
+            window.step();
+        }
+        cursor += if cursor < 12 { 1 } else { 1 + len / 97 };
+    }
+}
