@@ -23,7 +23,7 @@ fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
     let mut window = window(setup);
     assert_eq!(settle(&mut window), State::Finished);
     order(&mut window, Command::SelectMethod(method));
-    order(&mut window, Command::ShowView(view));
+    order(&mut window, Command::Maximize(Some(view)));
     window
 }
 
@@ -319,7 +319,7 @@ fn both_views_draw_at_every_moment_of_a_run() {
     let mut cursor = 0;
     while cursor < len {
         for view in ["images", "synthetic"] {
-            window.state_mut().send(Command::ShowView(view));
+            window.state_mut().send(Command::Maximize(Some(view)));
             window.state_mut().send(Command::MoveCursor(cursor));
             window.step();
             window.step();

@@ -194,6 +194,8 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
 #[test]
 fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
     let mut window = finished();
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.run_steps(2);
     move_to_end(&mut window, Method::MutualInformation);
     let surfaces = told::<PhaseSearched>(&window, Method::MutualInformation);
     let surface = &surfaces[0].1.surface;

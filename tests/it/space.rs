@@ -16,7 +16,8 @@ fn finished() -> Harness<'static, App> {
     setup.mode = RunMode::Running;
     let mut window = window(setup);
     settle(&mut window);
-    window.step();
+    window.state_mut().send(Command::Maximize(Some("space")));
+    window.run_steps(3);
     window
 }
 
@@ -43,6 +44,7 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
         pressed,
         modifiers: held,
     };
+    window.event(egui::Event::ModifiersChanged(held));
     window.hover_at(from);
     window.step();
     window.event(button(from, true));
@@ -52,6 +54,7 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
         window.step();
     }
     window.event(button(from + by, false));
+    window.event(egui::Event::ModifiersChanged(egui::Modifiers::NONE));
     window.step();
     window.step();
 }
