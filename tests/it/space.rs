@@ -3,21 +3,16 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command};
+use posescope::app::{App, Command, Setup};
 use posescope::event::PhaseSearched;
 use posescope::geometry::Pose;
 use posescope::grid::Phase;
 use posescope::session::RunMode;
 
-use crate::window::{settle, setup, window};
+use crate::window::{finished, settle, setup};
 
-fn finished() -> Harness<'static, App> {
-    let mut setup = setup();
-    setup.mode = RunMode::Running;
-    let mut window = window(setup);
-    settle(&mut window);
-    window.step();
-    window
+fn run_window() -> Harness<'static, App> {
+    finished(setup())
 }
 
 /// The words of the picture.
@@ -64,12 +59,16 @@ fn in_hand(window: &Harness<'_, App>) -> Pose {
 
 #[test]
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
-    let mut window = finished();
+    let mut window = run_window();
     let run = window.state().desk().run().clone();
-    let ends: Vec<usize> = run.spans().iter().map(|span| span.records.end - 1).collect();
+    let ends: Vec<usize> = run
+        .spans()
+        .iter()
+        .map(|span| span.records.end - 1)
+        .collect();
     // Every hundredth record, and all around the ends of the estimators.
-    let moments = (0..run.len())
-        .filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
+    let moments =
+        (0..run.len()).filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
     for cursor in moments {
         window.state_mut().send(Command::MoveCursor(cursor));
         window.step();
@@ -79,7 +78,10 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     window.state_mut().send(Command::First);
     window.step();
     window.step();
-    assert!(window.query_by_label_contains("FB: ").is_none(), "FB has no pose yet");
+    assert!(
+        window.query_by_label_contains("FB: ").is_none(),
+        "FB has no pose yet"
+    );
     window.state_mut().send(Command::MoveCursor(ends[0]));
     window.step();
     window.step();
@@ -88,7 +90,7 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
 
 #[test]
 fn the_truth_hides_with_its_errors() {
-    let mut window = finished();
+    let mut window = run_window();
     assert!(label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_some());
     window.state_mut().send(Command::ShowTruth);
@@ -100,12 +102,17 @@ fn the_truth_hides_with_its_errors() {
 
 #[test]
 fn one_looks_through_a_camera_and_leaves_it_by_turning() {
-    let mut window = finished();
+    let mut window = run_window();
     assert!(headline(&window).contains("From outside"));
     click(&mut window, "● FB");
     assert!(headline(&window).contains("Through FB"));
     let pane = window.get_by_label_contains("3-D view of").rect();
-    drag(&mut window, pane.center(), egui::vec2(30.0, 0.0), egui::Modifiers::NONE);
+    drag(
+        &mut window,
+        pane.center(),
+        egui::vec2(30.0, 0.0),
+        egui::Modifiers::NONE,
+    );
     assert!(headline(&window).contains("From outside"));
     click(&mut window, "× Truth");
     window.state_mut().send(Command::ShowTruth);
@@ -118,11 +125,9 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
 
 #[test]
 fn shifting_takes_the_labels_along() {
-    let mut window = finished();
+    let mut window = run_window();
     click(&mut window, "Top");
-    let place = |window: &Harness<'_, App>| {
-        window.get_by_label_contains("Reference: ").rect().min
-    };
+    let place = |window: &Harness<'_, App>| window.get_by_label_contains("Reference: ").rect().min;
     let before = place(&window);
     let pane = window.get_by_label_contains("3-D view of").rect();
     let by = egui::vec2(25.0, 15.0);
@@ -130,27 +135,48 @@ fn shifting_takes_the_labels_along() {
     drag(&mut window, corner, by, egui::Modifiers::SHIFT);
     let moved = place(&window) - before;
     // The camera is nearer to the eye than the ground that the pointer holds.
-    assert!(moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0, "{moved}");
+    assert!(
+        moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0,
+        "{moved}"
+    );
 }
 
 #[test]
 fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
-    let mut window = finished();
+    let mut window = run_window();
     click(&mut window, "Top");
-    window.state_mut().send(Command::TakeCamera(Some(start(&window))));
+    window
+        .state_mut()
+        .send(Command::TakeCamera(Some(start(&window))));
     window.step();
     window.step();
     let before = in_hand(&window);
-    let handle = window.get_by_label_contains("Camera in hand").rect().center();
-    drag(&mut window, handle, egui::vec2(40.0, 0.0), egui::Modifiers::NONE);
+    let handle = window
+        .get_by_label_contains("Camera in hand")
+        .rect()
+        .center();
+    drag(
+        &mut window,
+        handle,
+        egui::vec2(40.0, 0.0),
+        egui::Modifiers::NONE,
+    );
     let moved = before.inverse() * in_hand(&window);
     assert!(moved.translation.x > 0.1, "to the right: {moved}");
     assert!(moved.translation.y.abs() < 1e-6 && moved.translation.z.abs() < 0.05);
     assert!(moved.rotation.angle() < 1e-6);
 
     let before = in_hand(&window);
-    let handle = window.get_by_label_contains("Camera in hand").rect().center();
-    drag(&mut window, handle, egui::vec2(40.0, 0.0), egui::Modifiers::ALT);
+    let handle = window
+        .get_by_label_contains("Camera in hand")
+        .rect()
+        .center();
+    drag(
+        &mut window,
+        handle,
+        egui::vec2(40.0, 0.0),
+        egui::Modifiers::ALT,
+    );
     let turned = before.inverse() * in_hand(&window);
     assert!(turned.translation.vector.norm() < 1e-9);
     let ahead = turned.rotation * nalgebra::Vector3::z();
@@ -158,13 +184,19 @@ fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
 }
 
 fn start(window: &Harness<'_, App>) -> Pose {
-    let loaded = window.state().desk().run().loaded.as_deref().expect("is read");
+    let loaded = window
+        .state()
+        .desk()
+        .run()
+        .loaded
+        .as_deref()
+        .expect("is read");
     loaded.problems[0].reference.world_from_camera
 }
 
 #[test]
 fn jumps_and_blinking_go_between_two_poses() {
-    let mut window = finished();
+    let mut window = run_window();
     click(&mut window, "Start 5");
     let begin = in_hand(&window);
     click(&mut window, "Truth 9");
@@ -197,7 +229,7 @@ fn number_after(text: &str, words: &str) -> f64 {
 
 #[test]
 fn the_cost_under_the_pointer_is_the_recorded_one() {
-    let mut window = finished();
+    let mut window = run_window();
     click(&mut window, "Top");
     let pane = window.get_by_label_contains("3-D view of").rect();
     let mut found = 0;
@@ -237,7 +269,9 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
             })
             .collect::<Vec<_>>();
         assert!(
-            at_place.iter().any(|recorded| (recorded - cost).abs() < 5.1e-5),
+            at_place
+                .iter()
+                .any(|recorded| (recorded - cost).abs() < 5.1e-5),
             "{words}: {at_place:?}"
         );
     }
@@ -246,12 +280,12 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
 
 #[test]
 fn without_a_graphics_card_the_view_says_so() {
-    let window = finished();
+    let window = run_window();
     assert!(window.query_by_label_contains("No graphics card").is_some());
 }
 
 /// The window drawn by any adapter there is; `None`, and a line that says so, without one.
-fn drawn() -> Option<Harness<'static, App>> {
+fn drawn(setup: Setup) -> Option<Harness<'static, App>> {
     use eframe::wgpu;
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let options = wgpu::RequestAdapterOptions::default();
@@ -262,8 +296,10 @@ fn drawn() -> Option<Harness<'static, App>> {
         println!("skipped: no graphics adapter");
         return None;
     }
-    let mut setup = setup();
-    setup.mode = RunMode::Running;
+    let setup = Setup {
+        mode: RunMode::Running,
+        ..setup
+    };
     let mut window = Harness::builder()
         .with_size([1500.0, 950.0])
         .wgpu()
@@ -291,7 +327,9 @@ fn count(window: &mut Harness<'_, App>, [r, g, b]: [u8; 3]) -> usize {
 
 #[test]
 fn the_layers_are_drawn_and_can_be_taken_away() {
-    let Some(mut window) = drawn() else { return };
+    let Some(mut window) = drawn(setup()) else {
+        return;
+    };
     const TRUTH: [u8; 3] = [0x00, 0x9E, 0x73];
     assert!(window.query_by_label_contains("No graphics card").is_none());
     assert!(window.query_by_label_contains("Nothing is drawn").is_none());
@@ -309,19 +347,61 @@ fn the_layers_are_drawn_and_can_be_taken_away() {
 #[ignore = "to be looked at"]
 fn pictures_of_space() {
     let folder = std::env::var("POSESCOPE_PICTURES").expect("names a folder");
-    let Some(mut window) = drawn() else { return };
-    let mut save = |window: &mut Harness<'_, App>, name: &str| {
-        window.step();
-        window.step();
-        let picture = window.render().expect("a picture");
-        picture.save(format!("{folder}/{name}.png")).expect("saved");
+    let street: std::sync::Arc<dyn posescope::scene::Scene> =
+        std::sync::Arc::from(posescope::scene::open("street", None).expect("built in"));
+    let position = |name: &str| {
+        street
+            .frames()
+            .iter()
+            .position(|frame| frame == name)
+            .unwrap()
     };
-    save(&mut window, "overview");
-    click(&mut window, "Top");
-    save(&mut window, "top");
-    click(&mut window, "● FB");
-    save(&mut window, "through");
-    window.state_mut().send(Command::SwitchTheme);
-    click(&mut window, "Reset view");
-    save(&mut window, "light");
+    let on_street = Setup {
+        references: street.clone(),
+        queries: street.clone(),
+        offered: vec![position("000070")],
+        query: position("000070"),
+        reference_frames: vec![position("000062")],
+        uncertainty_radius_m: 15.0,
+        ..setup()
+    };
+    for (world, setup) in [("walls", setup()), ("street", on_street)] {
+        let Some(mut window) = drawn(setup) else {
+            return;
+        };
+        let save = |window: &mut Harness<'_, App>, name: &str| {
+            for _ in 0..3 {
+                window.step();
+            }
+            let picture = window.render().expect("a picture");
+            picture
+                .save(format!("{folder}/{world}-{name}.png"))
+                .expect("saved");
+        };
+        save(&mut window, "overview");
+        window.state_mut().send(Command::SelectMethod(
+            posescope::event::Method::MutualInformation,
+        ));
+        window.step();
+        let pose = start(&window) * Pose::translation(1.0, 0.0, 2.0);
+        window.state_mut().send(Command::TakeCamera(Some(pose)));
+        save(&mut window, "mi");
+        click(&mut window, "Layers");
+        click(&mut window, "Cost as height");
+        click(&mut window, "depth");
+        save(&mut window, "relief");
+        window.key_press(egui::Key::Escape);
+        window.step();
+        click(&mut window, "Top");
+        save(&mut window, "top");
+        click(&mut window, "● FB");
+        save(&mut window, "through");
+        window.state_mut().send(Command::SwitchTheme);
+        click(&mut window, "Reset view");
+        save(&mut window, "light");
+        let run = window.state().desk().run().clone();
+        let fb = run.spans()[0].records.clone();
+        window.state_mut().send(Command::MoveCursor(fb.end - 60));
+        save(&mut window, "ransac");
+    }
 }
