@@ -189,7 +189,7 @@ impl CallbackTrait for Job {
         };
         let viewport = info.viewport_in_pixels();
         let size = [viewport.width_px, viewport.height_px].map(|side| side.max(0) as u32);
-        if size.contains(&0) || self.pipelines.trouble().is_some() {
+        if size.contains(&0) {
             return Vec::new();
         }
         let mut picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
@@ -226,7 +226,7 @@ fn guarded<T>(device: &wgpu::Device, run: impl FnOnce() -> T) -> Result<T, Strin
         error = error.or(at_once(scope.pop()).flatten());
     }
     match error {
-        Some(error) => Err(first_line(&error.to_string())),
+        Some(error) => Err(one_line(&error.to_string())),
         None => Ok(value),
     }
 }
@@ -240,8 +240,15 @@ fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
     }
 }
 
-fn first_line(text: &str) -> String {
-    let lines = text.lines().map(str::trim);
-    let telling: Vec<_> = lines.filter(|line| !line.is_empty()).take(3).collect();
-    telling.join(" ")
+/// An error of wgpu in one line: what caused it, without the headings.
+fn one_line(text: &str) -> String {
+    let causes = text
+        .split_once("Caused by:")
+        .map_or(text, |(_, causes)| causes);
+    let lines: Vec<_> = causes
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    lines.join(": ")
 }

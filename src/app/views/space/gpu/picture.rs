@@ -59,7 +59,7 @@ impl Picture {
                 .as_ref()
                 .is_some_and(|(shown, at)| shown == frame && *at == scale);
         let Some(made) = pipelines.made() else { return };
-        if is_current || self.trouble.is_some() {
+        if is_current || self.trouble.is_some() || pipelines.trouble().is_some() {
             return;
         }
         let drawn = guarded(device, || {
@@ -98,7 +98,12 @@ impl Picture {
                 }
                 Cloud {
                     points: Arc::clone(&frame.points),
-                    buffer: filled(device, &frame.points.bytes, wgpu::BufferUsages::VERTEX),
+                    buffer: filled(
+                        device,
+                        queue,
+                        &frame.points.bytes,
+                        wgpu::BufferUsages::VERTEX,
+                    ),
                 }
             }
         };
@@ -106,12 +111,13 @@ impl Picture {
         let packed = |write: &dyn Fn(&mut Vec<u8>)| {
             let mut bytes = Vec::new();
             write(&mut bytes);
-            filled(device, &bytes, wgpu::BufferUsages::VERTEX)
+            filled(device, queue, &bytes, wgpu::BufferUsages::VERTEX)
         };
         let lines = packed(&|bytes| frame.lines.iter().for_each(|line| line.write(bytes)));
         let faces = packed(&|bytes| frame.faces.iter().for_each(|corner| corner.write(bytes)));
         let view = filled(
             device,
+            queue,
             &frame.view(size, scale),
             wgpu::BufferUsages::UNIFORM,
         );
@@ -239,11 +245,21 @@ fn bind(
 }
 
 /// A buffer with content; an empty one still has room for something, as wgpu wants it.
-fn filled(device: &wgpu::Device, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    use wgpu::util::DeviceExt as _;
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+///
+/// Written through the queue: a buffer that is mapped at its creation panics when the device is lost.
+fn filled(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    bytes: &[u8],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    let bytes = if bytes.is_empty() { &[0; 32] } else { bytes };
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("space"),
-        contents: if bytes.is_empty() { &[0; 32] } else { bytes },
-        usage,
-    })
+        size: bytes.len() as u64,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&buffer, 0, bytes);
+    buffer
 }

@@ -33,8 +33,8 @@ impl Pipelines {
         let lost: Arc<Mutex<Option<String>>> = Arc::default();
         let told = Arc::clone(&lost);
         device.set_device_lost_callback(move |_, why| {
-            let why = format!("the graphics card was lost: {}", super::first_line(&why));
-            *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(why);
+            let why = format!("the graphics card was lost {}", super::one_line(&why));
+            *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(why.trim().to_owned());
         });
         Self {
             made: guarded(device, || Made::new(device, target)),
