@@ -292,7 +292,7 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
         "residual",
         "coverage",
     ];
-    for (method, own) in [("MI", "contributions"), ("PM", "weights")] {
+    for (method, own) in [("MI", "shares"), ("PM", "weights")] {
         window.get_by_label(&format!("{method} pictures")).click();
         window.step();
         window.step();
