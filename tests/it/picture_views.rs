@@ -233,8 +233,10 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
         let cost = event.comparison.score.cost.expect("a cost");
         window.get_by_label(&format!("cost {cost:.4}"));
         window.get_by_label(&format!("{}, result", method.name().to_uppercase()));
+        assert!(event.offset.right_m.abs() < 0.005 && event.offset.yaw_rad == 0.0);
         let ahead = event.offset.forward_m;
-        window.get_by_label_contains(&format!("{ahead:.2} m ahead"));
+        let place = format!("0.00 m right, {ahead:.2} m ahead, turned 0.00° left");
+        window.get_by_label(&place);
         let covered = event.comparison.score.covered;
         window.get_by_label_contains(&format!("{covered} px covered, "));
         let assessed = latest::<MinimumAssessed>(&window);
@@ -243,7 +245,10 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
             assessed.shuffled.expect("a cost")
         ));
         window.get_by_label(&format!("best {:.4}", assessed.best));
-        window.get_by_label_contains("truth ");
+        let results = window.state().desk().run().results();
+        let mut costs = results.filter(|result| result.method == method.name());
+        let cost = costs.find_map(|result| result.cost).expect("it has a cost");
+        window.get_by_label(&format!("truth {:.4}", cost.truth.expect("known")));
     }
 }
 
@@ -287,7 +292,7 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
         "residual",
         "coverage",
     ];
-    for (method, own) in [("MI", "contributions"), ("PM", "weights")] {
+    for (method, own) in [("MI", "shares"), ("PM", "weights")] {
         window.get_by_label(&format!("{method} pictures")).click();
         window.step();
         window.step();

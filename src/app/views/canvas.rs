@@ -107,7 +107,7 @@ impl Placement {
     }
 
     /// The place of a pixel position on the screen.
-    pub(super) fn to_screen(&self, [x, y]: [f32; 2]) -> Pos2 {
+    pub(super) fn on_screen(&self, [x, y]: [f32; 2]) -> Pos2 {
         self.picture.min + self.scale * vec2(x + 0.5, y + 0.5)
     }
 
@@ -171,8 +171,8 @@ mod tests {
     fn a_fitted_picture_is_centred_and_pixel_centres_are_at_integers() {
         let at = Lens::default().place(area(), SIZE, CENTRED);
         assert_eq!(at.scale, 0.5);
-        assert_eq!(at.to_screen([-0.5, -0.5]), pos2(10.0, 95.0));
-        assert_eq!(at.to_screen([399.5, 99.5]), pos2(210.0, 145.0));
+        assert_eq!(at.on_screen([-0.5, -0.5]), pos2(10.0, 95.0));
+        assert_eq!(at.on_screen([399.5, 99.5]), pos2(210.0, 145.0));
         let low = Lens::default().place(area(), SIZE, vec2(0.5, 1.0));
         assert_eq!(low.visible().max, area().max);
     }
@@ -180,8 +180,8 @@ mod tests {
     #[test]
     fn a_patch_has_its_pixel_in_the_middle() {
         let at = Placement::around([30.0, 40.0], 16.0, area(), SIZE);
-        assert_eq!(at.to_screen([30.0, 40.0]), area().center());
-        assert_eq!(at.to_screen([46.0, 40.0]).x, area().right());
+        assert_eq!(at.on_screen([30.0, 40.0]), area().center());
+        assert_eq!(at.on_screen([46.0, 40.0]).x, area().right());
     }
 
     proptest! {

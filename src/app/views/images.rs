@@ -225,7 +225,7 @@ fn point_at(
 
 /// The epipolar line, and where the true pose sees the lifted point.
 fn draw_truth(ink: &mut Ink, at: &Placement, camera: &Intrinsics, truth: &TrueMatch) {
-    let place = |pixel: &nalgebra::Point2<f64>| at.to_screen(pixel.cast::<f32>().into());
+    let place = |pixel: &nalgebra::Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
     let shade = Color32::from_black_alpha(140);
     if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
         ink.line(place(&from), place(&to), 3.5, shade);

@@ -196,7 +196,7 @@ impl Detail {
         let radius = (0.35 * at.scale).clamp(1.5, 4.0);
         let seen = self.seen.iter().flat_map(|(_, _, seen)| seen);
         for (rank, point) in seen.enumerate() {
-            let place = at.to_screen(point.pixel.cast::<f32>().into());
+            let place = at.on_screen(point.pixel.cast::<f32>().into());
             let color = theme::rgb(palette::depth(point.depth_m));
             ink.disc(place, radius + 0.8, Color32::from_black_alpha(150));
             ink.disc(place, radius, color);
@@ -205,7 +205,7 @@ impl Detail {
             }
         }
         let radius = subject.depth_radius_px as f32 * at.scale;
-        let middle = at.to_screen(position(keypoint));
+        let middle = at.on_screen(position(keypoint));
         ink.ring(middle, radius, 1.0, Color32::WHITE.gamma_multiply(0.8));
         ink.dry(&at.painter(ui.painter()));
     }

@@ -99,10 +99,10 @@ impl Segment {
         let body = TextStyle::Body.resolve(ui.style());
         let (upper, lower) = (rect.top() + 10.0, rect.bottom() - 9.0);
         let mut ink = Ink::new(ui.pixels_per_point());
-        let mark_color = if is_shown {
-            color
-        } else {
-            visuals.weak_text_color()
+        // Pale colours are hard to see on their own tints.
+        let mark_color = match is_shown {
+            true => color.lerp_to_gamma(visuals.strong_text_color(), 0.3),
+            false => visuals.weak_text_color(),
         };
         ink.mark(
             mark(self.kind),

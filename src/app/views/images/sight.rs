@@ -62,9 +62,9 @@ impl Sights {
                 let sight = Sight {
                     feature,
                     kind,
-                    query: seen(query.to_screen(position(here)), 0),
+                    query: seen(query.on_screen(position(here)), 0),
                     reference: there
-                        .and_then(|(_, there)| seen(reference.to_screen(position(there)), 1)),
+                        .and_then(|(_, there)| seen(reference.on_screen(position(there)), 1)),
                     scales: [here.scale, there.map_or(0.0, |(_, there)| there.scale)],
                 };
                 if sight.query.is_some() || sight.reference.is_some() {
@@ -129,7 +129,7 @@ impl Sights {
         };
         let color = color.gamma_multiply(strength);
         for (keypoint, is_matched) in story.reference().iter().zip(&self.is_matched) {
-            let place = at.to_screen(position(keypoint));
+            let place = at.on_screen(position(keypoint));
             if !is_matched && area.contains(place) {
                 ink.mark(mark, place, radius, color);
             }

@@ -119,7 +119,13 @@ impl TrueMatch {
             .map(|distance| format!("{distance:.2} px from where the true pose sees its point"));
         match (self.is_true(within_px), seen) {
             (Some(true), Some(seen)) => format!("true match: {seen}"),
-            (Some(false), Some(seen)) => format!("false match: {seen}"),
+            (Some(false), Some(seen)) => match self.line_px {
+                // It is where some other depth would put it.
+                Some(distance) if distance <= within_px => {
+                    format!("false match or wrong depth: {seen}")
+                }
+                _ => format!("false match: {seen}"),
+            },
             (Some(false), None) => "false match: off its epipolar line".to_owned(),
             _ => "on its epipolar line, and no depth to tell more".to_owned(),
         }
@@ -163,6 +169,38 @@ mod tests {
         let above = Point2::new(300.0, -40.0);
         let line = Line::epipolar(&CAMERA, &CAMERA, &sideways, &above).expect("a line");
         assert_eq!(line.within(&CAMERA), None);
+    }
+
+    #[test]
+    fn a_match_is_judged_by_its_place_and_without_a_depth_by_its_line() {
+        let judged = |place_px, line_px| {
+            let seen = TrueMatch {
+                line: None,
+                line_px,
+                place: None,
+                place_px,
+            };
+            (seen.is_true(3.0), seen.verdict(3.0))
+        };
+        let starts = |(is_true, words): (Option<bool>, String), expected, start: &str| {
+            is_true == expected && words.starts_with(start)
+        };
+        let place = judged(Some(2.9), Some(0.1));
+        assert!(starts(place, Some(true), "true match: 2.90 px"));
+        let along = judged(Some(20.0), Some(0.1));
+        assert!(starts(along, Some(false), "false match or wrong depth: 20"));
+        let off = judged(Some(20.0), Some(9.0));
+        assert!(starts(off, Some(false), "false match: 20.00 px"));
+        assert!(starts(
+            judged(None, Some(9.0)),
+            Some(false),
+            "false match: off"
+        ));
+        assert!(starts(
+            judged(None, Some(1.0)),
+            None,
+            "on its epipolar line"
+        ));
     }
 
     proptest! {

@@ -49,7 +49,7 @@ impl Mode {
             Self::Checkerboard => "Checkerboard",
             Self::Residual => "Residual",
             Self::Weights if method == Method::Photometric => "Weights",
-            Self::Weights => "Contributions",
+            Self::Weights => "Shares",
             Self::Coverage => "Coverage",
         }
     }
