@@ -153,12 +153,19 @@ fn first_tree() -> Tree<String> {
     let middle = tiles.insert_vertical_tile(vec![pictures, lower]);
     let right = tiles.insert_vertical_tile(vec![space, words]);
     let root = tiles.insert_horizontal_tile(vec![lists, middle, right]);
-    if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
-        tiles.get_mut(root)
-    {
-        linear.shares.set_share(lists, 0.22);
-        linear.shares.set_share(middle, 0.48);
-        linear.shares.set_share(right, 0.30);
+    // Three maps beside each other need more room than one histogram.
+    let shares = [
+        (root, vec![(lists, 0.22), (middle, 0.48), (right, 0.30)]),
+        (lower, vec![(surface, 0.62), (histogram, 0.38)]),
+    ];
+    for (container, shares) in shares {
+        if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
+            tiles.get_mut(container)
+        {
+            for (tile, share) in shares {
+                linear.shares.set_share(tile, share);
+            }
+        }
     }
     Tree::new(egui::Id::unique("views"), root, tiles)
 }

@@ -18,6 +18,8 @@ fn finished() -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
+    // It shares its place with the view of the space.
+    window.state_mut().send(Command::ShowView("ransac"));
     assert_eq!(settle(&mut window), State::Finished);
     window
 }
@@ -406,6 +408,7 @@ fn pictures() {
         .wgpu()
         .build_eframe(|creation| App::new(creation, setup));
     settle(&mut window);
+    window.state_mut().send(Command::ShowView("ransac"));
     let name = if street { "street" } else { "walls" };
     let save = |window: &mut Harness<'_, App>, moment: &str| {
         window.run_steps(6);
