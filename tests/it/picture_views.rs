@@ -247,7 +247,9 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
         window.get_by_label(&format!("best {:.4}", assessed.best));
         let results = window.state().desk().run().results();
         let mut costs = results.filter(|result| result.method == method.name());
-        let cost = costs.find_map(|result| result.cost).expect("it has a cost");
+        let cost = costs
+            .find_map(|result| result.cost.clone())
+            .expect("it has a cost");
         window.get_by_label(&format!("truth {:.4}", cost.truth.expect("known")));
     }
 }

@@ -235,6 +235,10 @@ fn number_after(text: &str, words: &str) -> f64 {
 #[test]
 fn the_cost_under_the_pointer_is_the_recorded_one() {
     let mut window = finished();
+    // The hybrid took the pose of FB and searched nothing.
+    let method = posescope::event::Method::MutualInformation;
+    window.state_mut().send(Command::SelectMethod(method));
+    window.run_steps(2);
     click(&mut window, "Top");
     let pane = window.get_by_label_contains("3-D view of").rect();
     let mut found = 0;
@@ -280,7 +284,11 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
             "{words}: {at_place:?}"
         );
     }
-    assert!(found >= 2, "the pointer met {found} cells");
+    assert!(
+        found >= 2,
+        "the pointer met {found} cells: {}",
+        headline(&window)
+    );
 }
 
 #[test]
