@@ -84,7 +84,7 @@ impl Session {
                 }
                 Message::Began { method, reference } => self.run.begin(method, reference),
                 Message::Told(record) => {
-                    self.run.push(record);
+                    self.run.push(*record);
                     // It was told to go on, or is about to say that it waits.
                     self.state = State::Running;
                 }

@@ -355,9 +355,9 @@ impl Desk {
         let problem = loaded.problems.get(span.map_or(0, |span| span.reference))?;
         let minimum = |wanted: Phase| {
             let events = run.all_until::<PhaseSearched>(self.cursor);
-            let best = events
-                .filter(|(_, event)| event.surface.lattice.phase == wanted)
-                .last()?
+            let mut latest = events.rev();
+            let best = latest
+                .find(|(_, event)| event.surface.lattice.phase == wanted)?
                 .1
                 .best?;
             Some(problem.world_from_query(&best.reference_from_camera()))

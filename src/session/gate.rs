@@ -224,7 +224,7 @@ impl Gate {
 
 impl Sink for Gate {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        self.tell(Message::Told(record.clone()))?;
+        self.tell(Message::Told(Box::new(record.clone())))?;
         let breakpoint = {
             let control = Arc::clone(&self.control);
             let mut wishes = control.wishes();

@@ -60,7 +60,7 @@ pub(super) enum Message {
         method: Method,
         reference: usize,
     },
-    Told(Record),
+    Told(Box<Record>),
     Waits {
         breakpoint: Option<String>,
     },

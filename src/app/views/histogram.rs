@@ -99,6 +99,9 @@ fn caption(ui: &mut Ui, scope: &Scope<'_>, shown: &Shown) {
     });
 }
 
+/// A name, and how a cost is told under it.
+type Quality = (&'static str, fn(f64) -> f64);
+
 /// The cost here beside those it can be compared with. `quality` turns a cost into what is shown
 /// with it, if anything is.
 fn comparison(
@@ -106,7 +109,7 @@ fn comparison(
     scope: &Scope<'_>,
     method: Method,
     cost: Option<f64>,
-    quality: Option<(&str, fn(f64) -> f64)>,
+    quality: Option<Quality>,
 ) {
     let bounds = scope.cost_bounds(method);
     let rows = [
