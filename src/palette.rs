@@ -49,7 +49,7 @@ const DEPTH_RANGE_M: (f64, f64) = (2.0, 80.0);
 #[cfg(feature = "app")]
 pub(crate) fn depth_share(depth_m: f64) -> f64 {
     let (near, far) = DEPTH_RANGE_M;
-    ((depth_m / near).ln() / (far / near).ln()).clamp(0.0, 1.0)
+    (depth_m.clamp(near, far) / near).ln() / (far / near).ln()
 }
 
 /// The colour of a depth \[m\] in the pictures of a run.
