@@ -159,6 +159,8 @@ fn a_click_takes_the_camera_to_the_cell() {
 #[test]
 fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded() {
     let mut window = finished();
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.run_steps(3);
     let scored = told::<PoseScored>(&window, Method::MutualInformation);
     for &(at, ref event) in scored
         .iter()

@@ -236,15 +236,16 @@ impl Kind {
 pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<Pose> {
     let mut pointed_at = None;
     ui.horizontal_wrapped(|ui| {
+        // The room for the mark is part of the button, so that both wrap together.
+        let icon = ui.spacing().icon_width;
+        ui.spacing_mut().button_padding = vec2(0.5 * icon + 4.0, 1.0);
         for mark in marks {
-            let button = egui::Button::new(egui::RichText::new(&mark.words).small());
-            // The room for the mark is part of the button, so that both wrap together.
-            let icon = ui.spacing().icon_width;
-            let response = ui.scope(|ui| {
-                ui.spacing_mut().button_padding = vec2(0.5 * icon + 4.0, 1.0);
-                ui.add(button.frame(false).sense(Sense::click()))
-            });
-            let response = response.inner;
+            // Without a frame a button would have no room beside its words.
+            let button = egui::Button::new(egui::RichText::new(&mark.words).small())
+                .fill(Color32::TRANSPARENT)
+                .stroke(Stroke::NONE)
+                .wrap_mode(egui::TextWrapMode::Extend);
+            let response = ui.add(button.sense(Sense::click()));
             let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
             mark.kind.paint(ui.painter(), at, REACH);
             if response.hovered() {
