@@ -5,7 +5,7 @@
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResults};
 use posescope::app::{App, Command, Setup, views};
 use posescope::event::Method;
-use posescope::session::RunMode;
+use posescope::session::{RunMode, State};
 
 use crate::window::{has_adapter, settle, setup, wait};
 
@@ -42,8 +42,7 @@ fn every_view_looks_as_it_did() {
     };
     shoot(&mut window, "waiting");
     window.state_mut().send(Command::Run);
-    window.step();
-    settle(&mut window);
+    wait(&mut window, |app| *app.desk().state() == State::Finished);
     window
         .state_mut()
         .send(Command::SelectMethod(Method::Feature));
