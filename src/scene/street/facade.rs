@@ -100,7 +100,7 @@ pub(super) fn plaster(colour: Rgb, uv: Vector2<f64>, footprint: &Footprint, seed
     let grain = octaves(uv.into(), 0.11, 3, 1.0, footprint, seed ^ 5);
     let streaked = Vector2::new(uv.x, 0.06 * uv.y);
     let streaks = octaves(streaked.into(), 0.35, 2, 0.7, footprint, seed ^ 6);
-    colour * (0.92 + 0.15 * blotches + 0.05 * grain + 0.14 * streaks.min(0.0))
+    colour * (0.92 + 0.15 * blotches + 0.10 * grain + 0.14 * streaks.min(0.0))
 }
 
 /// Bricks in running bond.

@@ -55,10 +55,19 @@ fn boundaries(builder: &mut Builder, street: usize, side: f64, traversal: u32) {
                 half: Vector2::new(1.02, 0.12),
             };
             if builder.is_free(&plot, PAVEMENT + 0.05) {
-                boundary(builder, plot, kind, height, seed.wrapping_add(piece));
+                boundary(
+                    builder,
+                    plot,
+                    kind,
+                    height,
+                    seed.wrapping_add(piece),
+                    traversal,
+                );
             }
-            if kind != 3 && seed.wrapping_add(piece * 7).is_multiple_of(3) {
-                bush(builder, plot.at(0.0, -1.3), traversal);
+            match builder.rng.random_range(0..10_u32) {
+                0..=3 => bush(builder, plot.at(0.0, -1.2), traversal),
+                4..=6 => garden_tree(builder, plot.at(0.0, -1.6), traversal),
+                _ => (),
             }
         }
         // A gap to drive or walk through.
@@ -66,7 +75,7 @@ fn boundaries(builder: &mut Builder, street: usize, side: f64, traversal: u32) {
     }
 }
 
-fn boundary(builder: &mut Builder, plot: Plot, kind: u32, height: f64, seed: u32) {
+fn boundary(builder: &mut Builder, plot: Plot, kind: u32, height: f64, seed: u32, traversal: u32) {
     builder.shade(plot, 0.6, 0.45);
     match kind {
         0 | 1 => {
@@ -77,6 +86,17 @@ fn boundary(builder: &mut Builder, plot: Plot, kind: u32, height: f64, seed: u32
                 ..plot
             };
             builder.add_block(&thick, [0.0, height], Material::Hedge(green), seed);
+            // Shoots that the shears have missed since.
+            for k in 0..3 {
+                let x = builder.rng.random_range(-0.9..0.9);
+                let at = thick.at(x, builder.rng.random_range(0.0..0.3));
+                let radius = builder.rng.random_range(0.3..0.55);
+                let level = height * builder.rng.random_range(0.35..1.0);
+                let centre = Point3::new(at.x, level, at.y);
+                let tone = green * builder.rng.random_range(0.8..1.8);
+                let season = seed.wrapping_add(k) ^ traversal;
+                clump(builder, centre, radius, tone, season);
+            }
         }
         2 => {
             let colour = Rgb::new(0.36, 0.33, 0.28);
@@ -107,7 +127,7 @@ fn boundary(builder: &mut Builder, plot: Plot, kind: u32, height: f64, seed: u32
 fn kerbside(builder: &mut Builder, street: usize, side: f64, traversal: u32) {
     let length = builder.network.streets[street].axis.length();
     let mut along = 4.0;
-    let leafy = builder.rng.random_bool(0.6);
+    let leafy = builder.rng.random_bool(0.8);
     while along < length {
         let (here, to_crossing) = station(builder, street, along);
         let foot = here.beside(side * (HALF_WIDTH + 0.55));
@@ -301,6 +321,18 @@ fn bush(builder: &mut Builder, foot: Point2<f64>, traversal: u32) {
     }
 }
 
+/// A small tree behind the fence of a garden.
+fn garden_tree(builder: &mut Builder, foot: Point2<f64>, traversal: u32) {
+    let plot = Plot {
+        centre: foot,
+        ahead: Vector2::y(),
+        half: Vector2::repeat(0.5),
+    };
+    if builder.is_free(&plot, PAVEMENT + 0.4) {
+        tree(builder, foot, 0.75, traversal);
+    }
+}
+
 /// Trees behind the houses, so that gaps do not show the bare horizon.
 fn background(builder: &mut Builder, traversal: u32) {
     const STEP: f64 = 11.0;
@@ -327,17 +359,22 @@ fn background(builder: &mut Builder, traversal: u32) {
 
 /// Parks the cars of a traversal along both kerbs.
 pub(super) fn park_cars(builder: &mut Builder, traversal: u32) {
+    /// Share of the cars that stand where they stood on all other drives.
+    const RESIDENT: f64 = 0.5;
     let mut rng = Pcg32::seed_from_u64(u64::from(traversal));
     for street in 0..builder.network.streets.len() {
         let length = builder.network.streets[street].axis.length();
         for side in [-1.0, 1.0] {
-            let mut along = rng.random_range(2.0..8.0);
+            let mut along = builder.rng.random_range(2.0..8.0);
             while along < length - 3.0 {
                 let (here, to_crossing) = station(builder, street, along);
-                if to_crossing > NO_PARKING && rng.random_bool(0.6) {
-                    park(builder, &mut rng, &here, side);
+                let mut resident = Pcg32::seed_from_u64(builder.rng.random());
+                let stays = resident.random_bool(RESIDENT);
+                let driver = if stays { &mut resident } else { &mut rng };
+                if to_crossing > NO_PARKING && driver.random_bool(0.6) {
+                    park(builder, driver, &here, side);
                 }
-                along += rng.random_range(5.6..7.2);
+                along += builder.rng.random_range(5.6..7.2);
             }
         }
     }

@@ -145,15 +145,15 @@ fn pavement(place: &Place, p: Point2<f64>, footprint: &Footprint, seed: u32) -> 
         stripes(s, SLAB, 0.025, footprint.minor).max(stripes(l, SLAB, 0.025, footprint.minor))
             * clarity;
     let dirt = octaves(p, 1.5, 4, 0.65, footprint, seed ^ 42);
-    let grain = octaves(p, 0.05, 2, 0.9, footprint, seed ^ 43);
-    grey(0.2) * (1.0 + 0.15 * single * clarity + 0.3 * dirt + 0.1 * grain - 0.55 * joints).max(0.1)
+    let grain = octaves(p, 0.07, 2, 1.0, footprint, seed ^ 43);
+    grey(0.25) * (1.0 + 0.2 * single * clarity + 0.3 * dirt + 0.2 * grain - 0.55 * joints).max(0.1)
 }
 
 fn asphalt(p: Point2<f64>, footprint: &Footprint, seed: u32) -> f64 {
-    let grain = octaves(p, 0.06, 2, 1.0, footprint, seed ^ 51);
+    let grain = octaves(p, 0.11, 3, 1.0, footprint, seed ^ 51);
     let wear = octaves(p, 4.0, 3, 0.4, footprint, seed ^ 52);
     let cracked = cracks(p, footprint, seed);
-    0.125 * (1.0 + 0.11 * grain + 0.3 * wear - 0.6 * cracked).max(0.1)
+    0.118 * (1.0 + 0.20 * grain + 0.3 * wear - 0.6 * cracked).max(0.1)
 }
 
 /// Share of the pixel that is a crack; whole stretches have none.

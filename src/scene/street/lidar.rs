@@ -16,7 +16,7 @@ const BEAMS: u32 = 64;
 /// Shots per turn: 0.17° apart.
 const STEPS: u32 = 2118;
 /// Least and greatest range \[m\].
-const RANGE: [f64; 2] = [2.7, 120.0];
+const RANGE: [f64; 2] = [2.7, 80.0];
 /// Standard deviation of the range \[m\].
 const RANGE_NOISE: f64 = 0.02;
 /// Share of shots that are lost for no reason.

@@ -1,11 +1,11 @@
 //! Light, sky and the response of the sensor.
 
-use nalgebra::{Point2, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 
 use super::cover::Cover;
 use super::lens::Lens;
 use super::material::{Appearance, Rgb, blend};
-use super::noise::{Footprint, octaves};
+use super::noise::{Footprint, octaves, value2, value3};
 
 /// How the town is lit, what lies on it, and how it is exposed. Shading reads nothing else of the
 /// weather.
@@ -29,8 +29,10 @@ pub(super) struct Look {
     pub(super) shadows: bool,
     /// Radiance of the far side of the street, which glossy things mirror.
     pub(super) opposite: Rgb,
-    /// Strength of street lamps and lit windows; 0 when they are off.
+    /// Strength of street lamps; 0 when they are off.
     pub(super) lamps: f64,
+    /// Strength of lit rooms and of what else shines by itself; 0 when the lights are off.
+    pub(super) glow: f64,
     /// Strength of the car's own head lamps; 0 when they are off.
     pub(super) headlamps: f64,
     /// Share of the light that the air scatters away in a metre.
@@ -43,7 +45,7 @@ pub(super) struct Look {
     pub(super) lens: Lens,
     /// Radiance that saturates the sensor is 1 / `exposure`, by colour.
     pub(super) exposure: Rgb,
-    /// Standard deviation of the sensor's noise \[grey levels\].
+    /// Standard deviation of the sensor's noise at a middle level \[grey levels\].
     pub(super) noise: f64,
     /// Loss of light in the corners of the image, 0 … 1.
     pub(super) vignetting: f64,
@@ -59,6 +61,7 @@ impl Look {
         let p = Point2::new(direction.x / height, direction.z / height);
         let fine = Footprint {
             along: nalgebra::Vector2::repeat(0.01),
+            slant: nalgebra::Vector2::zeros(),
             minor: 0.01,
             major: 0.01 / height,
         };
@@ -74,11 +77,18 @@ impl Look {
         sky + self.key_light * (0.35 * eighth * eighth * eighth)
     }
 
-    /// What a mirror shows that reflects into a direction: the sky above the roofs, else the
-    /// far side of the street, which is not traced but made up.
-    fn mirrored(&self, direction: &Vector3<f64>, seed: u32) -> Rgb {
-        let above = ((direction.y - 0.28) * 8.0).clamp(0.0, 1.0);
-        let street = self.opposite * (1.0 + 1.1 * direction.y.max(0.0));
+    /// What a mirror at a point shows that reflects into a direction: the sky above the roofs, else
+    /// the far side of the street, which is not traced but made up of patches of light and dark.
+    fn mirrored(&self, point: &Point3<f64>, direction: &Vector3<f64>, seed: u32) -> Rgb {
+        /// How far the far side is \[m\].
+        const ACROSS: f64 = 11.0;
+        /// Size of the patches: walls, windows, cars \[m\].
+        const PATCH: f64 = 1.4;
+        let there = (point + direction * ACROSS) / PATCH;
+        let patch = value3(&there, 0x0FF5);
+        let roofs = 0.28 + 0.16 * value2(0.2 * there.x, 0.2 * there.z, 0x0FF6);
+        let above = ((direction.y - roofs) * 14.0).clamp(0.0, 1.0);
+        let street = self.opposite * (1.0 + 2.2 * patch).clamp(0.15, 2.6);
         if above == 0.0 {
             street
         } else {
@@ -99,21 +109,21 @@ impl Look {
     pub(super) fn radiance(
         &self,
         appearance: &Appearance,
+        point: &Point3<f64>,
         normal: &Vector3<f64>,
         direction: &Vector3<f64>,
         irradiance: &Rgb,
         open: f64,
         seed: u32,
     ) -> Rgb {
-        let diffuse =
-            appearance.albedo.component_mul(irradiance) + appearance.emission * self.lamps;
+        let diffuse = appearance.albedo.component_mul(irradiance) + appearance.emission * self.glow;
         if appearance.gloss < 0.05 {
             return diffuse;
         }
         let facing = -normal.dot(direction);
         let share = appearance.gloss * schlick(facing, 0.06);
         let reflected = direction + normal * (2.0 * facing);
-        diffuse * (1.0 - share) + self.mirrored(&reflected, seed) * (share * open.max(0.3))
+        diffuse * (1.0 - share) + self.mirrored(point, &reflected, seed) * (share * open.max(0.3))
     }
 
     /// A radiance as it is after a way through the air \[m\].

@@ -225,7 +225,7 @@ fn leaves(
     let leaf = |grain, stream| (2.2 * tone(grain, stream)).clamp(-1.0, 1.0);
     let light = 0.45 + 0.55 * contact.normal.y;
     let level =
-        0.6 + 0.5 * light + 0.5 * tone(0.45, 3) + 0.4 * leaf(0.12, 4) + 0.3 * leaf(0.055, 5);
+        0.6 + 0.5 * light + 0.5 * tone(0.45, 3) + 0.5 * leaf(0.12, 4) + 0.4 * leaf(0.055, 5);
     let tint = 0.12 * tone(0.7, 6);
     let colour = colour.component_mul(&Rgb::new(1.0 + tint, 1.0, 1.0 - tint));
     Appearance::matt(colour * level.max(0.12))

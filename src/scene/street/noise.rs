@@ -120,6 +120,8 @@ pub(super) fn value3(p: &Point3<f64>, seed: u32) -> f64 {
 pub(super) struct Footprint {
     /// Extent along the surface's horizontal direction and across it.
     pub(super) along: Vector2<f64>,
+    /// How far aside, to the right and up, one sees of what lies a metre behind the surface \[m\].
+    pub(super) slant: Vector2<f64>,
     /// Least extent in any direction.
     pub(super) minor: f64,
     /// Greatest extent in any direction.
@@ -142,6 +144,9 @@ impl Footprint {
     }
 }
 
+/// Contrast of an octave that is not worth its time.
+const UNSEEN: f64 = 0.02;
+
 /// Ratio of the grains of successive octaves.
 const LACUNARITY: f64 = 2.3;
 
@@ -159,7 +164,7 @@ pub(super) fn octaves(
     let mut p = p / grain;
     for octave in 0..count {
         let contrast = footprint.contrast(grain);
-        if contrast <= 0.0 {
+        if contrast <= UNSEEN {
             break;
         }
         let noise = value2(p.x, p.y, seed.wrapping_add(octave));
@@ -189,6 +194,7 @@ mod tests {
     fn grains_below_the_pixel_have_no_contrast() {
         let footprint = Footprint {
             along: Vector2::new(0.1, 0.4),
+            slant: Vector2::zeros(),
             minor: 0.1,
             major: 0.4,
         };

@@ -8,6 +8,9 @@ use super::noise::{Footprint, derive, floor, hash2, unit, value2};
 use super::pattern::{bar, glyphs, rectangle, step, stripes};
 use super::shape::Part;
 
+/// How far windows are set back from the wall \[m\].
+const RECESS: f64 = 0.12;
+
 /// A point of a facade, relative to the bay and the storey that it is in.
 pub(super) struct Spot {
     /// Number of bays of the face.
@@ -24,6 +27,8 @@ pub(super) struct Spot {
     u: f64,
     /// Extent of the pixel, horizontally and vertically.
     width: (f64, f64),
+    /// Shift of what is seen a metre behind the wall.
+    slant: Vector2<f64>,
     seed: u32,
 }
 
@@ -52,6 +57,7 @@ impl Spot {
             y: uv.y - facade.plinth.min(0.4) - f64::from(floor) * facade.storey,
             u: uv.x,
             width: (footprint.along.x, footprint.along.y),
+            slant: footprint.slant,
             seed: hash2(bay, floor, facade.seed ^ part as u32),
         }
     }
@@ -61,6 +67,17 @@ impl Spot {
         let top = self.floor as f64 * facade.storey + facade.sill + facade.window[1] + 0.6;
         let skipped = part == Part::Side && unit(derive(facade.seed, self.bay as u32)) < 0.35;
         self.floor < 0 || top > facade.eaves || skipped
+    }
+
+    /// What one sees through this spot at a distance behind the wall \[m\].
+    fn behind(&self, depth: f64) -> Self {
+        let shift = self.slant * depth;
+        Self {
+            x: self.x + shift.x,
+            y: self.y + shift.y,
+            u: self.u + shift.x,
+            ..*self
+        }
     }
 
     fn rectangle(&self, half_width: f64, low: f64, high: f64) -> f64 {
@@ -113,9 +130,9 @@ fn glazing(spot: &Spot, half: f64, low: f64, high: f64) -> Appearance {
         .covered(blind, step(y - (high - blind_height), dv))
 }
 
-/// Radiance of a room behind a window when lights are on; most people are out or asleep.
+/// Radiance of a room behind a window when lights are on; every third room is dark.
 fn room_light(seed: u32) -> Rgb {
-    if !derive(seed, 11).is_multiple_of(4) {
+    if derive(seed, 11).is_multiple_of(3) {
         return Rgb::zeros();
     }
     let warmth = unit(derive(seed, 12));
@@ -149,8 +166,11 @@ pub(super) fn window(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearan
     let sill = spot.rectangle(half + 0.12, low - 0.09, low);
     let sill_shadow = spot.rectangle(half + 0.12, low - 0.22, low - 0.09);
     let opening = spot.rectangle(half, low, high);
-    // The reveal is dark at the top, where the lintel hangs over it.
-    let reveal = spot.rectangle(half, high - 0.14, high);
+    let inner = spot.behind(RECESS);
+    let glazed = inner.rectangle(half, low, high);
+    let reveal = Appearance::matt(facade.trim * 0.55);
+    // It is dark at the top, where the lintel hangs over it.
+    let lintel = inner.rectangle(half, high - 0.1, high) * opening;
     let (flowers, planted) = flower_box(facade, spot);
     shuttered
         .covered(Appearance::matt(wall.albedo * 0.45), 0.8 * sill_shadow)
@@ -161,8 +181,11 @@ pub(super) fn window(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearan
             },
             sill,
         )
-        .covered(glazing(spot, half, low, high), opening)
-        .covered(Appearance::matt(grey(0.02)), 0.8 * reveal)
+        .covered(
+            reveal.covered(glazing(&inner, half, low, high), glazed),
+            opening,
+        )
+        .covered(Appearance::matt(grey(0.02)), 0.8 * lintel)
         .covered(flowers, planted)
 }
 

@@ -1,4 +1,4 @@
-//! Images: one ray per pixel, three more where surfaces meet.
+//! Images: one ray per pixel, two more where surfaces meet.
 
 use image::RgbImage;
 use nalgebra::{Point2, Point3, Vector3};
@@ -17,6 +17,9 @@ use crate::geometry::Pose;
 
 /// Pixels whose levels differ by more than this from a neighbour's are refined.
 const CONTRAST: f32 = 36.0;
+
+/// Level at which the noise is as strong as the weather says.
+const MID_LEVEL: f64 = 110.0;
 
 /// A camera in the town.
 pub(super) struct View<'a> {
@@ -94,7 +97,7 @@ impl View<'_> {
                 (0..columns).map(move |x| self.refined(shading, samples, columns, x, y))
             })
             .collect();
-        let plane = Plane { levels, columns };
+        let plane = Plane::new(levels, columns);
         let plane = self
             .look
             .lens
@@ -155,7 +158,7 @@ impl View<'_> {
         y: usize,
     ) -> Levels {
         /// With the one in the middle, a lattice of which no two samples share a row or a column.
-        const OTHERS: [(f64, f64); 3] = [(-0.35, -0.17), (0.17, -0.35), (0.18, 0.35)];
+        const OTHERS: [(f64, f64); 2] = [(-0.33, -0.28), (0.33, 0.28)];
         let index = y * columns + x;
         let here = &samples[index];
         let left = (x > 0).then(|| &samples[index - 1]);
@@ -168,7 +171,7 @@ impl View<'_> {
         }
         let surrounded = neighbours().all(|other| here.face == other.face);
         // Textures are smoothed over the pixel by themselves: there, one more sample will do.
-        let others = &OTHERS[..if surrounded { 1 } else { 3 }];
+        let others = &OTHERS[..if surrounded { 1 } else { 2 }];
         let sum = others.iter().fold(here.levels, |sum, (dx, dy)| {
             let pixel = Point2::new(x as f64 + dx, y as f64 + dy);
             let bearing = self.intrinsics.bearing(&pixel);
@@ -194,8 +197,10 @@ impl View<'_> {
         std::array::from_fn(|channel| {
             let seed = derive(self.frame_seed, channel as u32);
             let noise = normal(hash3(x.cast_signed(), y.cast_signed(), 1, seed));
-            let level = f64::from(levels[channel]) * gain + self.look.noise * noise;
-            (level + 0.5).clamp(0.0, 255.0) as u8
+            let level = f64::from(levels[channel]) * gain;
+            // Half the noise is the amplifier's, the rest is that of the light itself.
+            let spread = self.look.noise * (0.25 + 0.75 * (level / MID_LEVEL).min(2.0)).sqrt();
+            (level + spread * noise + 0.5).clamp(0.0, 255.0) as u8
         })
     }
 }

@@ -1,12 +1,12 @@
 //! What a ray brings to the camera: the surface it meets, its light, and the air between.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::frame::Ray;
 use super::headlamp::Headlamp;
 use super::look::{Look, schlick};
 use super::material::{Appearance, Rgb};
-use super::noise::value2;
+use super::noise::{value2, value3};
 use super::town::{Sight, Town};
 
 /// How much coarser a wet road mirrors than the eye sees \[rad\].
@@ -22,6 +22,12 @@ pub(super) struct Shading<'a> {
     pub(super) headlamp: Option<Headlamp>,
     /// Seed of the clouds.
     pub(super) sky_seed: u32,
+}
+
+/// Share of the light of street lamps that twigs and wires, which are not modelled, let through.
+fn dappled(p: &Point3<f64>) -> f64 {
+    let shadow = 4.0 * value3(&(p * 2.6), 0x7A16) - 0.6;
+    1.0 - 0.7 * shadow.clamp(0.0, 1.0)
 }
 
 impl Shading<'_> {
@@ -48,6 +54,7 @@ impl Shading<'_> {
         let irradiance = self.irradiance(sight, open);
         self.look.radiance(
             appearance,
+            &sight.point,
             &sight.normal,
             &ray.direction,
             &irradiance,
@@ -64,7 +71,8 @@ impl Shading<'_> {
         let mut sum = look.daylight(&sight.normal, open, if shaded { 0.0 } else { 1.0 });
         if look.lamps > 0.0 {
             let lamps = &self.town.lamps;
-            sum += lamps.irradiance(&sight.point, &sight.normal) * (look.lamps * open);
+            let share = look.lamps * open * dappled(&sight.point);
+            sum += lamps.irradiance(&sight.point, &sight.normal) * share;
         }
         if let Some(headlamp) = &self.headlamp {
             sum += headlamp.irradiance(&sight.point, &sight.normal) * look.headlamps;

@@ -118,14 +118,20 @@ impl Town {
             // Nothing is below the carriageway.
             limit = limit.min(-ray.origin.y / ray.direction.y + CARRIAGEWAY_SLACK);
         }
-        if let Some(Face::Solid(index, _)) = likely
+        let first = match likely {
+            Some(Face::Solid(index, _)) => Some(index),
+            _ => None,
+        };
+        if let Some(index) = first
             && let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit)
         {
             limit = contact.distance;
             best = Some((index, contact));
         }
         self.tree.traverse(ray, limit, |index| {
-            if let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit) {
+            if first != Some(index)
+                && let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit)
+            {
                 limit = contact.distance;
                 best = Some((index, contact));
             }
@@ -255,7 +261,67 @@ fn footprint(sight: &Sight, ray: &Ray, pixel: f64) -> Footprint {
     };
     Footprint {
         along: Vector2::new(extent(&across), extent(&up)),
+        slant: Vector2::new(-ray.direction.dot(&across), ray.direction.dot(&up)) / cosine,
         minor: width,
         major: width / cosine,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::material::Material;
+    use super::super::shape::Shape;
+    use super::*;
+
+    #[test]
+    fn about_half_of_the_cars_stand_where_they_stood() {
+        let cars = |traversal| -> Vec<[f64; 4]> {
+            Town::new(7, traversal, Season::Summer)
+                .solids
+                .iter()
+                .filter_map(|solid| match (&solid.shape, &solid.material) {
+                    (Shape::Car { frame, .. }, Material::Car(colour)) => {
+                        Some([frame.origin.x, frame.origin.z, frame.ahead.x, colour.x])
+                    }
+                    _ => None,
+                })
+                .collect()
+        };
+        let (here, there) = (cars(1), cars(2));
+        let stayed = here.iter().filter(|car| there.contains(car)).count();
+        assert!((120..400).contains(&here.len()), "{}", here.len());
+        assert!(
+            (0.4..0.6).contains(&(stayed as f64 / here.len() as f64)),
+            "{stayed}"
+        );
+    }
+
+    #[test]
+    fn what_lies_behind_a_wall_is_seen_farther_along_the_line_of_sight() {
+        // A wall at z = 4 that faces the origin, seen obliquely to the right and upwards.
+        let direction = Vector3::new(0.6, 0.3, 0.8).normalize();
+        let ray = Ray {
+            origin: Point3::origin(),
+            direction,
+        };
+        let sight = Sight {
+            distance: 5.0,
+            point: ray.at(5.0),
+            normal: -Vector3::z(),
+            target: Target::Solid(
+                0,
+                Contact {
+                    distance: 5.0,
+                    normal: -Vector3::z(),
+                    uv: Vector2::zeros(),
+                    part: Part::Front,
+                },
+            ),
+        };
+        let slant = footprint(&sight, &ray, 1e-3).slant;
+        assert!(
+            (slant - Vector2::new(0.75, 0.375)).norm() < 1e-12,
+            "{slant}"
+        );
     }
 }

@@ -49,15 +49,16 @@ fn overcast() -> Look {
         key: Vector3::new(0.48, 0.64, 0.6),
         key_light: Rgb::new(0.50, 0.48, 0.44),
         shadows: false,
-        opposite: grey(0.09),
+        opposite: grey(0.14),
         lamps: 0.0,
+        glow: 0.0,
         headlamps: 0.0,
         haze: 0.0,
         air: Rgb::zeros(),
         cover: Cover::default(),
         lens: Lens::default(),
         exposure: grey(1.12),
-        noise: 1.5,
+        noise: 3.0,
         vignetting: 0.12,
     }
 }
@@ -68,14 +69,14 @@ fn sun() -> Look {
         zenith: Rgb::new(0.16, 0.30, 0.62),
         horizon: Rgb::new(0.62, 0.70, 0.80),
         clouds: 0.12,
-        sky_light: Rgb::new(0.20, 0.26, 0.38),
+        sky_light: Rgb::new(0.30, 0.37, 0.50),
         bounce: Rgb::new(0.13, 0.11, 0.08),
         key: Vector3::new(-0.7, 0.5, -0.51),
-        key_light: Rgb::new(2.35, 1.95, 1.40),
+        key_light: Rgb::new(2.00, 1.68, 1.22),
         shadows: true,
         opposite: Rgb::new(0.16, 0.15, 0.13),
         exposure: Rgb::new(1.75, 1.70, 1.62),
-        noise: 1.2,
+        noise: 2.0,
         ..overcast()
     }
 }
@@ -86,21 +87,23 @@ fn night() -> Look {
         zenith: Rgb::new(0.004, 0.005, 0.010),
         horizon: Rgb::new(0.022, 0.017, 0.014),
         clouds: 0.5,
-        sky_light: Rgb::new(0.060, 0.050, 0.042),
-        bounce: Rgb::new(0.055, 0.040, 0.024),
+        sky_light: Rgb::new(0.300, 0.235, 0.170),
+        bounce: Rgb::new(0.080, 0.058, 0.036),
         key_light: Rgb::zeros(),
         opposite: Rgb::new(0.020, 0.015, 0.010),
-        lamps: 1.0,
-        headlamps: 1.0,
+        lamps: 0.32,
+        glow: 1.0,
+        headlamps: 0.2,
         haze: 0.002,
         air: Rgb::new(0.020, 0.015, 0.010),
         lens: Lens {
-            blur: 4,
+            motion: 0.35,
+            blur: 6,
             glare: 0.25,
             ..Lens::default()
         },
-        exposure: Rgb::new(1.75, 1.55, 1.40),
-        noise: 14.0,
+        exposure: Rgb::new(2.00, 1.80, 1.60),
+        noise: 20.0,
         vignetting: 0.45,
         ..overcast()
     }
@@ -123,12 +126,12 @@ fn rain() -> Look {
             wet: 1.0,
         },
         lens: Lens {
-            drops: 36,
+            drops: 28,
             streaks: 700,
             ..Lens::default()
         },
-        exposure: grey(1.35),
-        noise: 2.5,
+        exposure: grey(1.15),
+        noise: 3.5,
         vignetting: 0.15,
         ..overcast()
     }
@@ -143,15 +146,16 @@ fn snow() -> Look {
         sky_light: Rgb::new(0.62, 0.65, 0.70),
         bounce: Rgb::new(0.36, 0.37, 0.39),
         key_light: Rgb::new(0.14, 0.14, 0.13),
-        opposite: grey(0.22),
-        haze: 0.010,
+        opposite: grey(0.34),
+        glow: 0.7,
+        haze: 0.003,
         air: Rgb::new(0.66, 0.68, 0.71),
         cover: Cover {
             snow: 1.0,
             wet: 0.0,
         },
         lens: Lens {
-            flakes: 2400,
+            flakes: 1800,
             ..Lens::default()
         },
         exposure: grey(1.30),
