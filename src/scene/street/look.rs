@@ -106,6 +106,10 @@ impl Look {
     }
 
     /// Radiance of a surface under an irradiance, towards where `direction` comes from.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "each is one thing that light depends on at one point"
+    )]
     pub(super) fn radiance(
         &self,
         appearance: &Appearance,
