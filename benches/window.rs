@@ -107,6 +107,7 @@ fn open() -> Option<Window> {
         reference_frames: vec![reference],
         pick: ReferencePick::ByHand,
         methods: Method::ALL.to_vec(),
+        fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 15.0,
         seed: 0,

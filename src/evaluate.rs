@@ -33,6 +33,7 @@ pub use experiment::{
 #[cfg(feature = "cli")]
 pub use export::{Choice, Export, ExportError, ExportedFile, Format, export};
 pub use gate::{Gate, Passage};
+pub(crate) use localize::words_of;
 pub use localize::{LocalizeError, Localizer, Request, Unwatched, Watch};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
 pub use paper::{Sought, figure as paper_figure};

@@ -55,6 +55,41 @@ pub trait Scene: Send + Sync {
     /// When there is none, or it cannot be used.
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError>;
 
+    /// The frame as a query.
+    ///
+    /// # Errors
+    /// As [`Scene::photo`].
+    fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
+        Ok(Arc::new(Query {
+            name: self.frames()[frame].clone(),
+            photo: self.photo(frame)?,
+            intrinsics: self.intrinsics(),
+            memo: Memo::off(),
+        }))
+    }
+
+    /// The frame as a reference tuple.
+    ///
+    /// # Errors
+    /// As [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
+    fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
+        let name = &self.frames()[frame];
+        let Some(world_from_camera) = self.pose(frame) else {
+            return Err(SceneError::NoPose {
+                scene: self.name().to_owned(),
+                frame: name.clone(),
+            });
+        };
+        Ok(Arc::new(ReferenceTuple {
+            name: name.clone(),
+            photo: self.photo(frame)?,
+            intrinsics: self.intrinsics(),
+            world_from_camera,
+            cloud: self.cloud(frame)?,
+            memo: Memo::off(),
+        }))
+    }
+
     /// A number that changes with the photos, as far as can be told without reading them: what was
     /// made from them before is stale then.
     fn fingerprint(&self) -> u64 {
@@ -102,41 +137,6 @@ impl dyn Scene + '_ {
                     [first, .., last] => format!("{first} … {last}, {} in all", frames.len()),
                 },
             })
-    }
-
-    /// The frame as a query.
-    ///
-    /// # Errors
-    /// As [`Scene::photo`].
-    pub fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
-        Ok(Arc::new(Query {
-            name: self.frames()[frame].clone(),
-            photo: self.photo(frame)?,
-            intrinsics: self.intrinsics(),
-            memo: Memo::off(),
-        }))
-    }
-
-    /// The frame as a reference tuple.
-    ///
-    /// # Errors
-    /// As [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
-    pub fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
-        let name = &self.frames()[frame];
-        let Some(world_from_camera) = self.pose(frame) else {
-            return Err(SceneError::NoPose {
-                scene: self.name().to_owned(),
-                frame: name.clone(),
-            });
-        };
-        Ok(Arc::new(ReferenceTuple {
-            name: name.clone(),
-            photo: self.photo(frame)?,
-            intrinsics: self.intrinsics(),
-            world_from_camera,
-            cloud: self.cloud(frame)?,
-            memo: Memo::off(),
-        }))
     }
 }
 

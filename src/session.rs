@@ -4,6 +4,7 @@
 //! The estimators know nothing of this. A gate, which is one more [`Sink`](crate::trace::Sink),
 //! holds the thread back between two events.
 
+mod at_hand;
 mod breakpoint;
 mod gate;
 mod job;
@@ -15,7 +16,7 @@ use std::sync::mpsc::{self, Receiver};
 pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use gate::RunMode;
 pub use job::{Job, Loaded};
-pub use run::{Run, Span, StageBar};
+pub use run::{Part, Run, Span, StageBar};
 
 use gate::Control;
 use job::Message;
@@ -82,7 +83,7 @@ impl Session {
                     self.run.loaded = Some(loaded);
                     self.state = State::Running;
                 }
-                Message::Began { method, reference } => self.run.begin(method, reference),
+                Message::Began(part) => self.run.begin(part),
                 Message::Told(record) => {
                     self.run.push(*record);
                     // It was told to go on, or is about to say that it waits.

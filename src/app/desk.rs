@@ -9,10 +9,9 @@ use super::queries::Queries;
 use super::scope::{Scope, ShownAt};
 use super::setup::Setup;
 use super::textures::Textures;
-use crate::event::Method;
 use crate::geometry::Pose;
 use crate::params::Params;
-use crate::session::{Breakpoints, Run, RunMode, Session, State};
+use crate::session::{Breakpoints, Loaded, Part, Run, RunMode, Session, State};
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,8 +108,7 @@ impl Anchor {
 /// What an estimator was doing at a record.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Meaning {
-    method: Method,
-    reference: usize,
+    part: Part,
     /// The stages around it, by name, the outermost first.
     stages: Vec<&'static str>,
     /// How many records into the innermost stage.
@@ -125,8 +123,7 @@ impl Meaning {
         let stages: Vec<_> = run.stages_at(cursor).collect();
         let innermost = stages.last()?;
         Some(Self {
-            method: span.method,
-            reference: span.reference,
+            part: span.part,
             stages: stages.iter().map(|bar| bar.stage.name()).collect(),
             records_in: cursor - innermost.records.start,
             is_end: cursor + 1 == innermost.records.end && innermost.succeeded.is_some(),
@@ -135,10 +132,7 @@ impl Meaning {
 
     /// The same place in another run, if the run has come so far.
     fn find(&self, run: &Run) -> Option<usize> {
-        let span = run
-            .spans()
-            .iter()
-            .find(|span| span.method == self.method && span.reference == self.reference)?;
+        let span = run.span_of(self.part)?;
         let inside = |records: &std::ops::Range<usize>| {
             span.records.start <= records.start && records.end <= span.records.end
         };
@@ -294,8 +288,7 @@ impl Desk {
 
     fn problem(&self) -> Option<&crate::problem::Problem> {
         let loaded = self.run().loaded.as_deref()?;
-        let span = self.run().span_at(self.cursor);
-        loaded.problems.get(span.map_or(0, |span| span.reference))
+        loaded.problems.get(self.run().reference_at(self.cursor))
     }
 
     fn ended(&mut self) {
@@ -323,6 +316,10 @@ impl Desk {
     /// Another query, or other references: everything begins anew.
     pub(super) fn begin(&mut self, mode: RunMode) {
         let at_hand = self.run().loaded.clone();
+        self.begin_with(mode, at_hand);
+    }
+
+    fn begin_with(&mut self, mode: RunMode, at_hand: Option<Arc<Loaded>>) {
         self.session = start(&self.setup, mode, at_hand, &self.ctx);
         self.cursor = 0;
         self.follows = true;
@@ -339,7 +336,8 @@ impl Desk {
         self.params = Arc::new(self.setup.params.clone());
         self.kept = None;
         self.comparing = Comparing::default();
-        self.begin(RunMode::Running);
+        // Frames of another scene may have the same names.
+        self.begin_with(RunMode::Running, None);
         self.follows = false;
         self.anchor = Some(Anchor::Record(cursor));
     }
@@ -359,7 +357,7 @@ impl Desk {
 fn start(
     setup: &Setup,
     mode: RunMode,
-    at_hand: Option<Arc<crate::session::Loaded>>,
+    at_hand: Option<Arc<Loaded>>,
     ctx: &egui::Context,
 ) -> Session {
     let ctx = ctx.clone();

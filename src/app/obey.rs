@@ -12,7 +12,7 @@ use crate::evaluate::{QueryResult, Status};
 use crate::event::{Method, PhaseSearched};
 use crate::geometry::Pose;
 use crate::grid::Phase;
-use crate::session::{Breakpoint, Breakpoints, RunMode, State};
+use crate::session::{Breakpoint, Breakpoints, Part, RunMode, State};
 use crate::sink::rerun::Targets;
 
 impl App {
@@ -239,15 +239,14 @@ impl Desk {
     }
 
     fn select_method(&mut self, method: Method) {
-        let reference = self
-            .run()
-            .span_at(self.cursor)
-            .map_or(0, |span| span.reference);
-        let span = self
-            .run()
-            .spans()
-            .iter()
-            .find(|span| span.method == method && span.reference == reference);
+        let run = self.run();
+        let here = run.span_at(self.cursor).map(|span| span.part);
+        let part = match here {
+            // From fusion to fusion, and from a reference to the same one.
+            Some(Part::Fusion(_)) => Part::Fusion(method),
+            _ => Part::Reference(method, run.reference_at(self.cursor)),
+        };
+        let span = run.span_of(part);
         match span.and_then(|span| span.records.end.checked_sub(1)) {
             Some(last) => self.move_cursor(last),
             None => {
@@ -352,7 +351,7 @@ impl Desk {
         let run = self.run();
         let loaded = run.loaded.as_deref()?;
         let span = run.span_at(self.cursor);
-        let problem = loaded.problems.get(span.map_or(0, |span| span.reference))?;
+        let problem = loaded.problems.get(run.reference_at(self.cursor))?;
         let minimum = |wanted: Phase| {
             let events = run.all_until::<PhaseSearched>(self.cursor);
             let mut latest = events.rev();

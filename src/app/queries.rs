@@ -193,7 +193,7 @@ fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
     let request = Request {
         radius_m: setup.uncertainty_radius_m,
         references: setup.choose(query)?,
-        fusions: Vec::new(),
+        fusions: setup.fusions.clone(),
         setting: None,
     };
     let mut results = Vec::new();

@@ -8,6 +8,7 @@ use egui::Ui;
 use super::command::{Command, Queue};
 use super::desk::Desk;
 use crate::evaluate::Watch as _;
+use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;
 
@@ -80,14 +81,20 @@ impl Desk {
         let mut recorder = Recorder::open(targets, &identity, &setup.methods)?;
         recorder.begin_query(0, &loaded.problems, loaded.truth.as_ref());
         for span in run.spans() {
-            recorder.begin_method(span.reference, span.method);
+            match span.part {
+                Part::Reference(method, reference) => recorder.begin_method(reference, method),
+                Part::Fusion(method) => recorder.begin_fusion(method),
+                Part::Retrieval => {}
+            }
             for record in &run.records()[span.records.clone()] {
                 if recorder.accept(record).is_err() {
                     break;
                 }
             }
-            if let Some(result) = &span.result {
-                recorder.end_method(result);
+            match (&span.result, &span.times) {
+                (Some(result), Some(times)) => recorder.end_method(result, times),
+                (Some(result), None) => recorder.end_fusion(result),
+                (None, _) => {}
             }
         }
         recorder.close()

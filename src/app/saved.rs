@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::setup::{ReferencePick, Setup};
 use crate::event::Method;
 use crate::files;
+use crate::fusion;
 use crate::params::Params;
 use crate::scene::{self, Scene};
 
@@ -25,6 +26,8 @@ pub(super) struct SavedSession {
     /// As [`ReferencePick`] is written.
     pick: String,
     methods: Vec<String>,
+    #[serde(default)]
+    fusions: Vec<String>,
     radius_m: f64,
     seed: u64,
     breakpoints: Vec<String>,
@@ -54,6 +57,7 @@ impl SavedSession {
                 .iter()
                 .map(|method| method.name().to_owned())
                 .collect(),
+            fusions: setup.fusions.iter().map(|f| f.name.to_owned()).collect(),
             radius_m: setup.uncertainty_radius_m,
             seed: setup.seed,
             breakpoints: setup.breakpoints.clone(),
@@ -127,6 +131,11 @@ impl SavedSession {
                 .methods
                 .iter()
                 .filter_map(|name| Method::from_name(name))
+                .collect(),
+            fusions: self
+                .fusions
+                .iter()
+                .filter_map(|name| fusion::find(name))
                 .collect(),
             params,
             uncertainty_radius_m: self.radius_m,

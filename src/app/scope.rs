@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::command::{Command, Queue};
 use super::desk::Desk;
-use crate::event::{DebugEvent, Method, MinimumAssessed, Moment, ViewRendered};
+use crate::event::{DebugEvent, Method, MinimumAssessed, Moment, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
 use crate::problem::Problem;
 use crate::render::Comparison;
-use crate::session::{Run, Span};
+use crate::session::{Part, Run, Span};
 
 /// A run at a cursor, and the desk around it.
 #[derive(Clone, Copy)]
@@ -70,15 +70,18 @@ impl<'a> Scope<'a> {
 
     /// The estimator at the cursor.
     pub fn method(&self) -> Option<Method> {
-        self.span().map(|span| span.method)
+        self.span().and_then(|span| span.part.method())
     }
 
-    /// The problem at the cursor; before the first record, that of the first reference.
+    /// The reference that is looked at, by its position among those of the run.
+    pub fn reference(&self) -> usize {
+        self.run.reference_at(self.cursor)
+    }
+
+    /// The problem at the cursor.
     pub fn problem(&self) -> Option<&'a Problem> {
         let loaded = self.run.loaded.as_deref()?;
-        loaded
-            .problems
-            .get(self.span().map_or(0, |span| span.reference))
+        loaded.problems.get(self.reference())
     }
 
     /// The true pose of the query, if it is known and shown.
@@ -99,18 +102,16 @@ impl<'a> Scope<'a> {
         self.run.all_until(self.cursor)
     }
 
-    /// The part of another estimator on the same reference, and the cursor for it: its last record,
+    /// The part of an estimator on the reference that is looked at, and the cursor for it: its last record,
     /// or the cursor itself where it is the estimator at the cursor.
     pub fn of(&self, method: Method) -> Option<(&'a Span, usize)> {
-        let here = self.span();
-        if let Some(span) = here
-            && span.method == method
+        let part = Part::Reference(method, self.reference());
+        if let Some(span) = self.span()
+            && span.part == part
         {
             return Some((span, self.cursor));
         }
-        let reference = here.map_or(0, |span| span.reference);
-        let is_wanted = |span: &&Span| span.method == method && span.reference == reference;
-        let span = self.run.spans().iter().rev().find(is_wanted)?;
+        let span = self.run.span_of(part)?;
         Some((span, span.records.end.checked_sub(1)?))
     }
 
@@ -158,8 +159,12 @@ impl<'a> Scope<'a> {
         })
     }
 
-    /// The estimate of a method on the reference at the cursor (`world_from_camera`).
+    /// The estimate of a method on the reference at the cursor, in a fusion of that method the fused
+    /// one (`world_from_camera`).
     pub fn estimate(&self, method: Method) -> Option<Pose> {
+        if self.span()?.part == Part::Fusion(method) {
+            return self.latest::<ReferencesFused>()?.pose;
+        }
         let (span, _) = self.of(method)?;
         span.result.as_ref()?.pose.as_ref()?.to_pose()
     }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::evaluate::{Chooser, Localizer, QueryResult, Selection};
 use crate::event::Method;
+use crate::fusion;
 use crate::params::Params;
 use crate::scene::Scene;
 use crate::session::{Job, Loaded, RunMode};
@@ -50,6 +51,8 @@ pub struct Setup {
     pub pick: ReferencePick,
     /// The methods to run.
     pub methods: Vec<Method>,
+    /// What to make of several references: nothing, or one pose by each of these.
+    pub fusions: Vec<&'static fusion::Entry>,
     /// Their parameters.
     pub params: Params,
     /// How far the query may be from a reference \[m\].
@@ -74,6 +77,7 @@ impl Setup {
             query: self.query,
             reference_frames: self.reference_frames.clone(),
             methods: self.methods.clone(),
+            fusions: self.fusions.clone(),
             params: self.params.clone(),
             uncertainty_radius_m: self.uncertainty_radius_m,
             seed: self.seed,
@@ -132,6 +136,10 @@ impl Setup {
         if self.methods != Method::ALL {
             let names: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
             words.extend(["--method".to_owned(), names.join(",")]);
+        }
+        if !self.fusions.is_empty() {
+            let names: Vec<_> = self.fusions.iter().map(|fusion| fusion.name).collect();
+            words.extend(["--fusion".to_owned(), names.join(",")]);
         }
         words.extend(["--radius".to_owned(), self.uncertainty_radius_m.to_string()]);
         words.extend(["--seed".to_owned(), self.seed.to_string()]);

@@ -5,7 +5,8 @@ use egui::{Align2, Color32, FontId, Rect, Sense, Slider, Stroke, StrokeKind, Ui,
 use super::command::{Command, Queue};
 use super::desk::Desk;
 use super::theme;
-use crate::session::{Run, StageBar};
+use crate::event::Method;
+use crate::session::{Part, Run, StageBar};
 
 /// Height of a stage's bar \[points\].
 const BAR_HEIGHT: f32 = 9.0;
@@ -51,7 +52,7 @@ fn lanes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     for span in run.spans() {
-        let name = span.method.name().to_uppercase();
+        let name = name_of(run, span.part);
         let (left, right) = (x_of(span.records.start), x_of(span.records.end));
         let top = pos2(left + 3.0, rect.top() + 1.0);
         if right - left > 20.0 {
@@ -78,6 +79,21 @@ fn lanes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     } else if let Some(pointer) = response.hover_pos() {
         let record = ((pointer.x - rect.left()) / rect.width() * count).max(0.0) as usize;
         response.on_hover_text_at_pointer(words_at(run, record));
+    }
+}
+
+/// The estimator, with the number of its reference where there are several.
+fn name_of(run: &Run, part: Part) -> String {
+    let problems = run
+        .loaded
+        .as_ref()
+        .map_or(0, |loaded| loaded.problems.len());
+    let upper = |method: Method| method.name().to_uppercase();
+    match part {
+        Part::Retrieval => "retrieval".to_owned(),
+        Part::Reference(method, _) if problems < 2 => upper(method),
+        Part::Reference(method, reference) => format!("{} {}", upper(method), reference + 1),
+        Part::Fusion(method) => format!("{} fusion", upper(method)),
     }
 }
 

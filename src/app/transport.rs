@@ -152,7 +152,10 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
 }
 
 fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let here = desk.run().span_at(desk.cursor).map(|span| span.method);
+    let here = desk
+        .run()
+        .span_at(desk.cursor)
+        .and_then(|span| span.part.method());
     for (number, method) in (1..).zip(Method::ALL) {
         let is_here = here == Some(method);
         let text = method.name().to_uppercase();

@@ -116,8 +116,13 @@ pub struct RunArgs {
     )]
     pub method: Vec<Method>,
     /// Fuse the poses of several references into one; otherwise each reference gives its own
-    #[arg(long, value_name = "maxf|avg|wavg|r-wavg", value_parser = fusion)]
-    pub fusion: Option<&'static fusion::Entry>,
+    #[arg(
+        long,
+        value_name = "maxf,avg,wavg,r-wavg",
+        value_delimiter = ',',
+        value_parser = fusion
+    )]
+    pub fusion: Vec<&'static fusion::Entry>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -174,6 +179,14 @@ pub struct ViewArgs {
         default_value = "fb,pm,mi,hy"
     )]
     pub method: Vec<Method>,
+    /// Fuse the poses of several references into one; otherwise each reference gives its own
+    #[arg(
+        long,
+        value_name = "maxf,avg,wavg,r-wavg",
+        value_delimiter = ',',
+        value_parser = fusion
+    )]
+    pub fusion: Vec<&'static fusion::Entry>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     pub seed: u64,

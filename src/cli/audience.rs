@@ -1,6 +1,6 @@
 //! Who watches the command line's queries: a progress bar, and perhaps a recording.
 
-use posescope::evaluate::{QueryResult, Watch};
+use posescope::evaluate::{QueryResult, StageTimes, Watch};
 use posescope::event::{Event, KindSet, Method};
 use posescope::geometry::Pose;
 use posescope::problem::Problem;
@@ -77,10 +77,10 @@ impl Watch for Audience {
         }
     }
 
-    fn end_method(&mut self, result: &QueryResult) {
+    fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
         self.bar.inc(1);
         if let Some(recorder) = &mut self.recorder {
-            recorder.end_method(result);
+            recorder.end_method(result, times);
         }
     }
 

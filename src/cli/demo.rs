@@ -34,7 +34,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
             index: None,
             radius: 15.0,
             method: Method::ALL.to_vec(),
-            fusion: None,
+            fusion: Vec::new(),
             seed: 0,
             config: ConfigArgs::default(),
             threads: None,

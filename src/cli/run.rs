@@ -62,7 +62,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         let request = Request {
             radius_m: args.radius,
             references: task.references.clone(),
-            fusions: args.fusion.into_iter().collect(),
+            fusions: args.fusion.clone(),
             setting: None,
         };
         plan.localizer.localize(

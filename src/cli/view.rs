@@ -31,6 +31,7 @@ impl ViewArgs {
             references: Selection::Random(1),
             radius: 15.0,
             method: Method::ALL.to_vec(),
+            fusion: Vec::new(),
             seed: 0,
             config: ConfigArgs::default(),
             threads: None,
@@ -81,7 +82,7 @@ fn record_instead(
             index: None,
             radius: setup.uncertainty_radius_m,
             method: setup.methods.clone(),
-            fusion: None,
+            fusion: setup.fusions.clone(),
             seed: setup.seed,
             config: ConfigArgs {
                 config: None,
@@ -134,6 +135,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         },
         reference_frames: named,
         methods: methods(&args.method),
+        fusions: args.fusion.clone(),
         params: params::resolve(&args.config)?,
         uncertainty_radius_m: args.radius,
         seed: args.seed,
@@ -250,6 +252,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             .iter()
             .filter_map(|name| Method::from_name(name))
             .collect(),
+        fusions: file.fusions(),
         params,
         uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.radius),
         seed: file.seed,

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::localize::words_of;
 use super::run_file::{Item, Pair, RunFile};
 use super::run_folder::{FolderError, RunFolder};
 use super::{
@@ -169,7 +168,7 @@ impl Execution<'_> {
                 let requests = requests?;
                 self.tell_failures(item, localizer, frame, &requests, &results, companion)?;
             }
-            Err(panic) => results = self.broken(item, &words_of(panic.as_ref())),
+            Err(panic) => results = self.broken(item, &super::words_of(panic.as_ref())),
         }
         Ok(results)
     }

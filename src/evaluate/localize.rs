@@ -5,6 +5,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::{QueryResult, Setting, StageTimes, StageTimings, evaluate};
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
@@ -33,9 +34,9 @@ pub trait Watch: Sink {
         let _ = (problem, method);
     }
 
-    /// The method's result.
-    fn end_method(&mut self, result: &QueryResult) {
-        let _ = result;
+    /// The method's result, and how long its stages took.
+    fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
+        let _ = (result, times);
     }
 
     /// What the method gave for several problems is going to be fused.
@@ -46,6 +47,11 @@ pub trait Watch: Sink {
     /// The fused result.
     fn end_fusion(&mut self, result: &QueryResult) {
         let _ = result;
+    }
+
+    /// A flag that is raised when [`Sink::attend`] is to be called although nothing was told.
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        None
     }
 }
 
@@ -293,7 +299,7 @@ impl<'a> Localizer<'a> {
             }
             _ => self.estimate(work, problem, method, watch)?,
         };
-        watch.end_method(&candidate.result);
+        watch.end_method(&candidate.result, &candidate.times);
         let row = Method::ALL.iter().position(|known| *known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
@@ -309,12 +315,17 @@ impl<'a> Localizer<'a> {
         watch: &mut dyn Watch,
     ) -> Result<Candidate, Cancelled> {
         let mut timings = StageTimings::default();
+        let attention = watch.attention();
         let estimated = catch_unwind(AssertUnwindSafe(|| {
             let mut estimator = (estimator::entry(method).new)(self.params);
             estimator.remember(&self.features);
             let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
             let mut fanout = Fanout::new(sinks);
-            estimator.estimate(&work.problems[problem], &mut Trace::to(&mut fanout))
+            let mut trace = match &attention {
+                Some(flag) => Trace::watched(&mut fanout, flag),
+                None => Trace::to(&mut fanout),
+            };
+            estimator.estimate(&work.problems[problem], &mut trace)
         }));
         let outcome = match estimated {
             Ok(outcome) => outcome?,

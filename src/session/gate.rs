@@ -5,8 +5,12 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::breakpoint::Breakpoints;
-use super::job::Message;
-use crate::event::{Event, StageEnded};
+use super::job::{Loaded, Message};
+use super::run::Part;
+use crate::evaluate::{QueryResult, StageTimes, Watch};
+use crate::event::{Event, Method, StageEnded};
+use crate::geometry::Pose;
+use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
 
 /// How a run goes on.
@@ -29,7 +33,7 @@ pub(super) struct Control {
     wishes: Mutex<Wishes>,
     changed: Condvar,
     /// Raised with every change, so that a run without events notices it too.
-    pub(super) attention: AtomicBool,
+    pub(super) attention: Arc<AtomicBool>,
 }
 
 struct Wishes {
@@ -50,7 +54,7 @@ impl Control {
                 cancelled: false,
             }),
             changed: Condvar::new(),
-            attention: AtomicBool::new(false),
+            attention: Arc::new(AtomicBool::new(false)),
         }
     }
 
@@ -219,6 +223,43 @@ impl Gate {
             self.order = wishes.orders;
             self.until = Until::new(wishes.mode, self.last);
         }
+    }
+}
+
+/// Nobody to tell means that the session was dropped, which the next event answers.
+impl Watch for Gate {
+    fn begin_query(&mut self, _index: usize, problems: &[Problem], truth: Option<&Pose>) {
+        let loaded = Loaded {
+            problems: problems.to_vec(),
+            truth: truth.copied(),
+        };
+        let _ = self.tell(Message::Loaded(Arc::new(loaded)));
+    }
+
+    fn begin_method(&mut self, problem: usize, method: Method) {
+        let _ = self.tell(Message::Began(Part::Reference(method, problem)));
+    }
+
+    fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
+        let _ = self.tell(Message::Ended {
+            result: Box::new(result.clone()),
+            times: Some(times.clone()),
+        });
+    }
+
+    fn begin_fusion(&mut self, method: Method) {
+        let _ = self.tell(Message::Began(Part::Fusion(method)));
+    }
+
+    fn end_fusion(&mut self, result: &QueryResult) {
+        let _ = self.tell(Message::Ended {
+            result: Box::new(result.clone()),
+            times: None,
+        });
+    }
+
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(Arc::clone(&self.control.attention))
     }
 }
 

@@ -5,21 +5,17 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread;
 
+use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
-use crate::estimator;
-use crate::evaluate::{QueryResult, StageTimes, StageTimings, evaluate};
+use super::run::Part;
+use crate::evaluate::{LocalizeError, Localizer, QueryResult, Request, StageTimes, words_of};
 use crate::event::Method;
+use crate::fusion;
 use crate::geometry::Pose;
-use crate::memo::Memo;
 use crate::params::Params;
-use crate::problem::{Problem, Query, ReferenceTuple};
-use crate::scene::{Scene, SceneError};
-use crate::sink::Fanout;
-use crate::trace::{Cancelled, Record, Trace};
-
-/// Values that one photo's memo keeps: some settings of each stage, so that going back to the last
-/// one costs nothing either.
-const REMEMBERED: usize = 64;
+use crate::problem::Problem;
+use crate::scene::Scene;
+use crate::trace::Record;
 
 /// One query, its references, and what to do with them.
 #[derive(Clone)]
@@ -34,6 +30,8 @@ pub struct Job {
     pub reference_frames: Vec<usize>,
     /// The methods to run, in this order, each on every reference.
     pub methods: Vec<Method>,
+    /// What to make of several references.
+    pub fusions: Vec<&'static fusion::Entry>,
     /// Their parameters.
     pub params: Params,
     /// How far the query may be from a reference \[m\].
@@ -56,10 +54,7 @@ pub struct Loaded {
 /// What the worker says to the session.
 pub(super) enum Message {
     Loaded(Arc<Loaded>),
-    Began {
-        method: Method,
-        reference: usize,
-    },
+    Began(Part),
     Told(Box<Record>),
     Waits {
         breakpoint: Option<String>,
@@ -67,29 +62,11 @@ pub(super) enum Message {
     Goes,
     Ended {
         result: Box<QueryResult>,
-        times: StageTimes,
+        times: Option<StageTimes>,
     },
     Finished,
     Cancelled,
     Broke(String),
-}
-
-/// Why a job ends before its time.
-enum Stop {
-    Cancelled,
-    Scene(SceneError),
-}
-
-impl From<Cancelled> for Stop {
-    fn from(_: Cancelled) -> Self {
-        Self::Cancelled
-    }
-}
-
-impl From<SceneError> for Stop {
-    fn from(error: SceneError) -> Self {
-        Self::Scene(error)
-    }
 }
 
 /// Starts the worker. Nobody joins it: it ends by itself, or at the next event after a cancel.
@@ -103,12 +80,14 @@ pub(super) fn spawn(
     let started = thread::Builder::new()
         .name("estimator".to_owned())
         .spawn(move || {
-            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&control, &mut gate)));
+            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate)));
             let last_words = match outcome {
                 Ok(Ok(())) => Message::Finished,
-                Ok(Err(Stop::Cancelled)) => Message::Cancelled,
-                Ok(Err(Stop::Scene(error))) => Message::Broke(error.to_string()),
-                Err(panic) => Message::Broke(format!("internal error: {}", words_of(&*panic))),
+                Ok(Err(LocalizeError::Cancelled(_))) => Message::Cancelled,
+                Ok(Err(error)) => Message::Broke(error.to_string()),
+                Err(panic) => {
+                    Message::Broke(format!("internal error: {}", words_of(panic.as_ref())))
+                }
             };
             // Nobody to tell: the session was dropped.
             let _ = gate.tell(last_words);
@@ -121,73 +100,21 @@ pub(super) fn spawn(
     }
 }
 
-fn words_of(panic: &(dyn std::any::Any + Send)) -> &str {
-    panic
-        .downcast_ref::<String>()
-        .map(String::as_str)
-        .or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("a panic without words")
-}
-
 impl Job {
-    fn work(&self, control: &Control, gate: &mut Gate) -> Result<(), Stop> {
-        let loaded = Arc::new(self.load()?);
-        gate.tell(Message::Loaded(Arc::clone(&loaded)))?;
-        for &method in &self.methods {
-            let estimator = (estimator::entry(method).new)(&self.params);
-            for (reference, problem) in loaded.problems.iter().enumerate() {
-                gate.tell(Message::Began { method, reference })?;
-                let mut timings = StageTimings::default();
-                let mut fanout = Fanout::new(vec![&mut timings, gate]);
-                let mut trace = Trace::watched(&mut fanout, &control.attention);
-                let outcome = estimator.estimate(problem, &mut trace)?;
-                let truth = loaded.truth.as_ref();
-                let scene = self.references.name();
-                let result = evaluate(scene, problem, method, &self.params, &outcome, truth);
-                gate.tell(Message::Ended {
-                    result: Box::new(result),
-                    times: timings.into_times(),
-                })?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Reads the frames that are not at hand.
-    fn load(&self) -> Result<Loaded, SceneError> {
-        let name = &self.queries.frames()[self.query];
-        let at_hand = self.at_hand.as_deref();
-        let known = at_hand.map_or(&[][..], |loaded| &loaded.problems);
-        let query = match known.iter().find(|problem| problem.query.name == *name) {
-            Some(problem) => Arc::clone(&problem.query),
-            None => Arc::new(Query {
-                memo: Memo::of(REMEMBERED),
-                ..Arc::unwrap_or_clone(self.queries.query(self.query)?)
-            }),
+    fn work(&self, gate: &mut Gate) -> Result<(), LocalizeError> {
+        let before = self.at_hand.as_deref();
+        let scene = |scene| AtHand { scene, before };
+        let references = scene(self.references.as_ref());
+        let queries = scene(self.queries.as_ref());
+        let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
+        let request = Request {
+            radius_m: self.uncertainty_radius_m,
+            references: self.reference_frames.clone(),
+            fusions: self.fusions.clone(),
+            setting: None,
         };
-        let problems = self
-            .reference_frames
-            .iter()
-            .map(|&frame| {
-                let name = &self.references.frames()[frame];
-                let reference = match known.iter().find(|known| known.reference.name == *name) {
-                    Some(problem) => Arc::clone(&problem.reference),
-                    None => Arc::new(ReferenceTuple {
-                        memo: Memo::of(REMEMBERED),
-                        ..Arc::unwrap_or_clone(self.references.reference(frame)?)
-                    }),
-                };
-                Ok(Problem {
-                    query: Arc::clone(&query),
-                    reference,
-                    uncertainty_radius_m: self.uncertainty_radius_m,
-                    seed: self.seed,
-                })
-            })
-            .collect::<Result<_, SceneError>>()?;
-        Ok(Loaded {
-            problems,
-            truth: self.queries.pose(self.query),
-        })
+        // The gate has told every result on the way.
+        let done = |_, _| Ok(());
+        localizer.localize(0, self.query, &[request], &self.methods, gate, done)
     }
 }

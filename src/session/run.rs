@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use super::job::Loaded;
 use crate::evaluate::{QueryResult, StageTimes};
-use crate::event::{DebugEvent, Event, Method, Stage};
+use crate::event::{DebugEvent, Event, Method, ReferencesFused, Stage};
 use crate::history::History;
 use crate::params::Params;
 use crate::trace::Record;
 
-/// The records of all estimators of a run, one after the other, and their results.
+/// The records of all parts of a run, one after the other, and their results.
 ///
-/// A *cursor* is a position among the records. What is asked at a cursor is answered for the
-/// estimator that told the record there.
+/// A *cursor* is a position among the records. What is asked at a cursor is answered for the part
+/// that told the record there.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
     /// The parameters it was made with.
@@ -27,18 +27,45 @@ pub struct Run {
     open: Vec<usize>,
 }
 
-/// The part of a run that one estimator told about one reference.
+/// What a part of a run is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The choice of the references.
+    Retrieval,
+    /// One estimator on one reference, given by its position among those of the run.
+    Reference(Method, usize),
+    /// One pose from what an estimator gave for each reference.
+    Fusion(Method),
+}
+
+impl Part {
+    /// The estimator, if it is about one.
+    pub fn method(self) -> Option<Method> {
+        match self {
+            Self::Retrieval => None,
+            Self::Reference(method, _) | Self::Fusion(method) => Some(method),
+        }
+    }
+
+    /// The reference, if it is about one, by its position among those of the run.
+    pub fn reference(self) -> Option<usize> {
+        match self {
+            Self::Reference(_, reference) => Some(reference),
+            Self::Retrieval | Self::Fusion(_) => None,
+        }
+    }
+}
+
+/// A part of a run, told without a break.
 #[derive(Clone, Debug)]
 pub struct Span {
-    /// The estimator.
-    pub method: Method,
-    /// Position of the reference among those of the run.
-    pub reference: usize,
+    /// What it is about.
+    pub part: Part,
     /// Its records.
     pub records: Range<usize>,
     /// Its result, once there is one.
     pub result: Option<QueryResult>,
-    /// How long its stages took.
+    /// How long its stages took; a fusion takes no time worth telling.
     pub times: Option<StageTimes>,
 }
 
@@ -66,12 +93,11 @@ impl Run {
         }
     }
 
-    pub(super) fn begin(&mut self, method: Method, reference: usize) {
+    pub(super) fn begin(&mut self, part: Part) {
         let start = self.len();
         self.open.clear();
         self.spans.push(Span {
-            method,
-            reference,
+            part,
             records: start..start,
             result: None,
             times: None,
@@ -110,10 +136,10 @@ impl Run {
         }
     }
 
-    pub(super) fn end(&mut self, result: QueryResult, times: StageTimes) {
+    pub(super) fn end(&mut self, result: QueryResult, times: Option<StageTimes>) {
         if let Some(span) = self.spans.last_mut() {
             span.result = Some(result);
-            span.times = Some(times);
+            span.times = times;
         }
     }
 
@@ -161,7 +187,27 @@ impl Run {
             .filter(move |bar| bar.records.contains(&cursor))
     }
 
-    /// The latest event of a type at or before `cursor`, told by the estimator at the cursor.
+    /// What was told about something, the latest where that was several times.
+    pub fn span_of(&self, part: Part) -> Option<&Span> {
+        self.spans.iter().rev().find(|span| span.part == part)
+    }
+
+    /// The reference that is looked at when the cursor is somewhere, by its position among those of
+    /// the run: the one that is worked on there, in a fusion the one with the most to say.
+    pub fn reference_at(&self, cursor: usize) -> usize {
+        let span = self.span_at(cursor);
+        if let Some(reference) = span.and_then(|span| span.part.reference()) {
+            return reference;
+        }
+        let fused = span.and_then(|span| self.latest_in::<ReferencesFused>(span, cursor));
+        let shares = fused.map_or(&[][..], |fused| &fused.shares);
+        (0..shares.len())
+            .rev()
+            .max_by(|&a, &b| shares[a].weight.total_cmp(&shares[b].weight))
+            .unwrap_or(0)
+    }
+
+    /// The latest event of a type at or before `cursor`, told by the part at the cursor.
     pub fn latest<E: DebugEvent + 'static>(&self, cursor: usize) -> Option<&E> {
         self.latest_in(self.span_at(cursor)?, cursor)
     }
@@ -174,7 +220,7 @@ impl Run {
             .find_map(|record| E::from_event(&record.event))
     }
 
-    /// All events of a type that the estimator at the cursor has told up to there, with their
+    /// All events of a type that the part at the cursor has told up to there, with their
     /// positions.
     pub fn all_until<E: DebugEvent + 'static>(
         &self,

@@ -6,7 +6,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use posescope::estimator;
-use posescope::evaluate::{Watch as _, evaluate};
+use posescope::evaluate::{StageTimes, Watch as _, evaluate};
 use posescope::event::{FeatureState, Kind, KindSet, Method};
 use posescope::geometry::Pose;
 use posescope::params::Params;
@@ -50,7 +50,7 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
             &outcome,
             Some(&truth),
         );
-        recorder.end_method(&result);
+        recorder.end_method(&result, &StageTimes::default());
     }
 }
 

@@ -26,7 +26,7 @@ fn finished() -> Harness<'static, App> {
 
 fn span(window: &Harness<'_, App>, method: Method) -> Span {
     let spans = window.state().desk().run().spans();
-    let span = spans.iter().find(|span| span.method == method);
+    let span = spans.iter().find(|span| span.part.method() == Some(method));
     span.expect("the method ran").clone()
 }
 

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use posescope::evaluate::QueryResult;
-use posescope::event::{Event, Method, Stage, StageEnded, StageStarted};
+use posescope::evaluate::{LocalizeError, Localizer, QueryResult, Request, Unwatched};
+use posescope::event::{Event, Method, ReferencesFused, Stage, StageEnded, StageStarted};
+use posescope::fusion;
 use posescope::params::Params;
-use posescope::session::{Breakpoints, Job, RunMode, Session, State};
+use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
@@ -18,6 +19,7 @@ fn job(query: usize) -> Job {
         query,
         reference_frames: vec![0],
         methods: Method::ALL.to_vec(),
+        fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
         seed: 7,
@@ -197,8 +199,8 @@ fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
 #[test]
 fn a_fault_in_the_worker_is_a_state_of_the_session() {
     let mut broken = job(1);
-    // Only frame 0 has a cloud; the scene of this test panics when asked for another.
-    broken.reference_frames = vec![2];
+    // This frame has no cloud; the scene of this test panics when asked for one all the same.
+    broken.reference_frames = vec![1];
     let mut session = start(broken, RunMode::Running, &[]);
     match settle(&mut session) {
         State::Broken(why) => assert!(why.contains("internal error"), "{why}"),
@@ -233,4 +235,46 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
     assert_eq!(reused[0], "detect");
     assert_eq!(reused[1..6], direct);
     assert_eq!(reused[6..11], direct);
+}
+
+#[test]
+fn several_references_are_fused_as_without_a_session() {
+    let several = Job {
+        reference_frames: vec![0, 2],
+        fusions: fusion::ALL.iter().collect(),
+        ..job(1)
+    };
+    let mut expected = Vec::new();
+    let scene = Walls::new();
+    let localizer = Localizer::new(&scene, &scene, &several.params, several.seed);
+    let request = Request {
+        radius_m: several.uncertainty_radius_m,
+        references: several.reference_frames.clone(),
+        fusions: several.fusions.clone(),
+        setting: None,
+    };
+    let keep = |result, _| {
+        expected.push(result);
+        Ok::<(), LocalizeError>(())
+    };
+    localizer
+        .localize(0, 1, &[request], &several.methods, &mut Unwatched, keep)
+        .expect("good data");
+
+    let mut session = start(several, RunMode::Running, &[]);
+    assert_eq!(settle(&mut session), State::Finished);
+    let (fused, alone): (Vec<_>, Vec<_>) = results(&session)
+        .into_iter()
+        .partition(|result| result.fusion.is_some());
+    assert_eq!(fused, expected);
+    assert_eq!(alone.len(), 4 * 2);
+    let run = session.run();
+    let parts: Vec<Part> = run.spans().iter().map(|span| span.part).collect();
+    let first = [0, 1].map(|reference| Part::Reference(Method::Feature, reference));
+    assert_eq!(parts[..2], first);
+    assert_eq!(parts[2..6], [Part::Fusion(Method::Feature); 4]);
+    for span in run.spans() {
+        let fused = run.latest_in::<ReferencesFused>(span, span.records.end);
+        assert_eq!(fused.is_some(), matches!(span.part, Part::Fusion(_)));
+    }
 }

@@ -258,7 +258,7 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
         let span = run
             .spans()
             .iter()
-            .rfind(|span| span.method.name() == "mi")
+            .rfind(|span| span.part.method() == Some(method))
             .expect("MI ran");
         let at_place = run
             .all_until::<PhaseSearched>(span.records.end - 1)

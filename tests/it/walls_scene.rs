@@ -43,7 +43,7 @@ impl Scene for Walls {
         Some(frame as f64)
     }
     fn has_cloud(&self, frame: usize) -> bool {
-        frame == 0
+        matches!(frame, 0 | 2)
     }
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         match frame {
@@ -61,7 +61,11 @@ impl Scene for Walls {
         }
     }
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        assert_eq!(frame, 0, "only the first frame has a cloud");
-        Ok(cloud_of_the_walls())
+        assert!(self.has_cloud(frame), "this frame has no cloud");
+        let mut cloud = cloud_of_the_walls();
+        for point in &mut cloud.points {
+            point.z -= AHEAD_M[frame] as f32;
+        }
+        Ok(cloud)
     }
 }

@@ -28,6 +28,7 @@ pub fn setup() -> Setup {
         reference_frames: vec![0],
         pick: ReferencePick::ByHand,
         methods: Method::ALL.to_vec(),
+        fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
         seed: 7,
@@ -194,7 +195,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     press(&mut window, Modifiers::NONE, Key::Num3);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.method, Method::MutualInformation);
+    assert_eq!(span.part.method(), Some(Method::MutualInformation));
 }
 
 #[test]
@@ -250,7 +251,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     assert_eq!(settle(&mut window), State::Finished);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.method, Method::MutualInformation);
+    assert_eq!(span.part.method(), Some(Method::MutualInformation));
     assert_eq!(desk.cursor + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
         let bars = desk.run().stages().iter();
@@ -319,9 +320,9 @@ fn what_goes_wrong_is_said_and_the_window_lives_on() {
     window.step();
     assert!(matches!(settle(&mut window), State::Broken(_)));
     assert!(is_said(&window, "000004"));
-    // Frame 2 has no cloud, and the scene of this test panics when it is asked for it.
+    // Frame 1 has no cloud, and the scene of this test panics when it is asked for it.
     window.state_mut().send(Command::SelectQuery(1));
-    window.state_mut().send(Command::SetReferences(vec![2]));
+    window.state_mut().send(Command::SetReferences(vec![1]));
     window.step();
     assert!(matches!(settle(&mut window), State::Broken(_)));
     assert!(is_said(&window, "internal error"));

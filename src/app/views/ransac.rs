@@ -103,7 +103,7 @@ impl Ransac {
 
 fn head(ui: &mut Ui, scope: &Scope<'_>, span: &Span, trials: &Trials) {
     ui.horizontal_wrapped(|ui| {
-        if span.method == Method::Hybrid {
+        if span.part.method() == Some(Method::Hybrid) {
             ui.weak("inside HY");
         }
         let needed = trials

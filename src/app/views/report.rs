@@ -44,7 +44,11 @@ fn counterpart<'a>(span: &Span, others: &[&'a QueryResult]) -> Option<&'a QueryR
     let result = span.result.as_ref()?;
     others
         .iter()
-        .find(|other| other.method == result.method && other.references == result.references)
+        .find(|other| {
+            other.method == result.method
+                && other.fusion == result.fusion
+                && other.references == result.references
+        })
         .copied()
 }
 
@@ -69,12 +73,18 @@ fn heading(ui: &mut Ui, columns: &[&str]) {
 }
 
 fn name(ui: &mut Ui, span: &Span) {
-    let name = span.method.name().to_uppercase();
-    ui.label(
-        RichText::new(name)
-            .color(theme::method(span.method))
-            .strong(),
-    );
+    let Some(method) = span.part.method() else {
+        return;
+    };
+    let fusion = span
+        .result
+        .as_ref()
+        .and_then(|result| result.fusion.as_ref());
+    let name = match fusion {
+        Some(fusion) => format!("{} {fusion}", method.name().to_uppercase()),
+        None => method.name().to_uppercase(),
+    };
+    ui.label(RichText::new(name).color(theme::method(method)).strong());
 }
 
 fn verdict(result: &QueryResult) -> (String, Option<Color32>) {
@@ -104,7 +114,8 @@ fn verdicts(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
     let shows_truth = scope.desk.shows_truth;
     Grid::new("verdicts").striped(true).show(ui, |ui| {
         heading(ui, &["method", "reference", "result"]);
-        for span in scope.run.spans() {
+        let parts = scope.run.spans().iter();
+        for span in parts.filter(|span| span.part.method().is_some()) {
             name(ui, span);
             let Some(result) = &span.result else {
                 ui.weak("at work");

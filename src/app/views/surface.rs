@@ -73,7 +73,7 @@ impl Surface {
                 }
             }
             let Some(search) = search else { return };
-            if search.span.method != shown {
+            if search.span.part.method() != Some(shown) {
                 ui.weak("inside HY");
             }
             match search.lattices.last() {

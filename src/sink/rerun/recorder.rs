@@ -12,7 +12,7 @@ use super::place::Place;
 use super::scene::{self, Camera, Origin};
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report};
-use crate::evaluate::{PoseReport, QueryResult, Status, Watch};
+use crate::evaluate::{PoseReport, QueryResult, StageTimes, Status, Watch};
 use crate::event::{Event, Kind, KindSet, Method, ReferencesFused, Stage};
 use crate::geometry::Pose;
 use crate::narration;
@@ -345,7 +345,7 @@ impl Watch for Recorder {
         self.query.tellers.clear();
     }
 
-    fn end_method(&mut self, result: &QueryResult) {
+    fn end_method(&mut self, result: &QueryResult, _times: &StageTimes) {
         self.stream.advance();
         self.result_in_words(result);
         self.estimate(result);
@@ -359,7 +359,7 @@ impl Watch for Recorder {
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {
-        self.end_method(result);
+        self.end_method(result, &StageTimes::default());
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::app::Scope;
 use crate::event::{Event, FeatureState, LiftedMatch, Method, Side};
 use crate::features::{Features, Keypoint, Match, MatchVerdict};
-use crate::session::{Run, Span};
+use crate::session::{Part, Run, Span};
 
 /// Position of "undecided" behind those of [`FeatureState::NAMES`].
 pub(super) const UNDECIDED: usize = FeatureState::NAMES.len();
@@ -50,17 +50,13 @@ impl<'a> Story<'a> {
 
     /// The whole story of the same estimator and reference in another run.
     pub(super) fn counterpart(scope: &Scope<'_>, method: Method, other: &'a Run) -> Option<Self> {
-        let reference = scope.span().map_or(0, |span| span.reference);
-        let span = other
-            .spans()
-            .iter()
-            .find(|span| span.method == method && span.reference == reference)?;
+        let span = other.span_of(Part::Reference(method, scope.reference()))?;
         Some(Self::until(other, span, span.records.end.checked_sub(1)?))
     }
 
     fn until(run: &'a Run, span: &Span, cursor: usize) -> Self {
         let mut story = Self {
-            method: Some(span.method),
+            method: span.part.method(),
             ..Self::default()
         };
         let end = span.records.end.min(cursor.saturating_add(1));

@@ -210,7 +210,7 @@ fn acceptance(ui: &mut Ui, scope: &Scope<'_>, span: &Span, judged: &ConsensusJud
         .run
         .loaded
         .as_deref()
-        .and_then(|loaded| loaded.problems.get(span.reference))
+        .and_then(|loaded| loaded.problems.get(span.part.reference()?))
     else {
         return;
     };

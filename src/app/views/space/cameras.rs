@@ -229,10 +229,11 @@ fn best_so_far(
         return None;
     }
     let by_search = search.path.last().map(|best| best.reference_from_camera());
-    let best = match span.method {
+    let method = span.part.method()?;
+    let best = match method {
         Method::Feature => features.reference_from_query,
         Method::Photometric | Method::MutualInformation => by_search,
         Method::Hybrid => by_search.or(features.reference_from_query),
     };
-    Some((span.method, best?))
+    Some((method, best?))
 }

@@ -94,11 +94,11 @@ pub(super) struct SearchStory<'a> {
 impl<'a> SearchStory<'a> {
     /// From the direct method whose pictures are shown.
     pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let place = match scope.method() {
-            Some(Method::Hybrid) => scope.span().map(|span| (span, scope.cursor)),
-            _ => scope.of(scope.direct_method()),
+        let method = match scope.method() {
+            Some(Method::Hybrid) => Method::Hybrid,
+            _ => scope.direct_method(),
         };
-        let Some((span, cursor)) = place else {
+        let Some((span, cursor)) = scope.of(method) else {
             return Self::default();
         };
         let mut story = Self::default();

@@ -37,7 +37,8 @@ impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
     pub(super) fn at(scope: &Scope<'a>, method: Method) -> Option<Self> {
         let (span, cursor) = part(scope, method)?;
-        let problem = scope.run.loaded.as_deref()?.problems.get(span.reference)?;
+        let problems = &scope.run.loaded.as_deref()?.problems;
+        let problem = problems.get(span.part.reference()?)?;
         let end = span.records.end.min(cursor + 1);
         let records = scope.run.records().get(span.records.start..end)?;
         let mut events = records.iter().map(|record| &record.event);
