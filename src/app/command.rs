@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 use crate::event::Method;
+use crate::fusion;
 use crate::geometry::Pose;
 
 /// Something to be done between two frames.
@@ -54,6 +55,8 @@ pub enum Command {
     PickReferences(super::ReferencePick),
     /// Use other reference frames.
     SetReferences(Vec<usize>),
+    /// Fuse what several references give, in these ways, and run again.
+    SetFusions(Vec<&'static fusion::Entry>),
     /// Change the uncertainty radius \[m\] and run again.
     SetRadius(f64),
     /// Change the seed and run again.

@@ -277,7 +277,7 @@ impl Desk {
         }
         // The query at work comes first.
         if *self.session.state() != State::Loading {
-            self.queries.paint_thumbnails(&self.setup.queries);
+            self.queries.paint_thumbnails(&self.setup);
         }
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
@@ -332,6 +332,7 @@ impl Desk {
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
         self.results = setup.results.clone();
+        self.queries = Queries::new(self.ctx.clone());
         self.setup = setup;
         self.params = Arc::new(self.setup.params.clone());
         self.kept = None;

@@ -143,11 +143,16 @@ fn first_tree() -> Tree<String> {
             .collect();
         tiles.insert_tab_tile(panes)
     };
-    let lists = tabs(&[views::QUERIES, views::PARAMETERS, "breakpoints"]);
+    let lists = tabs(&[
+        views::QUERIES,
+        "references",
+        views::PARAMETERS,
+        "breakpoints",
+    ]);
     let pictures = tabs(&["images", "synthetic"]);
     let space = tabs(&["space", "ransac"]);
     let surface = tabs(&["surface"]);
-    let histogram = tabs(&["histogram"]);
+    let histogram = tabs(&["histogram", "fusion"]);
     let words = tabs(&["report", "log"]);
     let lower = tiles.insert_horizontal_tile(vec![surface, histogram]);
     let middle = tiles.insert_vertical_tile(vec![pictures, lower]);

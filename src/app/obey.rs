@@ -52,6 +52,10 @@ impl App {
             Command::RunAllQueries => desk.queries.run_all(&desk.setup),
             Command::PickReferences(pick) => desk.pick_references(pick),
             Command::SetReferences(frames) => desk.set_references(frames),
+            Command::SetFusions(fusions) => {
+                desk.setup.fusions = fusions;
+                desk.begin_again();
+            }
             Command::SetRadius(radius_m) => {
                 desk.setup.uncertainty_radius_m = radius_m;
                 desk.begin_again();

@@ -12,6 +12,7 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 use super::setup::Setup;
 use super::textures::color_image;
 use crate::evaluate::{LocalizeError, QueryResult, Request, Unwatched};
+use crate::event::Side;
 use crate::picture;
 use crate::scene::Scene;
 
@@ -24,15 +25,15 @@ pub(super) type Outcome = (usize, Result<Vec<QueryResult>, String>);
 /// Thumbnails and results that are made beside the window's thread.
 pub struct Queries {
     ctx: egui::Context,
-    thumbnails: BTreeMap<usize, Option<TextureHandle>>,
-    wanted: Arc<Mutex<BTreeSet<usize>>>,
+    thumbnails: BTreeMap<(Side, usize), Option<TextureHandle>>,
+    wanted: Arc<Mutex<BTreeSet<(Side, usize)>>>,
     pictures: (Sender<Picture>, Receiver<Picture>),
     painter_is_busy: bool,
     batch: Option<Batch>,
 }
 
 enum Picture {
-    Thumbnail(usize, Option<ColorImage>),
+    Thumbnail((Side, usize), Option<ColorImage>),
     Idle,
 }
 
@@ -56,13 +57,14 @@ impl Queries {
         }
     }
 
-    /// The thumbnail of a frame, once it is made. Asking for it has it made.
-    pub fn thumbnail(&self, frame: usize) -> Option<&TextureHandle> {
-        match self.thumbnails.get(&frame) {
+    /// The thumbnail of a frame of the queries' or the references' scene, once it is made. Asking for
+    /// it has it made.
+    pub fn thumbnail(&self, side: Side, frame: usize) -> Option<&TextureHandle> {
+        match self.thumbnails.get(&(side, frame)) {
             Some(thumbnail) => thumbnail.as_ref(),
             None => {
                 let mut wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
-                wanted.insert(frame);
+                wanted.insert((side, frame));
                 None
             }
         }
@@ -117,7 +119,7 @@ impl Queries {
             match picture {
                 Picture::Thumbnail(frame, image) => {
                     let texture = image.map(|image| {
-                        let name = format!("thumbnail {frame}");
+                        let name = format!("thumbnail {frame:?}");
                         self.ctx.load_texture(name, image, TextureOptions::LINEAR)
                     });
                     self.thumbnails.insert(frame, texture);
@@ -137,7 +139,7 @@ impl Queries {
     }
 
     /// Has the wanted thumbnails made.
-    pub(super) fn paint_thumbnails(&mut self, scene: &Arc<dyn Scene>) {
+    pub(super) fn paint_thumbnails(&mut self, setup: &Setup) {
         let is_idle = || {
             let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
             wanted.is_empty()
@@ -145,7 +147,8 @@ impl Queries {
         if self.painter_is_busy || is_idle() {
             return;
         }
-        let (scene, wanted) = (Arc::clone(scene), Arc::clone(&self.wanted));
+        let (queries, references) = (Arc::clone(&setup.queries), Arc::clone(&setup.references));
+        let wanted = Arc::clone(&self.wanted);
         let (outbox, ctx) = (self.pictures.0.clone(), self.ctx.clone());
         let started = thread::Builder::new()
             .name("thumbnails".to_owned())
@@ -155,9 +158,14 @@ impl Queries {
                         .lock()
                         .unwrap_or_else(PoisonError::into_inner)
                         .pop_first();
-                    let Some(frame) = next else { break };
-                    let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene.as_ref(), frame)));
-                    let told = outbox.send(Picture::Thumbnail(frame, image.ok().flatten()));
+                    let Some((side, frame)) = next else { break };
+                    let scene = match side {
+                        Side::Query => queries.as_ref(),
+                        Side::Reference => references.as_ref(),
+                    };
+                    let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene, frame)));
+                    let picture = Picture::Thumbnail((side, frame), image.ok().flatten());
+                    let told = outbox.send(picture);
                     if told.is_err() {
                         return;
                     }

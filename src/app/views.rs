@@ -5,6 +5,7 @@
 
 mod breakpoints;
 mod canvas;
+mod fusion;
 mod histogram;
 mod images;
 mod ink;
@@ -14,6 +15,7 @@ mod parameters;
 mod queries;
 mod ransac;
 mod readout;
+mod references;
 mod report;
 mod space;
 mod surface;
@@ -59,6 +61,12 @@ pub const ALL: &[Entry] = &[
         title: "Queries",
         about: "all queries with what is known of them",
         new: |_| Box::<queries::QueryList>::default(),
+    },
+    Entry {
+        name: "references",
+        title: "References",
+        about: "which frames the query is localised against, and how their poses are fused",
+        new: |_| Box::<references::References>::default(),
     },
     Entry {
         name: PARAMETERS,
@@ -107,6 +115,12 @@ pub const ALL: &[Entry] = &[
         title: "Histogram",
         about: "joint histogram and entropies of MI, residuals of PM",
         new: |_| Box::<histogram::Histogram>::default(),
+    },
+    Entry {
+        name: "fusion",
+        title: "Fusion",
+        about: "what each reference gives alone, its weight, and the fused pose",
+        new: |_| Box::<fusion::Fusion>::default(),
     },
     Entry {
         name: "report",

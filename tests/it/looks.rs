@@ -31,8 +31,9 @@ fn every_view_looks_as_it_did() {
     // Glyph edges and points differ by little from one rasterizer to the next.
     let options = SnapshotOptions::new().threshold(2.0).max_failed_pixels(900);
     let mut results = SnapshotResults::new();
-    let mut shoot = |window: &mut Harness<'_, App>, moment: &str| {
-        for entry in views::ALL {
+    let mut shoot = |window: &mut Harness<'_, App>, moment: &str, of: &[&str]| {
+        let is_wanted = |entry: &&views::Entry| of.is_empty() || of.contains(&entry.name);
+        for entry in views::ALL.iter().filter(is_wanted) {
             window.state_mut().send(Command::Maximize(Some(entry.name)));
             wait(window, |app| !app.desk().is_probing());
             window.run_steps(4);
@@ -40,19 +41,30 @@ fn every_view_looks_as_it_did() {
             results.add(window.try_snapshot_options(name, &options));
         }
     };
-    shoot(&mut window, "waiting");
+    shoot(&mut window, "waiting", &[]);
     window.state_mut().send(Command::Run);
     wait(&mut window, |app| *app.desk().state() == State::Finished);
     window
         .state_mut()
         .send(Command::SelectMethod(Method::Feature));
-    shoot(&mut window, "features");
+    shoot(&mut window, "features", &[]);
     window
         .state_mut()
         .send(Command::SelectMethod(Method::MutualInformation));
-    shoot(&mut window, "search");
+    shoot(&mut window, "search", &[]);
     window.state_mut().send(Command::SwitchTheme);
-    shoot(&mut window, "light");
+    shoot(&mut window, "light", &[]);
+    window.state_mut().send(Command::SetReferences(vec![0, 2]));
+    let all = posescope::fusion::ALL.iter().collect();
+    window.state_mut().send(Command::SetFusions(all));
+    window.run_steps(2);
+    wait(&mut window, |app| *app.desk().state() == State::Finished);
+    window.state_mut().send(Command::Last);
+    shoot(
+        &mut window,
+        "fused",
+        &["references", "fusion", "report", "space"],
+    );
     results.unwrap();
 }
 

@@ -6,7 +6,7 @@ use super::View;
 use crate::app::obey::has_failed;
 use crate::app::{Command, Scope, theme};
 use crate::evaluate::QueryResult;
-use crate::event::Method;
+use crate::event::{Method, Side};
 
 /// Size of a thumbnail on the screen \[points\].
 const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
@@ -67,7 +67,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
     let name = &desk.setup.queries.frames()[query];
     let is_here = query == desk.setup.query;
     ui.horizontal(|ui| {
-        match desk.queries.thumbnail(query) {
+        match desk.queries.thumbnail(Side::Query, query) {
             Some(texture) => {
                 ui.add(
                     egui::Image::new(texture)
@@ -93,7 +93,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
 }
 
 /// One mark per method: what it is tells the shape too.
-fn dots(ui: &mut Ui, results: &[QueryResult], shows_truth: bool) {
+pub(super) fn dots(ui: &mut Ui, results: &[QueryResult], shows_truth: bool) {
     ui.spacing_mut().item_spacing.x = 2.0;
     for method in Method::ALL {
         for result in results.iter().filter(|r| r.method == method.name()) {

@@ -1,0 +1,231 @@
+//! What each reference gives alone, how much it has to say, and where the fused pose is.
+
+use egui::{Color32, Grid, Rect, RichText, ScrollArea, Sense, Ui, vec2};
+use egui_plot::{MarkerShape, Plot, PlotUi, Points};
+
+use super::View;
+use crate::app::{Scope, theme};
+use crate::event::{Event, Method, ReferencesFused};
+use crate::fusion::{Fate, Share};
+use crate::geometry::{Pose, PoseError};
+use crate::session::Part;
+
+/// Width of the bar of a weight of 1 \[points\].
+const FULL_BAR: f32 = 56.0;
+/// Height of the map \[points\].
+const MAP_HEIGHT: f32 = 230.0;
+
+/// The fusions of a method, in a table and on a map.
+#[derive(Default)]
+pub struct Fusion {}
+
+impl View for Fusion {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        let Some((method, fused)) = told(scope) else {
+            ui.weak(
+                "No poses were fused so far. Choose two references or more and a fusion in the \
+                 view References.",
+            );
+            return;
+        };
+        ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+            let name = method.name().to_uppercase();
+            ui.label(
+                RichText::new(format!("{name}, {} references", fused[0].shares.len()))
+                    .color(theme::method(method))
+                    .strong(),
+            );
+            table(ui, scope, method, &fused);
+            map(ui, scope, method, &fused);
+        });
+    }
+}
+
+/// The fusions that were told up to the cursor, of the method at the cursor if it has any, else of
+/// the latest that has.
+fn told<'a>(scope: &Scope<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
+    let of = |wanted: Method| -> Vec<&'a ReferencesFused> {
+        let spans = scope.run.spans().iter();
+        spans
+            .filter(|span| span.part == Part::Fusion(wanted))
+            .flat_map(|span| {
+                let end = span.records.end.min(scope.cursor + 1);
+                &scope.run.records()[span.records.start.min(end)..end]
+            })
+            .filter_map(|record| match &record.event {
+                Event::ReferencesFused(fused) => Some(fused),
+                _ => None,
+            })
+            .collect()
+    };
+    let others = Method::ALL.into_iter().rev();
+    scope
+        .method()
+        .into_iter()
+        .chain(others)
+        .map(|method| (method, of(method)))
+        .find(|(_, fused)| !fused.is_empty())
+}
+
+/// How far a pose is from the truth, or why there is nothing to say.
+fn error(scope: &Scope<'_>, pose: Option<&Pose>) -> String {
+    match (pose, scope.truth()) {
+        (None, _) => "× no pose".to_owned(),
+        (Some(_), None) => "a pose".to_owned(),
+        (Some(pose), Some(truth)) => {
+            let error = PoseError::between(truth, pose);
+            format!("{:.3} m, {:.3}°", error.translation_m, error.rotation_deg)
+        }
+    }
+}
+
+fn table(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused]) {
+    let weak = |ui: &mut Ui, text: &str| ui.label(RichText::new(text).weak().small());
+    Grid::new("fusion").striped(true).show(ui, |ui| {
+        for text in ["reference", "matches", "alone"] {
+            weak(ui, text);
+        }
+        for fusion in fused {
+            weak(ui, fusion.fusion);
+        }
+        ui.end_row();
+        for (index, share) in fused[0].shares.iter().enumerate() {
+            ui.label(RichText::new(&share.reference).color(theme::REFERENCE));
+            ui.label(share.matches.to_string());
+            ui.label(error(scope, share.pose.as_ref()));
+            for fusion in fused {
+                weight(ui, &fusion.shares[index], theme::method(method));
+            }
+            ui.end_row();
+        }
+        ui.strong("fused");
+        ui.label("");
+        ui.label("");
+        for fusion in fused {
+            ui.strong(error(scope, fusion.pose.as_ref()));
+        }
+        ui.end_row();
+    });
+}
+
+/// A bar as long as the weight; what has none says why.
+fn weight(ui: &mut Ui, share: &Share, color: Color32) {
+    match share.fate {
+        Fate::Dropped => {
+            ui.weak("left out")
+                .on_hover_text("The fusion gives it no weight");
+        }
+        Fate::Failed => {
+            ui.label(RichText::new("× failed").color(theme::ESTIMATE))
+                .on_hover_text("It had a weight, but no pose");
+        }
+        Fate::Kept => {
+            ui.horizontal(|ui| {
+                let size = vec2(FULL_BAR, 10.0);
+                let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
+                let filled = vec2(share.weight as f32 * FULL_BAR, size.y);
+                let painter = ui.painter();
+                painter.rect_filled(rect, 1.0, ui.visuals().faint_bg_color);
+                painter.rect_filled(Rect::from_min_size(rect.min, filled), 1.0, color);
+                ui.label(format!("{:.0} %", 100.0 * share.weight));
+            });
+        }
+    }
+}
+
+/// Seen from above, in the frame of the first reference: references, what each gives alone, the
+/// fused poses, the truth.
+fn map(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused]) {
+    let Some(loaded) = scope.run.loaded.as_deref() else {
+        return;
+    };
+    let Some(first) = loaded.problems.first() else {
+        return;
+    };
+    let camera_from_world = first.reference.world_from_camera.inverse();
+    let place = |pose: &Pose| {
+        let centre = camera_from_world * nalgebra::Point3::from(pose.translation.vector);
+        [centre.x, centre.z]
+    };
+    // The fusion at the cursor says who was left out.
+    let present = scope
+        .latest::<ReferencesFused>()
+        .unwrap_or(fused[fused.len() - 1]);
+    let answer = Plot::new("fusion map")
+        .height(MAP_HEIGHT)
+        .data_aspect(1.0)
+        .allow_scroll(false)
+        .x_axis_label("right of the first reference [m]")
+        .y_axis_label("ahead [m]")
+        .legend(egui_plot::Legend::default())
+        .show(ui, |plot| {
+            for problem in &loaded.problems {
+                let at = place(&problem.reference.world_from_camera);
+                mark(
+                    plot,
+                    "references",
+                    at,
+                    theme::REFERENCE,
+                    MarkerShape::Square,
+                    5.0,
+                );
+            }
+            for share in present.shares.iter() {
+                let Some(pose) = &share.pose else { continue };
+                let (name, shape) = match share.fate {
+                    Fate::Kept => ("alone, kept", MarkerShape::Circle),
+                    Fate::Dropped | Fate::Failed => ("alone, left out", MarkerShape::Cross),
+                };
+                let radius = 3.0 + 6.0 * share.weight.sqrt() as f32;
+                mark(
+                    plot,
+                    name,
+                    place(pose),
+                    theme::method(method),
+                    shape,
+                    radius,
+                );
+            }
+            if let Some(pose) = &present.pose {
+                let shape = MarkerShape::Diamond;
+                mark(
+                    plot,
+                    present.fusion,
+                    place(pose),
+                    theme::ESTIMATE,
+                    shape,
+                    8.0,
+                );
+            }
+            if let Some(truth) = scope.truth() {
+                mark(
+                    plot,
+                    "truth",
+                    place(truth),
+                    theme::TRUTH,
+                    MarkerShape::Up,
+                    7.0,
+                );
+            }
+        });
+    let name = format!("Map of the fusion {}", present.fusion);
+    answer
+        .response
+        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+}
+
+fn mark(
+    plot: &mut PlotUi<'_>,
+    name: &str,
+    at: [f64; 2],
+    color: Color32,
+    shape: MarkerShape,
+    radius: f32,
+) {
+    let points = Points::new(name, vec![at])
+        .color(color)
+        .shape(shape)
+        .filled(false)
+        .radius(radius);
+    plot.points(points);
+}

@@ -1,0 +1,228 @@
+//! The references of the query: how they are chosen, which frames could be, what is made of several.
+
+use egui::{ComboBox, DragValue, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
+
+use super::View;
+use super::queries::dots;
+use crate::app::{Command, ReferencePick, Scope, theme};
+use crate::evaluate::{QueryResult, Selection, frames_within};
+use crate::event::Side;
+use crate::fusion;
+use crate::geometry::PoseError;
+
+/// Size of a thumbnail on the screen \[points\].
+const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
+/// The ways of choosing, each with the count that it begins with.
+const WAYS: [(&str, Selection); 3] = [
+    ("at random", Selection::Random(1)),
+    ("the nearest", Selection::Nearest(1)),
+    ("most matches", Selection::Matched(1)),
+];
+
+/// The frames around a query, and which of them are its references.
+#[derive(Default)]
+pub struct References {
+    nearby: Option<Nearby>,
+}
+
+/// Frames that could be references of a query.
+struct Nearby {
+    query: usize,
+    radius_m: f64,
+    scene: String,
+    frames: Vec<usize>,
+}
+
+impl View for References {
+    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+        choice(ui, scope);
+        fusions(ui, scope);
+        ui.separator();
+        let setup = &scope.desk.setup;
+        let frames = &self.nearby(scope).frames;
+        // Those that were named may be farther away than the radius.
+        let mut shown: Vec<usize> = setup.reference_frames.clone();
+        shown.extend(
+            frames
+                .iter()
+                .filter(|f| !setup.reference_frames.contains(f)),
+        );
+        ui.weak(format!(
+            "{} of {} frames within {} m",
+            setup.reference_frames.len(),
+            frames.len(),
+            setup.uncertainty_radius_m
+        ));
+        ScrollArea::vertical().auto_shrink(false).show_rows(
+            ui,
+            THUMBNAIL.y,
+            shown.len(),
+            |ui, rows| {
+                for &frame in &shown[rows] {
+                    row(ui, scope, frame);
+                }
+            },
+        );
+    }
+}
+
+impl References {
+    /// Looking for them in a long scene at every frame would be too slow.
+    fn nearby(&mut self, scope: &Scope<'_>) -> &Nearby {
+        let setup = &scope.desk.setup;
+        let is_known = self.nearby.as_ref().is_some_and(|nearby| {
+            nearby.query == setup.query
+                && nearby.radius_m == setup.uncertainty_radius_m
+                && nearby.scene == setup.references.name()
+        });
+        let nearby = self.nearby.take().filter(|_| is_known);
+        self.nearby.insert(nearby.unwrap_or_else(|| Nearby {
+            query: setup.query,
+            radius_m: setup.uncertainty_radius_m,
+            scene: setup.references.name().to_owned(),
+            frames: frames(scope),
+        }))
+    }
+}
+
+fn frames(scope: &Scope<'_>) -> Vec<usize> {
+    let setup = &scope.desk.setup;
+    let (references, queries) = (setup.references.as_ref(), setup.queries.as_ref());
+    let is_same_scene = references.name() == queries.name();
+    let is_query = |frame| is_same_scene && frame == setup.query;
+    match queries.pose(setup.query) {
+        Some(place) => frames_within(references, &place, setup.uncertainty_radius_m, &is_query),
+        None => (0..references.frames().len())
+            .filter(|&frame| !is_query(frame) && references.has_cloud(frame))
+            .filter(|&frame| references.pose(frame).is_some())
+            .collect(),
+    }
+}
+
+fn choice(ui: &mut Ui, scope: &Scope<'_>) {
+    let setup = &scope.desk.setup;
+    let name = |pick: ReferencePick| match pick {
+        ReferencePick::ByHand => "by hand",
+        ReferencePick::By(selection) => WAYS
+            .iter()
+            .find(|(_, way)| way.with_count(1) == selection.with_count(1))
+            .map_or("ranked", |(name, _)| name),
+    };
+    ui.horizontal(|ui| {
+        let count = match setup.pick {
+            ReferencePick::ByHand => setup.reference_frames.len(),
+            ReferencePick::By(selection) => selection.count(),
+        };
+        let label = ui.label("Choose");
+        ComboBox::from_id_salt("way")
+            .selected_text(name(setup.pick))
+            .show_ui(ui, |ui| {
+                let ways = WAYS.map(|(_, way)| ReferencePick::By(way.with_count(count.max(1))));
+                for pick in ways.into_iter().chain([ReferencePick::ByHand]) {
+                    if ui
+                        .selectable_label(setup.pick == pick, name(pick))
+                        .clicked()
+                    {
+                        scope.send(Command::PickReferences(pick));
+                    }
+                }
+            })
+            .response
+            .labelled_by(label.id);
+        if let ReferencePick::By(selection) = setup.pick {
+            let mut wanted = count;
+            let drag = DragValue::new(&mut wanted)
+                .range(1..=20)
+                .update_while_editing(false);
+            let response = ui.add(drag).on_hover_text("How many references");
+            let is_done = !response.dragged() || response.drag_stopped();
+            if wanted != count && is_done {
+                let pick = ReferencePick::By(selection.with_count(wanted));
+                scope.send(Command::PickReferences(pick));
+            }
+        }
+    });
+}
+
+fn fusions(ui: &mut Ui, scope: &Scope<'_>) {
+    let setup = &scope.desk.setup;
+    ui.horizontal(|ui| {
+        ui.label("Fuse");
+        for entry in fusion::ALL {
+            let is_on = setup.fusions.contains(&entry);
+            let response = ui.selectable_label(is_on, entry.name);
+            if response.on_hover_text(entry.about).clicked() {
+                // In the order of the registry.
+                let all = fusion::ALL.iter();
+                let wanted = all.filter(|other| match *other == entry {
+                    true => !is_on,
+                    false => setup.fusions.contains(other),
+                });
+                scope.send(Command::SetFusions(wanted.collect()));
+            }
+        }
+    });
+}
+
+fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
+    let desk = scope.desk;
+    let setup = &desk.setup;
+    let name = &setup.references.frames()[frame];
+    ui.horizontal(|ui| {
+        let mut is_used = setup.reference_frames.contains(&frame);
+        let checkbox = ui.checkbox(&mut is_used, "");
+        checkbox
+            .widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_used, name));
+        if checkbox.changed() {
+            let mut frames = setup.reference_frames.clone();
+            match is_used {
+                true => frames.push(frame),
+                false => frames.retain(|other| *other != frame),
+            }
+            scope.send(Command::SetReferences(frames));
+        }
+        match desk.queries.thumbnail(Side::Reference, frame) {
+            Some(texture) => {
+                ui.add(
+                    egui::Image::new(texture)
+                        .fit_to_exact_size(THUMBNAIL)
+                        .alt_text(name),
+                );
+            }
+            None => {
+                let (rect, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
+                let fill = ui.visuals().faint_bg_color;
+                ui.painter().rect_filled(rect, 2.0, fill);
+            }
+        }
+        ui.vertical(|ui| {
+            ui.label(RichText::new(name).monospace().color(theme::REFERENCE));
+            ui.horizontal(|ui| {
+                let results: Vec<QueryResult> = scope
+                    .run
+                    .results()
+                    .filter(|result| result.fusion.is_none() && result.references == [name.clone()])
+                    .cloned()
+                    .collect();
+                dots(ui, &results, desk.shows_truth);
+                if let Some(words) = distance(scope, frame) {
+                    ui.weak(words);
+                }
+            });
+        });
+    });
+}
+
+/// How far a reference is from the query, which tells the truth.
+fn distance(scope: &Scope<'_>, frame: usize) -> Option<String> {
+    let setup = &scope.desk.setup;
+    let reference = setup.references.pose(frame)?;
+    let query = setup.queries.pose(setup.query)?;
+    let error = PoseError::between(&query, &reference);
+    scope.desk.shows_truth.then(|| {
+        format!(
+            "{:.1} m, {:.1}° away",
+            error.translation_m, error.rotation_deg
+        )
+    })
+}
