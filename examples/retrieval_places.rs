@@ -170,7 +170,7 @@ fn ask(
             let ranked = index.query(features, params, |_| true).ranked;
             if row == 1 {
                 tally.times.push(started.elapsed());
-                if let Some(found) = ranked.first().and_then(|first| first.verified.as_ref()) {
+                if let Some(found) = ranked.first().and_then(|first| first.verification()) {
                     tally.verified += 1;
                     tally.inliers.push(found.inliers);
                 }

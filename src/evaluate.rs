@@ -44,7 +44,10 @@ pub use result::{
 };
 pub use run_file::{Camera, Item, Pair, RUN_SCHEMA, RunFile, Shard};
 pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run};
-pub use select::{ByMatches, ChoiceError, Chooser, Ranking, Selection, draw, frames_within};
+pub use select::{
+    ByMatches, ChoiceError, Chooser, Ranking, References, Selection, draw, frames_within,
+    tell_ranking,
+};
 #[cfg(feature = "cli")]
 pub use table::Table;
 pub use timing::{StageTimes, StageTimings};

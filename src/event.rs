@@ -10,7 +10,9 @@ use crate::features::{Features, Match, MatchVerdict};
 use crate::fusion::Share;
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase, ScoredLattice};
+use crate::image::Photo;
 use crate::render::{ColoredCloud, Comparison, Score};
+use crate::retrieval::ReferenceRanking;
 use crate::robust::{Acceptance, Trial};
 
 /// Which of the two photos.
@@ -65,6 +67,8 @@ impl Method {
 pub enum Stage {
     /// A whole estimator; within the hybrid also the one it runs inside.
     Estimator(Method),
+    /// References are chosen by what they look like.
+    Retrieve,
     /// FB: features of both photos.
     Detect,
     /// FB: exhaustive matching, ratio test, uniqueness.
@@ -90,6 +94,7 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Estimator(method) => method.name(),
+            Self::Retrieve => "retrieve",
             Self::Detect => "detect",
             Self::Match => "match",
             Self::DepthLift => "depth",
@@ -201,6 +206,7 @@ events! {
     MinimumAssessed,
     BranchTaken,
     ReferencesFused,
+    ReferencesRanked,
 }
 
 /// A stage begins.
@@ -470,4 +476,14 @@ pub struct ReferencesFused {
     pub shares: Arc<[Share]>,
     /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
     pub pose: Option<Pose>,
+}
+
+/// Frames were ranked by what they look like, and the first of them became references.
+#[derive(Clone, Debug)]
+pub struct ReferencesRanked {
+    /// The best frames with their scores, and what verification made of them.
+    pub ranking: Arc<ReferenceRanking>,
+    /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
+    /// read.
+    pub photos: Arc<[Option<Photo>]>,
 }

@@ -1,9 +1,12 @@
 //! Decisions in words, for logs.
 
-use crate::event::{Event, MinimumAssessed, Moment, ReferencesFused, Side, Stage, ViewRendered};
+use crate::event::{
+    Event, MinimumAssessed, Moment, ReferencesFused, ReferencesRanked, Side, Stage, ViewRendered,
+};
 use crate::features::MatchVerdict;
 use crate::fusion::Fate;
 use crate::grid::Offset;
+use crate::retrieval::{Criterion, Geometry, RankedReference};
 
 /// One sentence for an event that is a decision; `None` for the others.
 pub(crate) fn sentence(event: &Event) -> Option<String> {
@@ -87,6 +90,7 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             format!("takes the pose of {}: {}", event.method.name(), event.why)
         }
         Event::ReferencesFused(event) => fused(event),
+        Event::ReferencesRanked(event) => ranked(event),
         Event::HypothesisTried(_)
         | Event::PoseScored(_)
         | Event::StageStarted(_)
@@ -139,6 +143,34 @@ fn fused(event: &ReferencesFused) -> String {
         })
         .collect();
     format!("{} of {}", event.fusion, shares.join(", "))
+}
+
+fn ranked(event: &ReferencesRanked) -> String {
+    let ranking = &event.ranking;
+    let say = |reference: &RankedReference| {
+        let ranked = &reference.ranked;
+        let inliers = match &ranked.geometry {
+            Geometry::Verified(found) => format!(", {} inliers", found.inliers),
+            Geometry::Refused => ", refused".to_owned(),
+            Geometry::Unchecked => String::new(),
+        };
+        match ranking.criterion {
+            Criterion::Words => format!("{} ({:.3}{inliers})", reference.name, ranked.score),
+            Criterion::Matches => format!("{} ({:.0} matches)", reference.name, ranked.score),
+        }
+    };
+    let chosen: Vec<String> = ranking
+        .frames
+        .iter()
+        .take(ranking.chosen)
+        .map(say)
+        .collect();
+    format!(
+        "{} of {} frames are references: {}",
+        chosen.len(),
+        ranking.candidates,
+        chosen.join(", ")
+    )
 }
 
 fn cost(cost: Option<f64>) -> String {

@@ -12,6 +12,7 @@
 //! | `build` | from the features of the frames to a file | |
 //! | `layout` | the file: checked, then mapped | |
 //! | `index` | from the features of a query to ranked frames | |
+//! | `ranking` | what is told of ranked frames | |
 //!
 //! Nothing in here knows scenes or photos; [`crate::scene::Retriever`] does.
 
@@ -22,6 +23,7 @@ mod forest;
 mod index;
 mod layout;
 mod params;
+mod ranking;
 #[cfg(test)]
 mod synthetic;
 #[cfg(test)]
@@ -33,8 +35,9 @@ mod vocabulary;
 pub use affine::Affine;
 pub use build::{Progress, Request, Step, Summary, build};
 pub use error::{BuildError, IndexError};
-pub use index::{Index, Ranked, Retrieval};
+pub use index::{Geometry, Index, Ranked, Retrieval};
 pub use layout::{Counts, Description};
 pub use params::RetrievalParams;
+pub use ranking::{Criterion, RankedReference, ReferenceRanking};
 pub use verification::{Verification, VerifiedMatch};
 pub use vocabulary::{Clustering, Vocabulary};

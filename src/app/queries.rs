@@ -200,7 +200,7 @@ fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
 fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
     let request = Request {
         radius_m: setup.uncertainty_radius_m,
-        references: setup.choose(query)?,
+        references: setup.choose(query)?.into(),
         fusions: setup.fusions.clone(),
         setting: None,
     };

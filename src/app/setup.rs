@@ -103,7 +103,8 @@ impl Setup {
         };
         let chosen = chooser
             .choose(query, &|_| false)
-            .map_err(|error| error.to_string())?;
+            .map_err(|error| error.to_string())?
+            .frames;
         if chosen.is_empty() {
             let name = &self.queries.frames()[query];
             return Err(format!(

@@ -122,7 +122,7 @@ impl<'a> FailureRecordings<'a> {
         let identity = Identity {
             scene: query.localizer.references().name().to_owned(),
             queries: vec![query.item.query.to_owned()],
-            references: (query.request.references.iter())
+            references: (query.request.references.frames.iter())
                 .map(|&frame| frames[frame].clone())
                 .collect(),
             configuration: self.params.to_toml(),
@@ -204,7 +204,7 @@ impl Companion for FailureRecordings<'_> {
         let name = name_of(&query.item, query.method.name(), self.several_pairs);
         let path = self.folder.join(format!("{name}.rrd"));
         remove_if_there(&path)?;
-        if query.request.references.is_empty() {
+        if query.request.references.frames.is_empty() {
             return Ok(());
         }
         if self.room.is_full || self.room.recordings == 0 {

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use posescope::evaluate::{Chooser, Localizer, QueryResult, Ranking, Request, Selection};
+use posescope::evaluate::{
+    Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
+};
 use posescope::event::Method;
 use posescope::params::Params;
 use posescope::scene::{self, Scene};
@@ -23,10 +25,10 @@ struct Plan<'a> {
     localizer: Localizer<'a>,
 }
 
-/// One query with its references, as positions in their scenes.
+/// One query, as its position in its scene, with its references.
 struct Task {
     query: usize,
-    references: Vec<usize>,
+    references: References,
 }
 
 /// Runs the command.
@@ -51,7 +53,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     };
     let mut results = Vec::new();
     let methods = plan.methods();
-    let estimates = tasks.iter().map(|task| task.references.len());
+    let estimates = tasks.iter().map(|task| task.references.frames.len());
     let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
     let mut audience = Audience::new(bar.clone(), plan.recorder(&tasks)?);
     if !args.breakpoints.is_empty() {
@@ -174,16 +176,16 @@ impl Plan<'_> {
                 let references = if named.is_empty() {
                     self.chosen(&chooser, query)?
                 } else {
-                    named.clone()
+                    named.clone().into()
                 };
                 Ok(Task { query, references })
             })
             .collect()
     }
 
-    fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<Vec<usize>, CliError> {
+    fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<References, CliError> {
         let chosen = chooser.choose(query, &|_| false)?;
-        if chosen.is_empty() {
+        if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(
                 "{}: no frame with pose and scan within {} m of query {name}; \
@@ -209,7 +211,7 @@ impl Plan<'_> {
         let names = |scene: &dyn Scene, frames: &mut dyn Iterator<Item = usize>| {
             frames.map(|frame| scene.frames()[frame].clone()).collect()
         };
-        let references = tasks.iter().flat_map(|task| task.references.iter());
+        let references = tasks.iter().flat_map(|task| task.references.frames.iter());
         let (from, of) = (self.localizer.references(), self.localizer.queries());
         let identity = Identity {
             scene: from.name().to_owned(),

@@ -6,7 +6,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use super::run_file::{Item, Pair, RunFile};
 use super::run_folder::{FolderError, RunFolder};
 use super::{
-    ChoiceError, Chooser, Localizer, QueryResult, Ranking, Request, StageTimes, Status, Watch,
+    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes, Status,
+    Watch,
 };
 use crate::estimator::Failure;
 use crate::event::Method;
@@ -197,7 +198,7 @@ impl Execution<'_> {
             chooser.choose(frame, &|frame| left_out.contains(&frame))
         };
         let mut requests = Vec::new();
-        let mut last: Option<(f64, Vec<usize>)> = None;
+        let mut last: Option<(f64, References)> = None;
         for setting in self.run.settings() {
             let radius = self.run.prior_m.unwrap_or(setting.radius_m);
             let chosen = match last.take() {

@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::{QueryResult, Setting, StageTimes, StageTimings, evaluate};
+use super::{QueryResult, References, Setting, StageTimes, StageTimings, evaluate, tell_ranking};
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::{KindSet, Method};
 use crate::features::FeatureCache;
@@ -15,6 +15,7 @@ use crate::fusion;
 use crate::geometry::{Pose, PoseError};
 use crate::params::Params;
 use crate::problem::{Problem, Query};
+use crate::retrieval::ReferenceRanking;
 use crate::scene::{Scene, SceneError};
 use crate::sink::Fanout;
 use crate::trace::{Cancelled, Record, Sink, Trace};
@@ -87,8 +88,9 @@ impl Watch for Unwatched {}
 pub struct Request {
     /// How far the query may be from a reference \[m\].
     pub radius_m: f64,
-    /// The references, as positions in their scene. Without any, the query fails.
-    pub references: Vec<usize>,
+    /// The references, as positions in their scene, and how they were found. Without any, the query
+    /// fails.
+    pub references: References,
     /// The fusions to make; without any, each reference gives a result of its own.
     pub fusions: Vec<&'static fusion::Entry>,
     /// What the results are marked with.
@@ -176,7 +178,7 @@ impl<'a> Localizer<'a> {
         let mut members: Vec<Vec<usize>> = Vec::new();
         for request in requests {
             let mut of_request = Vec::new();
-            for &reference in &request.references {
+            for &reference in &request.references.frames {
                 let place = (reference, request.radius_m.to_bits());
                 let known = places.iter().position(|known| *known == place);
                 of_request.push(match known {
@@ -205,6 +207,7 @@ impl<'a> Localizer<'a> {
             problems,
         };
         watch.begin_query(index, &work.problems, work.truth.as_ref());
+        self.tell_rankings(requests, watch)?;
         for &method in methods {
             for (request, members) in requests.iter().zip(&members) {
                 let mut emit = |result: QueryResult, times: StageTimes| {
@@ -241,6 +244,22 @@ impl<'a> Localizer<'a> {
                     let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
                     emit(result, times)?;
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Each ranking once, though several requests may take their references from it.
+    fn tell_rankings(&self, requests: &[Request], watch: &mut dyn Watch) -> Result<(), Cancelled> {
+        let mut told: Vec<&Arc<ReferenceRanking>> = Vec::new();
+        for ranking in requests
+            .iter()
+            .filter_map(|r| r.references.ranking.as_ref())
+        {
+            if !told.iter().any(|known| Arc::ptr_eq(known, ranking)) {
+                let sink: &mut dyn Sink = &mut *watch;
+                tell_ranking(ranking, self.references, &mut Trace::to(sink))?;
+                told.push(ranking);
             }
         }
         Ok(())

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::experiment::Experiment;
-use super::{Request, Selection, Setting};
+use super::{References, Request, Selection, Setting};
 use crate::camera::Intrinsics;
 use crate::event::Method;
 use crate::fusion;
@@ -236,11 +236,14 @@ impl RunFile {
     }
 
     /// The request of a setting, with as many of the chosen references.
-    pub fn request(&self, setting: Setting, chosen: &[usize]) -> Request {
-        let count = setting.references.min(chosen.len());
+    pub fn request(&self, setting: Setting, chosen: &References) -> Request {
+        let count = setting.references.min(chosen.frames.len());
         Request {
             radius_m: setting.radius_m,
-            references: chosen[..count].to_vec(),
+            references: References {
+                frames: chosen.frames[..count].to_vec(),
+                ranking: chosen.ranking.clone(),
+            },
             fusions: self.fusions(),
             setting: Some(setting),
         }

@@ -1,8 +1,9 @@
-//! Choosing references by where they are.
+//! Choosing references by where they are, or by what they look like.
 
 use std::collections::HashSet;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -10,11 +11,14 @@ use rand_pcg::Pcg64;
 
 use super::Localizer;
 use crate::estimator::count_matches;
+use crate::event::{ReferencesRanked, Stage};
 use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Query;
+use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use crate::scene::{Retriever, Scene, SceneError};
+use crate::trace::{Cancelled, Trace};
 
 /// How references are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,7 +92,11 @@ impl FromStr for Selection {
 
 /// Something that ranks reference frames for a query by what they look like: an index to ask.
 pub trait Ranking: Send + Sync {
-    /// The best `count` of the candidates, the best first, as positions in the references' scene.
+    /// What its scores are.
+    fn criterion(&self) -> Criterion;
+
+    /// The best `count` of the candidates, the best first, all of them as positions in the
+    /// references' scene.
     ///
     /// # Errors
     /// When a frame or the index cannot be read.
@@ -97,7 +105,46 @@ pub trait Ranking: Send + Sync {
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<usize>, SceneError>;
+    ) -> Result<Vec<Ranked>, SceneError>;
+}
+
+/// The references of a query.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct References {
+    /// Their positions in their scene.
+    pub frames: Vec<usize>,
+    /// How they were found, where something ranked them.
+    pub ranking: Option<Arc<ReferenceRanking>>,
+}
+
+impl From<Vec<usize>> for References {
+    fn from(frames: Vec<usize>) -> Self {
+        Self {
+            frames,
+            ranking: None,
+        }
+    }
+}
+
+/// Tells whoever watches how the references of a query were ranked.
+///
+/// # Errors
+/// Only [`Cancelled`]. A photo that cannot be read is not shown: watching never changes the answer.
+pub fn tell_ranking(
+    ranking: &Arc<ReferenceRanking>,
+    references: &dyn Scene,
+    trace: &mut Trace<'_>,
+) -> Result<(), Cancelled> {
+    let photo = |reference: &RankedReference| {
+        let read = references.photo(reference.ranked.frame);
+        read.inspect_err(|error| log::warn!("{error}")).ok()
+    };
+    trace.stage(Stage::Retrieve, |trace| {
+        trace.emit(|| ReferencesRanked {
+            ranking: Arc::clone(ranking),
+            photos: ranking.pictured().iter().map(photo).collect(),
+        })
+    })
 }
 
 /// Frames with pose and cloud within `radius_m` of a place, except those left out, the nearest
@@ -174,7 +221,7 @@ impl Chooser<'_> {
         &self,
         query: usize,
         left_out: &dyn Fn(usize) -> bool,
-    ) -> Result<Vec<usize>, ChoiceError> {
+    ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
         let place = queries.pose(query);
@@ -194,36 +241,73 @@ impl Chooser<'_> {
             }
         };
         let count = self.selection.count();
-        let ranked = |ranking: &dyn Ranking| -> Result<Vec<usize>, ChoiceError> {
-            Ok(ranking.rank(&*queries.query(query)?, &within, count)?)
-        };
         match self.selection {
-            Selection::Random(_) => Ok(draw(within, count, name, self.seed)),
+            Selection::Random(_) => Ok(draw(within, count, name, self.seed).into()),
             Selection::Nearest(_) => {
                 within.truncate(count);
-                Ok(within)
+                Ok(within.into())
             }
-            Selection::Matched(_) => ranked(&ByMatches {
-                scene: references,
-                params: self.params,
-                features: self.localizer.features(),
-            }),
-            Selection::Retrieved(_) => ranked(self.index.ok_or(ChoiceError::NoIndex)?),
+            Selection::Matched(_) => {
+                let by_matches = ByMatches {
+                    scene: references,
+                    params: self.params,
+                    features: self.localizer.features(),
+                };
+                self.ranked(query, &within, &by_matches)
+            }
+            Selection::Retrieved(_) => {
+                self.ranked(query, &within, self.index.ok_or(ChoiceError::NoIndex)?)
+            }
         }
+    }
+
+    fn ranked(
+        &self,
+        query: usize,
+        candidates: &[usize],
+        by: &dyn Ranking,
+    ) -> Result<References, ChoiceError> {
+        let (references, queries) = (self.localizer.references(), self.localizer.queries());
+        let count = self.selection.count();
+        let depth = ReferenceRanking::depth(count);
+        let frames: Vec<RankedReference> = by
+            .rank(&*queries.query(query)?, candidates, depth)?
+            .into_iter()
+            .map(|ranked| RankedReference {
+                name: references.frames()[ranked.frame].clone(),
+                world_from_camera: references.pose(ranked.frame),
+                ranked,
+            })
+            .collect();
+        let chosen = frames.iter().take(count);
+        Ok(References {
+            frames: chosen.map(|reference| reference.ranked.frame).collect(),
+            ranking: Some(Arc::new(ReferenceRanking {
+                criterion: by.criterion(),
+                candidates: candidates.len(),
+                chosen: count.min(frames.len()),
+                frames,
+            })),
+        })
     }
 }
 
 impl Ranking for Retriever {
+    fn criterion(&self) -> Criterion {
+        Criterion::Words
+    }
+
     fn rank(
         &self,
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<usize>, SceneError> {
+    ) -> Result<Vec<Ranked>, SceneError> {
         let candidates: HashSet<usize> = candidates.iter().copied().collect();
         let retrieval = self.retrieve(&query.photo, |frame| candidates.contains(&frame));
-        let ranked = retrieval.ranked.into_iter().take(count);
-        Ok(ranked.map(|ranked| ranked.frame).collect())
+        let mut ranked = retrieval.ranked;
+        ranked.truncate(count);
+        Ok(ranked)
     }
 }
 
@@ -238,12 +322,16 @@ pub struct ByMatches<'a> {
 }
 
 impl Ranking for ByMatches<'_> {
+    fn criterion(&self) -> Criterion {
+        Criterion::Matches
+    }
+
     fn rank(
         &self,
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<usize>, SceneError> {
+    ) -> Result<Vec<Ranked>, SceneError> {
         let of_query = self.features.surf(&query.photo.gray, &self.params.surf);
         let mut ranked = Vec::new();
         for &candidate in candidates {
@@ -256,7 +344,12 @@ impl Ranking for ByMatches<'_> {
         }
         ranked.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         ranked.truncate(count);
-        Ok(ranked.into_iter().map(|(_, frame)| frame).collect())
+        let ranked = ranked.into_iter().map(|(matches, frame)| Ranked {
+            frame,
+            score: matches as f32,
+            geometry: Geometry::Unchecked,
+        });
+        Ok(ranked.collect())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Asking an index.
 
+use std::iter::repeat;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -17,15 +18,36 @@ use crate::features::Features;
 /// nothing about where each of them is.
 const PAIRS_PER_WORD: usize = 16;
 
-/// An indexed frame and how much it resembles the query.
+/// What verification made of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// It was not asked: the score was not among the best, or scores are all that counts.
+    Unchecked,
+    /// Too few of the shared words lie alike.
+    Refused,
+    /// Many of the shared words lie alike.
+    Verified(Verification),
+}
+
+/// A frame and how much it resembles the query.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ranked {
     /// Its position in the scene.
     pub frame: usize,
-    /// Cosine of the tf-idf weights, in 0 … 1.
+    /// How much; from an index the cosine of the tf-idf weights, in 0 … 1.
     pub score: f32,
-    /// What verification found; `None` where it found nothing or was not asked.
-    pub verified: Option<Verification>,
+    /// Whether the resemblance has a geometry.
+    pub geometry: Geometry,
+}
+
+impl Ranked {
+    /// What verification found, if it found anything.
+    pub fn verification(&self) -> Option<&Verification> {
+        match &self.geometry {
+            Geometry::Verified(found) => Some(found),
+            Geometry::Unchecked | Geometry::Refused => None,
+        }
+    }
 }
 
 /// What the index answers.
@@ -133,25 +155,28 @@ impl Index {
         let mut scored = self.scored(&sorted, allowed);
         scored.sort_unstable_by(|a, b| (b.1.total_cmp(&a.1)).then(a.0.cmp(&b.0)));
         let tolerance = params.tolerance();
-        let verified: Vec<Option<Verification>> = scored
+        let verified: Vec<Geometry> = scored
             .par_iter()
             .take(params.verify)
-            .map(|&(document, _)| verify(&self.pairs(features, &by_word, document), &tolerance))
+            .map(|&(document, _)| {
+                let found = verify(&self.pairs(features, &by_word, document), &tolerance);
+                found.map_or(Geometry::Refused, Geometry::Verified)
+            })
             .collect();
         let mut ranked: Vec<Ranked> = scored
             .into_iter()
-            .zip(verified.into_iter().chain(std::iter::repeat(None)))
-            .filter_map(|((document, score), verified)| {
+            .zip(verified.into_iter().chain(repeat(Geometry::Unchecked)))
+            .filter_map(|((document, score), geometry)| {
                 Some(Ranked {
                     frame: self.stored.frame(document)?,
                     score,
-                    verified,
+                    geometry,
                 })
             })
             .collect();
         // Stable: of as many inliers, or none, the better score stays first.
         ranked.sort_by_key(|ranked| {
-            let inliers = ranked.verified.as_ref().map(|found| found.inliers);
+            let inliers = ranked.verification().map(|found| found.inliers);
             std::cmp::Reverse(inliers)
         });
         Retrieval { words, ranked }

@@ -87,7 +87,7 @@ fn the_frames_around_a_new_view_come_first_and_are_verified() {
         assert_eq!(retrieval.words.len(), SEEN);
         let first = &retrieval.ranked[0];
         assert!(first.frame.abs_diff(place) <= 1, "{place}: {}", first.frame);
-        let verified = first.verified.as_ref().expect("is the same place");
+        let verified = first.verification().expect("is the same place");
         assert!(verified.inliers > SEEN / 2);
         // Landmarks move by as many pixels as the places are apart.
         let shift = (place as f64 - first.frame as f64) * 20.0 * STEP as f64;
@@ -119,7 +119,11 @@ fn without_verification_the_order_is_that_of_the_scores() {
     let retrieval = open(&path).query(&view(10, 9), &params, |_| true);
     let ranked = &retrieval.ranked;
     assert!(ranked.is_sorted_by(|a, b| a.score >= b.score));
-    assert!(ranked.iter().all(|ranked| ranked.verified.is_none()));
+    assert!(
+        ranked
+            .iter()
+            .all(|ranked| ranked.geometry == Geometry::Unchecked)
+    );
     assert!(ranked.iter().all(|r| r.score > 0.0 && r.score < 1.0 + 1e-5));
 }
 
@@ -131,7 +135,7 @@ fn verified_frames_stand_before_the_others_by_their_inliers() {
         ..RetrievalParams::default()
     };
     let ranked = open(&path).query(&view(10, 9), &params, |_| true).ranked;
-    let inliers = |r: &Ranked| r.verified.as_ref().map(|found| found.inliers);
+    let inliers = |r: &Ranked| r.verification().map(|found| found.inliers);
     assert!(ranked.is_sorted_by(|a, b| inliers(a) >= inliers(b)));
     assert!(inliers(&ranked[0]).is_some());
     assert!(ranked.iter().any(|ranked| inliers(ranked).is_none()));

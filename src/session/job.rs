@@ -109,7 +109,7 @@ impl Job {
         let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
         let request = Request {
             radius_m: self.uncertainty_radius_m,
-            references: self.reference_frames.clone(),
+            references: self.reference_frames.clone().into(),
             fusions: self.fusions.clone(),
             setting: None,
         };

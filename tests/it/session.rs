@@ -249,7 +249,7 @@ fn several_references_are_fused_as_without_a_session() {
     let localizer = Localizer::new(&scene, &scene, &several.params, several.seed);
     let request = Request {
         radius_m: several.uncertainty_radius_m,
-        references: several.reference_frames.clone(),
+        references: several.reference_frames.clone().into(),
         fusions: several.fusions.clone(),
         setting: None,
     };

@@ -134,7 +134,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
     let mut results = Vec::new();
     let request = Request {
         radius_m: 3.0,
-        references: vec![0],
+        references: vec![0].into(),
         fusions: Vec::new(),
         setting: None,
     };
