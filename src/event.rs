@@ -485,5 +485,5 @@ pub struct ReferencesRanked {
     pub ranking: Arc<ReferenceRanking>,
     /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
     /// read.
-    pub photos: Arc<[Option<Photo>]>,
+    pub photos: Arc<[Option<Arc<Photo>>]>,
 }

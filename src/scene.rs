@@ -13,7 +13,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 pub use error::SceneError;
 pub use kitti::{KittiOdometry, SequenceWriter};
-pub use retriever::{IndexOptions, Retriever};
+pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;

@@ -7,15 +7,19 @@
 mod at_hand;
 mod breakpoint;
 mod gate;
+mod index_file;
 mod job;
 mod run;
 
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver};
 
+use crate::evaluate::References;
+
 pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use gate::RunMode;
-pub use job::{Job, Loaded};
+pub use index_file::IndexFile;
+pub use job::{Job, JobError, Loaded};
 pub use run::{Part, Run, Span, StageBar};
 
 use gate::Control;
@@ -48,6 +52,7 @@ pub struct Session {
     control: Arc<Control>,
     inbox: Receiver<Message>,
     run: Run,
+    chosen: Option<References>,
     state: State,
 }
 
@@ -69,6 +74,7 @@ impl Session {
             control,
             inbox,
             run,
+            chosen: None,
             state: State::Loading,
         }
     }
@@ -79,6 +85,7 @@ impl Session {
         while let Ok(message) = self.inbox.try_recv() {
             is_new = true;
             match message {
+                Message::Chosen(chosen) => self.chosen = Some(chosen),
                 Message::Loaded(loaded) => {
                     self.run.loaded = Some(loaded);
                     self.state = State::Running;
@@ -103,6 +110,11 @@ impl Session {
     /// What the run has told so far.
     pub fn run(&self) -> &Run {
         &self.run
+    }
+
+    /// The references, once they are chosen.
+    pub fn chosen(&self) -> Option<&References> {
+        self.chosen.as_ref()
     }
 
     /// What the session is doing, as of the last [`Self::drain`].

@@ -244,6 +244,11 @@ impl Desk {
     pub(super) fn attend(&mut self) {
         let was_alive = self.session.is_alive();
         if self.session.drain() {
+            if let Some(chosen) = self.session.chosen()
+                && *chosen != self.setup.chosen
+            {
+                self.setup.chosen = chosen.clone();
+            }
             let last = self.session.run().len().saturating_sub(1);
             if let Some(anchor) = &self.anchor {
                 match anchor.find(self.session.run()) {

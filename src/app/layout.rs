@@ -149,7 +149,7 @@ fn first_tree() -> Tree<String> {
         views::PARAMETERS,
         "breakpoints",
     ]);
-    let pictures = tabs(&["images", "synthetic"]);
+    let pictures = tabs(&["images", "retrieval", "synthetic"]);
     let space = tabs(&["space", "ransac"]);
     let surface = tabs(&["surface"]);
     let histogram = tabs(&["histogram", "fusion"]);

@@ -8,7 +8,7 @@ use super::command::Command;
 use super::desk::{Comparing, Desk, Kept};
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
-use crate::evaluate::{QueryResult, Status};
+use crate::evaluate::{QueryResult, References, Status};
 use crate::event::{Method, PhaseSearched};
 use crate::geometry::Pose;
 use crate::grid::Phase;
@@ -58,10 +58,12 @@ impl App {
             }
             Command::SetRadius(radius_m) => {
                 desk.setup.uncertainty_radius_m = radius_m;
+                desk.setup.go_to(desk.setup.query);
                 desk.begin_again();
             }
             Command::SetSeed(seed) => {
                 desk.setup.seed = seed;
+                desk.setup.go_to(desk.setup.query);
                 desk.begin_again();
             }
             Command::SetParam { key, value } => match desk.setup.params.set(&key, &value) {
@@ -261,14 +263,7 @@ impl Desk {
     }
 
     fn select_query(&mut self, query: usize) {
-        match self.setup.choose(query) {
-            Ok(frames) => self.setup.reference_frames = frames,
-            Err(why) => {
-                self.note(why, true);
-                return;
-            }
-        }
-        self.setup.query = query;
+        self.setup.go_to(query);
         self.camera = None;
         self.begin(RunMode::Running);
     }
@@ -303,19 +298,10 @@ impl Desk {
     }
 
     fn pick_references(&mut self, pick: ReferencePick) {
-        let before = std::mem::replace(&mut self.setup.pick, pick);
-        if pick == ReferencePick::ByHand {
-            return;
-        }
-        match self.setup.choose(self.setup.query) {
-            Ok(frames) => {
-                self.setup.reference_frames = frames;
-                self.begin(RunMode::Running);
-            }
-            Err(why) => {
-                self.setup.pick = before;
-                self.note(why, true);
-            }
+        self.setup.pick = pick;
+        if pick != ReferencePick::ByHand {
+            self.setup.chosen = References::default();
+            self.begin(RunMode::Running);
         }
     }
 
@@ -325,7 +311,7 @@ impl Desk {
             return;
         }
         self.setup.pick = ReferencePick::ByHand;
-        self.setup.reference_frames = frames;
+        self.setup.chosen = frames.into();
         self.begin(RunMode::Running);
     }
 

@@ -11,7 +11,7 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 
 use super::setup::Setup;
 use super::textures::color_image;
-use crate::evaluate::{LocalizeError, QueryResult, Request, Unwatched};
+use crate::evaluate::{QueryResult, Unwatched};
 use crate::event::Side;
 use crate::picture;
 use crate::scene::Scene;
@@ -198,21 +198,8 @@ fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
 }
 
 fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
-    let request = Request {
-        radius_m: setup.uncertainty_radius_m,
-        references: setup.choose(query)?.into(),
-        fusions: setup.fusions.clone(),
-        setting: None,
-    };
-    let mut results = Vec::new();
-    let keep = |result, _| {
-        results.push(result);
-        Ok::<(), LocalizeError>(())
-    };
-    let methods = &setup.methods;
-    setup
-        .localizer()
-        .localize(0, query, &[request], methods, &mut Unwatched, keep)
-        .map_err(|error| error.to_string())?;
-    Ok(results)
+    let mut setup = setup.clone();
+    setup.go_to(query);
+    let results = setup.job(None).work(&mut Unwatched, |_| {});
+    results.map_err(|error| error.to_string())
 }

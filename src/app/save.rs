@@ -68,7 +68,7 @@ impl Desk {
             return Ok(());
         };
         let setup = &self.setup;
-        let reference_names = setup.reference_frames.iter();
+        let reference_names = setup.chosen.frames.iter();
         let identity = Identity {
             scene: setup.references.name().to_owned(),
             queries: vec![setup.queries.frames()[setup.query].clone()],

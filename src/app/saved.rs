@@ -11,6 +11,7 @@ use crate::files;
 use crate::fusion;
 use crate::params::Params;
 use crate::scene::{self, Scene};
+use crate::session::IndexFile;
 
 /// The version of the file's form.
 const SCHEMA: &str = "posescope.session/1";
@@ -42,7 +43,7 @@ pub(super) struct SavedSession {
 impl SavedSession {
     pub(super) fn new(setup: &Setup, cursor: usize, layout: serde_json::Value) -> Self {
         let name = |scene: &Arc<dyn Scene>, frame: usize| scene.frames()[frame].clone();
-        let references = setup.reference_frames.iter();
+        let references = setup.chosen.frames.iter();
         Self {
             schema: SCHEMA.to_owned(),
             scene: setup.scene_argument.clone(),
@@ -101,7 +102,7 @@ impl SavedSession {
             None => Arc::clone(&references),
         };
         let query = queries.find(&self.query).map_err(words)?;
-        let reference_frames = self
+        let reference_frames: Vec<usize> = self
             .references
             .iter()
             .map(|name| references.find(name).map_err(words))
@@ -122,7 +123,11 @@ impl SavedSession {
             references,
             queries,
             query,
-            reference_frames,
+            chosen: reference_frames.into(),
+            index: match is_same_scene {
+                true => Arc::clone(&present.index),
+                false => Arc::new(IndexFile::new(&self.scene, None)),
+            },
             pick: self
                 .pick
                 .parse()

@@ -5,12 +5,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::evaluate::{Chooser, Localizer, QueryResult, Selection};
+use crate::evaluate::{QueryResult, References, Selection, frames_within};
 use crate::event::Method;
 use crate::fusion;
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::session::{Job, Loaded, RunMode};
+use crate::session::{IndexFile, Job, Loaded, RunMode};
 
 /// How the references of a query are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,10 +45,12 @@ pub struct Setup {
     pub offered: Vec<usize>,
     /// The query to begin with.
     pub query: usize,
-    /// Its references.
-    pub reference_frames: Vec<usize>,
+    /// Its references; none where they are still to be chosen.
+    pub chosen: References,
     /// How the references of other queries are chosen.
     pub pick: ReferencePick,
+    /// What a choice by looks asks.
+    pub index: Arc<IndexFile>,
     /// The methods to run.
     pub methods: Vec<Method>,
     /// What to make of several references: nothing, or one pose by each of these.
@@ -75,7 +77,12 @@ impl Setup {
             references: Arc::clone(&self.references),
             queries: Arc::clone(&self.queries),
             query: self.query,
-            reference_frames: self.reference_frames.clone(),
+            chosen: self.chosen.clone(),
+            selection: match self.pick {
+                ReferencePick::ByHand => None,
+                ReferencePick::By(selection) => Some(selection),
+            },
+            index: Arc::clone(&self.index),
             methods: self.methods.clone(),
             fusions: self.fusions.clone(),
             params: self.params.clone(),
@@ -85,41 +92,27 @@ impl Setup {
         }
     }
 
-    /// The references of a query by the present rule, at least one.
-    ///
-    /// # Errors
-    /// Why there is none, in one line.
-    pub fn choose(&self, query: usize) -> Result<Vec<usize>, String> {
-        let ReferencePick::By(selection) = self.pick else {
-            return Ok(self.reference_frames.clone());
-        };
-        let chooser = Chooser {
-            localizer: &self.localizer(),
-            params: &self.params,
-            selection,
-            radius_m: self.uncertainty_radius_m,
-            seed: self.seed,
-            index: None,
-        };
-        let chosen = chooser
-            .choose(query, &|_| false)
-            .map_err(|error| error.to_string())?
-            .frames;
-        if chosen.is_empty() {
-            let name = &self.queries.frames()[query];
-            return Err(format!(
-                "no frame with pose and scan within {} m of query {name}; raise the radius or \
-                 choose references by hand",
-                self.uncertainty_radius_m
-            ));
+    /// Goes to another query; where references are not chosen by hand, new ones are needed.
+    pub(super) fn go_to(&mut self, query: usize) {
+        self.query = query;
+        if self.pick != ReferencePick::ByHand {
+            self.chosen = References::default();
         }
-        Ok(chosen)
     }
 
-    /// Localises queries without a person.
-    pub(super) fn localizer(&self) -> Localizer<'_> {
+    /// Frames that could be references of a query: with pose and cloud, within the radius where the
+    /// query's position is known.
+    pub fn candidates(&self, query: usize) -> Vec<usize> {
         let (references, queries) = (self.references.as_ref(), self.queries.as_ref());
-        Localizer::new(references, queries, &self.params, self.seed)
+        let is_same_scene = references.name() == queries.name();
+        let is_query = |frame| is_same_scene && frame == query;
+        match queries.pose(query) {
+            Some(place) => frames_within(references, &place, self.uncertainty_radius_m, &is_query),
+            None => (0..references.frames().len())
+                .filter(|&frame| !is_query(frame) && references.has_cloud(frame))
+                .filter(|&frame| references.pose(frame).is_some())
+                .collect(),
+        }
     }
 
     /// The command line that repeats this run.
@@ -131,7 +124,7 @@ impl Setup {
         }
         let frame = |scene: &Arc<dyn Scene>, index: usize| scene.frames()[index].clone();
         words.extend(["--query".to_owned(), frame(&self.queries, self.query)]);
-        for &reference in &self.reference_frames {
+        for &reference in &self.chosen.frames {
             words.extend(["--reference".to_owned(), frame(&self.references, reference)]);
         }
         if self.methods != Method::ALL {

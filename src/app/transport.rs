@@ -111,7 +111,8 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     );
     ui.label("←");
     let names: Vec<_> = setup
-        .reference_frames
+        .chosen
+        .frames
         .iter()
         .map(|&reference| frame(&setup.references, reference))
         .collect();

@@ -17,6 +17,7 @@ mod ransac;
 mod readout;
 mod references;
 mod report;
+mod retrieval;
 mod space;
 mod surface;
 mod synthetic;
@@ -85,6 +86,12 @@ pub const ALL: &[Entry] = &[
         title: "Images",
         about: "both photos, their matches, and where each feature ended",
         new: |_| Box::<images::Images>::default(),
+    },
+    Entry {
+        name: "retrieval",
+        title: "Retrieval",
+        about: "frames that resemble the query, and what in them lies alike",
+        new: |_| Box::<retrieval::Retrieval>::default(),
     },
     Entry {
         name: "synthetic",

@@ -159,7 +159,9 @@ pub struct ViewArgs {
     /// A frame with known pose and cloud to localise against; repeatable
     #[arg(long, value_name = "FRAME")]
     pub reference: Vec<String>,
-    /// How references are chosen where --reference names none: random:K, nearest:K or maxf:K
+    /// How references are chosen where --reference names none: random:K, nearest:K, maxf:K (those
+    /// with the most feature matches) or retrieve:K (those that the index of `posescope index` ranks
+    /// first)
     #[arg(
         long,
         value_name = "HOW",
@@ -167,6 +169,9 @@ pub struct ViewArgs {
         conflicts_with = "reference"
     )]
     pub references: Selection,
+    /// The index that retrieve:K asks [default: where `posescope index` puts it]
+    #[arg(long, value_name = "FILE")]
+    pub index: Option<PathBuf>,
     /// How far the query may be from its reference: the disc that the direct methods search [m]
     #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
     pub radius: f64,

@@ -9,7 +9,7 @@ use posescope::evaluate::{
 };
 use posescope::event::Method;
 use posescope::params::Params;
-use posescope::scene::{self, Scene};
+use posescope::scene::{self, Retriever, Scene};
 
 use super::args::EvalArgs;
 use super::failure::CliError;
@@ -17,7 +17,7 @@ use super::failures::FailureRecordings;
 use super::output;
 use super::run::use_threads;
 use super::terminal::Terminal;
-use super::{diff, index, params};
+use super::{diff, params};
 
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
@@ -93,7 +93,7 @@ fn indices(
     let named = scenes.references.iter().zip(&run.scenes);
     named
         .map(|(scene, argument)| {
-            let index = index::open(None, scene.as_ref(), argument, params)?;
+            let index = Retriever::find(None, scene.as_ref(), argument, params)?;
             Ok(Box::new(index) as Box<dyn Ranking>)
         })
         .collect()

@@ -6,8 +6,7 @@ use std::process::ExitCode;
 
 use posescope::evaluate::{ChoiceError, DrawError, FolderError, RunError};
 use posescope::params::ParamError;
-use posescope::retrieval::IndexError;
-use posescope::scene::SceneError;
+use posescope::scene::{NoIndex, SceneError};
 use posescope::sink::rerun::{ComparisonError, RecordError};
 use posescope::trace::Cancelled;
 
@@ -33,8 +32,8 @@ pub enum CliError {
     Io { path: PathBuf, source: io::Error },
     #[error("{0}")]
     NoReference(String),
-    #[error("{source}; `{command}` builds it")]
-    Index { source: IndexError, command: String },
+    #[error(transparent)]
+    Index(#[from] NoIndex),
     #[error(transparent)]
     Choice(#[from] ChoiceError),
     #[error(transparent)]
@@ -78,7 +77,7 @@ impl CliError {
             | Self::Config { .. }
             | Self::Io { .. }
             | Self::NoReference(_)
-            | Self::Index { .. }
+            | Self::Index(_)
             | Self::Choice(_)
             | Self::Draw(_)
             | Self::Folder(_)

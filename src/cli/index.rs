@@ -1,10 +1,7 @@
 //! `posescope index`: the retrieval index of a scene.
 
-use std::path::{Path, PathBuf};
-
-use posescope::params::Params;
 use posescope::retrieval::{BuildError, Index, IndexError, Progress};
-use posescope::scene::{self, IndexOptions, Retriever, Scene};
+use posescope::scene::{self, IndexOptions, NoIndex, Retriever};
 
 use super::args::IndexArgs;
 use super::failure::CliError;
@@ -17,7 +14,10 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     use_threads(args.threads)?;
     let params = params::resolve(&args.config)?;
     let scene = scene::open(&args.scene, args.format.as_deref())?;
-    let path = path(args.output.as_deref(), scene.as_ref(), &args.scene)?;
+    let path = match &args.output {
+        Some(path) => path.clone(),
+        None => Retriever::default_path(scene.as_ref(), &args.scene).ok_or(NoIndex::NoFolder)?,
+    };
     let options = IndexOptions {
         words: args.words.get(),
         every: args.every.get(),
@@ -69,37 +69,6 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         )
     });
     Ok(())
-}
-
-/// Opens the index of a scene, or says which command builds it.
-pub fn open(
-    given: Option<&Path>,
-    scene: &dyn Scene,
-    argument: &str,
-    params: &Params,
-) -> Result<Retriever, CliError> {
-    let path = path(given, scene, argument)?;
-    Retriever::open(&path, scene, params).map_err(|source| {
-        let output = given.map_or(String::new(), |path| {
-            format!(" --output {}", path.display())
-        });
-        CliError::Index {
-            source,
-            command: format!("posescope index {argument}{output}"),
-        }
-    })
-}
-
-fn path(given: Option<&Path>, scene: &dyn Scene, argument: &str) -> Result<PathBuf, CliError> {
-    let path = given.map(Path::to_owned);
-    path.or_else(|| Retriever::default_path(scene, argument))
-        .ok_or_else(|| {
-            CliError::Usage(
-                "there is no cache directory for the retrieval index; name a file with --output \
-                 of `posescope index` and --index of `posescope run`"
-                    .to_owned(),
-            )
-        })
 }
 
 fn say(terminal: &Terminal, message: impl FnOnce() -> String) {

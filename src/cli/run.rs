@@ -7,7 +7,7 @@ use posescope::evaluate::{
 };
 use posescope::event::Method;
 use posescope::params::Params;
-use posescope::scene::{self, Scene};
+use posescope::scene::{self, Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
@@ -16,7 +16,7 @@ use super::audience::Audience;
 use super::failure::CliError;
 use super::output::{self, JsonLines};
 use super::terminal::Terminal;
-use super::{index, params, table};
+use super::{params, table};
 
 /// What is asked of every query.
 struct Plan<'a> {
@@ -154,7 +154,7 @@ impl Plan<'_> {
             .map(|name| references.find(name))
             .collect::<Result<Vec<_>, _>>()?;
         let index = match args.references {
-            Selection::Retrieved(_) if named.is_empty() => Some(index::open(
+            Selection::Retrieved(_) if named.is_empty() => Some(Retriever::find(
                 args.index.as_deref(),
                 references,
                 &args.scene,

@@ -9,7 +9,7 @@ use posescope::evaluate::{QueryResult, Selection, read_results, read_run};
 use posescope::event::Method;
 use posescope::params::Params;
 use posescope::scene::{self, Scene};
-use posescope::session::RunMode;
+use posescope::session::{IndexFile, RunMode};
 
 use super::args::{ConfigArgs, RecordingArgs, RunArgs, ViewArgs};
 use super::failure::CliError;
@@ -29,6 +29,7 @@ impl ViewArgs {
             query: None,
             reference: Vec::new(),
             references: Selection::Random(1),
+            index: None,
             radius: 15.0,
             method: Method::ALL.to_vec(),
             fusion: Vec::new(),
@@ -67,7 +68,7 @@ fn record_instead(
         "posescope: {why}; recording {} instead",
         recording.display()
     );
-    let references = setup.reference_frames.iter();
+    let references = setup.chosen.frames.iter();
     run::run(
         &RunArgs {
             scene: setup.scene_argument.clone(),
@@ -78,8 +79,11 @@ fn record_instead(
             reference: references
                 .map(|&frame| setup.references.frames()[frame].clone())
                 .collect(),
-            references: Selection::Random(1),
-            index: None,
+            references: match setup.pick {
+                ReferencePick::By(selection) => selection,
+                ReferencePick::ByHand => args.references,
+            },
+            index: setup.index.file().cloned(),
             radius: setup.uncertainty_radius_m,
             method: setup.methods.clone(),
             fusion: setup.fusions.clone(),
@@ -133,7 +137,8 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
             [] => ReferencePick::By(args.references),
             _ => ReferencePick::ByHand,
         },
-        reference_frames: named,
+        chosen: named.into(),
+        index: Arc::new(IndexFile::new(&args.scene, args.index.clone())),
         methods: methods(&args.method),
         fusions: args.fusion.clone(),
         params: params::resolve(&args.config)?,
@@ -150,30 +155,36 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
 
 /// The query that was named, the demonstration's, or the first that has a reference.
 fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
-    let no_reference = |why: String| CliError::NoReference(format!("{}: {why}", args.scene));
-    if let Some(name) = &args.query {
-        setup.query = setup.queries.find(name)?;
-        setup.reference_frames = setup.choose(setup.query).map_err(no_reference)?;
-        return Ok(());
-    }
-    let is_demo = args.scene == "street" && args.queries.is_none() && args.reference.is_empty();
-    if is_demo {
-        setup.query = setup.queries.find(demo::QUERY)?;
-        setup.reference_frames = vec![setup.references.find(demo::REFERENCE)?];
-        return Ok(());
-    }
-    let mut why = "there is no frame".to_owned();
-    for &query in &setup.offered {
-        match setup.choose(query) {
-            Ok(frames) => {
-                setup.query = query;
-                setup.reference_frames = frames;
-                return Ok(());
-            }
-            Err(reason) => why = reason,
+    let has_reference = |setup: &Setup, query| {
+        setup.pick == ReferencePick::ByHand || !setup.candidates(query).is_empty()
+    };
+    let is_demo = args.scene == "street"
+        && args.queries.is_none()
+        && args.query.is_none()
+        && setup.pick == ReferencePick::By(Selection::Random(1));
+    setup.query = match &args.query {
+        _ if is_demo => {
+            setup.chosen = vec![setup.references.find(demo::REFERENCE)?].into();
+            setup.queries.find(demo::QUERY)?
         }
+        Some(name) => setup.queries.find(name)?,
+        None => {
+            let mut offered = setup.offered.iter().copied();
+            offered
+                .find(|&query| has_reference(setup, query))
+                .unwrap_or(0)
+        }
+    };
+    if has_reference(setup, setup.query) {
+        return Ok(());
     }
-    Err(no_reference(why))
+    Err(CliError::NoReference(format!(
+        "{}: no frame with pose and scan within {} m of query {}; raise --radius or name one with \
+         --reference",
+        args.scene,
+        args.radius,
+        setup.queries.frames()[setup.query]
+    )))
 }
 
 /// In the order of the registry, each once.
@@ -238,15 +249,19 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         .map(|name| references.find(name))
         .collect::<Result<Vec<_>, _>>()?;
     let selection = file.references.parse().map_err(CliError::Usage)?;
-    let mut setup = Setup {
+    Ok(Setup {
         scene_argument,
         offered: results.keys().copied().collect(),
         references,
         queries_argument: other.cloned(),
         queries,
         query,
-        reference_frames,
+        chosen: reference_frames.into(),
         pick: ReferencePick::By(selection),
+        index: Arc::new(IndexFile::new(
+            &file.scenes[pair.scene_index],
+            args.index.clone(),
+        )),
         methods: file
             .methods
             .iter()
@@ -260,9 +275,5 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         mode: RunMode::Paused,
         results,
         folder: PathBuf::from(FOLDER),
-    };
-    if setup.reference_frames.is_empty() {
-        setup.reference_frames = setup.choose(query).map_err(CliError::NoReference)?;
-    }
-    Ok(setup)
+    })
 }

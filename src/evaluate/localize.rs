@@ -30,6 +30,9 @@ pub trait Watch: Sink {
         let _ = (index, problems, truth);
     }
 
+    /// How the references were ranked is going to be told.
+    fn begin_retrieval(&mut self) {}
+
     /// A method begins on one of the problems; what it tells goes to [`Sink::accept`].
     fn begin_method(&mut self, problem: usize, method: Method) {
         let _ = (problem, method);
@@ -257,6 +260,7 @@ impl<'a> Localizer<'a> {
             .filter_map(|r| r.references.ranking.as_ref())
         {
             if !told.iter().any(|known| Arc::ptr_eq(known, ranking)) {
+                watch.begin_retrieval();
                 let sink: &mut dyn Sink = &mut *watch;
                 tell_ranking(ranking, self.references, &mut Trace::to(sink))?;
                 told.push(ranking);

@@ -137,7 +137,9 @@ pub fn tell_ranking(
 ) -> Result<(), Cancelled> {
     let photo = |reference: &RankedReference| {
         let read = references.photo(reference.ranked.frame);
-        read.inspect_err(|error| log::warn!("{error}")).ok()
+        read.inspect_err(|error| log::warn!("{error}"))
+            .ok()
+            .map(Arc::new)
     };
     trace.stage(Stage::Retrieve, |trace| {
         trace.emit(|| ReferencesRanked {

@@ -28,6 +28,25 @@ pub struct IndexOptions {
     pub seed: u64,
 }
 
+/// Why there is no index to ask.
+#[derive(Debug, thiserror::Error)]
+pub enum NoIndex {
+    /// There is no cache directory, and no file was named.
+    #[error(
+        "there is no cache directory for the retrieval index; name a file with --output of \
+         `posescope index`, and with --index"
+    )]
+    NoFolder,
+    /// The file is not there or cannot be used.
+    #[error("{source}; `{command}` builds it")]
+    Unusable {
+        /// What is wrong with it.
+        source: IndexError,
+        /// The command that builds it.
+        command: String,
+    },
+}
+
 /// A scene's index.
 pub struct Retriever {
     index: Index,
@@ -103,6 +122,32 @@ impl Retriever {
             index,
             surf: params.retrieval.surf(&params.surf),
             params: params.retrieval,
+        })
+    }
+
+    /// Opens the index of the scene that `argument` names: the given file, or that of
+    /// [`Self::default_path`].
+    ///
+    /// # Errors
+    /// [`NoIndex`], with the command that builds one.
+    pub fn find(
+        given: Option<&Path>,
+        scene: &dyn Scene,
+        argument: &str,
+        params: &Params,
+    ) -> Result<Self, NoIndex> {
+        let path = given.map(Path::to_owned);
+        let path = path
+            .or_else(|| Self::default_path(scene, argument))
+            .ok_or(NoIndex::NoFolder)?;
+        Self::open(&path, scene, params).map_err(|source| {
+            let output = given.map_or(String::new(), |path| {
+                format!(" --output {}", path.display())
+            });
+            NoIndex::Unusable {
+                source,
+                command: format!("posescope index {argument}{output}"),
+            }
         })
     }
 

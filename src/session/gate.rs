@@ -236,6 +236,10 @@ impl Watch for Gate {
         let _ = self.tell(Message::Loaded(Arc::new(loaded)));
     }
 
+    fn begin_retrieval(&mut self) {
+        let _ = self.tell(Message::Began(Part::Retrieval));
+    }
+
     fn begin_method(&mut self, problem: usize, method: Method) {
         let _ = self.tell(Message::Began(Part::Reference(method, problem)));
     }

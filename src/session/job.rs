@@ -7,14 +7,18 @@ use std::thread;
 
 use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
+use super::index_file::IndexFile;
 use super::run::Part;
-use crate::evaluate::{LocalizeError, Localizer, QueryResult, Request, StageTimes, words_of};
+use crate::evaluate::{
+    ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
+    Selection, StageTimes, Watch, words_of,
+};
 use crate::event::Method;
 use crate::fusion;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::scene::Scene;
+use crate::scene::{NoIndex, Scene};
 use crate::trace::Record;
 
 /// One query, its references, and what to do with them.
@@ -26,8 +30,12 @@ pub struct Job {
     pub queries: Arc<dyn Scene>,
     /// The query's position in its scene.
     pub query: usize,
-    /// The references' positions in theirs.
-    pub reference_frames: Vec<usize>,
+    /// The references, once they are chosen.
+    pub chosen: References,
+    /// How they are chosen where there are none yet.
+    pub selection: Option<Selection>,
+    /// What a choice by looks asks.
+    pub index: Arc<IndexFile>,
     /// The methods to run, in this order, each on every reference.
     pub methods: Vec<Method>,
     /// What to make of several references.
@@ -51,8 +59,40 @@ pub struct Loaded {
     pub truth: Option<Pose>,
 }
 
+/// Why a job has no results.
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// A frame cannot be read, or the job was cancelled.
+    #[error(transparent)]
+    Localize(#[from] LocalizeError),
+    /// References cannot be chosen.
+    #[error(transparent)]
+    Choice(#[from] ChoiceError),
+    /// There is no index to ask.
+    #[error(transparent)]
+    Index(#[from] NoIndex),
+    /// Nobody said which.
+    #[error("no reference is chosen for query {query}")]
+    NoneNamed {
+        /// The query frame's name.
+        query: String,
+    },
+    /// Nothing is near enough.
+    #[error(
+        "no frame with pose and scan within {radius_m} m of query {query}; raise the radius or \
+         choose references by hand"
+    )]
+    NoneNear {
+        /// The query frame's name.
+        query: String,
+        /// The radius.
+        radius_m: f64,
+    },
+}
+
 /// What the worker says to the session.
 pub(super) enum Message {
+    Chosen(References),
     Loaded(Arc<Loaded>),
     Began(Part),
     Told(Box<Record>),
@@ -77,13 +117,18 @@ pub(super) fn spawn(
     wake: Arc<dyn Fn() + Send + Sync>,
 ) {
     let mut gate = Gate::new(Arc::clone(&control), outbox.clone(), Arc::clone(&wake));
+    let choices = outbox.clone();
     let started = thread::Builder::new()
         .name("estimator".to_owned())
         .spawn(move || {
-            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate)));
+            let on_choice = |chosen: &References| {
+                // The session may be gone; the next event finds out.
+                let _ = choices.send(Message::Chosen(chosen.clone()));
+            };
+            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate, on_choice)));
             let last_words = match outcome {
-                Ok(Ok(())) => Message::Finished,
-                Ok(Err(LocalizeError::Cancelled(_))) => Message::Cancelled,
+                Ok(Ok(_)) => Message::Finished,
+                Ok(Err(JobError::Localize(LocalizeError::Cancelled(_)))) => Message::Cancelled,
                 Ok(Err(error)) => Message::Broke(error.to_string()),
                 Err(panic) => {
                     Message::Broke(format!("internal error: {}", words_of(panic.as_ref())))
@@ -101,20 +146,69 @@ pub(super) fn spawn(
 }
 
 impl Job {
-    fn work(&self, gate: &mut Gate) -> Result<(), LocalizeError> {
+    /// Chooses references where there are none yet, and localises.
+    ///
+    /// `on_choice` hears which frames the references are before any of them is used. Hands out what
+    /// [`Localizer::localize`] does: with a fusion the fused results only.
+    ///
+    /// # Errors
+    /// [`JobError`].
+    pub fn work(
+        &self,
+        watch: &mut dyn Watch,
+        on_choice: impl FnOnce(&References),
+    ) -> Result<Vec<QueryResult>, JobError> {
         let before = self.at_hand.as_deref();
         let scene = |scene| AtHand { scene, before };
         let references = scene(self.references.as_ref());
         let queries = scene(self.queries.as_ref());
         let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
+        let chosen = self.choose(&localizer)?;
+        on_choice(&chosen);
         let request = Request {
             radius_m: self.uncertainty_radius_m,
-            references: self.reference_frames.clone().into(),
+            references: chosen,
             fusions: self.fusions.clone(),
             setting: None,
         };
-        // The gate has told every result on the way.
-        let done = |_, _| Ok(());
-        localizer.localize(0, self.query, &[request], &self.methods, gate, done)
+        let mut results = Vec::new();
+        let keep = |result, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        };
+        localizer.localize(0, self.query, &[request], &self.methods, watch, keep)?;
+        Ok(results)
+    }
+
+    fn choose(&self, localizer: &Localizer<'_>) -> Result<References, JobError> {
+        if !self.chosen.frames.is_empty() {
+            return Ok(self.chosen.clone());
+        }
+        let query = || self.queries.frames()[self.query].clone();
+        let Some(selection) = self.selection else {
+            return Err(JobError::NoneNamed { query: query() });
+        };
+        let index = match selection {
+            Selection::Retrieved(_) => {
+                Some(self.index.open(self.references.as_ref(), &self.params)?)
+            }
+            _ => None,
+        };
+        let chooser = Chooser {
+            localizer,
+            params: &self.params,
+            selection,
+            radius_m: self.uncertainty_radius_m,
+            seed: self.seed,
+            index: index.as_deref().map(|index| index as &dyn Ranking),
+        };
+        let chosen = chooser.choose(self.query, &|_| false)?;
+        if chosen.frames.is_empty() {
+            return Err(JobError::NoneNear {
+                query: query(),
+                radius_m: self.uncertainty_radius_m,
+            });
+        }
+        Ok(chosen)
     }
 }

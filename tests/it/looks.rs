@@ -72,7 +72,7 @@ fn every_view_looks_as_it_did() {
 #[test]
 fn every_view_bears_a_run_that_never_began() {
     let mut broken = setup();
-    broken.reference_frames = vec![1];
+    broken.chosen = vec![1].into();
     broken.mode = RunMode::Running;
     let mut window = crate::window::window(broken);
     settle(&mut window);

@@ -13,6 +13,7 @@ mod looks;
 mod picture_views;
 mod real_pair;
 mod recording;
+mod reference_views;
 mod retrieval;
 mod robust_pose;
 mod search_views;

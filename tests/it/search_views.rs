@@ -398,7 +398,7 @@ fn pictures() {
                 .expect("the street")
                 .into();
         setup.query = scene.find("000070").expect("a frame");
-        setup.reference_frames = vec![scene.find("000062").expect("a frame")];
+        setup.chosen = vec![scene.find("000062").expect("a frame")].into();
         setup.offered = vec![setup.query];
         setup.references = scene.clone();
         setup.queries = scene;

@@ -17,7 +17,9 @@ fn job(query: usize) -> Job {
         references: scene.clone(),
         queries: scene,
         query,
-        reference_frames: vec![0],
+        chosen: vec![0].into(),
+        selection: None,
+        index: Arc::default(),
         methods: Method::ALL.to_vec(),
         fusions: Vec::new(),
         params: Params::default(),
@@ -200,7 +202,7 @@ fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
 fn a_fault_in_the_worker_is_a_state_of_the_session() {
     let mut broken = job(1);
     // This frame has no cloud; the scene of this test panics when asked for one all the same.
-    broken.reference_frames = vec![1];
+    broken.chosen = vec![1].into();
     let mut session = start(broken, RunMode::Running, &[]);
     match settle(&mut session) {
         State::Broken(why) => assert!(why.contains("internal error"), "{why}"),
@@ -240,7 +242,7 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
 #[test]
 fn several_references_are_fused_as_without_a_session() {
     let several = Job {
-        reference_frames: vec![0, 2],
+        chosen: vec![0, 2].into(),
         fusions: fusion::ALL.iter().collect(),
         ..job(1)
     };
@@ -249,7 +251,7 @@ fn several_references_are_fused_as_without_a_session() {
     let localizer = Localizer::new(&scene, &scene, &several.params, several.seed);
     let request = Request {
         radius_m: several.uncertainty_radius_m,
-        references: several.reference_frames.clone().into(),
+        references: several.chosen.clone(),
         fusions: several.fusions.clone(),
         setting: None,
     };

@@ -25,8 +25,9 @@ pub fn setup() -> Setup {
         queries: scene,
         offered: vec![1, 2, GREY],
         query: 1,
-        reference_frames: vec![0],
+        chosen: vec![0].into(),
         pick: ReferencePick::ByHand,
+        index: Arc::default(),
         methods: Method::ALL.to_vec(),
         fusions: Vec::new(),
         params: Params::default(),
@@ -112,7 +113,7 @@ fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event
 }
 
 /// Whether some label of the window holds these words.
-fn is_said(window: &Harness<'_, App>, words: &str) -> bool {
+pub fn is_said(window: &Harness<'_, App>, words: &str) -> bool {
     window.query_all_by_label_contains(words).next().is_some()
 }
 
@@ -124,7 +125,7 @@ fn stage(event: &Event) -> Option<(Stage, bool)> {
     }
 }
 
-fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
+pub fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
     window.state().desk().run().results().cloned().collect()
 }
 
@@ -404,74 +405,4 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     assert!((moved.translation.z - truth.translation.z - 0.2).abs() < 1e-9);
     press(&mut window, Modifiers::NONE, Key::Escape);
     assert_eq!(window.state().desk().camera, None);
-}
-
-#[test]
-fn references_are_chosen_by_hand_and_their_poses_fused() {
-    let mut window = finished(setup());
-    let maximize = |window: &mut Harness<'_, App>, view| {
-        window.state_mut().send(Command::Maximize(Some(view)));
-        window.run_steps(3);
-    };
-    maximize(&mut window, "references");
-    assert!(is_said(&window, "1 of 2 frames within 3 m"));
-    window
-        .get_by_role_and_label(egui::Role::CheckBox, "000002")
-        .click();
-    window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
-    assert_eq!(results(&window).len(), 2 * Method::ALL.len());
-    assert!(
-        results(&window)
-            .iter()
-            .all(|result| result.fusion.is_none())
-    );
-
-    let stages = window.state().desk().run().stages();
-    let inner = stages.iter().filter(|bar| bar.stage.name() == "detect");
-    assert!(inner.count() >= 2);
-    window.get_by_label("wavg").click();
-    window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
-    let fused: Vec<_> = results(&window)
-        .into_iter()
-        .filter(|result| result.fusion.as_deref() == Some("wavg"))
-        .collect();
-    assert_eq!(fused.len(), Method::ALL.len());
-    // Only the fusion is new.
-    let run = window.state().desk().run();
-    for bar in run.stages() {
-        let name = bar.stage.name();
-        assert!(name != "detect" && name != "color" || bar.reused, "{name}");
-    }
-    let command = window.state().desk().setup.command_line();
-    assert!(
-        command.contains("--reference 000000 --reference 000002"),
-        "{command}"
-    );
-    assert!(command.contains("--fusion wavg"), "{command}");
-
-    maximize(&mut window, "fusion");
-    window.state_mut().send(Command::Last);
-    window.run_steps(3);
-    assert!(is_said(&window, "HY, 2 references"));
-    let error = fused[3].error.expect("the truth is known");
-    assert!(is_said(&window, &format!("{:.3} m", error.translation_m)));
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::Feature));
-    window.run_steps(3);
-    assert!(is_said(&window, "FB, 2 references"));
-
-    // Without a second reference there is nothing to fuse, but a fusion of one is its pose.
-    maximize(&mut window, "references");
-    window
-        .get_by_role_and_label(egui::Role::CheckBox, "000002")
-        .click();
-    window.run_steps(2);
-    window
-        .get_by_role_and_label(egui::Role::CheckBox, "000000")
-        .click();
-    window.run_steps(2);
-    assert!(is_said(&window, "at least one reference"));
 }

@@ -11,6 +11,7 @@ mod truth;
 
 use egui::{Color32, Ui, UiBuilder};
 
+pub(super) use self::arrangement::Arrangement;
 use self::detail::{Detail, Subject};
 use self::photos::{Lenses, Photos, Shown};
 use self::sight::Sights;

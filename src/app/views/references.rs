@@ -5,7 +5,7 @@ use egui::{ComboBox, DragValue, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
 use super::View;
 use super::queries::dots;
 use crate::app::{Command, ReferencePick, Scope, theme};
-use crate::evaluate::{QueryResult, Selection, frames_within};
+use crate::evaluate::{QueryResult, Selection};
 use crate::event::Side;
 use crate::fusion;
 use crate::geometry::PoseError;
@@ -13,10 +13,11 @@ use crate::geometry::PoseError;
 /// Size of a thumbnail on the screen \[points\].
 const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 /// The ways of choosing, each with the count that it begins with.
-const WAYS: [(&str, Selection); 3] = [
+const WAYS: [(&str, Selection); 4] = [
     ("at random", Selection::Random(1)),
     ("the nearest", Selection::Nearest(1)),
     ("most matches", Selection::Matched(1)),
+    ("by the index", Selection::Retrieved(1)),
 ];
 
 /// The frames around a query, and which of them are its references.
@@ -41,15 +42,11 @@ impl View for References {
         let setup = &scope.desk.setup;
         let frames = &self.nearby(scope).frames;
         // Those that were named may be farther away than the radius.
-        let mut shown: Vec<usize> = setup.reference_frames.clone();
-        shown.extend(
-            frames
-                .iter()
-                .filter(|f| !setup.reference_frames.contains(f)),
-        );
+        let mut shown: Vec<usize> = setup.chosen.frames.clone();
+        shown.extend(frames.iter().filter(|f| !setup.chosen.frames.contains(f)));
         ui.weak(format!(
             "{} of {} frames within {} m",
-            setup.reference_frames.len(),
+            setup.chosen.frames.len(),
             frames.len(),
             setup.uncertainty_radius_m
         ));
@@ -80,22 +77,8 @@ impl References {
             query: setup.query,
             radius_m: setup.uncertainty_radius_m,
             scene: setup.references.name().to_owned(),
-            frames: frames(scope),
+            frames: setup.candidates(setup.query),
         }))
-    }
-}
-
-fn frames(scope: &Scope<'_>) -> Vec<usize> {
-    let setup = &scope.desk.setup;
-    let (references, queries) = (setup.references.as_ref(), setup.queries.as_ref());
-    let is_same_scene = references.name() == queries.name();
-    let is_query = |frame| is_same_scene && frame == setup.query;
-    match queries.pose(setup.query) {
-        Some(place) => frames_within(references, &place, setup.uncertainty_radius_m, &is_query),
-        None => (0..references.frames().len())
-            .filter(|&frame| !is_query(frame) && references.has_cloud(frame))
-            .filter(|&frame| references.pose(frame).is_some())
-            .collect(),
     }
 }
 
@@ -106,11 +89,11 @@ fn choice(ui: &mut Ui, scope: &Scope<'_>) {
         ReferencePick::By(selection) => WAYS
             .iter()
             .find(|(_, way)| way.with_count(1) == selection.with_count(1))
-            .map_or("ranked", |(name, _)| name),
+            .map_or("", |(name, _)| name),
     };
     ui.horizontal(|ui| {
         let count = match setup.pick {
-            ReferencePick::ByHand => setup.reference_frames.len(),
+            ReferencePick::ByHand => setup.chosen.frames.len(),
             ReferencePick::By(selection) => selection.count(),
         };
         let label = ui.label("Choose");
@@ -169,12 +152,12 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
     let setup = &desk.setup;
     let name = &setup.references.frames()[frame];
     ui.horizontal(|ui| {
-        let mut is_used = setup.reference_frames.contains(&frame);
+        let mut is_used = setup.chosen.frames.contains(&frame);
         let checkbox = ui.checkbox(&mut is_used, "");
         checkbox
             .widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_used, name));
         if checkbox.changed() {
-            let mut frames = setup.reference_frames.clone();
+            let mut frames = setup.chosen.frames.clone();
             match is_used {
                 true => frames.push(frame),
                 false => frames.retain(|other| *other != frame),

@@ -19,14 +19,14 @@ const NARROW: f32 = 560.0;
 
 /// Two photos above or beside each other. Each keeps to the side where the other one is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Arrangement {
+pub(in crate::app::views) struct Arrangement {
     areas: [Rect; 2],
     aligns: [Vec2; 2],
 }
 
 impl Arrangement {
     /// The arrangement that shows photos of these sizes \[px\] larger.
-    pub(super) fn new(area: Rect, query: Vec2, reference: Vec2) -> Self {
+    pub(in crate::app::views) fn new(area: Rect, query: Vec2, reference: Vec2) -> Self {
         let free = (area.size() - Vec2::splat(GAP)).max(Vec2::splat(1.0));
         let wider = query.x.max(reference.x);
         let higher = query.y.max(reference.y);
@@ -50,7 +50,7 @@ impl Arrangement {
     }
 
     /// Where the query (0) or the reference (1) is, looked at through a lens.
-    pub(super) fn place(&self, photo: usize, lens: &Lens, size: Vec2) -> Placement {
+    pub(in crate::app::views) fn place(&self, photo: usize, lens: &Lens, size: Vec2) -> Placement {
         lens.place(self.areas[photo], size, self.aligns[photo])
     }
 }

@@ -1,0 +1,68 @@
+//! The retrieval index of a scene, opened when it is first asked.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::features::SurfParams;
+use crate::params::Params;
+use crate::retrieval::RetrievalParams;
+use crate::scene::{NoIndex, Retriever, Scene};
+
+/// Where a scene's index is. Opening one checks every byte of it, so that is done only for somebody
+/// who asks, and once for the same parameters.
+#[derive(Debug, Default)]
+pub struct IndexFile {
+    argument: String,
+    file: Option<PathBuf>,
+    opened: Mutex<Option<Opened>>,
+}
+
+struct Opened {
+    surf: SurfParams,
+    retrieval: RetrievalParams,
+    retriever: Arc<Retriever>,
+}
+
+impl std::fmt::Debug for Opened {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Opened").finish_non_exhaustive()
+    }
+}
+
+impl IndexFile {
+    /// The index of the scene that `argument` names: in a file, or where it is put by default.
+    pub fn new(argument: impl Into<String>, file: Option<PathBuf>) -> Self {
+        Self {
+            argument: argument.into(),
+            file,
+            opened: Mutex::default(),
+        }
+    }
+
+    /// The file, if one was named.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.file.as_ref()
+    }
+
+    /// The index.
+    ///
+    /// # Errors
+    /// As [`Retriever::find`].
+    pub fn open(&self, scene: &dyn Scene, params: &Params) -> Result<Arc<Retriever>, NoIndex> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = &*opened
+            && known.surf == params.surf
+            && known.retrieval == params.retrieval
+        {
+            return Ok(Arc::clone(&known.retriever));
+        }
+        let file = self.file.as_deref();
+        let retriever = Arc::new(Retriever::find(file, scene, &self.argument, params)?);
+        *opened = Some(Opened {
+            surf: params.surf,
+            retrieval: params.retrieval,
+            retriever: Arc::clone(&retriever),
+        });
+        Ok(retriever)
+    }
+}

@@ -1,0 +1,164 @@
+//! Choosing references in the window, and what is made of several.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use posescope::app::{App, Command, ReferencePick};
+use posescope::evaluate::Selection;
+use posescope::event::Method;
+use posescope::params::Params;
+use posescope::scene::{IndexOptions, Retriever};
+use posescope::session::{IndexFile, Part, State};
+
+use crate::walls_scene::Walls;
+use crate::window::{finished, is_said, results, settle, setup};
+
+fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
+    window.state_mut().send(Command::Maximize(Some(view)));
+    window.run_steps(3);
+}
+
+fn pick(window: &mut Harness<'_, App>, selection: Selection) -> State {
+    let pick = ReferencePick::By(selection);
+    window.state_mut().send(Command::PickReferences(pick));
+    window.run_steps(2);
+    settle(window)
+}
+
+fn index(file: &Path, params: &Params) {
+    let scene = Walls::new();
+    let options = IndexOptions {
+        words: 400,
+        every: 1,
+        seed: 0,
+    };
+    // The photos behind the first three cannot all be read.
+    let mut request = Retriever::request(&scene, &options, params);
+    request.frames.truncate(3);
+    Retriever::build(&scene, file, &request, params, |_| {}).expect("an index");
+}
+
+#[test]
+fn references_are_chosen_by_hand_and_their_poses_fused() {
+    let mut window = finished(setup());
+    maximize(&mut window, "references");
+    assert!(is_said(&window, "1 of 2 frames within 3 m"));
+    window
+        .get_by_role_and_label(egui::Role::CheckBox, "000002")
+        .click();
+    window.run_steps(2);
+    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(results(&window).len(), 2 * Method::ALL.len());
+    assert!(
+        results(&window)
+            .iter()
+            .all(|result| result.fusion.is_none())
+    );
+
+    let stages = window.state().desk().run().stages();
+    let inner = stages.iter().filter(|bar| bar.stage.name() == "detect");
+    assert!(inner.count() >= 2);
+    window.get_by_label("wavg").click();
+    window.run_steps(2);
+    assert_eq!(settle(&mut window), State::Finished);
+    let fused: Vec<_> = results(&window)
+        .into_iter()
+        .filter(|result| result.fusion.as_deref() == Some("wavg"))
+        .collect();
+    assert_eq!(fused.len(), Method::ALL.len());
+    // Only the fusion is new.
+    let run = window.state().desk().run();
+    for bar in run.stages() {
+        let name = bar.stage.name();
+        assert!(name != "detect" && name != "color" || bar.reused, "{name}");
+    }
+    let command = window.state().desk().setup.command_line();
+    assert!(
+        command.contains("--reference 000000 --reference 000002"),
+        "{command}"
+    );
+    assert!(command.contains("--fusion wavg"), "{command}");
+
+    maximize(&mut window, "fusion");
+    window.state_mut().send(Command::Last);
+    window.run_steps(3);
+    assert!(is_said(&window, "HY, 2 references"));
+    let error = fused[3].error.expect("the truth is known");
+    assert!(is_said(&window, &format!("{:.3} m", error.translation_m)));
+    window
+        .state_mut()
+        .send(Command::SelectMethod(Method::Feature));
+    window.run_steps(3);
+    assert!(is_said(&window, "FB, 2 references"));
+
+    // Without a second reference there is nothing to fuse, but a fusion of one is its pose.
+    maximize(&mut window, "references");
+    window
+        .get_by_role_and_label(egui::Role::CheckBox, "000002")
+        .click();
+    window.run_steps(2);
+    window
+        .get_by_role_and_label(egui::Role::CheckBox, "000000")
+        .click();
+    window.run_steps(2);
+    assert!(is_said(&window, "at least one reference"));
+}
+
+#[test]
+fn references_are_ranked_by_their_matches() {
+    let mut window = finished(setup());
+    assert_eq!(pick(&mut window, Selection::Matched(1)), State::Finished);
+    let setup = &window.state().desk().setup;
+    let ranking = setup.chosen.ranking.as_ref().expect("they were ranked");
+    assert_eq!(setup.chosen.frames, [ranking.frames[0].ranked.frame]);
+    let scores: Vec<f32> = ranking.frames.iter().map(|f| f.ranked.score).collect();
+    assert!(scores.len() == 2 && scores[0] >= scores[1], "{scores:?}");
+    let run = window.state().desk().run();
+    assert_eq!(run.spans()[0].part, Part::Retrieval);
+    maximize(&mut window, "retrieval");
+    assert!(is_said(
+        &window,
+        "1 of 2 frames are references, ranked by feature matches"
+    ));
+    // What a setting changes does not change the references.
+    let key = "fb.ratio".to_owned();
+    let value = "0.7".to_owned();
+    window.state_mut().send(Command::SetParam { key, value });
+    window.run_steps(2);
+    assert_eq!(settle(&mut window), State::Finished);
+    let again = &window.state().desk().run().spans()[0];
+    assert_eq!(again.part, Part::Retrieval);
+}
+
+#[test]
+fn references_are_found_by_an_index_and_a_missing_one_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("walls.posescope-index");
+    let mut asked = setup();
+    asked.index = Arc::new(IndexFile::new("walls", Some(file.clone())));
+    let mut window = finished(asked);
+    let state = pick(&mut window, Selection::Retrieved(2));
+    assert!(matches!(state, State::Broken(_)), "{state:?}");
+    assert!(is_said(
+        &window,
+        "there is no retrieval index; `posescope index walls"
+    ));
+
+    index(&file, &Params::default());
+    assert_eq!(pick(&mut window, Selection::Retrieved(2)), State::Finished);
+    let chosen = &window.state().desk().setup.chosen;
+    assert_eq!(chosen.frames.len(), 2);
+    assert_eq!(results(&window).len(), 2 * Method::ALL.len());
+    maximize(&mut window, "retrieval");
+    assert!(is_said(
+        &window,
+        "2 of 2 frames are references, ranked by visual words"
+    ));
+    let ranking = window.state().desk().setup.chosen.ranking.clone();
+    let first = &ranking.expect("an index ranks").frames[0];
+    let found = first.ranked.verification().expect("the walls are the same");
+    let name = format!("{} matches with {}", found.matches.len(), first.name);
+    assert!(is_said(&window, &name), "{name}");
+}
