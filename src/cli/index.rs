@@ -96,7 +96,7 @@ fn path(given: Option<&Path>, scene: &dyn Scene, argument: &str) -> Result<PathB
         .ok_or_else(|| {
             CliError::Usage(
                 "there is no cache directory for the retrieval index; name a file with --output \
-                 of `posescope index` and --index of `posescope run`"
+                 of `posescope index` and --index of whatever asks it"
                     .to_owned(),
             )
         })
