@@ -151,7 +151,7 @@ fn ranked(event: &ReferencesRanked) -> String {
         let ranked = &reference.ranked;
         let inliers = match &ranked.geometry {
             Geometry::Verified(found) => format!(", {} inliers", found.inliers),
-            Geometry::Refused => ", refused".to_owned(),
+            Geometry::Refused => ", not verified".to_owned(),
             Geometry::Unchecked => String::new(),
         };
         match ranking.criterion {

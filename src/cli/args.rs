@@ -242,6 +242,10 @@ pub struct EvalArgs {
     /// multi: random:5; large: retrieve:5]
     #[arg(long, value_name = "HOW")]
     pub references: Option<Selection>,
+    /// The index that retrieve:K asks; repeatable, one per scene of references, in their order
+    /// [default: where `posescope index` puts it]
+    #[arg(long, value_name = "FILE")]
+    pub index: Vec<PathBuf>,
     /// Uncertainty radius; several are run one by one [m] [default: 15; multi: 10]
     #[arg(long, value_name = "METRES", value_delimiter = ',', value_parser = positive)]
     pub radius: Vec<f64>,

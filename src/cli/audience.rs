@@ -64,6 +64,7 @@ impl Watch for Audience {
         let name =
             |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);
         self.tasks = problems.iter().map(name).collect();
+        self.progress = None;
         if let Some(recorder) = &mut self.recorder {
             recorder.begin_query(index, problems, truth);
         }

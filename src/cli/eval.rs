@@ -53,7 +53,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         queries: open_all(&args.queries, args)?,
     };
     let run = describe(args, &scenes, &params)?;
-    let indices = indices(&run, &scenes, &params)?;
+    let indices = indices(args, &run, &scenes, &params)?;
     let mut folder = if args.resume {
         RunFolder::resume(folder, &run)?
     } else {
@@ -83,6 +83,7 @@ fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>
 
 /// Ranked references need an index of each scene.
 fn indices(
+    args: &EvalArgs,
     run: &RunFile,
     scenes: &Scenes,
     params: &Params,
@@ -90,10 +91,20 @@ fn indices(
     let Selection::Retrieved(_) = run.selection() else {
         return Ok(Vec::new());
     };
-    let named = scenes.references.iter().zip(&run.scenes);
+    let (files, scenes) = (&args.index, &scenes.references);
+    if !files.is_empty() && files.len() != scenes.len() {
+        return Err(CliError::Usage(format!(
+            "--index is given {} times for {} scenes; each needs its own, in the same order",
+            files.len(),
+            scenes.len()
+        )));
+    }
+    let named = scenes.iter().zip(&run.scenes);
     named
-        .map(|(scene, argument)| {
-            let index = Retriever::find(None, scene.as_ref(), argument, params)?;
+        .enumerate()
+        .map(|(number, (scene, argument))| {
+            let file = files.get(number).map(PathBuf::as_path);
+            let index = Retriever::find(file, scene.as_ref(), argument, params)?;
             Ok(Box::new(index) as Box<dyn Ranking>)
         })
         .collect()

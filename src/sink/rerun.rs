@@ -18,6 +18,7 @@ mod layout;
 mod place;
 mod recorder;
 mod report;
+mod retrieval;
 mod scene;
 mod stream;
 mod surface;

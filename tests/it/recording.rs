@@ -4,14 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use posescope::estimator;
 use posescope::evaluate::{StageTimes, Watch as _, evaluate};
-use posescope::event::{FeatureState, Kind, KindSet, Method};
+use posescope::event::{FeatureState, Kind, KindSet, Method, ReferencesRanked, Stage};
 use posescope::geometry::Pose;
 use posescope::params::Params;
+use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
-use posescope::trace::{Sink as _, Trace};
+use posescope::trace::{Cancelled, Sink as _, Trace};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 
@@ -76,7 +78,7 @@ fn recorded(
 }
 
 /// The chunks of the recording itself, without those of its layout.
-fn chunks(path: &Path) -> Vec<Chunk> {
+pub fn chunks(path: &Path) -> Vec<Chunk> {
     let file = BufReader::new(File::open(path).expect("the recording"));
     DecoderApp::decode_lazy(file)
         .map(|message| message.expect("a readable message"))
@@ -89,8 +91,22 @@ fn chunks(path: &Path) -> Vec<Chunk> {
         .collect()
 }
 
+/// The layout, as text.
+fn layout(path: &Path) -> String {
+    let file = BufReader::new(File::open(path).expect("the recording"));
+    DecoderApp::decode_lazy(file)
+        .map(|message| message.expect("a readable message"))
+        .filter_map(|message| match message {
+            LogMsg::ArrowMsg(store, message) if !store.is_recording() => {
+                Some(format!("{:?}", message.batch))
+            }
+            _ => None,
+        })
+        .collect()
+}
+
 /// The timelines on which each entity has rows.
-fn timelines(chunks: &[Chunk]) -> BTreeMap<String, BTreeSet<String>> {
+pub fn timelines(chunks: &[Chunk]) -> BTreeMap<String, BTreeSet<String>> {
     let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for chunk in chunks {
         let path = chunk
@@ -347,4 +363,88 @@ fn a_fusion_is_recorded_with_weights_and_candidates() {
         let timelines = found.get(&entity).unwrap_or_else(|| panic!("{entity}"));
         assert!(timelines.contains(STEP), "{entity}: {timelines:?}");
     }
+}
+
+/// Twelve frames, of which the third has no photo.
+fn ranking_of_twelve() -> ReferencesRanked {
+    let photo = &solvable().reference.photo;
+    let reference = |frame: usize| RankedReference {
+        name: format!("{frame:06}"),
+        world_from_camera: Some(Pose::translation(0.0, 0.0, frame as f64)),
+        ranked: Ranked {
+            frame,
+            score: 1.0 / (1 + frame) as f32,
+            geometry: Geometry::Refused,
+        },
+    };
+    let ranking = ReferenceRanking {
+        criterion: Criterion::Words,
+        candidates: 40,
+        chosen: 12,
+        frames: (0..12).map(reference).collect(),
+    };
+    let photos = (0..ranking.pictured().len())
+        .map(|rank| (rank != 2).then(|| Arc::new(photo.clone())))
+        .collect();
+    ReferencesRanked {
+        ranking: Arc::new(ranking),
+        photos,
+    }
+}
+
+fn tell_ranking(recorder: &mut Recorder, event: &ReferencesRanked) {
+    let told: Result<(), Cancelled> =
+        Trace::to(recorder).stage(Stage::Retrieve, |trace| trace.emit(|| event.clone()));
+    told.expect("a recorder never cancels");
+}
+
+#[test]
+fn a_ranking_is_recorded_with_a_picture_of_the_best_and_wiped_for_the_next_query() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("ranked.rrd");
+    let mut recorder = open(&path, &[Method::Feature]);
+    let problem = solvable();
+    recorder.begin_query(0, std::slice::from_ref(&problem), None);
+    tell_ranking(&mut recorder, &ranking_of_twelve());
+    recorder.begin_query(1, std::slice::from_ref(&problem), None);
+    recorder.close().expect("a whole recording");
+    let chunks = chunks(&path);
+    let found = timelines(&chunks);
+    for rank in 0..12 {
+        let is_shown = found.contains_key(&entities::rank(rank));
+        assert_eq!(is_shown, rank < 10 && rank != 2, "rank {rank}");
+        // Nothing was verified.
+        assert!(!found.contains_key(&entities::rank_part(rank, "matches")));
+    }
+    for entity in [entities::RETRIEVAL_TABLE, entities::RETRIEVAL_PLACES] {
+        assert!(found[entity].contains(STEP), "{entity}");
+    }
+    // The second query has no ranking, and shows none.
+    assert!(found.contains_key("retrieval"));
+    assert!(entities::OF_A_QUERY.contains(&"retrieval"));
+}
+
+#[test]
+fn a_ranking_has_a_place_in_the_layout_only_where_there_is_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let is_laid_out = |name: &str, ranking: Option<&ReferencesRanked>| {
+        let path = folder.path().join(name);
+        let mut recorder = open(&path, &[Method::Feature]);
+        recorder.begin_query(0, std::slice::from_ref(&solvable()), None);
+        if let Some(ranking) = ranking {
+            tell_ranking(&mut recorder, ranking);
+        }
+        recorder.begin_method(0, Method::Feature);
+        recorder.close().expect("a whole recording");
+        let layout = layout(&path);
+        assert!(layout.contains("fb/matches/0"), "there is a layout");
+        let views =
+            (0..12).filter(|&rank| layout.contains(&format!("\"{}\"", entities::rank(rank))));
+        (layout.contains(entities::RETRIEVAL_TABLE), views.count())
+    };
+    assert_eq!(is_laid_out("without.rrd", None), (false, 0));
+    assert_eq!(
+        is_laid_out("with.rrd", Some(&ranking_of_twelve())),
+        (true, 10)
+    );
 }

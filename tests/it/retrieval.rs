@@ -2,12 +2,23 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use assert_cmd::Command;
+use posescope::evaluate::{LocalizeError, Localizer, QueryResult, References, Request, Watch};
+use posescope::event::{Event, Method, ReferencesRanked, Stage};
+use posescope::geometry::Pose;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
+use posescope::sink::rerun::entities;
+use posescope::trace::{Cancelled, Record, Sink};
 use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::binary::posescope;
+use crate::recording::{chunks, timelines};
+use crate::walls_scene::{UNREADABLE, Walls};
 
 /// Every hundredth frame of the street.
 fn index(file: &Path) -> Command {
@@ -60,7 +71,9 @@ fn an_index_is_built_once_and_finds_the_reference() {
     assert_eq!(code, Some(0), "{message}");
     assert!(first == fs::read(&file).expect("is there"), "other bytes");
 
-    let output = run(&file).output().expect("the binary starts");
+    let recording = file.with_extension("rrd");
+    let output = run(&file).arg("--save").arg(&recording).output();
+    let output = output.expect("the binary starts");
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
     let results: Vec<Value> = String::from_utf8_lossy(&output.stdout)
@@ -70,6 +83,50 @@ fn an_index_is_built_once_and_finds_the_reference() {
     // Within 150 m there are others; what looks alike is 3 m away.
     assert_eq!(results[0]["references"], serde_json::json!(["000200"]));
     assert_eq!(results[0]["status"], "ok");
+    let shown = timelines(&chunks(&recording));
+    for entity in [
+        entities::RETRIEVAL_TABLE.to_owned(),
+        entities::RETRIEVAL_PLACES.to_owned(),
+        entities::rank(0),
+        entities::rank_part(0, "matches"),
+        entities::rank_part(0, "outline"),
+    ] {
+        assert!(shown.contains_key(&entity), "{entity} is missing");
+    }
+}
+
+#[test]
+fn an_experiment_asks_the_index_that_is_named_for_each_scene() {
+    let (folder, file) = file();
+    assert!(index(&file).output().expect("starts").status.success());
+    let runs = folder.path().join("run");
+    let eval = |files: &[&Path]| {
+        let mut command = posescope();
+        command
+            .args(["eval", "street", "--only", "203", "--method", "fb", "-q"])
+            .args(["--references", "retrieve:2", "--prior", "150"])
+            .arg("--out")
+            .arg(&runs);
+        for file in files {
+            command.arg("--index").arg(file);
+        }
+        command
+    };
+    let (code, message) = said(&mut eval(&[&file, &file]));
+    assert_eq!(code, Some(2), "{message}");
+    assert!(message.contains("2 times for 1 scenes"), "{message}");
+    let elsewhere = folder.path().join("elsewhere");
+    let (code, message) = said(&mut eval(&[&elsewhere]));
+    assert_eq!(code, Some(3), "{message}");
+    let command = format!("`posescope index street --output {}`", elsewhere.display());
+    assert!(message.contains(&command), "{message}");
+
+    let (code, message) = said(&mut eval(&[&file]));
+    assert_eq!(code, Some(0), "{message}");
+    let results = fs::read_to_string(runs.join("results.jsonl")).expect("was written");
+    let result: Value = serde_json::from_str(results.trim()).expect("one result");
+    assert_eq!(result["references"][0], "000200");
+    assert_eq!(result["fusion"], "r-wavg");
 }
 
 #[test]
@@ -139,4 +196,94 @@ fn without_a_cache_directory_a_file_has_to_be_named() {
     );
     assert_eq!(code, Some(2), "{message}");
     assert!(message.contains("--output"), "{message}");
+}
+
+/// Writes down what comes between the beginning of a query and that of its first method.
+#[derive(Default)]
+struct Notebook {
+    notes: Vec<String>,
+    rankings: Vec<ReferencesRanked>,
+}
+
+impl Sink for Notebook {
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        match &record.event {
+            Event::StageStarted(event) if event.stage == Stage::Retrieve => {
+                self.notes.push("retrieve".to_owned());
+            }
+            Event::StageEnded(event) if event.stage == Stage::Retrieve => {
+                self.notes.push("retrieved".to_owned());
+            }
+            Event::ReferencesRanked(event) => {
+                self.notes.push("ranking".to_owned());
+                self.rankings.push(event.clone());
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+impl Watch for Notebook {
+    fn begin_query(&mut self, _: usize, _: &[Problem], _: Option<&Pose>) {
+        self.notes.push("query".to_owned());
+    }
+    fn begin_method(&mut self, _: usize, method: Method) {
+        self.notes.push(method.name().to_owned());
+    }
+}
+
+fn localized(requests: &[Request], watch: &mut dyn Watch) -> Vec<QueryResult> {
+    let (scene, params) = (Walls::new(), Params::default());
+    let mut results = Vec::new();
+    Localizer::new(&scene, &scene, &params, 7)
+        .localize(0, 1, requests, &[Method::Feature], watch, |result, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        })
+        .expect("readable");
+    results
+}
+
+#[test]
+fn a_ranking_is_told_once_after_the_query_and_a_lost_photo_does_not_matter() {
+    let frames = [0, UNREADABLE].map(|frame| RankedReference {
+        name: format!("{frame:06}"),
+        world_from_camera: None,
+        ranked: Ranked {
+            frame,
+            score: 0.5,
+            geometry: Geometry::Unchecked,
+        },
+    });
+    let ranking = Arc::new(ReferenceRanking {
+        criterion: Criterion::Words,
+        candidates: 2,
+        chosen: 1,
+        frames: frames.into(),
+    });
+    let request = |radius_m, ranking| Request {
+        radius_m,
+        references: References {
+            frames: vec![0],
+            ranking,
+        },
+        fusions: Vec::new(),
+        setting: None,
+    };
+    let asked = |ranking: Option<&Arc<ReferenceRanking>>| {
+        [3.0, 4.0].map(|radius_m| request(radius_m, ranking.cloned()))
+    };
+    let mut notebook = Notebook::default();
+    let results = localized(&asked(Some(&ranking)), &mut notebook);
+    let expected = ["query", "retrieve", "ranking", "retrieved", "fb", "fb"];
+    assert_eq!(notebook.notes, expected);
+    let told = &notebook.rankings[0];
+    assert_eq!(told.ranking, ranking);
+    let is_there: Vec<bool> = told.photos.iter().map(Option::is_some).collect();
+    assert_eq!(is_there, [true, false]);
+
+    let mut other = Notebook::default();
+    assert_eq!(localized(&asked(None), &mut other), results);
+    assert_eq!(other.notes, ["query", "fb", "fb"]);
 }

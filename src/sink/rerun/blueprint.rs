@@ -11,9 +11,24 @@ use crate::event::{FeatureState, Method};
 use crate::palette;
 use crate::problem::Problem;
 
-/// Sends the layout for a run with these methods. The eyes stand where the first reference does.
-pub(super) fn send(stream: &mut Stream, methods: &[Method], first: &Problem, references: usize) {
-    let root = root(methods, &Eyes(first), references);
+/// Photos of cars are wide.
+const RANKS_PER_ROW: usize = 2;
+
+/// What a layout follows from.
+pub(super) struct Occasion<'a> {
+    /// The methods that are run.
+    pub(super) methods: &'a [Method],
+    /// The eyes stand where its reference does.
+    pub(super) first: &'a Problem,
+    /// References of a query.
+    pub(super) references: usize,
+    /// Ranked frames that have a picture.
+    pub(super) ranked: usize,
+}
+
+/// Sends the layout for a run.
+pub(super) fn send(stream: &mut Stream, occasion: &Occasion<'_>) {
+    let root = root(occasion);
     stream.send_layout(|id, recording| layout::send(&root, id, recording));
 }
 
@@ -44,7 +59,14 @@ fn shows(methods: &[Method], method: Method) -> bool {
 }
 
 /// The world and the words on the left, a row per method on the right.
-fn root(methods: &[Method], eyes: &Eyes<'_>, references: usize) -> Node {
+fn root(occasion: &Occasion<'_>) -> Node {
+    let Occasion {
+        methods,
+        first,
+        references,
+        ranked,
+    } = *occasion;
+    let eyes = &Eyes(first);
     let mut words: Vec<Node> = vec![
         View::new("TextDocument", "Report", entities::REPORT).into(),
         View::new("TextLog", "Log", entities::LOG).into(),
@@ -52,6 +74,9 @@ fn root(methods: &[Method], eyes: &Eyes<'_>, references: usize) -> Node {
     ];
     if references > 1 {
         words.push(View::new("TextDocument", "Fusion", entities::FUSION_TABLE).into());
+    }
+    if ranked > 0 {
+        words.push(View::new("TextDocument", "Ranking", entities::RETRIEVAL_TABLE).into());
     }
     let left = Node::Column(vec![(3.0, overview(eyes).into()), (2.0, Node::Tabs(words))]);
     let mut rows = Vec::new();
@@ -69,7 +94,27 @@ fn root(methods: &[Method], eyes: &Eyes<'_>, references: usize) -> Node {
     } else if !direct.is_empty() {
         rows.push((1.2, Node::Tabs(direct)));
     }
-    row("posescope", vec![(2.0, left), (3.0, Node::Column(rows))])
+    let methods = Node::Column(rows);
+    let right = if ranked > 0 {
+        Node::Tabs(vec![row("Methods", vec![(1.0, methods)]), ranks(ranked)])
+    } else {
+        methods
+    };
+    row("posescope", vec![(2.0, left), (3.0, right)])
+}
+
+/// The ranked frames, the best at the top left.
+fn ranks(ranked: usize) -> Node {
+    let view = |rank: usize| -> (f32, Node) {
+        let name = format!("Rank {} (query above)", rank + 1);
+        (1.0, View::new("2D", name, entities::rank(rank)).into())
+    };
+    let ranks: Vec<usize> = (0..ranked).collect();
+    let rows = ranks.chunks(RANKS_PER_ROW).map(|chunk| {
+        let views = chunk.iter().map(|&rank| view(rank)).collect();
+        (1.0, row("ranks", views))
+    });
+    row("Retrieval", vec![(1.0, Node::Column(rows.collect()))])
 }
 
 fn overview(eyes: &Eyes<'_>) -> View {

@@ -15,7 +15,16 @@ pub const EVAL_TIMELINE: &str = "eval";
 /// Everything that has a place in the world.
 pub const WORLD: &str = "world";
 /// The roots of all that belongs to one query.
-pub const OF_A_QUERY: [&str; 7] = [WORLD, "query", "fb", "pm", "mi", "search", "fusion"];
+pub const OF_A_QUERY: [&str; 8] = [
+    WORLD,
+    "query",
+    "fb",
+    "pm",
+    "mi",
+    "search",
+    "fusion",
+    "retrieval",
+];
 /// Inliers of the best trial so far, one row per improvement.
 pub const RANSAC_BEST: &str = "fb/ransac/best";
 /// Number of inliers of each trial.
@@ -32,6 +41,10 @@ pub const QUERY_IMAGE: &str = "query/image";
 pub const QUERY_DETECTED: &str = "query/keypoints/detected";
 /// What each reference had to say in the fused poses, as Markdown.
 pub const FUSION_TABLE: &str = "fusion/table";
+/// The ranked frames with scores and inliers, as Markdown.
+pub const RETRIEVAL_TABLE: &str = "retrieval/table";
+/// Where the ranked frames are.
+pub const RETRIEVAL_PLACES: &str = "world/retrieval";
 /// The results of the query, as Markdown.
 pub const REPORT: &str = "report";
 /// The decisions, in words.
@@ -121,6 +134,17 @@ pub fn direct(method: Method, part: &str) -> String {
 /// The stage that a method is in.
 pub fn stage(method: Method) -> String {
     format!("stage/{}", method.name())
+}
+
+/// The query above a frame that was ranked as a reference, by its rank from 0.
+pub fn rank(rank: usize) -> String {
+    format!("retrieval/rank/{rank}")
+}
+
+/// What is drawn on a ranked frame: its verified `matches`, the `outline` of the part of the query
+/// that has them with the place where the affine transform puts it, a `label`.
+pub fn rank_part(rank: usize, part: &str) -> String {
+    format!("retrieval/rank/{rank}/{part}")
 }
 
 /// The references' weights in a method's fused pose, in the order of the references.

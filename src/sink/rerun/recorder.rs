@@ -11,9 +11,9 @@ use super::fusion::FusionStory;
 use super::place::Place;
 use super::scene::{self, Camera, Origin};
 use super::stream::Stream;
-use super::{Identity, RecordError, Targets, blueprint, entities, report};
+use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
 use crate::evaluate::{PoseReport, QueryResult, StageTimes, Status, Watch};
-use crate::event::{Event, Kind, KindSet, Method, ReferencesFused, Stage};
+use crate::event::{Event, Kind, KindSet, Method, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
 use crate::narration;
 use crate::palette;
@@ -33,6 +33,7 @@ pub struct Recorder {
     methods: Vec<Method>,
     /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
     origin: Option<Origin>,
+    is_laid_out: bool,
     query: Query,
     /// Hypotheses of each method in earlier runs: `eval` goes on where the last run ended.
     evals: BTreeMap<Method, i64>,
@@ -42,6 +43,7 @@ pub struct Recorder {
 #[derive(Default)]
 struct Query {
     problems: Vec<Problem>,
+    truth: Option<Pose>,
     results: Vec<QueryResult>,
     reference: usize,
     method: Option<Method>,
@@ -82,6 +84,7 @@ impl Recorder {
             configuration: identity.configuration.clone(),
             methods: methods.to_vec(),
             origin: None,
+            is_laid_out: false,
             query: Query::default(),
             evals: BTreeMap::new(),
         })
@@ -96,15 +99,33 @@ impl Recorder {
     }
 
     /// What holds for the whole recording follows from its first problem.
-    fn set_up(&mut self, first: &Problem, references: usize) -> Origin {
+    fn set_up(&mut self, first: &Problem) -> Origin {
         let reference = &first.reference.world_from_camera;
         let origin = Origin(reference.translation.vector);
         self.origin = Some(origin);
         self.stream
             .log_static(entities::WORLD, &ViewCoordinates::RDF());
-        blueprint::send(&mut self.stream, &self.methods, first, references);
         blueprint::log_styles(&mut self.stream, &self.methods);
         origin
+    }
+
+    /// Sends the layout, as soon as it is known whether the references of the first query were
+    /// ranked: `ranked` frames have a picture.
+    fn lay_out(&mut self, ranked: usize) {
+        let Some(first) = self.query.problems.first() else {
+            return;
+        };
+        if self.is_laid_out {
+            return;
+        }
+        self.is_laid_out = true;
+        let occasion = blueprint::Occasion {
+            methods: &self.methods,
+            first,
+            references: self.query.problems.len(),
+            ranked,
+        };
+        blueprint::send(&mut self.stream, &occasion);
     }
 
     /// Nothing of the last query must be taken for the next one's.
@@ -239,6 +260,23 @@ impl Recorder {
         story.tell(event, method, origin, &mut self.stream);
     }
 
+    fn ranked(&mut self, event: &ReferencesRanked) {
+        let (Some(problem), Some(origin)) = (self.query.problems.first(), self.origin) else {
+            return;
+        };
+        let asked = retrieval::Asked {
+            query: &problem.query,
+            truth: self.query.truth.as_ref(),
+            origin,
+        };
+        self.stream.advance();
+        retrieval::tell(event, &asked, &mut self.stream);
+        let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
+        let path = narration::stages(&self.query.stages);
+        self.say(&format!("{path}: {words}"), TextLogLevel::INFO);
+        self.lay_out(event.ranking.pictured().len());
+    }
+
     fn tell(&mut self, event: &Event) {
         let Some(teller) = self.query.tellers.last_mut() else {
             return;
@@ -305,6 +343,7 @@ impl Watch for Recorder {
     fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
         self.query = Query {
             problems: problems.to_vec(),
+            truth: truth.copied(),
             ..Query::default()
         };
         let Some(first) = problems.first() else {
@@ -317,7 +356,7 @@ impl Watch for Recorder {
                 self.wipe();
                 origin
             }
-            None => self.set_up(first, problems.len()),
+            None => self.set_up(first),
         };
         let stream = &mut self.stream;
         scene::log_query(stream, &first.query);
@@ -339,6 +378,7 @@ impl Watch for Recorder {
     }
 
     fn begin_method(&mut self, reference_index: usize, method: Method) {
+        self.lay_out(0);
         self.query.reference = reference_index;
         self.query.method = Some(method);
         self.query.stages.clear();
@@ -382,6 +422,7 @@ impl Sink for Recorder {
             Event::StageStarted(started) => self.stage_started(started.stage),
             Event::StageEnded(ended) => self.stage_ended(ended.stage, ended.succeeded),
             Event::ReferencesFused(event) => self.fused(event),
+            Event::ReferencesRanked(event) => self.ranked(event),
             event => self.tell(event),
         }
         Ok(())

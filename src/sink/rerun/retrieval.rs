@@ -1,0 +1,337 @@
+//! What retrieval tells: the ranked frames beside the query, with scores and verified matches.
+
+use image::imageops::thumbnail;
+use nalgebra::Point2;
+use rerun::{LineStrips2D, Points2D, Points3D, Radius, TextDocument};
+
+use super::encode::jpeg;
+use super::entities;
+use super::scene::Origin;
+use super::stream::Stream;
+use crate::event::ReferencesRanked;
+use crate::geometry::Pose;
+use crate::image::Photo;
+use crate::palette::{self, Rgb};
+use crate::picture;
+use crate::problem::Query;
+use crate::retrieval::{
+    Criterion, Geometry, RankedReference, ReferenceRanking, Verification, VerifiedMatch,
+};
+
+/// Width of a canvas at most \[px\]: ten of them weigh as much as one photo of full size.
+const CANVAS_WIDTH: u32 = 480;
+
+/// What a ranking is shown against.
+pub(super) struct Asked<'a> {
+    pub(super) query: &'a Query,
+    /// Where the query camera was, if that is known.
+    pub(super) truth: Option<&'a Pose>,
+    pub(super) origin: Origin,
+}
+
+/// Records a ranking.
+pub(super) fn tell(event: &ReferencesRanked, asked: &Asked<'_>, stream: &mut Stream) {
+    let ranking = &event.ranking;
+    let document = TextDocument::from_markdown(table(ranking, asked.truth));
+    stream.log(entities::RETRIEVAL_TABLE, &document);
+    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, asked.origin));
+    let pictured = ranking.pictured().iter().zip(event.photos.iter());
+    for (rank, (reference, photo)) in pictured.enumerate() {
+        // The frame is in the table all the same.
+        let Some(photo) = photo else { continue };
+        let canvas = Canvas::of(&asked.query.photo, photo);
+        let path = entities::rank(rank);
+        stream.log_image(&path, jpeg(&canvas.picture.clone().into()));
+        let is_chosen = rank < ranking.chosen;
+        let label = canvas.label(&label(ranking, rank, reference), is_chosen);
+        stream.log(&entities::rank_part(rank, "label"), &label);
+        if let Some(found) = reference.ranked.verification() {
+            let part = |name: &str| entities::rank_part(rank, name);
+            stream.log(&part("matches"), &canvas.matches(&found.matches));
+            stream.log(&part("outline"), &canvas.outline(found));
+        }
+    }
+}
+
+/// The query above a ranked frame, small.
+struct Canvas {
+    picture: image::RgbImage,
+    /// Pixels of the canvas per pixel of the photos, across and down.
+    scale: [f64; 2],
+    /// The row of the photos at which the ranked frame begins.
+    top: f64,
+}
+
+impl Canvas {
+    fn of(query: &Photo, reference: &Photo) -> Self {
+        let (stacked, top) = picture::stacked(query, reference);
+        let (width, height) = stacked.dimensions();
+        let shrink = f64::from(CANVAS_WIDTH) / f64::from(width.max(CANVAS_WIDTH));
+        let small = |length: u32| ((f64::from(length) * shrink).round() as u32).max(1);
+        let picture = thumbnail(&stacked, small(width), small(height));
+        Self {
+            scale: [
+                f64::from(picture.width()) / f64::from(width),
+                f64::from(picture.height()) / f64::from(height),
+            ],
+            picture,
+            top: f64::from(top),
+        }
+    }
+
+    /// Rerun's pixel (0, 0) is the corner of the image, that of the photos the centre of their first
+    /// pixel.
+    fn shown(&self, x: f64, y: f64) -> [f32; 2] {
+        let [across, down] = self.scale;
+        [((x + 0.5) * across) as f32, ((y + 0.5) * down) as f32]
+    }
+
+    fn of_query(&self, pixel: &Point2<f64>) -> [f32; 2] {
+        self.shown(pixel.x, pixel.y)
+    }
+
+    fn of_reference(&self, pixel: &Point2<f64>) -> [f32; 2] {
+        self.shown(pixel.x, pixel.y + self.top)
+    }
+
+    fn matches(&self, matches: &[VerifiedMatch]) -> LineStrips2D {
+        let ends = |found: &VerifiedMatch| {
+            let below = self.of_reference(&found.reference_pixel);
+            [self.of_query(&found.query_pixel), below]
+        };
+        lines(matches.iter().map(ends), palette::TRUTH, 0.75)
+    }
+
+    /// The part of the query that has matches, and where the affine transform puts it.
+    fn outline(&self, found: &Verification) -> LineStrips2D {
+        let Some(corners) = corners(&found.matches) else {
+            return LineStrips2D::clear_fields();
+        };
+        let in_query = corners.map(|corner| self.of_query(&corner));
+        let in_reference =
+            corners.map(|corner| self.of_reference(&found.reference_from_query.apply(&corner)));
+        lines([in_query, in_reference], palette::STATES[2], 1.0)
+    }
+
+    /// Words on the seam between the photos.
+    fn label(&self, words: &str, is_chosen: bool) -> Points2D {
+        let color = if is_chosen {
+            palette::light(palette::REFERENCE)
+        } else {
+            palette::light(palette::UNDECIDED)
+        };
+        let middle = f64::from(self.picture.width()) / self.scale[0] / 2.0;
+        Points2D::new([self.shown(middle, self.top)])
+            .with_colors([super::color(color)])
+            .with_radii([Radius::new_ui_points(1.0)])
+            .with_labels([words])
+            .with_show_labels(true)
+    }
+}
+
+fn lines<const N: usize>(
+    strips: impl IntoIterator<Item = [[f32; 2]; N]>,
+    color: Rgb,
+    radius: f32,
+) -> LineStrips2D {
+    LineStrips2D::new(strips)
+        .with_colors([super::color(color)])
+        .with_radii([Radius::new_ui_points(radius)])
+}
+
+/// The corners of the box around the query's matched features, the first one again at the end.
+fn corners(matches: &[VerifiedMatch]) -> Option<[Point2<f64>; 5]> {
+    let first = matches.first()?.query_pixel;
+    let (least, greatest) = matches.iter().fold((first, first), |(least, greatest), m| {
+        (least.inf(&m.query_pixel), greatest.sup(&m.query_pixel))
+    });
+    let corner = |x: f64, y: f64| Point2::new(x, y);
+    Some([
+        corner(least.x, least.y),
+        corner(greatest.x, least.y),
+        corner(greatest.x, greatest.y),
+        corner(least.x, greatest.y),
+        corner(least.x, least.y),
+    ])
+}
+
+/// Where the ranked frames are.
+fn places(ranking: &ReferenceRanking, origin: Origin) -> Points3D {
+    let known: Vec<_> = ranking
+        .frames
+        .iter()
+        .enumerate()
+        .filter_map(|(rank, reference)| Some((rank, reference, reference.world_from_camera?)))
+        .collect();
+    Points3D::new(
+        known
+            .iter()
+            .map(|(.., pose)| origin.place(&pose.translation.vector)),
+    )
+    .with_colors(known.iter().map(|(rank, ..)| {
+        super::color(if *rank < ranking.chosen {
+            palette::REFERENCE
+        } else {
+            palette::UNDECIDED
+        })
+    }))
+    .with_radii([Radius::new_ui_points(4.0)])
+    .with_labels(
+        known
+            .iter()
+            .map(|(rank, reference, _)| label(ranking, *rank, reference)),
+    )
+    .with_show_labels(false)
+}
+
+fn label(ranking: &ReferenceRanking, rank: usize, reference: &RankedReference) -> String {
+    let score = score(ranking.criterion, reference.ranked.score);
+    let place = rank + 1;
+    let geometry = match &reference.ranked.geometry {
+        Geometry::Verified(found) => format!(", {} inliers", found.inliers),
+        Geometry::Refused => ", not verified".to_owned(),
+        Geometry::Unchecked => String::new(),
+    };
+    format!("{place}. {}: {score}{geometry}", reference.name)
+}
+
+fn score(criterion: Criterion, score: f32) -> String {
+    match criterion {
+        Criterion::Words => format!("{score:.3}"),
+        Criterion::Matches => format!("{score:.0} matches"),
+    }
+}
+
+fn table(ranking: &ReferenceRanking, truth: Option<&Pose>) -> String {
+    let what = match ranking.criterion {
+        Criterion::Words => "score (cosine of visual words)",
+        Criterion::Matches => "score (feature matches)",
+    };
+    let mut text = format!(
+        "# Ranked references\n\nThe first {} of {} candidates are the references.\n\n\
+         | rank | frame | {what} | inliers | verified | from the truth \\[m\\] | reference |\n\
+         |--:|:--|--:|--:|:--|--:|:--|\n",
+        ranking.chosen, ranking.candidates
+    );
+    for (rank, reference) in ranking.frames.iter().enumerate() {
+        let (inliers, verified) = match &reference.ranked.geometry {
+            Geometry::Verified(found) => (found.inliers.to_string(), "yes"),
+            Geometry::Refused => ("–".to_owned(), "no"),
+            Geometry::Unchecked => ("–".to_owned(), "not checked"),
+        };
+        let distance =
+            truth
+                .zip(reference.world_from_camera)
+                .map_or("–".to_owned(), |(truth, pose)| {
+                    let offset = pose.translation.vector - truth.translation.vector;
+                    format!("{:.1}", offset.norm())
+                });
+        let chosen = if rank < ranking.chosen { "yes" } else { "no" };
+        text += &format!(
+            "| {} | {} | {} | {inliers} | {verified} | {distance} | {chosen} |\n",
+            rank + 1,
+            reference.name,
+            score(ranking.criterion, reference.ranked.score),
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use image::GrayImage;
+    use nalgebra::{Matrix2, Vector2};
+
+    use super::*;
+    use crate::retrieval::{Affine, Ranked};
+
+    fn matched(query: [f64; 2], reference: [f64; 2]) -> VerifiedMatch {
+        VerifiedMatch {
+            query: 0,
+            query_pixel: query.into(),
+            reference_pixel: reference.into(),
+        }
+    }
+
+    fn verification() -> Verification {
+        Verification {
+            inliers: 2,
+            reference_from_query: Affine {
+                linear: Matrix2::new(2.0, 0.0, 0.0, 1.0),
+                translation: Vector2::new(5.0, 0.0),
+            },
+            matches: vec![
+                matched([10.0, 20.0], [25.0, 20.0]),
+                matched([30.0, 40.0], [65.0, 40.0]),
+            ],
+        }
+    }
+
+    #[test]
+    fn pixels_of_both_photos_are_found_on_the_shrunken_canvas() {
+        let photo = Photo::from_gray(GrayImage::new(960, 300));
+        let canvas = Canvas::of(&photo, &photo);
+        // 960 × (300 + 4 + 300) at half the size.
+        assert_eq!(canvas.picture.dimensions(), (480, 302));
+        assert_eq!(canvas.of_query(&Point2::new(-0.5, -0.5)), [0.0, 0.0]);
+        assert_eq!(canvas.of_query(&Point2::new(959.5, 299.5)), [480.0, 150.0]);
+        assert_eq!(canvas.of_reference(&Point2::new(-0.5, -0.5)), [0.0, 152.0]);
+        assert_eq!(
+            canvas.of_reference(&Point2::new(959.5, 299.5)),
+            [480.0, 302.0]
+        );
+        // A small photo is not blown up.
+        let small = Photo::from_gray(GrayImage::new(96, 30));
+        let canvas = Canvas::of(&small, &small);
+        assert_eq!(canvas.picture.dimensions(), (96, 64));
+    }
+
+    #[test]
+    fn the_outline_holds_all_matches() {
+        let [low, _, high, ..] = corners(&verification().matches).expect("there are matches");
+        assert_eq!(
+            (low, high),
+            (Point2::new(10.0, 20.0), Point2::new(30.0, 40.0))
+        );
+        assert!(corners(&[]).is_none());
+    }
+
+    #[test]
+    fn the_table_says_what_became_of_each_frame_and_how_far_off_it_is() {
+        let ranked = |name: &str, score, geometry, ahead: Option<f64>| RankedReference {
+            name: name.to_owned(),
+            world_from_camera: ahead.map(|z| Pose::translation(0.0, 0.0, z)),
+            ranked: Ranked {
+                frame: 0,
+                score,
+                geometry,
+            },
+        };
+        let ranking = ReferenceRanking {
+            criterion: Criterion::Words,
+            candidates: 40,
+            chosen: 1,
+            frames: vec![
+                ranked("a", 0.25, Geometry::Verified(verification()), Some(2.0)),
+                ranked("b", 0.5, Geometry::Refused, Some(-30.0)),
+                ranked("c", 0.125, Geometry::Unchecked, None),
+            ],
+        };
+        let text = table(&ranking, Some(&Pose::translation(0.0, 0.0, 5.0)));
+        let rows: Vec<&str> = text.lines().filter(|line| line.starts_with("| ")).collect();
+        assert_eq!(
+            rows[1..],
+            [
+                "| 1 | a | 0.250 | 2 | yes | 3.0 | yes |",
+                "| 2 | b | 0.500 | – | no | 35.0 | no |",
+                "| 3 | c | 0.125 | – | not checked | – | no |",
+            ]
+        );
+        assert!(text.contains("first 1 of 40 candidates"), "{text}");
+        assert!(table(&ranking, None).contains("| a | 0.250 | 2 | yes | – | yes |"));
+        assert_eq!(
+            label(&ranking, 0, &ranking.frames[0]),
+            "1. a: 0.250, 2 inliers"
+        );
+    }
+}
