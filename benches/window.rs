@@ -111,6 +111,7 @@ fn open() -> Option<Window> {
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 15.0,
+        prior_m: None,
         seed: 0,
         breakpoints: Vec::new(),
         mode: RunMode::Running,

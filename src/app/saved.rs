@@ -30,6 +30,8 @@ pub(super) struct SavedSession {
     #[serde(default)]
     fusions: Vec<String>,
     radius_m: f64,
+    #[serde(default)]
+    prior_m: Option<f64>,
     seed: u64,
     breakpoints: Vec<String>,
     /// Every parameter, as in a configuration file.
@@ -60,6 +62,7 @@ impl SavedSession {
                 .collect(),
             fusions: setup.fusions.iter().map(|f| f.name.to_owned()).collect(),
             radius_m: setup.uncertainty_radius_m,
+            prior_m: setup.prior_m,
             seed: setup.seed,
             breakpoints: setup.breakpoints.clone(),
             params: setup.params.to_toml(),
@@ -144,6 +147,7 @@ impl SavedSession {
                 .collect(),
             params,
             uncertainty_radius_m: self.radius_m,
+            prior_m: self.prior_m,
             seed: self.seed,
             breakpoints: self.breakpoints.clone(),
             ..present.clone()

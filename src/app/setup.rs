@@ -59,6 +59,9 @@ pub struct Setup {
     pub params: Params,
     /// How far the query may be from a reference \[m\].
     pub uncertainty_radius_m: f64,
+    /// How far from the query's known position references are chosen \[m\]; without it, within the
+    /// radius.
+    pub prior_m: Option<f64>,
     /// Seed of every random choice.
     pub seed: u64,
     /// Breakpoints to begin with.
@@ -87,6 +90,7 @@ impl Setup {
             fusions: self.fusions.clone(),
             params: self.params.clone(),
             uncertainty_radius_m: self.uncertainty_radius_m,
+            prior_m: self.prior_m,
             seed: self.seed,
             at_hand,
         }

@@ -106,6 +106,10 @@ pub struct RunArgs {
     /// How far the query may be from its reference: the disc that the direct methods search [m]
     #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
     pub radius: f64,
+    /// How far from the query's known position references may be, where that is more than the radius
+    /// [m] [default: the radius]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub prior: Option<f64>,
     /// The methods to run
     #[arg(
         long,
@@ -175,6 +179,10 @@ pub struct ViewArgs {
     /// How far the query may be from its reference: the disc that the direct methods search [m]
     #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
     pub radius: f64,
+    /// How far from the query's known position references may be, where that is more than the radius
+    /// [m] [default: the radius]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub prior: Option<f64>,
     /// The methods to run
     #[arg(
         long,

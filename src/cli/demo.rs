@@ -33,6 +33,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
             references: Selection::Random(1),
             index: None,
             radius: 15.0,
+            prior: None,
             method: Method::ALL.to_vec(),
             fusion: Vec::new(),
             seed: 0,

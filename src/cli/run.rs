@@ -166,7 +166,7 @@ impl Plan<'_> {
             localizer: &self.localizer,
             params: self.params,
             selection: args.references,
-            radius_m: args.radius,
+            radius_m: args.prior.unwrap_or(args.radius),
             seed: args.seed,
             index: index.as_ref().map(|index| index as &dyn Ranking),
         };

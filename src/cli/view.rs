@@ -31,6 +31,7 @@ impl ViewArgs {
             references: Selection::Random(1),
             index: None,
             radius: 15.0,
+            prior: None,
             method: Method::ALL.to_vec(),
             fusion: Vec::new(),
             seed: 0,
@@ -85,6 +86,7 @@ fn record_instead(
             },
             index: setup.index.file().cloned(),
             radius: setup.uncertainty_radius_m,
+            prior: setup.prior_m,
             method: setup.methods.clone(),
             fusion: setup.fusions.clone(),
             seed: setup.seed,
@@ -143,6 +145,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         fusions: args.fusion.clone(),
         params: params::resolve(&args.config)?,
         uncertainty_radius_m: args.radius,
+        prior_m: args.prior,
         seed: args.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,
@@ -182,7 +185,7 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
         "{}: no frame with pose and scan within {} m of query {}; raise --radius or name one with \
          --reference",
         args.scene,
-        args.radius,
+        setup.prior_m.unwrap_or(setup.uncertainty_radius_m),
         setup.queries.frames()[setup.query]
     )))
 }
@@ -269,6 +272,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             .collect(),
         fusions: file.fusions(),
         params,
+        prior_m: args.prior.or(file.prior_m),
         uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.radius),
         seed: file.seed,
         breakpoints: Vec::new(),

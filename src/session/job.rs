@@ -44,6 +44,9 @@ pub struct Job {
     pub params: Params,
     /// How far the query may be from a reference \[m\].
     pub uncertainty_radius_m: f64,
+    /// How far from the query's known position references are chosen \[m\]; without it, within the
+    /// radius.
+    pub prior_m: Option<f64>,
     /// Seed of every random choice.
     pub seed: u64,
     /// Frames that an earlier job has read, with all that was worked out about them.
@@ -194,11 +197,12 @@ impl Job {
             }
             _ => None,
         };
+        let radius_m = self.prior_m.unwrap_or(self.uncertainty_radius_m);
         let chooser = Chooser {
             localizer,
             params: &self.params,
             selection,
-            radius_m: self.uncertainty_radius_m,
+            radius_m,
             seed: self.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),
         };
@@ -206,7 +210,7 @@ impl Job {
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear {
                 query: query(),
-                radius_m: self.uncertainty_radius_m,
+                radius_m,
             });
         }
         Ok(chosen)

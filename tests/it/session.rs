@@ -24,6 +24,7 @@ fn job(query: usize) -> Job {
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
+        prior_m: None,
         seed: 7,
         at_hand: None,
     }

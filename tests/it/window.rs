@@ -32,6 +32,7 @@ pub fn setup() -> Setup {
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
+        prior_m: None,
         seed: 7,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,

@@ -40,7 +40,8 @@ impl View for References {
         fusions(ui, scope);
         ui.separator();
         let setup = &scope.desk.setup;
-        let frames = &self.nearby(scope).frames;
+        let nearby = self.nearby(scope);
+        let (frames, radius_m) = (&nearby.frames, nearby.radius_m);
         // Those that were named may be farther away than the radius.
         let mut shown: Vec<usize> = setup.chosen.frames.clone();
         shown.extend(frames.iter().filter(|f| !setup.chosen.frames.contains(f)));
@@ -48,7 +49,7 @@ impl View for References {
             "{} of {} frames within {} m",
             setup.chosen.frames.len(),
             frames.len(),
-            setup.uncertainty_radius_m
+            radius_m
         ));
         ScrollArea::vertical().auto_shrink(false).show_rows(
             ui,
@@ -67,15 +68,16 @@ impl References {
     /// Looking for them in a long scene at every frame would be too slow.
     fn nearby(&mut self, scope: &Scope<'_>) -> &Nearby {
         let setup = &scope.desk.setup;
+        let radius_m = setup.prior_m.unwrap_or(setup.uncertainty_radius_m);
         let is_known = self.nearby.as_ref().is_some_and(|nearby| {
             nearby.query == setup.query
-                && nearby.radius_m == setup.uncertainty_radius_m
+                && nearby.radius_m == radius_m
                 && nearby.scene == setup.references.name()
         });
         let nearby = self.nearby.take().filter(|_| is_known);
         self.nearby.insert(nearby.unwrap_or_else(|| Nearby {
             query: setup.query,
-            radius_m: setup.uncertainty_radius_m,
+            radius_m,
             scene: setup.references.name().to_owned(),
             frames: setup.candidates(setup.query),
         }))

@@ -78,12 +78,13 @@ impl Retrieval {
             ui.end_row();
             for (index, frame) in ranking.frames.iter().enumerate() {
                 let name = RichText::new(&frame.name).monospace();
-                let name = match index < ranking.chosen {
+                let is_looked_at = index == self.looked_at;
+                let name = match index < ranking.chosen && !is_looked_at {
                     true => name.color(theme::REFERENCE).strong(),
                     false => name,
                 };
                 ui.label((index + 1).to_string());
-                if ui.selectable_label(index == self.looked_at, name).clicked() {
+                if ui.selectable_label(is_looked_at, name).clicked() {
                     self.looked_at = index;
                 }
                 ui.label(match ranking.criterion {
