@@ -29,7 +29,7 @@ pub use command::{Command, Shortcut, shortcuts};
 pub use desk::{Comparing, Desk, Note};
 pub use scope::{Scope, Shown, ShownAt};
 pub use setup::{ReferencePick, Setup};
-pub use window::{WindowError, has_display, open};
+pub use window::{WindowError, has_display, open, window_options};
 
 use layout::Layout;
 

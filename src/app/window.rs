@@ -31,6 +31,18 @@ pub fn has_display() -> bool {
     is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
 }
 
+/// How the window is opened and painted.
+pub fn window_options() -> eframe::NativeOptions {
+    eframe::NativeOptions {
+        viewport: ViewportBuilder::default()
+            .with_app_id("posescope")
+            .with_inner_size([1500.0, 950.0]),
+        // There are no wide gradients, and it costs time for every pixel on a software adapter.
+        dithering: false,
+        ..eframe::NativeOptions::default()
+    }
+}
+
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
@@ -39,13 +51,9 @@ pub fn open(setup: Setup) -> Result<(), WindowError> {
     if !has_display() {
         return Err(WindowError::NoDisplay);
     }
-    let options = eframe::NativeOptions {
-        viewport: ViewportBuilder::default()
-            .with_title(format!("posescope: {}", setup.scene_argument))
-            .with_app_id("posescope")
-            .with_inner_size([1500.0, 950.0]),
-        ..eframe::NativeOptions::default()
-    };
+    let mut options = window_options();
+    let title = format!("posescope: {}", setup.scene_argument);
+    options.viewport = options.viewport.with_title(title);
     eframe::run_native(
         "posescope",
         options,
