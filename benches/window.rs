@@ -99,7 +99,13 @@ impl Canvas {
             wgpu_setup: setup,
             ..WgpuConfiguration::default()
         };
-        let state = ready(RenderState::create(&configuration, &instance, None, options))?.ok()?;
+        let state = ready(RenderState::create(
+            &configuration,
+            &instance,
+            None,
+            options,
+        ))?
+        .ok()?;
         let texture = state.device.create_texture(&wgpu::TextureDescriptor {
             label: None,
             size: wgpu::Extent3d {
@@ -297,30 +303,48 @@ fn orbiting(bencher: Bencher) {
     });
 }
 
-/// The camera in hand moves: until costs and pictures of both methods are there and drawn.
+/// The camera in hand moves: until the views have costs and pictures of both methods to paint.
 #[divan::bench(sample_count = 30, sample_size = 1)]
-fn what_if_move(bencher: Bencher) {
-    with_window(|window| {
-        let loaded = window.state().desk().run().loaded.clone();
-        let loaded = loaded.expect("the run is over");
-        let start = loaded.problems[0].reference.world_from_camera;
-        let mut moves = 0;
-        bencher.bench_local(|| {
-            moves += 1;
-            let pose = start * Pose::translation(0.0, 0.0, 0.05 * f64::from(moves));
-            window.state_mut().send(Command::TakeCamera(Some(pose)));
+fn what_if_answer(bencher: Bencher) {
+    with_window(|window| bencher.bench_local(what_if(window, |_| ())));
+}
+
+/// The camera in hand moves: until costs and pictures of both methods are painted.
+#[divan::bench(sample_count = 30, sample_size = 1)]
+fn what_if_painted(bencher: Bencher) {
+    with_window(|window| bencher.bench_local(what_if(window, draw)));
+}
+
+/// One move of the camera at each call.
+fn what_if(window: &mut Window, end: impl Fn(&mut Window)) -> impl FnMut() {
+    let loaded = window.state().desk().run().loaded.clone();
+    let loaded = loaded.expect("the run is over");
+    let start = loaded.problems[0].reference.world_from_camera;
+    let mut moves = 0;
+    move || {
+        moves += 1;
+        let pose = start * Pose::translation(0.0, 0.0, 0.05 * f64::from(moves));
+        window.state_mut().send(Command::TakeCamera(Some(pose)));
+        loop {
             window.step();
-            loop {
-                window.step();
-                let desk = window.state().desk();
-                if desk.probe().is_some_and(|probe| probe.pose == pose) {
-                    break;
-                }
-                std::thread::sleep(std::time::Duration::from_millis(1));
+            let desk = window.state().desk();
+            if desk.probe().is_some_and(|probe| probe.pose == pose) {
+                break;
             }
-            window.render().expect("a picture");
-        });
-        window.state_mut().send(Command::TakeCamera(None));
-        window.step();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        end(window);
+    }
+}
+
+/// An empty view: what it costs to fill the window at all.
+#[divan::bench(sample_count = 30, sample_size = 1)]
+fn next_to_nothing(bencher: Bencher) {
+    with_window(|window| {
+        window.state_mut().send(Command::Maximize(Some("fusion")));
+        draw(window);
+        bencher.bench_local(|| draw(window));
+        window.state_mut().send(Command::Maximize(None));
+        draw(window);
     });
 }

@@ -15,16 +15,24 @@ pub(super) struct Picture {
     /// What the picture shows, and how many pixels one of egui's points has.
     shown: Option<(Frame, f32)>,
     trouble: Option<String>,
-    /// How often it was drawn, and how often a cloud was uploaded.
+    /// How often it was drawn, how often the points in it, and how often a cloud was uploaded.
     #[cfg(test)]
     pub(super) drawn: usize,
+    #[cfg(test)]
+    pub(super) points_drawn: usize,
     #[cfg(test)]
     pub(super) uploaded: usize,
 }
 
 /// Textures of the size of the pane.
+///
+/// The points have a layer of their own, which stays while only lines and faces change: a hundred
+/// thousand of them take a software adapter longer than all the rest.
 struct Target {
     size: [u32; 2],
+    cloud_color: wgpu::TextureView,
+    cloud_depth: wgpu::TextureView,
+    backdrop: wgpu::BindGroup,
     samples: wgpu::TextureView,
     depth: wgpu::TextureView,
     resolved: wgpu::Texture,
@@ -87,7 +95,10 @@ impl Picture {
     ) {
         let target = match self.target.take() {
             Some(target) if target.size == size => target,
-            _ => Target::new(device, &made.blit_layout, size),
+            _ => {
+                self.shown = None;
+                Target::new(device, made, size)
+            }
         };
         let cloud = match self.cloud.take() {
             Some(cloud) if Arc::ptr_eq(&cloud.points, &frame.points) => cloud,
@@ -121,15 +132,32 @@ impl Picture {
             &frame.view(size, scale),
             wgpu::BufferUsages::UNIFORM,
         );
-        let view = bind(device, &made.view_layout, view.as_entire_binding());
+        let view = bind(device, &made.view_layout, [view.as_entire_binding()]);
 
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
-            let mut pass = target.begin(&mut encoder, frame);
+        let has_points = self.shown.as_ref().is_some_and(|(shown, at)| {
+            *at == scale
+                && shown.lens == frame.lens
+                && shown.background == frame.background
+                && Arc::ptr_eq(&shown.points, &frame.points)
+        });
+        if !has_points {
+            let mut pass = target.begin_cloud(&mut encoder, frame);
             pass.set_bind_group(0, &view, &[]);
             pass.set_pipeline(&made.points);
             pass.set_vertex_buffer(0, cloud.buffer.slice(..));
             pass.draw(0..4, 0..frame.points.len() as u32);
+            #[cfg(test)]
+            {
+                self.points_drawn += 1;
+            }
+        }
+        {
+            let mut pass = target.begin(&mut encoder, frame);
+            pass.set_pipeline(&made.backdrop);
+            pass.set_bind_group(0, &target.backdrop, &[]);
+            pass.draw(0..3, 0..1);
+            pass.set_bind_group(0, &view, &[]);
             pass.set_pipeline(&made.faces);
             pass.set_vertex_buffer(0, faces.slice(..));
             pass.draw(0..frame.faces.len() as u32, 0..1);
@@ -161,7 +189,7 @@ impl Picture {
 }
 
 impl Target {
-    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2]) -> Self {
+    fn new(device: &wgpu::Device, made: &Made, size: [u32; 2]) -> Self {
         let texture = |format, sample_count, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("space"),
@@ -182,13 +210,19 @@ impl Target {
         let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         let resolved = texture(COLOR, 1, attached | read);
-        let bind_group = bind(
-            device,
-            layout,
-            wgpu::BindingResource::TextureView(&view(&resolved)),
-        );
+        let shown = wgpu::BindingResource::TextureView;
+        let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
+        let cloud_color = view(&texture(COLOR, 1, attached | sampled));
+        let cloud_depth = view(&texture(DEPTH, 1, attached | sampled));
+        let layers = [shown(&cloud_color), shown(&cloud_depth)];
+        let backdrop = bind(device, &made.backdrop_layout, layers);
+        let whole = view(&resolved);
+        let bind_group = bind(device, &made.blit_layout, [shown(&whole)]);
         Self {
             size,
+            cloud_color,
+            cloud_depth,
+            backdrop,
             samples: view(&texture(COLOR, SAMPLES, attached)),
             depth: view(&texture(DEPTH, SAMPLES, attached)),
             resolved,
@@ -196,51 +230,90 @@ impl Target {
         }
     }
 
+    /// The pass that draws the points.
+    fn begin_cloud<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        frame: &Frame,
+    ) -> wgpu::RenderPass<'a> {
+        let store = wgpu::StoreOp::Store;
+        pass(
+            encoder,
+            frame,
+            (&self.cloud_color, None),
+            &self.cloud_depth,
+            store,
+        )
+    }
+
+    /// The pass that draws everything else in front of them.
     fn begin<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
         frame: &Frame,
     ) -> wgpu::RenderPass<'a> {
-        let [r, g, b, a] = frame
-            .background
-            .to_array()
-            .map(|value| f64::from(value) / 255.0);
-        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("space"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.samples,
-                depth_slice: None,
-                resolve_target: Some(&self.resolved.create_view(&Default::default())),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
-                    store: wgpu::StoreOp::Discard,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
-                stencil_ops: None,
-            }),
-            ..wgpu::RenderPassDescriptor::default()
-        })
+        let resolved = self.resolved.create_view(&Default::default());
+        let store = wgpu::StoreOp::Discard;
+        pass(
+            encoder,
+            frame,
+            (&self.samples, Some(&resolved)),
+            &self.depth,
+            store,
+        )
     }
 }
 
-fn bind(
+/// A pass that begins with nothing but the background. What several samples are resolved to is kept
+/// in any case.
+fn pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    frame: &Frame,
+    (color, resolved): (&wgpu::TextureView, Option<&wgpu::TextureView>),
+    depth: &wgpu::TextureView,
+    store: wgpu::StoreOp,
+) -> wgpu::RenderPass<'a> {
+    let [r, g, b, a] = frame
+        .background
+        .to_array()
+        .map(|value| f64::from(value) / 255.0);
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("space"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: color,
+            depth_slice: None,
+            resolve_target: resolved,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                store,
+            },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(0.0),
+                store,
+            }),
+            stencil_ops: None,
+        }),
+        ..wgpu::RenderPassDescriptor::default()
+    })
+}
+
+fn bind<const N: usize>(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
-    resource: wgpu::BindingResource<'_>,
+    resources: [wgpu::BindingResource<'_>; N],
 ) -> wgpu::BindGroup {
+    let mut bindings = 0..;
+    let entries = resources.map(|resource| wgpu::BindGroupEntry {
+        binding: bindings.next().unwrap_or_default(),
+        resource,
+    });
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("space"),
         layout,
-        entries: &[wgpu::BindGroupEntry {
-            binding: 0,
-            resource,
-        }],
+        entries: &entries,
     })
 }
 

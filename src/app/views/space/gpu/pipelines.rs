@@ -22,8 +22,10 @@ pub(super) struct Made {
     pub(super) points: wgpu::RenderPipeline,
     pub(super) lines: wgpu::RenderPipeline,
     pub(super) faces: wgpu::RenderPipeline,
+    pub(super) backdrop: wgpu::RenderPipeline,
     pub(super) blit: wgpu::RenderPipeline,
     pub(super) view_layout: wgpu::BindGroupLayout,
+    pub(super) backdrop_layout: wgpu::BindGroupLayout,
     pub(super) blit_layout: wgpu::BindGroupLayout,
 }
 
@@ -60,47 +62,67 @@ impl Made {
         let view_layout = layout(
             device,
             wgpu::ShaderStages::VERTEX,
-            wgpu::BindingType::Buffer {
+            &[wgpu::BindingType::Buffer {
                 ty: wgpu::BufferBindingType::Uniform,
                 has_dynamic_offset: false,
                 min_binding_size: None,
-            },
+            }],
         );
-        let blit_layout = layout(
-            device,
-            wgpu::ShaderStages::FRAGMENT,
-            wgpu::BindingType::Texture {
-                sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
-        );
+        let texture = |sample_type| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let color = texture(wgpu::TextureSampleType::Float { filterable: false });
+        let depth = texture(wgpu::TextureSampleType::Depth);
+        let fragment = wgpu::ShaderStages::FRAGMENT;
+        let blit_layout = layout(device, fragment, &[color]);
+        let backdrop_layout = layout(device, fragment, &[color, depth]);
         let spot = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];
         let line = wgpu::vertex_attr_array![
             0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Float32
         ];
         let instance = wgpu::VertexStepMode::Instance;
         let strip = wgpu::PrimitiveTopology::TriangleStrip;
-        let part = |name, topology, buffer| {
+        let part = |name, topology, buffer, onto| {
             let drawn = Drawn {
                 layout: &view_layout,
                 vertex: (&scene, name),
                 fragment: (&scene, "paint"),
                 buffer: Some(buffer),
                 topology,
-                format: COLOR,
-                has_depth: true,
+                onto,
             };
             drawn.pipeline(device)
         };
         Self {
-            points: part("point", strip, buffer(Spot::BYTES, instance, &spot)),
-            lines: part("line", strip, buffer(Line::BYTES, instance, &line)),
+            points: part(
+                "point",
+                strip,
+                buffer(Spot::BYTES, instance, &spot),
+                Onto::Cloud,
+            ),
+            lines: part(
+                "line",
+                strip,
+                buffer(Line::BYTES, instance, &line),
+                Onto::Picture,
+            ),
             faces: part(
                 "face",
                 wgpu::PrimitiveTopology::TriangleList,
                 buffer(Spot::BYTES, wgpu::VertexStepMode::Vertex, &spot),
+                Onto::Picture,
             ),
+            backdrop: Drawn {
+                layout: &backdrop_layout,
+                vertex: (&blit, "cover"),
+                fragment: (&blit, "backdrop"),
+                buffer: None,
+                topology: wgpu::PrimitiveTopology::TriangleList,
+                onto: Onto::Picture,
+            }
+            .pipeline(device),
             blit: Drawn {
                 layout: &blit_layout,
                 vertex: (&blit, "cover"),
@@ -110,11 +132,11 @@ impl Made {
                 },
                 buffer: None,
                 topology: wgpu::PrimitiveTopology::TriangleList,
-                format: target,
-                has_depth: false,
+                onto: Onto::Pane(target),
             }
             .pipeline(device),
             view_layout,
+            backdrop_layout,
             blit_layout,
         }
     }
@@ -135,16 +157,20 @@ fn buffer(
 fn layout(
     device: &wgpu::Device,
     visibility: wgpu::ShaderStages,
-    ty: wgpu::BindingType,
+    types: &[wgpu::BindingType],
 ) -> wgpu::BindGroupLayout {
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("space"),
-        entries: &[wgpu::BindGroupLayoutEntry {
-            binding: 0,
+    let entries: Vec<_> = (0..)
+        .zip(types)
+        .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
+            binding,
             visibility,
             ty,
             count: None,
-        }],
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("space"),
+        entries: &entries,
     })
 }
 
@@ -155,9 +181,34 @@ struct Drawn<'a> {
     fragment: (&'a wgpu::ShaderModule, &'a str),
     buffer: Option<wgpu::VertexBufferLayout<'a>>,
     topology: wgpu::PrimitiveTopology,
-    format: wgpu::TextureFormat,
-    /// Whether it is drawn into the picture, with depth and several samples in a pixel.
-    has_depth: bool,
+    onto: Onto,
+}
+
+/// What is drawn into.
+#[derive(Clone, Copy)]
+enum Onto {
+    /// The layer of the points alone. They are squares, which more samples would only blur.
+    Cloud,
+    /// The whole picture.
+    Picture,
+    /// The window, which has no depth.
+    Pane(wgpu::TextureFormat),
+}
+
+impl Onto {
+    fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Self::Cloud | Self::Picture => COLOR,
+            Self::Pane(format) => format,
+        }
+    }
+
+    fn samples(self) -> u32 {
+        match self {
+            Self::Picture => SAMPLES,
+            Self::Cloud | Self::Pane(_) => 1,
+        }
+    }
 }
 
 impl Drawn<'_> {
@@ -182,7 +233,7 @@ impl Drawn<'_> {
                 topology: self.topology,
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: self.has_depth.then(|| wgpu::DepthStencilState {
+            depth_stencil: (!matches!(self.onto, Onto::Pane(_))).then(|| wgpu::DepthStencilState {
                 format: DEPTH,
                 depth_write_enabled: Some(true),
                 depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
@@ -190,7 +241,7 @@ impl Drawn<'_> {
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState {
-                count: if self.has_depth { SAMPLES } else { 1 },
+                count: self.onto.samples(),
                 ..wgpu::MultisampleState::default()
             },
             fragment: Some(wgpu::FragmentState {
@@ -198,7 +249,7 @@ impl Drawn<'_> {
                 entry_point: Some(self.fragment.1),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: self.format,
+                    format: self.onto.format(),
                     blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
                     write_mask: wgpu::ColorWrites::ALL,
                 })],

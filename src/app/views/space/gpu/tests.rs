@@ -196,6 +196,24 @@ fn a_picture_is_drawn_again_only_if_something_changed() {
     assert_eq!((picture.drawn, picture.uploaded), (2, 1));
     card.draw(&mut picture, &frame(&[point], Vec::new()));
     assert_eq!((picture.drawn, picture.uploaded), (3, 2));
+    // The points stay while a line moves in front of them.
+    assert_eq!(picture.points_drawn, 3);
+    let mut crossed = first.clone();
+    card.draw(&mut picture, &crossed);
+    assert_eq!(picture.points_drawn, 4);
+    crossed.lines = vec![Line {
+        ends: [place(20.0, 50.0, 2.0), place(80.0, 50.0, 2.0)],
+        color: GREEN,
+        width: 6.0,
+    }];
+    card.draw(&mut picture, &crossed);
+    assert_eq!((picture.drawn, picture.points_drawn), (5, 4));
+    assert_eq!(near_pixel(&card.pixels(&picture), 50.0, 50.0), GREEN);
+    crossed.lines[0].ends = [place(20.0, 50.0, 5.0), place(80.0, 50.0, 5.0)];
+    card.draw(&mut picture, &crossed);
+    let pixels = card.pixels(&picture);
+    assert_eq!(near_pixel(&pixels, 50.0, 50.0), RED);
+    assert_eq!(near_pixel(&pixels, 30.0, 50.0), GREEN);
 }
 
 #[test]
