@@ -12,7 +12,7 @@ use crate::palette;
 use crate::problem::Problem;
 
 /// Photos of cars are wide.
-const RANKS_PER_ROW: usize = 2;
+const RANKS_PER_ROW: usize = 3;
 
 /// What a layout follows from.
 pub(super) struct Occasion<'a> {
