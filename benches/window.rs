@@ -99,7 +99,13 @@ impl Canvas {
             wgpu_setup: setup,
             ..WgpuConfiguration::default()
         };
-        let state = ready(RenderState::create(&configuration, &instance, None, options))?.ok()?;
+        let state = ready(RenderState::create(
+            &configuration,
+            &instance,
+            None,
+            options,
+        ))?
+        .ok()?;
         let texture = state.device.create_texture(&wgpu::TextureDescriptor {
             label: None,
             size: wgpu::Extent3d {
