@@ -21,7 +21,7 @@ use posescope::problem::Problem;
 use posescope::render::{ColoredCloud, Scorer, color_cloud};
 use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
-use posescope::scene::street::Street;
+use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, IndexOptions, Retriever};
 use posescope::solver::{Correspondence, p3p};
 use posescope::trace::Trace;
@@ -202,19 +202,41 @@ fn whole_estimator(bencher: Bencher, name: &str) {
     bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
 }
 
-/// Making a frame, past the cache.
-#[divan::bench(args = [70], sample_count = 5)]
-fn street_photo(bencher: Bencher, frame: usize) {
-    let street = Street::open("street").expect("is built in");
-    let drive = street.traversal();
-    bencher.bench(|| drive.image(black_box(frame)));
-}
+/// Making a frame of the street, past the cache.
+mod frame {
+    use super::*;
 
-#[divan::bench(args = [70], sample_count = 5)]
-fn street_cloud(bencher: Bencher, frame: usize) {
-    let street = Street::open("street").expect("is built in");
-    let drive = street.traversal();
-    bencher.bench(|| drive.cloud(black_box(frame)));
+    const FRAME: usize = 70;
+
+    fn drives() -> Vec<(Size, Condition)> {
+        let sizes = [Size::Full, Size::Half].into_iter();
+        sizes
+            .flat_map(|size| Condition::ALL.map(|condition| (size, condition)))
+            .collect()
+    }
+
+    fn traversal((size, condition): (Size, Condition)) -> Traversal {
+        Traversal::new(WORLD_SEED, condition, size)
+    }
+
+    #[divan::bench(args = drives(), sample_count = 10)]
+    fn photo(bencher: Bencher, drive: (Size, Condition)) {
+        let drive = traversal(drive);
+        bencher.bench(|| drive.image(black_box(FRAME)));
+    }
+
+    #[divan::bench(args = drives(), sample_count = 10)]
+    fn photo_and_scan(bencher: Bencher, drive: (Size, Condition)) {
+        let drive = traversal(drive);
+        bencher.bench(|| (drive.image(black_box(FRAME)), drive.cloud(black_box(FRAME))));
+    }
+
+    /// The same for both sizes.
+    #[divan::bench(args = Condition::ALL, sample_count = 10)]
+    fn scan(bencher: Bencher, condition: Condition) {
+        let drive = traversal((Size::Full, condition));
+        bencher.bench(|| drive.cloud(black_box(FRAME)));
+    }
 }
 
 /// Random words of unit length, and as many descriptors near them.

@@ -7,6 +7,7 @@
 //! Inside, the town has coordinates x right, y *up*, z forward with the road at y = 0; the public
 //! interface is x right, y down, z forward everywhere (see [`Traversal::world_from_camera`]).
 
+mod beam;
 mod box_tree;
 mod camera_path;
 mod car;

@@ -1,8 +1,15 @@
 //! A hierarchy of bounding boxes over the solids.
 
+mod thicket;
+
+use std::cell::Cell;
+
+use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
 
+use super::beam::Beam;
 use super::frame::Ray;
+pub(super) use thicket::Thicket;
 
 /// Solids per leaf.
 const LEAF: usize = 2;
@@ -13,15 +20,28 @@ const SMALL: usize = 128;
 struct Node {
     /// Least and greatest corner.
     corners: [Point3<f32>; 2],
-    /// First item of a leaf, or index of the second child (the first follows its parent).
-    next: u32,
+    /// Indices of the children; those of a leaf both are that of its first item.
+    links: [u32; 2],
     /// Number of items, 0 for an inner node.
     count: u16,
     /// Axis along which the children are separated.
     axis: u16,
 }
 
-/// The hierarchy; items are indices into the list that it was built from.
+impl Node {
+    /// The children of an inner node, the nearer one first.
+    #[inline]
+    fn children(&self, backwards: [bool; 3]) -> [u32; 2] {
+        let [first, second] = self.links;
+        if backwards[usize::from(self.axis)] {
+            [second, first]
+        } else {
+            [first, second]
+        }
+    }
+}
+
+/// The hierarchy; items are indices into the list that it was built from. The root is the last node.
 #[derive(Debug)]
 pub(super) struct BoxTree {
     nodes: Vec<Node>,
@@ -41,7 +61,8 @@ impl BoxTree {
         tree
     }
 
-    fn split(&mut self, boxes: &[[Point3<f64>; 2]], begin: usize, end: usize) {
+    /// Adds the tree over some of the items; returns the index of its root.
+    fn split(&mut self, boxes: &[[Point3<f64>; 2]], begin: usize, end: usize) -> u32 {
         let items = &mut self.items[begin..end];
         let empty = [
             Point3::from(Vector3::repeat(f64::MAX)),
@@ -53,25 +74,73 @@ impl BoxTree {
         });
         // Rounded outwards: a box must not lose what it holds.
         let slack = Vector3::repeat(1e-3);
-        let index = self.nodes.len();
-        self.nodes.push(Node {
-            corners: [(low - slack).cast(), (high + slack).cast()],
-            next: begin as u32,
-            count: if end - begin <= LEAF {
-                (end - begin) as u16
-            } else {
-                0
-            },
-            axis: 0,
-        });
+        let corners = [(low - slack).cast(), (high + slack).cast()];
         if end - begin <= LEAF {
-            return;
+            return self.push(Node {
+                corners,
+                links: [begin as u32; 2],
+                count: (end - begin) as u16,
+                axis: 0,
+            });
         }
         let (axis, middle) = cheapest_split(items, boxes, (high - low).imax());
-        self.nodes[index].axis = axis as u16;
-        self.split(boxes, begin, begin + middle);
-        self.nodes[index].next = self.nodes.len() as u32;
-        self.split(boxes, begin + middle, end);
+        let first = self.split(boxes, begin, begin + middle);
+        let second = self.split(boxes, begin + middle, end);
+        self.push(Node {
+            corners,
+            links: [first, second],
+            count: 0,
+            axis: axis as u16,
+        })
+    }
+
+    fn push(&mut self, node: Node) -> u32 {
+        self.nodes.push(node);
+        self.nodes.len() as u32 - 1
+    }
+
+    fn root(&self) -> Option<u32> {
+        self.nodes.len().checked_sub(1).map(|last| last as u32)
+    }
+
+    #[inline]
+    fn items_of(&self, leaf: &Node) -> &[u32] {
+        &self.items[leaf.links[0] as usize..][..usize::from(leaf.count)]
+    }
+
+    /// The tree of what a beam reaches, in the same order.
+    pub(super) fn part(&self, beam: &Beam) -> Self {
+        let mut part = Self {
+            nodes: Vec::new(),
+            items: Vec::new(),
+        };
+        if let Some(root) = self.root() {
+            part.copy(self, root, beam);
+        }
+        part
+    }
+
+    /// Adds the part of a subtree of `whole` that a beam reaches; returns the index of its root.
+    fn copy(&mut self, whole: &Self, index: u32, beam: &Beam) -> Option<u32> {
+        let node = whole.nodes[index as usize];
+        if !beam.reaches(&node.corners) {
+            return None;
+        }
+        if node.count > 0 {
+            let first = self.items.len() as u32;
+            self.items.extend(whole.items_of(&node));
+            return Some(self.push(Node {
+                links: [first; 2],
+                ..node
+            }));
+        }
+        match node.links.map(|child| self.copy(whole, child, beam)) {
+            [Some(first), Some(second)] => Some(self.push(Node {
+                links: [first, second],
+                ..node
+            })),
+            [first, second] => first.or(second),
+        }
     }
 
     /// Calls `visit` with every item whose box the ray enters before the distance that `visit`
@@ -79,35 +148,83 @@ impl BoxTree {
     #[inline]
     pub(super) fn traverse(&self, ray: &Ray, limit: f64, mut visit: impl FnMut(u32) -> f64) {
         let origin: Point3<f32> = ray.origin.cast();
-        let inverse: Vector3<f32> = ray.direction.map(|c| c.recip() as f32);
-        let backwards = [inverse.x < 0.0, inverse.y < 0.0, inverse.z < 0.0];
+        let inverse = inverse(&ray.direction);
+        let backwards = backwards(&ray.direction);
         let mut limit = limit as f32;
-        let mut stack = [0_u32; 64];
-        let mut depth = usize::from(!self.nodes.is_empty());
-        while depth > 0 {
-            depth -= 1;
-            let index = stack[depth];
+        let mut stack: ArrayVec<u32, 64> = self.root().into_iter().collect();
+        while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
             if !enters(node, &origin, &inverse, backwards, limit) {
                 continue;
             }
             if node.count > 0 {
-                let begin = node.next as usize;
-                for &item in &self.items[begin..begin + usize::from(node.count)] {
+                for &item in self.items_of(node) {
                     limit = visit(item) as f32;
                 }
                 continue;
             }
-            let (near, far) = if backwards[usize::from(node.axis)] {
-                (node.next, index + 1)
-            } else {
-                (index + 1, node.next)
-            };
-            stack[depth] = far;
-            stack[depth + 1] = near;
-            depth += 2;
+            let [near, far] = node.children(backwards);
+            stack.extend([far, near]);
         }
     }
+
+    /// Whether `is_met` holds for any item whose box the ray enters before `limit`.
+    ///
+    /// `leaf` is the one where the last such item was: rays side by side mostly meet the same.
+    #[inline]
+    pub(super) fn any(
+        &self,
+        ray: &Ray,
+        limit: f32,
+        leaf: &Cell<Option<u32>>,
+        is_met: impl Fn(u32) -> bool,
+    ) -> bool {
+        let origin: Point3<f32> = ray.origin.cast();
+        let inverse = inverse(&ray.direction);
+        let backwards = backwards(&ray.direction);
+        let is_entered = |index: u32| {
+            let node = &self.nodes[index as usize];
+            enters(node, &origin, &inverse, backwards, limit)
+        };
+        let holds_met = |index: u32| {
+            let leaf = &self.nodes[index as usize];
+            self.items_of(leaf).iter().any(|&item| is_met(item))
+        };
+        if leaf
+            .get()
+            .is_some_and(|leaf| is_entered(leaf) && holds_met(leaf))
+        {
+            return true;
+        }
+        let mut stack: ArrayVec<u32, 64> = self.root().into_iter().collect();
+        while let Some(index) = stack.pop() {
+            if !is_entered(index) {
+                continue;
+            }
+            let node = &self.nodes[index as usize];
+            if node.count == 0 {
+                let [near, far] = node.children(backwards);
+                stack.extend([far, near]);
+            } else if leaf.get() != Some(index) && holds_met(index) {
+                leaf.set(Some(index));
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// The reciprocals of a direction's coordinates.
+#[inline]
+fn inverse(direction: &Vector3<f64>) -> Vector3<f32> {
+    direction.map(|c| c.recip() as f32)
+}
+
+/// Along which axes a direction points backwards.
+#[inline]
+pub(super) fn backwards(direction: &Vector3<f64>) -> [bool; 3] {
+    // The sign of a zero counts: its reciprocal has it too.
+    [0, 1, 2].map(|axis| direction[axis].is_sign_negative())
 }
 
 /// Sorts items along the axis, and returns it and the position, where the surface area heuristic
@@ -185,24 +302,27 @@ mod tests {
     use super::super::noise::{derive, unit};
     use super::*;
 
+    fn random_boxes(count: u32) -> Vec<[Point3<f64>; 2]> {
+        let random = |i, row: usize| 100.0 * unit(derive(i, row as u32)) - 50.0;
+        let corner = |i| Point3::from(Vector3::from_fn(|row, _| random(i, row)));
+        (0..count)
+            .map(|i| [corner(i), corner(i) + Vector3::repeat(5.0)])
+            .collect()
+    }
+
+    fn random_ray(i: u32) -> Ray {
+        let direction = Vector3::from_fn(|r, _| unit(derive(i, 50 + r as u32)) - 0.5);
+        Ray {
+            origin: Point3::origin(),
+            direction: direction.normalize(),
+        }
+    }
+
     #[test]
     fn every_box_on_the_ray_is_visited() {
-        let boxes: Vec<_> = (0..500)
-            .map(|i| {
-                let corner = Point3::from(Vector3::from_fn(|r, _| {
-                    100.0 * unit(derive(i, r as u32)) - 50.0
-                }));
-                [corner, corner + Vector3::repeat(5.0)]
-            })
-            .collect();
+        let boxes = random_boxes(500);
         let tree = BoxTree::new(&boxes);
-        for i in 0..200 {
-            let direction =
-                Vector3::from_fn(|r, _| unit(derive(i, 50 + r as u32)) - 0.5).normalize();
-            let ray = Ray {
-                origin: Point3::origin(),
-                direction,
-            };
+        for ray in (0..200).map(random_ray) {
             let mut visited = vec![false; boxes.len()];
             tree.traverse(&ray, 1e3, |item| {
                 visited[item as usize] = true;
@@ -210,10 +330,60 @@ mod tests {
             });
             for (k, [low, high]) in boxes.iter().enumerate() {
                 let centre = nalgebra::center(low, high);
-                let along = centre.coords.dot(&direction);
+                let along = centre.coords.dot(&ray.direction);
                 let inside = (centre - ray.at(along)).amax() < 2.4;
                 assert!(!inside || along < 0.0 || visited[k]);
             }
         }
+    }
+
+    #[test]
+    fn any_finds_what_traversing_finds_whatever_it_found_before() {
+        let tree = BoxTree::new(&random_boxes(500));
+        let leaf = Cell::new(None);
+        let is_met = |item: u32| item.is_multiple_of(3);
+        let mut found = 0;
+        for ray in (0..300).map(random_ray) {
+            let mut expected = false;
+            tree.traverse(&ray, 30.0, |item| {
+                expected |= is_met(item);
+                30.0
+            });
+            assert_eq!(tree.any(&ray, 30.0, &leaf, is_met), expected);
+            found += u32::from(expected);
+        }
+        assert!((50..250).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn a_thicket_shows_the_rays_of_its_beam_what_the_tree_shows_them_in_the_same_order() {
+        let tree = BoxTree::new(&random_boxes(3000));
+        let mut seen = 0;
+        for ray in (0..200).map(random_ray) {
+            let aside = |k: u32| random_ray(1000 + k).direction * 0.1;
+            let directions: Vec<_> = (0..8).map(|k| ray.direction + aside(k)).collect();
+            let wide = Beam::around(ray.origin, &directions);
+            let narrow = Beam::around(ray.origin, &directions[..4]);
+            let mean = directions[..4].iter().sum::<Vector3<f64>>().normalize();
+            let ray = Ray {
+                direction: mean,
+                ..ray
+            };
+            let thicket = tree.part(&wide).within(&narrow, backwards(&mean));
+            // The search ends at the fifth item.
+            let limit = |found: &[u32]| if found.len() < 5 { 60.0 } else { 20.0 };
+            let (mut expected, mut found) = (Vec::new(), Vec::new());
+            tree.traverse(&ray, 60.0, |item| {
+                expected.push(item);
+                limit(&expected)
+            });
+            thicket.traverse(&ray, 60.0, |item| {
+                found.push(item);
+                limit(&found)
+            });
+            assert_eq!(found, expected);
+            seen += found.len();
+        }
+        assert!(seen > 500, "{seen}");
     }
 }

@@ -9,6 +9,10 @@ use super::shape::{Contact, Part};
 
 const WHEEL_RADIUS: f64 = 0.32;
 const WHEEL_WIDTH: f64 = 0.2;
+/// Height of the lower edge of the body \[m\].
+const SILL: f64 = 0.2;
+/// The parts of a car reach less far beyond its length, its width and their heights \[m\].
+const SLACK: f64 = 0.1;
 
 /// The shape of a car in its own frame: x right, y up, z to the nose; origin on the road below
 /// its middle \[m\].
@@ -66,7 +70,7 @@ impl CarShape {
             plane(Vector3::new(0.0, 1.0, fall), belt + fall * windscreen),
             plane(Vector3::new(0.0, 1.0, 0.6), belt + 0.6 * (nose - 0.32)),
             plane(Vector3::y(), belt + 0.01),
-            plane(-Vector3::y(), -0.2),
+            plane(-Vector3::y(), -SILL),
         ];
         let [pane_right, pane_left] = mirrored(1.0, 0.33, 0.0, side - 0.03 + 0.33 * belt);
         let [edge_right, edge_left] = mirrored(1.0, 1.3, 0.0, side - 0.38 + 1.3 * height);
@@ -136,6 +140,8 @@ impl CarShape {
     /// First contact beyond `from` of a ray of the car's frame. The contact's uv are z (flanks) or x
     /// (front and rear) of the frame, and the height above the road.
     pub(super) fn meet(&self, ray: &Ray, from: f64) -> Option<Contact> {
+        let [low, high] = self.heights(ray, from)?;
+        let between = |bottom: f64, top: f64| high >= bottom - SLACK && low <= top + SLACK;
         let polyhedron = |planes: &[Plane], part_of: fn(&Vector3<f64>) -> Part| {
             let (distance, index) = first_beyond(clip(ray, planes.iter())?, from)?;
             let p = ray.at(distance);
@@ -148,14 +154,38 @@ impl CarShape {
                 part: part_of(&normal),
             })
         };
-        [
-            polyhedron(&self.body, part_of_body),
-            polyhedron(&self.cabin, part_of_cabin),
-            self.meet_wheels(ray, from),
-        ]
-        .into_iter()
-        .flatten()
-        .min_by(|a, b| a.distance.total_cmp(&b.distance))
+        let body = between(SILL, self.belt + 0.01).then(|| polyhedron(&self.body, part_of_body));
+        let cabin = between(self.belt, self.height).then(|| polyhedron(&self.cabin, part_of_cabin));
+        let wheels = between(0.0, 2.0 * WHEEL_RADIUS).then(|| self.meet_wheels(ray, from));
+        [body, cabin, wheels]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .min_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+
+    /// The least and the greatest height of a ray above the plan of the car; `None` if it is nowhere
+    /// there beyond `from`.
+    fn heights(&self, ray: &Ray, from: f64) -> Option<[f64; 2]> {
+        let half = self.half_plan();
+        let (mut enter, mut leave) = (from, f64::INFINITY);
+        for (origin, direction, half) in [
+            (ray.origin.x, ray.direction.x, half.x + SLACK),
+            (ray.origin.z, ray.direction.z, half.y + SLACK),
+        ] {
+            let inverse = direction.recip();
+            let (a, b) = ((-half - origin) * inverse, (half - origin) * inverse);
+            let (near, far) = if a < b { (a, b) } else { (b, a) };
+            if near > enter {
+                enter = near;
+            }
+            if far < leave {
+                leave = far;
+            }
+        }
+        let height = |distance: f64| ray.origin.y + ray.direction.y * distance;
+        let (a, b) = (height(enter), height(leave));
+        (enter <= leave).then(|| if a < b { [a, b] } else { [b, a] })
     }
 
     fn meet_wheels(&self, ray: &Ray, from: f64) -> Option<Contact> {

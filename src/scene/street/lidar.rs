@@ -1,8 +1,13 @@
 //! A rotating laser scanner with 64 beams.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
+use super::beam::{Beam, Sector};
+use super::box_tree::BoxTree;
 use super::look::Look;
 use super::noise::{derive, hash2, normal, unit};
 use super::render::town_ray;
@@ -33,21 +38,37 @@ pub struct ScanPoint {
     pub reflectance: f32,
 }
 
+/// Beams and steps of the shots that are searched for together.
+const TILE: [u32; 2] = [4, 32];
+
 /// The scan taken at a camera pose, beam after beam.
 pub(super) fn scan(town: &Town, look: &Look, pose: &Pose, seed: u32) -> Vec<ScanPoint> {
     let circle: Vec<(f64, f64)> = (0..STEPS)
         .map(|step| libm::sincos(f64::from(step) / f64::from(STEPS) * std::f64::consts::TAU))
         .collect();
-    let beam = |beam: u32| {
-        let (up, level) = libm::sincos(elevation(beam).to_radians());
-        let circle = &circle;
-        (0_u32..).zip(circle).filter_map(move |(step, (sin, cos))| {
-            let direction = Vector3::new(level * sin, -up, level * cos);
-            let roll = hash2(step.cast_signed(), beam.cast_signed(), seed);
-            shoot(town, look, pose, &direction, roll)
-        })
+    let shooter = Shooter {
+        town,
+        look,
+        pose,
+        seed,
     };
-    (0..BEAMS).into_par_iter().flat_map_iter(beam).collect()
+    let sides: Vec<Side> = circle
+        .par_chunks(TILE[1] as usize)
+        .map(|steps| shooter.side(steps))
+        .collect();
+    (0..BEAMS)
+        .into_par_iter()
+        .step_by(TILE[0] as usize)
+        .flat_map_iter(|first| shooter.turn(&sides, first..first + TILE[0]))
+        .collect()
+}
+
+/// Directions of the shots of a beam in the camera frame.
+fn bearings(beam: u32, steps: &[(f64, f64)]) -> impl Iterator<Item = Vector3<f64>> {
+    let (up, level) = libm::sincos(elevation(beam).to_radians());
+    steps
+        .iter()
+        .map(move |(sin, cos)| Vector3::new(level * sin, -up, level * cos))
 }
 
 /// Elevation of a beam \[°\]: the upper 32 a third of a degree apart, the lower 32 half a degree.
@@ -60,37 +81,83 @@ fn elevation(beam: u32) -> f64 {
     }
 }
 
-/// The point that a shot in a direction of the camera frame yields, if any.
-fn shoot(
-    town: &Town,
-    look: &Look,
-    pose: &Pose,
-    direction: &Vector3<f64>,
-    roll: u32,
-) -> Option<ScanPoint> {
-    if unit(derive(roll, 1)) < LOST {
-        return None;
+/// A scanner at a place.
+struct Shooter<'a> {
+    town: &'a Town,
+    look: &'a Look,
+    pose: &'a Pose,
+    seed: u32,
+}
+
+/// What is on one side of the scanner.
+struct Side<'a> {
+    /// Sines and cosines of its steps.
+    steps: &'a [(f64, f64)],
+    solids: Arc<BoxTree>,
+}
+
+impl Shooter<'_> {
+    fn side<'a>(&self, steps: &'a [(f64, f64)]) -> Side<'a> {
+        let solids = self.town.solids_in(&self.beam(steps, &(0..BEAMS)));
+        Side {
+            steps,
+            solids: Arc::new(solids),
+        }
     }
-    let ray = town_ray(pose, &SCANNER, direction);
-    let sight = town.look(&ray, 0.0)?;
-    let [least, greatest] = RANGE;
-    if !(least..greatest).contains(&sight.distance) {
-        return None;
+
+    /// The points that a full turn of some beams yields, beam after beam.
+    fn turn(&self, sides: &[Side<'_>], beams: Range<u32>) -> impl Iterator<Item = ScanPoint> {
+        let mut points = vec![Vec::new(); beams.len()];
+        for (first, side) in (0_u32..).step_by(TILE[1] as usize).zip(sides) {
+            let sector = Sector::new(&side.solids, self.beam(side.steps, &beams));
+            for (beam, points) in beams.clone().zip(&mut points) {
+                for (step, bearing) in (first..).zip(bearings(beam, side.steps)) {
+                    let roll = hash2(step.cast_signed(), beam.cast_signed(), self.seed);
+                    points.extend(self.shoot(&sector, &bearing, roll));
+                }
+            }
+        }
+        points.into_iter().flatten()
     }
-    let appearance = town.appearance(&sight, &ray, 1.5e-3, &look.cover);
-    if unit(derive(roll, 2)) < THROUGH_GLASS * appearance.glass {
-        return None;
+
+    /// All shots of these steps and beams: none is outside of those of the first and the last beam.
+    fn beam(&self, steps: &[(f64, f64)], beams: &Range<u32>) -> Beam {
+        let outer = [beams.start, beams.end - 1].into_iter();
+        let bearings = outer.flat_map(|beam| bearings(beam, steps));
+        let directions: Vec<Vector3<f64>> = bearings
+            .map(|bearing| town_ray(self.pose, &SCANNER, &bearing).direction)
+            .collect();
+        let origin = town_ray(self.pose, &SCANNER, &Vector3::z()).origin;
+        Beam::around(origin, &directions)
     }
-    let facing = -sight.normal.dot(&ray.direction);
-    let reflectance = look.infrared(&appearance);
-    if unit(derive(roll, 3)) > returned(facing, reflectance, sight.distance) {
-        return None;
+
+    /// The point that a shot in a direction of the camera frame yields, if any.
+    fn shoot(&self, sector: &Sector, direction: &Vector3<f64>, roll: u32) -> Option<ScanPoint> {
+        if unit(derive(roll, 1)) < LOST {
+            return None;
+        }
+        let ray = town_ray(self.pose, &SCANNER, direction);
+        let (town, look) = (self.town, self.look);
+        let sight = town.look_within(sector, &ray, None)?;
+        let [least, greatest] = RANGE;
+        if !(least..greatest).contains(&sight.distance) {
+            return None;
+        }
+        let appearance = town.appearance(&sight, &ray, 1.5e-3, &look.cover);
+        if unit(derive(roll, 2)) < THROUGH_GLASS * appearance.glass {
+            return None;
+        }
+        let facing = -sight.normal.dot(&ray.direction);
+        let reflectance = look.infrared(&appearance);
+        if unit(derive(roll, 3)) > returned(facing, reflectance, sight.distance) {
+            return None;
+        }
+        let range = sight.distance + RANGE_NOISE * normal(derive(roll, 4));
+        Some(ScanPoint {
+            position: (SCANNER + direction * range).cast(),
+            reflectance: reflectance as f32,
+        })
     }
-    let range = sight.distance + RANGE_NOISE * normal(derive(roll, 4));
-    Some(ScanPoint {
-        position: (SCANNER + direction * range).cast(),
-        reflectance: reflectance as f32,
-    })
 }
 
 /// Probability that enough light comes back for a return.

@@ -13,13 +13,16 @@ pub(super) fn mix(word: u32) -> u32 {
     word ^ (word >> 16)
 }
 
+const X: u32 = 0x9E37_79B1;
+const Y: u32 = 0x85EB_CA77;
+const Z: u32 = 0xC2B2_AE3D;
+const SEED: u32 = 0x27D4_EB2F;
+
 /// A hash of a lattice point.
 #[inline]
 pub(super) fn hash3(x: i32, y: i32, z: i32, seed: u32) -> u32 {
-    let word = x.cast_unsigned().wrapping_mul(0x9E37_79B1)
-        ^ y.cast_unsigned().wrapping_mul(0x85EB_CA77)
-        ^ z.cast_unsigned().wrapping_mul(0xC2B2_AE3D);
-    mix(word.wrapping_add(seed.wrapping_mul(0x27D4_EB2F)))
+    let [x, y, z] = [(x, X), (y, Y), (z, Z)].map(|(at, factor)| terms(at, factor)[0]);
+    mix((x ^ y ^ z).wrapping_add(seed.wrapping_mul(SEED)))
 }
 
 /// A hash of a lattice point of the plane.
@@ -73,7 +76,15 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
 
 #[inline]
 fn signed(hash: u32) -> f64 {
-    unit(hash) * 2.0 - 1.0
+    // As unit(hash) · 2 − 1, whose first product is exact.
+    f64::from(hash) * (1.0 / 2_147_483_648.0) - 1.0
+}
+
+/// The terms of [`hash3`] for a coordinate and the next.
+#[inline]
+fn terms(coordinate: i32, factor: u32) -> [u32; 2] {
+    let term = coordinate.cast_unsigned().wrapping_mul(factor);
+    [term, term.wrapping_add(factor)]
 }
 
 /// Smooth noise along a line, −1 … 1, lattice spacing 1.
@@ -91,12 +102,11 @@ pub(super) fn value1(x: f64, seed: u32) -> f64 {
 pub(super) fn value2(x: f64, y: f64, seed: u32) -> f64 {
     let ((i, tx), (j, ty)) = (cell(x), cell(y));
     let (tx, ty) = (ease(tx), ease(ty));
-    let at = |di, dj| signed(hash2(i + di, j + dj, seed));
-    lerp(
-        lerp(at(0, 0), at(1, 0), tx),
-        lerp(at(0, 1), at(1, 1), tx),
-        ty,
-    )
+    let ([x0, x1], [y0, y1]) = (terms(i, X), terms(j, Y));
+    let seed = seed.wrapping_mul(SEED);
+    let [a, b, c, d] =
+        [x0 ^ y0, x1 ^ y0, x0 ^ y1, x1 ^ y1].map(|word| signed(mix(word.wrapping_add(seed))));
+    lerp(lerp(a, b, tx), lerp(c, d, tx), ty)
 }
 
 /// Smooth noise in space, −1 … 1, lattice spacing 1.
@@ -104,15 +114,14 @@ pub(super) fn value2(x: f64, y: f64, seed: u32) -> f64 {
 pub(super) fn value3(p: &Point3<f64>, seed: u32) -> f64 {
     let ((i, tx), (j, ty), (k, tz)) = (cell(p.x), cell(p.y), cell(p.z));
     let (tx, ty, tz) = (ease(tx), ease(ty), ease(tz));
-    let at = |di, dj, dk| signed(hash3(i + di, j + dj, k + dk, seed));
-    let layer = |dk| {
-        lerp(
-            lerp(at(0, 0, dk), at(1, 0, dk), tx),
-            lerp(at(0, 1, dk), at(1, 1, dk), tx),
-            ty,
-        )
+    let ([x0, x1], [y0, y1], [z0, z1]) = (terms(i, X), terms(j, Y), terms(k, Z));
+    let seed = seed.wrapping_mul(SEED);
+    let layer = |z: u32| {
+        let [a, b, c, d] = [x0 ^ y0, x1 ^ y0, x0 ^ y1, x1 ^ y1]
+            .map(|word| signed(mix((word ^ z).wrapping_add(seed))));
+        lerp(lerp(a, b, tx), lerp(c, d, tx), ty)
     };
-    lerp(layer(0), layer(1), tz)
+    lerp(layer(z0), layer(z1), tz)
 }
 
 /// How much of a surface one pixel covers \[m\].

@@ -1,9 +1,14 @@
 //! Images: one ray per pixel, two more where surfaces meet.
 
+use std::cell::Cell;
+use std::ops::Range;
+use std::sync::Arc;
+
 use image::RgbImage;
 use nalgebra::{Point2, Point3, Vector3};
 use rayon::prelude::*;
 
+use super::beam::{Beam, Sector};
 use super::camera_path::CAMERA_HEIGHT;
 use super::frame::Ray;
 use super::headlamp::Headlamp;
@@ -17,6 +22,9 @@ use crate::geometry::Pose;
 
 /// Pixels whose levels differ by more than this from a neighbour's are refined.
 const CONTRAST: f32 = 36.0;
+
+/// Columns and rows of the tiles whose rays are searched for together.
+const TILE: [u32; 2] = [32, 8];
 
 /// Level at which the noise is as strong as the weather says.
 const MID_LEVEL: f64 = 110.0;
@@ -54,7 +62,7 @@ pub(super) fn town_ray(pose: &Pose, origin: &Point3<f64>, direction: &Vector3<f6
 }
 
 /// Levels of a pixel, and what it shows.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Sample {
     levels: Levels,
     /// `None` is the sky.
@@ -68,35 +76,26 @@ impl Sample {
     }
 }
 
+/// A row of tiles: the samples of its pixels, row after row, and what is seen through its tiles.
+struct Band {
+    samples: Vec<Sample>,
+    sectors: Vec<Sector>,
+}
+
 impl View<'_> {
     /// The image; the same bytes whatever the number of threads.
     pub(super) fn image(&self) -> RgbImage {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let columns = width as usize;
-        let shading = Shading {
-            town: self.town,
-            look: self.look,
-            headlamp: (self.look.headlamps > 0.0).then(|| Headlamp::new(self.world_from_camera)),
-            sky_seed: self.sky_seed,
-        };
-        let samples: Vec<Sample> = (0..height)
+        let bands: Vec<Band> = (0..height.div_ceil(TILE[1]))
             .into_par_iter()
-            .flat_map_iter(|y| {
-                let shading = &shading;
-                (0..width).scan(None, move |left, x| {
-                    let sample = self.sample(shading, f64::from(x), f64::from(y), *left);
-                    *left = sample.face;
-                    Some(sample)
-                })
-            })
+            .map(|band| self.band(band))
             .collect();
-        let levels: Vec<Levels> = (0..height as usize)
-            .into_par_iter()
-            .flat_map_iter(|y| {
-                let (samples, shading) = (&samples, &shading);
-                (0..columns).map(move |x| self.refined(shading, samples, columns, x, y))
-            })
-            .collect();
+        let mut levels: Vec<Levels> = vec![[0.0; 3]; columns * height as usize];
+        levels
+            .par_chunks_mut(columns * TILE[1] as usize)
+            .enumerate()
+            .for_each(|(band, levels)| self.refine(&bands, band, levels));
         let plane = Plane::new(levels, columns);
         let plane = self
             .look
@@ -126,10 +125,72 @@ impl View<'_> {
         town_ray(self.world_from_camera, &Point3::origin(), bearing)
     }
 
-    fn sample(&self, shading: &Shading<'_>, x: f64, y: f64, likely: Option<Face>) -> Sample {
+    /// The light; for one thread, as it remembers what shaded last.
+    fn shading(&self) -> Shading<'_> {
+        Shading {
+            town: self.town,
+            look: self.look,
+            headlamp: (self.look.headlamps > 0.0).then(|| Headlamp::new(self.world_from_camera)),
+            sky_seed: self.sky_seed,
+            occluder: Cell::new(None),
+        }
+    }
+
+    /// The rays through a part of the image.
+    fn beam(&self, columns: &Range<u32>, rows: &Range<u32>) -> Beam {
+        let border = |at: u32| f64::from(at) - 0.5;
+        let corners = [rows.start, rows.end].map(|y| {
+            [columns.start, columns.end].map(|x| {
+                let corner = Point2::new(border(x), border(y));
+                self.ray(&self.intrinsics.bearing(&corner)).direction
+            })
+        });
+        let origin = self.ray(&Vector3::z()).origin;
+        Beam::around(origin, corners.as_flattened())
+    }
+
+    /// One sample for every pixel of a row of tiles.
+    fn band(&self, band: u32) -> Band {
+        let shading = &self.shading();
+        let (width, height) = (self.intrinsics.width, self.intrinsics.height);
+        let rows = band * TILE[1]..((band + 1) * TILE[1]).min(height);
+        let mut samples = vec![Sample::default(); (width * rows.len() as u32) as usize];
+        let solids = Arc::new(self.town.solids_in(&self.beam(&(0..width), &rows)));
+        let mut left = [None; TILE[1] as usize];
+        let sectors = (0..width)
+            .step_by(TILE[0] as usize)
+            .map(|begin| {
+                let columns = begin..(begin + TILE[0]).min(width);
+                let sector = Sector::new(&solids, self.beam(&columns, &rows));
+                for ((y, left), line) in rows
+                    .clone()
+                    .zip(&mut left)
+                    .zip(samples.chunks_exact_mut(width as usize))
+                {
+                    for x in columns.clone() {
+                        let sample =
+                            self.sample(shading, &sector, f64::from(x), f64::from(y), *left);
+                        *left = sample.face;
+                        line[x as usize] = sample;
+                    }
+                }
+                sector
+            })
+            .collect();
+        Band { samples, sectors }
+    }
+
+    fn sample(
+        &self,
+        shading: &Shading<'_>,
+        sector: &Sector,
+        x: f64,
+        y: f64,
+        likely: Option<Face>,
+    ) -> Sample {
         let bearing = self.intrinsics.bearing(&Point2::new(x, y));
         let ray = self.ray(&bearing);
-        let sight = self.town.look_near(&ray, 0.0, likely);
+        let sight = self.town.look_within(sector, &ray, likely);
         Sample {
             levels: self.levels(shading, &ray, sight.as_ref(), bearing.z),
             face: sight.map(|s| s.face()),
@@ -148,37 +209,60 @@ impl View<'_> {
         self.look.levels(&radiance).cast().into()
     }
 
-    /// The mean of several samples where a pixel differs from a neighbour, else its one sample.
+    /// The levels of a band, refined where surfaces meet.
+    fn refine(&self, bands: &[Band], band: usize, levels: &mut [Levels]) {
+        let shading = &self.shading();
+        let columns = self.intrinsics.width as usize;
+        let here = &bands[band];
+        let rows: Vec<&[Sample]> = here.samples.chunks_exact(columns).collect();
+        let before = band
+            .checked_sub(1)
+            .and_then(|band| bands[band].samples.rchunks_exact(columns).next());
+        let after = bands.get(band + 1).map(|band| &band.samples[..columns]);
+        for (i, line) in levels.chunks_exact_mut(columns).enumerate() {
+            let above = i.checked_sub(1).map(|above| rows[above]).or(before);
+            let below = rows.get(i + 1).copied().or(after);
+            let y = (band * TILE[1] as usize + i) as f64;
+            for (x, levels) in line.iter_mut().enumerate() {
+                let sample = &rows[i][x];
+                let neighbours = [
+                    x.checked_sub(1).map(|left| &rows[i][left]),
+                    rows[i].get(x + 1),
+                    above.map(|row| &row[x]),
+                    below.map(|row| &row[x]),
+                ];
+                let neighbours = || neighbours.iter().flatten();
+                *levels = if neighbours().any(|other| sample.differs(other)) {
+                    let surrounded = neighbours().all(|other| sample.face == other.face);
+                    let sector = &here.sectors[x / TILE[0] as usize];
+                    self.refined(shading, sector, sample, surrounded, x as f64, y)
+                } else {
+                    sample.levels
+                };
+            }
+        }
+    }
+
+    /// The mean of several samples of a pixel; it is `surrounded` by pixels of the same face, or not.
     fn refined(
         &self,
         shading: &Shading<'_>,
-        samples: &[Sample],
-        columns: usize,
-        x: usize,
-        y: usize,
+        sector: &Sector,
+        here: &Sample,
+        surrounded: bool,
+        x: f64,
+        y: f64,
     ) -> Levels {
         /// With the one in the middle, a lattice of which no two samples share a row or a column.
         const OTHERS: [(f64, f64); 2] = [(-0.33, -0.28), (0.33, 0.28)];
-        let index = y * columns + x;
-        let here = &samples[index];
-        let left = (x > 0).then(|| &samples[index - 1]);
-        let right = (x + 1 < columns).then(|| &samples[index + 1]);
-        let above = index.checked_sub(columns).map(|i| &samples[i]);
-        let below = samples.get(index + columns);
-        let neighbours = || [left, right, above, below].into_iter().flatten();
-        if !neighbours().any(|other| here.differs(other)) {
-            return here.levels;
-        }
-        let surrounded = neighbours().all(|other| here.face == other.face);
         // Textures are smoothed over the pixel by themselves: there, one more sample will do.
         let others = &OTHERS[..if surrounded { 1 } else { 2 }];
         let sum = others.iter().fold(here.levels, |sum, (dx, dy)| {
-            let pixel = Point2::new(x as f64 + dx, y as f64 + dy);
-            let bearing = self.intrinsics.bearing(&pixel);
+            let bearing = self.intrinsics.bearing(&Point2::new(x + dx, y + dy));
             let ray = self.ray(&bearing);
             let sight = match here.face {
-                Some(face) if surrounded => self.town.look_again(&ray, face),
-                likely => self.town.look_near(&ray, 0.0, likely),
+                Some(face) if surrounded => self.town.look_again(sector, &ray, face),
+                likely => self.town.look_within(sector, &ray, likely),
             };
             let levels = self.levels(shading, &ray, sight.as_ref(), bearing.z);
             std::array::from_fn(|c| sum[c] + levels[c])

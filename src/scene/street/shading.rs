@@ -1,5 +1,7 @@
 //! What a ray brings to the camera: the surface it meets, its light, and the air between.
 
+use std::cell::Cell;
+
 use nalgebra::{Point3, Vector3};
 
 use super::frame::Ray;
@@ -22,6 +24,8 @@ pub(super) struct Shading<'a> {
     pub(super) headlamp: Option<Headlamp>,
     /// Seed of the clouds.
     pub(super) sky_seed: u32,
+    /// Where something stood in the light last.
+    pub(super) occluder: Cell<Option<u32>>,
 }
 
 /// Share of the light of street lamps that twigs and wires, which are not modelled, let through.
@@ -67,7 +71,7 @@ impl Shading<'_> {
         let look = self.look;
         let shaded = look.shadows
             && sight.normal.dot(&look.key) > 0.0
-            && self.town.is_shaded(sight, &look.key);
+            && self.town.is_shaded(sight, &look.key, &self.occluder);
         let mut sum = look.daylight(&sight.normal, open, if shaded { 0.0 } else { 1.0 });
         if look.lamps > 0.0 {
             let lamps = &self.town.lamps;

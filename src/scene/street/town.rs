@@ -1,7 +1,10 @@
 //! The town: all its solids, the ground, and what a ray sees of them.
 
+use std::cell::Cell;
+
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
+use super::beam::{Beam, Sector};
 use super::box_tree::BoxTree;
 use super::cover::Cover;
 use super::frame::Ray;
@@ -107,30 +110,42 @@ impl Town {
 
     /// The first surface on a ray farther than `from`.
     pub(super) fn look(&self, ray: &Ray, from: f64) -> Option<Sight> {
-        self.look_near(ray, from, None)
+        let mut limit = far(ray);
+        let mut best: Option<(u32, Contact)> = None;
+        self.tree.traverse(ray, limit, |index| {
+            if let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit) {
+                limit = contact.distance;
+                best = Some((index, contact));
+            }
+            limit
+        });
+        self.on_ground(ray, limit)
+            .or_else(|| best.map(|(index, contact)| on_solid(ray, index, contact)))
     }
 
-    /// As [`Self::look`]; the search is quicker if it is a piece of `likely` that is seen.
-    pub(super) fn look_near(&self, ray: &Ray, from: f64, likely: Option<Face>) -> Option<Sight> {
+    /// As [`Self::look`], for a ray of the beam of a sector; the search is quicker if it is a piece
+    /// of `likely` that is seen.
+    pub(super) fn look_within(
+        &self,
+        sector: &Sector,
+        ray: &Ray,
+        likely: Option<Face>,
+    ) -> Option<Sight> {
+        let mut limit = far(ray);
         let mut best: Option<(u32, Contact)> = None;
-        let mut limit = FAR;
-        if ray.direction.y < 0.0 && ray.origin.y > 0.0 {
-            // Nothing is below the carriageway.
-            limit = limit.min(-ray.origin.y / ray.direction.y + CARRIAGEWAY_SLACK);
-        }
         let first = match likely {
             Some(Face::Solid(index, _)) => Some(index),
             _ => None,
         };
         if let Some(index) = first
-            && let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit)
+            && let Some(contact) = self.meet(&self.solids[index as usize], ray, 0.0, limit)
         {
             limit = contact.distance;
             best = Some((index, contact));
         }
-        self.tree.traverse(ray, limit, |index| {
+        sector.thicket(ray).traverse(ray, limit, |index| {
             if first != Some(index)
-                && let Some(contact) = self.meet(&self.solids[index as usize], ray, from, limit)
+                && let Some(contact) = self.meet(&self.solids[index as usize], ray, 0.0, limit)
             {
                 limit = contact.distance;
                 best = Some((index, contact));
@@ -141,16 +156,21 @@ impl Town {
             .or_else(|| best.map(|(index, contact)| on_solid(ray, index, contact)))
     }
 
+    /// The solids in a beam.
+    pub(super) fn solids_in(&self, beam: &Beam) -> BoxTree {
+        self.tree.part(beam)
+    }
+
     /// What a ray sees that passes very near to one that saw `face`: that face, most probably,
     /// which is much quicker to find than the first of all surfaces.
-    pub(super) fn look_again(&self, ray: &Ray, face: Face) -> Option<Sight> {
+    pub(super) fn look_again(&self, sector: &Sector, ray: &Ray, face: Face) -> Option<Sight> {
         let seen = match face {
             Face::Solid(index, _) => self
                 .meet(&self.solids[index as usize], ray, 0.0, FAR)
                 .map(|contact| on_solid(ray, index, contact)),
             Face::Road | Face::Kerb | Face::Land => self.on_ground(ray, FAR),
         };
-        seen.or_else(|| self.look(ray, 0.0))
+        seen.or_else(|| self.look_within(sector, ray, None))
     }
 
     fn on_ground(&self, ray: &Ray, limit: f64) -> Option<Sight> {
@@ -200,8 +220,14 @@ impl Town {
         }
     }
 
-    /// Whether something is between a surface and a light far away in a direction.
-    pub(super) fn is_shaded(&self, sight: &Sight, light: &Vector3<f64>) -> bool {
+    /// Whether something is between a surface and a light far away in a direction; `occluder` says
+    /// where something was before.
+    pub(super) fn is_shaded(
+        &self,
+        sight: &Sight,
+        light: &Vector3<f64>,
+        occluder: &Cell<Option<u32>>,
+    ) -> bool {
         /// A surface does not shade itself.
         const CLEAR: f64 = 0.02;
         /// Nothing is high enough to cast longer shadows \[m\].
@@ -210,16 +236,10 @@ impl Town {
             origin: sight.point + sight.normal * CLEAR,
             direction: *light,
         };
-        let mut shaded = false;
-        self.tree.traverse(&ray, LONGEST, |index| {
-            shaded = shaded
-                || self
-                    .meet(&self.solids[index as usize], &ray, CLEAR, LONGEST)
-                    .is_some();
-            // No box is nearer than that: the search ends.
-            if shaded { -1.0 } else { LONGEST }
-        });
-        shaded
+        self.tree.any(&ray, LONGEST as f32, occluder, |index| {
+            self.meet(&self.solids[index as usize], &ray, CLEAR, LONGEST)
+                .is_some()
+        })
     }
 
     /// The share of the light of the surroundings that reaches a surface.
@@ -232,6 +252,16 @@ impl Town {
             Target::Solid(..) if low => 0.55 + 0.75 * sight.point.y.max(0.0),
             Target::Solid(..) => 1.0,
         }
+    }
+}
+
+/// Where the search along a ray ends.
+fn far(ray: &Ray) -> f64 {
+    if ray.direction.y < 0.0 && ray.origin.y > 0.0 {
+        // Nothing is below the carriageway.
+        FAR.min(-ray.origin.y / ray.direction.y + CARRIAGEWAY_SLACK)
+    } else {
+        FAR
     }
 }
 
