@@ -70,6 +70,12 @@ impl Queries {
         }
     }
 
+    /// Whether thumbnails that were asked for are still to come.
+    pub fn is_painting(&self) -> bool {
+        let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
+        self.painter_is_busy || !wanted.is_empty()
+    }
+
     /// How far the run over all queries is: done, and all.
     pub fn progress(&self) -> Option<(usize, usize)> {
         self.batch.as_ref().map(|batch| (batch.done, batch.all))
@@ -140,11 +146,7 @@ impl Queries {
 
     /// Has the wanted thumbnails made.
     pub(super) fn paint_thumbnails(&mut self, setup: &Setup) {
-        let is_idle = || {
-            let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
-            wanted.is_empty()
-        };
-        if self.painter_is_busy || is_idle() {
+        if self.painter_is_busy || !self.is_painting() {
             return;
         }
         let (queries, references) = (Arc::clone(&setup.queries), Arc::clone(&setup.references));

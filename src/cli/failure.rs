@@ -65,6 +65,7 @@ impl CliError {
             Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
             Self::Usage(_)
             | Self::Param(_)
+            | Self::Index(NoIndex::NoFolder)
             | Self::Choice(ChoiceError::UnknownPosition { .. } | ChoiceError::NoIndex)
             | Self::Draw(DrawError::NotDrawn { .. })
             | Self::Folder(

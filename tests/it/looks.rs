@@ -35,7 +35,11 @@ fn every_view_looks_as_it_did() {
         let is_wanted = |entry: &&views::Entry| of.is_empty() || of.contains(&entry.name);
         for entry in views::ALL.iter().filter(is_wanted) {
             window.state_mut().send(Command::Maximize(Some(entry.name)));
-            wait(window, |app| !app.desk().is_probing());
+            // What is in sight asks for its thumbnails.
+            window.run_steps(2);
+            wait(window, |app| {
+                !app.desk().is_probing() && !app.desk().queries.is_painting()
+            });
             window.run_steps(4);
             let name = format!("{}-{moment}", entry.name);
             results.add(window.try_snapshot_options(name, &options));

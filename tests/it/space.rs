@@ -344,24 +344,3 @@ fn the_layers_are_drawn_and_can_be_taken_away() {
     let without = count(&mut window, TRUTH);
     assert!(without < with_truth / 2, "{without} of {with_truth}");
 }
-
-#[test]
-#[ignore = "to be looked at"]
-fn pictures_of_space() {
-    let folder = std::env::var("POSESCOPE_PICTURES").expect("names a folder");
-    let Some(mut window) = drawn() else { return };
-    let save = |window: &mut Harness<'_, App>, name: &str| {
-        window.step();
-        window.step();
-        let picture = window.render().expect("a picture");
-        picture.save(format!("{folder}/{name}.png")).expect("saved");
-    };
-    save(&mut window, "overview");
-    click(&mut window, "Top");
-    save(&mut window, "top");
-    click(&mut window, "● FB");
-    save(&mut window, "through");
-    window.state_mut().send(Command::SwitchTheme);
-    click(&mut window, "Reset view");
-    save(&mut window, "light");
-}
