@@ -105,8 +105,11 @@ fn markdown(run: &RunFile, tables: &[Table], passages: &[Passage]) -> String {
             false => format!("{} ← {}", pair.scene, pair.query_scene),
         })
         .collect();
+    let prior = run.prior_m.map_or(String::new(), |metres| {
+        format!(" within {metres} m of the known position")
+    });
     let mut text = format!(
-        "# {}\n\n{} queries, references {}, seed {}; a pose {} m off or more is a failure.\n\n",
+        "# {}\n\n{} queries, references {}{prior}, seed {}; a pose {} m off or more is a failure.\n\n",
         scenes.join(", "),
         run.plan().count(),
         run.references,

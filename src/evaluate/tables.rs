@@ -299,30 +299,15 @@ fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
     vec![rmse, success]
 }
 
-/// The paper's table 3: one line per pair of scenes and method.
+/// The paper's table 3: one line per pair of scenes and method, with the paper's figures if it has
+/// any of these scenes.
 fn large(run: &RunFile, measures: &[Measures]) -> Table {
-    let mut table = Table::new(
-        "large",
-        format!(
-            "References by {} within {} m: success rate and RMSE over successes",
-            run.references,
-            run.prior_m.unwrap_or_default()
-        ),
-        [
-            "",
-            "method",
-            "%",
-            "RMSE (m)",
-            "RMSE (°)",
-            "% (paper)",
-            "RMSE (m) (paper)",
-            "RMSE (°) (paper)",
-        ],
-    );
+    let mut rows: Vec<(Vec<String>, [Option<f64>; 3])> = Vec::new();
     for pair in &run.pairs {
         let of_pair = OfPair::new(pair, measures);
         for one in &of_pair.measures {
             let mut cells = vec![of_pair.title(), one.method.to_uppercase()];
+            cells.push(one.queries.to_string());
             cells.extend(triple(one));
             let papers = ["success_percent", "rmse_m", "rmse_deg"].map(|measure| {
                 let number = if of_pair.pair.scene.starts_with("kitti") {
@@ -336,12 +321,38 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
                     ..of_pair.sought(number, &one.method, measure)
                 })
             });
-            if papers.iter().any(Option::is_some) {
-                let [rate, metres, degrees] = papers;
-                cells.extend([number(rate, 1), number(metres, 3), number(degrees, 3)]);
-            }
-            table.push(cells);
+            rows.push((cells, papers));
         }
+    }
+    let mut header = vec![
+        "references",
+        "method",
+        "queries",
+        "%",
+        "RMSE (m)",
+        "RMSE (°)",
+    ];
+    let is_papers = rows
+        .iter()
+        .any(|(_, papers)| papers.iter().any(Option::is_some));
+    if is_papers {
+        header.extend(["% (paper)", "RMSE (m) (paper)", "RMSE (°) (paper)"]);
+    }
+    let mut table = Table::new(
+        "large",
+        format!(
+            "References by {} within {} m: success rate (within {} m) and RMSE over successes",
+            run.references,
+            run.prior_m.unwrap_or_default(),
+            run.failure_radius_m
+        ),
+        header,
+    );
+    for (mut cells, [rate, metres, degrees]) in rows {
+        if is_papers {
+            cells.extend([number(rate, 1), number(metres, 3), number(degrees, 3)]);
+        }
+        table.push(cells);
     }
     table
 }
@@ -587,10 +598,10 @@ mod tests {
         assert_eq!(
             lines(&tables, "large"),
             [
-                "kitti/01 | FB | 100.0 | 3.000 | 1.500 | 84.5 | 0.494 | 0.567",
-                "kitti/01 | MI | 100.0 | 4.000 | 2.000 | 60.0 | 0.980 | 0.353",
-                "kitti/01, queries from rain | FB | 0.0 | – | – |  |  | ",
-                "kitti/01, queries from rain | MI | 100.0 | 6.000 | 3.000 |  |  | ",
+                "kitti/01 | FB | 1 | 100.0 | 3.000 | 1.500 | 84.5 | 0.494 | 0.567",
+                "kitti/01 | MI | 1 | 100.0 | 4.000 | 2.000 | 60.0 | 0.980 | 0.353",
+                "kitti/01, queries from rain | FB | 1 | 0.0 | – | – | – | – | –",
+                "kitti/01, queries from rain | MI | 1 | 100.0 | 6.000 | 3.000 | – | – | –",
             ]
         );
         assert_eq!(
@@ -599,6 +610,28 @@ mod tests {
                 "kitti/01 | FB | 100.0 | 3.000 | 1.500 | 0.0 | – | –",
                 "kitti/01 | MI | 100.0 | 4.000 | 2.000 | 100.0 | 6.000 | 3.000",
             ]
+        );
+    }
+
+    #[test]
+    fn the_large_table_has_no_columns_for_figures_that_the_paper_does_not_have() {
+        let run = run(Experiment::Large, &[("street", "street")]);
+        let rows = [at(
+            row("a", "fb", Some(3.0)),
+            "street",
+            10.0,
+            2,
+            Some("r-wavg"),
+        )];
+        let tables = tables(&run, &measure(&rows, 10.0));
+        assert_eq!(
+            lines(&tables, "large"),
+            ["street | FB | 1 | 100.0 | 3.000 | 1.500"]
+        );
+        assert!(
+            tables
+                .iter()
+                .all(|table| !table.markdown().contains("paper"))
         );
     }
 
