@@ -1,8 +1,10 @@
 #!/bin/bash
-# An experiment as a Slurm array: sbatch --array=1-32 examples/ci/slurm.sh
+# An experiment as a Slurm array:  sbatch --array=1-32 examples/ci/slurm.sh
 # then, when all parts are done:   examples/ci/slurm.sh merge 32
 #
 # A part that was killed, by its time limit say, goes on where it was when it is submitted again.
+# For Slurm that is an array of its own, which has to be told the number of all parts:
+#                                  PARTS=32 sbatch --array=7,12 examples/ci/slurm.sh
 #SBATCH --job-name=posescope
 #SBATCH --cpus-per-task=4
 #SBATCH --mem=4G
@@ -21,6 +23,6 @@ if [ "${1:-}" = merge ]; then
 fi
 
 exec posescope eval "$scene" --experiment "$experiment" --quiet \
-    --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" \
+    --shard "$SLURM_ARRAY_TASK_ID/${PARTS:-$SLURM_ARRAY_TASK_COUNT}" \
     --threads "${SLURM_CPUS_PER_TASK:-1}" \
     --out "$runs/part-$SLURM_ARRAY_TASK_ID" --resume

@@ -359,30 +359,32 @@ mod tests {
     fn a_thicket_shows_the_rays_of_its_beam_what_the_tree_shows_them_in_the_same_order() {
         let tree = BoxTree::new(&random_boxes(3000));
         let mut seen = 0;
-        for ray in (0..200).map(random_ray) {
-            let aside = |k: u32| random_ray(1000 + k).direction * 0.1;
-            let directions: Vec<_> = (0..8).map(|k| ray.direction + aside(k)).collect();
-            let wide = Beam::around(ray.origin, &directions);
-            let narrow = Beam::around(ray.origin, &directions[..4]);
-            let mean = directions[..4].iter().sum::<Vector3<f64>>().normalize();
-            let ray = Ray {
-                direction: mean,
-                ..ray
-            };
-            let thicket = tree.part(&wide).within(&narrow, backwards(&mean));
-            // The search ends at the fifth item.
-            let limit = |found: &[u32]| if found.len() < 5 { 60.0 } else { 20.0 };
-            let (mut expected, mut found) = (Vec::new(), Vec::new());
-            tree.traverse(&ray, 60.0, |item| {
-                expected.push(item);
-                limit(&expected)
-            });
-            thicket.traverse(&ray, 60.0, |item| {
-                found.push(item);
-                limit(&found)
-            });
-            assert_eq!(found, expected);
-            seen += found.len();
+        for ahead in (0..100).map(random_ray) {
+            let aside = |k: u32| random_ray(1000 + k).direction * 0.3;
+            let directions: Vec<_> = (0..8).map(|k| ahead.direction + aside(k)).collect();
+            let wide = Beam::around(ahead.origin, &directions);
+            let narrow = Beam::around(ahead.origin, &directions[..4]);
+            let part = tree.part(&wide);
+            for outer in &directions[..4] {
+                let ray = Ray {
+                    origin: ahead.origin,
+                    direction: (outer * 3.0 + directions[0] + directions[1]).normalize(),
+                };
+                // The search ends at the fifth item.
+                let limit = |found: &[u32]| if found.len() < 5 { 60.0 } else { 20.0 };
+                let (mut expected, mut found) = (Vec::new(), Vec::new());
+                tree.traverse(&ray, 60.0, |item| {
+                    expected.push(item);
+                    limit(&expected)
+                });
+                let thicket = part.within(&narrow, backwards(&ray.direction));
+                thicket.traverse(&ray, 60.0, |item| {
+                    found.push(item);
+                    limit(&found)
+                });
+                assert_eq!(found, expected);
+                seen += found.len();
+            }
         }
         assert!(seen > 500, "{seen}");
     }

@@ -185,7 +185,7 @@ impl CarShape {
         }
         let height = |distance: f64| ray.origin.y + ray.direction.y * distance;
         let (a, b) = (height(enter), height(leave));
-        (enter <= leave).then(|| if a < b { [a, b] } else { [b, a] })
+        (enter <= leave).then_some([a.min(b), a.max(b)])
     }
 
     fn meet_wheels(&self, ray: &Ray, from: f64) -> Option<Contact> {
@@ -299,6 +299,31 @@ mod tests {
             assert!((flank.x - 0.5 * car.width()).abs() < 0.02);
             let nose = from(Point3::new(0.0, 0.5, 10.0), -Vector3::z());
             assert!((nose.z - 0.5 * car.length()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_ray_to_the_inside_of_any_part_meets_the_car_before() {
+        for seed in 0..20 {
+            let car = CarShape::new(seed);
+            let [rear, front] = car.axles;
+            let wheel = 0.5 * car.width() - 0.05;
+            let inner = [
+                Point3::new(0.0, 0.25, 0.0),
+                Point3::new(0.0, car.belt() - 0.1, 0.0),
+                Point3::new(0.1, car.belt() + 0.05, 0.0),
+                Point3::new(0.0, car.height() - 0.05, -0.3),
+                Point3::new(wheel, 0.05, rear),
+                Point3::new(-wheel, 0.1, front),
+            ];
+            for (k, target) in (0_u32..).zip(inner.iter().cycle()).take(600) {
+                let random = |stream, scale| scale * (unit(derive(k, stream)) - 0.5);
+                let origin = Point3::new(random(1, 20.0), 5.0 * unit(derive(k, 2)), 8.0);
+                let direction = (target - origin).normalize();
+                let contact = car.meet(&Ray { origin, direction }, 0.0);
+                let distance = contact.expect("in the way").distance;
+                assert!(distance < (target - origin).norm(), "{seed} {target}");
+            }
         }
     }
 }
