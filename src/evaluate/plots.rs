@@ -47,12 +47,15 @@ pub fn plots(run: &RunFile, measures: &[Measures]) -> Vec<Plot> {
         };
         if let Some(axis) = axis {
             let lines = success_lines(run, &of_pair);
-            all.push((name("success"), draw(axis, "success rate (%)", &lines)));
+            all.push((
+                name("success"),
+                draw(axis, "success rate (%)", &lines, true),
+            ));
         }
-        let lines = recall_lines(run, &of_pair);
+        let lines = recall_lines(&run.methods, &of_pair);
         if !lines.is_empty() {
             let axis = "translation error (m), failures infinite";
-            all.push((name("recall"), draw(axis, "queries (%)", &lines)));
+            all.push((name("recall"), draw(axis, "queries (%)", &lines, false)));
         }
     }
     all
@@ -70,44 +73,55 @@ fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
         };
         Some((x, 100.0 * one.success_rate))
     };
-    lines(run, |method| {
+    lines(&run.methods, |method| {
         let of_method = measures.iter().filter(|one| one.method == method);
         of_method.filter(robust).filter_map(point).collect()
     })
 }
 
-/// For the last group alone: the largest radius, or the most references.
-fn recall_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
-    lines(run, |method| {
+/// For the last group alone: the largest radius, or the most references. Steps, all as long as the
+/// longest: a method does not lose what it has found.
+fn recall_lines(methods: &[String], measures: &[&Measures]) -> Vec<Line> {
+    let mut all = lines(methods, |method| {
         let last = measures.iter().rfind(|one| one.method == method);
         let Some(errors) = last.and_then(|one| one.errors.as_ref()) else {
             return Vec::new();
         };
         let mut metres: Vec<f64> = errors.iter().map(|error| error.0).collect();
         metres.sort_unstable_by(f64::total_cmp);
-        let all = metres.len() as f64;
+        let queries = metres.len() as f64;
         let found = metres
             .iter()
             .take_while(|error| error.is_finite())
             .enumerate();
-        let steps = found.map(|(index, &error)| (error, 100.0 * (index + 1) as f64 / all));
+        let steps = found.flat_map(|(index, &error)| {
+            [index, index + 1].map(|count| (error, 100.0 * count as f64 / queries))
+        });
         std::iter::once((0.0, 0.0)).chain(steps).collect()
-    })
+    });
+    let ends = all.iter().filter_map(|line| line.points.last());
+    let end = ends.map(|point| point.0).fold(0.0, f64::max);
+    for line in &mut all {
+        if let Some(&(_, share)) = line.points.last() {
+            line.points.push((end, share));
+        }
+    }
+    all
 }
 
-fn lines(run: &RunFile, points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Line> {
-    let lines = run.methods.iter().map(|method| Line {
+fn lines(methods: &[String], points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Line> {
+    let lines = methods.iter().map(|method| Line {
         method: method.clone(),
         points: points(method),
     });
     lines.filter(|line| !line.points.is_empty()).collect()
 }
 
-fn draw(x_axis: &str, y_axis: &str, lines: &[Line]) -> Result<String, String> {
+fn draw(x_axis: &str, y_axis: &str, lines: &[Line], dotted: bool) -> Result<String, String> {
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, (560, 380)).into_drawing_area();
-        draw_into(&area, x_axis, y_axis, lines).map_err(|error| error.to_string())?;
+        draw_into(&area, x_axis, y_axis, lines, dotted).map_err(|error| error.to_string())?;
         area.present().map_err(|error| error.to_string())?;
     }
     Ok(svg)
@@ -118,6 +132,7 @@ fn draw_into(
     x_axis: &str,
     y_axis: &str,
     lines: &[Line],
+    dotted: bool,
 ) -> Result<(), Box<dyn std::error::Error>> {
     area.fill(&WHITE)?;
     let xs = || {
@@ -149,7 +164,7 @@ fn draw_into(
             ))?
             .label(line.method.to_uppercase())
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
-        if line.points.len() <= 12 {
+        if dotted {
             let dots = line
                 .points
                 .iter()
@@ -164,4 +179,38 @@ fn draw_into(
         .border_style(BLACK.mix(0.3))
         .draw()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::{measure, tests::row};
+    use super::*;
+
+    #[test]
+    fn recall_rises_in_steps_and_stays_where_failures_begin() {
+        let rows = [
+            row("a", "fb", Some(3.0)),
+            row("b", "fb", Some(1.0)),
+            row("c", "fb", None),
+            row("d", "fb", None),
+            row("a", "mi", Some(2.0)),
+        ];
+        let measures = measure(&rows, 10.0);
+        let measures: Vec<&Measures> = measures.iter().collect();
+        let methods = ["fb", "mi"].map(str::to_owned);
+        let lines = recall_lines(&methods, &measures);
+        let fb = [
+            (0.0, 0.0),
+            (1.0, 0.0),
+            (1.0, 25.0),
+            (3.0, 25.0),
+            (3.0, 50.0),
+            (3.0, 50.0),
+        ];
+        assert_eq!(lines[0].points, fb);
+        assert_eq!(
+            lines[1].points,
+            [(0.0, 0.0), (2.0, 0.0), (2.0, 100.0), (3.0, 100.0)]
+        );
+    }
 }

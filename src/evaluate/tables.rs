@@ -338,16 +338,7 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
     if is_papers {
         header.extend(["% (paper)", "RMSE (m) (paper)", "RMSE (°) (paper)"]);
     }
-    let mut table = Table::new(
-        "large",
-        format!(
-            "References by {} within {} m: success rate (within {} m) and RMSE over successes",
-            run.references,
-            run.prior_m.unwrap_or_default(),
-            run.failure_radius_m
-        ),
-        header,
-    );
+    let mut table = Table::new("large", caption_of_large(run), header);
     for (mut cells, [rate, metres, degrees]) in rows {
         if is_papers {
             cells.extend([number(rate, 1), number(metres, 3), number(degrees, 3)]);
@@ -355,6 +346,15 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
         table.push(cells);
     }
     table
+}
+
+fn caption_of_large(run: &RunFile) -> String {
+    format!(
+        "References by {} within {} m: success rate (within {} m) and RMSE over successes",
+        run.references,
+        run.prior_m.unwrap_or_default(),
+        run.failure_radius_m
+    )
 }
 
 /// The paper's table 4: references by line, queries by column.
@@ -374,7 +374,10 @@ fn confusion(run: &RunFile, measures: &[Measures]) -> Table {
         .flat_map(|query| ["%", "RMSE (m)", "RMSE (°)"].map(|figure| format!("{query}: {figure}")));
     let mut table = Table::new(
         "confusion",
-        "References by line, queries by column: success rate and RMSE over successes",
+        format!(
+            "{}; references by line, queries by column",
+            caption_of_large(run)
+        ),
         ["references", "method"]
             .map(str::to_owned)
             .into_iter()
