@@ -116,8 +116,12 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         .iter()
         .map(|&reference| frame(&setup.references, reference))
         .collect();
-    ui.label(RichText::new(names.join(", ")).color(theme::REFERENCE))
-        .on_hover_text("The references");
+    // A label without text would send what follows it back to the left edge.
+    let text = match names.as_slice() {
+        [] => RichText::new("not chosen").weak(),
+        names => RichText::new(names.join(", ")).color(theme::REFERENCE),
+    };
+    ui.label(text).on_hover_text("The references");
     ui.menu_button("References", |ui| {
         for pick in [
             ReferencePick::By(Selection::Random(1)),

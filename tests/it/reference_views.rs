@@ -146,6 +146,18 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
         "there is no retrieval index; `posescope index walls"
     ));
 
+    let left = |label| {
+        window
+            .get_all_by_label(label)
+            .next()
+            .map(|n| n.rect().left())
+    };
+    assert!(
+        left("Restart") < left("not chosen"),
+        "they lie on each other"
+    );
+    assert!(left("not chosen") < left("Truth"));
+
     index(&file, &Params::default());
     assert_eq!(pick(&mut window, Selection::Retrieved(2)), State::Finished);
     let chosen = &window.state().desk().setup.chosen;
