@@ -24,6 +24,7 @@ mod table;
 #[cfg(feature = "cli")]
 mod tables;
 mod timing;
+mod watch;
 
 pub use diff::{Change, Comparison, Difference, Tolerance};
 pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes, is_success};
@@ -34,7 +35,7 @@ pub use experiment::{
 pub use export::{Choice, Export, ExportError, ExportedFile, Format, export};
 pub use gate::{Gate, Passage};
 pub(crate) use localize::words_of;
-pub use localize::{LocalizeError, Localizer, Request, Unwatched, Watch};
+pub use localize::{LocalizeError, Localizer, Request};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
 pub use paper::{Sought, figure as paper_figure};
 #[cfg(feature = "cli")]
@@ -51,3 +52,4 @@ pub use select::{
 #[cfg(feature = "cli")]
 pub use table::Table;
 pub use timing::{StageTimes, StageTimings};
+pub use watch::{Unwatched, Watch};

@@ -5,9 +5,10 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
-use super::{QueryResult, References, Setting, StageTimes, StageTimings, evaluate, tell_ranking};
+use super::{
+    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, tell_ranking,
+};
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::{KindSet, Method};
 use crate::features::FeatureCache;
@@ -18,46 +19,10 @@ use crate::problem::{Problem, Query};
 use crate::retrieval::ReferenceRanking;
 use crate::scene::{Scene, SceneError};
 use crate::sink::Fanout;
-use crate::trace::{Cancelled, Record, Sink, Trace};
+use crate::trace::{Cancelled, Sink, Trace};
 
 /// Features of as many photos are kept: those of a query and of the references around it.
 const REMEMBERED_PHOTOS: usize = 32;
-
-/// Somebody who watches queries being localised: a recording, a progress bar, nobody.
-pub trait Watch: Sink {
-    /// A query begins, with one problem per reference.
-    fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        let _ = (index, problems, truth);
-    }
-
-    /// How the references were ranked is going to be told.
-    fn begin_retrieval(&mut self) {}
-
-    /// A method begins on one of the problems; what it tells goes to [`Sink::accept`].
-    fn begin_method(&mut self, problem: usize, method: Method) {
-        let _ = (problem, method);
-    }
-
-    /// The method's result, and how long its stages took.
-    fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
-        let _ = (result, times);
-    }
-
-    /// What the method gave for several problems is going to be fused.
-    fn begin_fusion(&mut self, method: Method) {
-        let _ = method;
-    }
-
-    /// The fused result.
-    fn end_fusion(&mut self, result: &QueryResult) {
-        let _ = result;
-    }
-
-    /// A flag that is raised when [`Sink::attend`] is to be called although nothing was told.
-    fn attention(&self) -> Option<Arc<AtomicBool>> {
-        None
-    }
-}
 
 /// Why queries could not be localised, for those who have no error of their own.
 #[derive(Debug, thiserror::Error)]
@@ -69,22 +34,6 @@ pub enum LocalizeError {
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
-
-/// Nobody watches.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Unwatched;
-
-impl Sink for Unwatched {
-    fn wanted(&self) -> KindSet {
-        KindSet::NONE
-    }
-
-    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
-        Ok(())
-    }
-}
-
-impl Watch for Unwatched {}
 
 /// What is asked of a query: a set of references and what to make of them.
 #[derive(Clone, Debug)]
