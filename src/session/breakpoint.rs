@@ -194,7 +194,10 @@ pub struct Breakpoint {
 }
 
 impl Breakpoint {
-    /// Names of the stages a breakpoint can be set at, in the order of the estimators.
+    /// Stages around the estimators, not of one of them.
+    const OUTSIDE: [&'static str; 2] = ["retrieve", "fusion"];
+
+    /// Names of the stages a breakpoint can be set at, in the order of a run.
     pub fn stages() -> Vec<&'static str> {
         let stages = [
             Stage::Detect,
@@ -206,11 +209,12 @@ impl Breakpoint {
         ];
         let names = Method::ALL.map(Stage::Estimator);
         let phases = Phase::ALL.map(Stage::Search);
-        names
+        [Stage::Retrieve]
             .iter()
+            .chain(&names)
             .chain(&stages)
             .chain(&phases)
-            .chain(&[Stage::Assess])
+            .chain(&[Stage::Assess, Stage::Fuse])
             .map(|stage| stage.name())
             .collect()
     }
@@ -276,6 +280,9 @@ impl FromStr for Breakpoint {
                         comparator,
                         bound,
                     })
+                }
+                None if method.is_some() && Self::OUTSIDE.contains(&name) => {
+                    return Err(refuse(format!("`{name}` belongs to no method")));
                 }
                 None => {
                     let stages = Self::stages();
@@ -533,6 +540,7 @@ mod tests {
         assert!(message("inlers < 10").contains("inliers"));
         assert!(message("inliers < ten").contains("no number"));
         assert!(message("").contains("fb.ransac"));
+        assert!(message("fb.fusion").contains("belongs to no method"));
     }
 
     #[test]

@@ -264,7 +264,13 @@ fn several_references_are_fused_as_without_a_session() {
         .localize(0, 1, &[request], &several.methods, &mut Unwatched, keep)
         .expect("good data");
 
-    let mut session = start(several, RunMode::Running, &[]);
+    let mut session = start(several, RunMode::Running, &["fusion"]);
+    let at_fusion = State::Paused {
+        breakpoint: Some("fusion".to_owned()),
+    };
+    assert_eq!(settle(&mut session), at_fusion);
+    session.set_breakpoints(Breakpoints::default());
+    order(&mut session, RunMode::Running);
     assert_eq!(settle(&mut session), State::Finished);
     let (fused, alone): (Vec<_>, Vec<_>) = results(&session)
         .into_iter()
