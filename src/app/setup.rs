@@ -111,7 +111,10 @@ impl Setup {
         let is_same_scene = references.name() == queries.name();
         let is_query = |frame| is_same_scene && frame == query;
         match queries.pose(query) {
-            Some(place) => frames_within(references, &place, self.uncertainty_radius_m, &is_query),
+            Some(place) => {
+                let radius_m = self.prior_m.unwrap_or(self.uncertainty_radius_m);
+                frames_within(references, &place, radius_m, &is_query)
+            }
             None => (0..references.frames().len())
                 .filter(|&frame| !is_query(frame) && references.has_cloud(frame))
                 .filter(|&frame| references.pose(frame).is_some())

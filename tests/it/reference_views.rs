@@ -107,6 +107,20 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
 }
 
 #[test]
+fn references_may_be_as_far_away_as_the_prior_allows() {
+    let mut narrow = setup();
+    narrow.uncertainty_radius_m = 0.6;
+    assert_eq!(narrow.candidates(1), [2]);
+    narrow.prior_m = Some(3.0);
+    assert_eq!(narrow.candidates(1), [2, 0]);
+    let mut window = finished(narrow);
+    assert_eq!(pick(&mut window, Selection::Nearest(2)), State::Finished);
+    assert_eq!(window.state().desk().setup.chosen.frames, [2, 0]);
+    maximize(&mut window, "references");
+    assert!(is_said(&window, "2 of 2 frames within 3 m"));
+}
+
+#[test]
 fn references_are_ranked_by_their_matches() {
     let mut window = finished(setup());
     assert_eq!(pick(&mut window, Selection::Matched(1)), State::Finished);
