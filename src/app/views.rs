@@ -21,6 +21,7 @@ mod retrieval;
 mod space;
 mod surface;
 mod synthetic;
+mod thumbnail;
 
 use eframe::egui_wgpu::RenderState;
 

@@ -75,72 +75,16 @@ pub struct RunArgs {
     /// Where the frames are: street, street:night and so on, or a folder such as …/sequences/00
     /// (KITTI odometry)
     pub scene: String,
-    /// The format of the scene, if its content does not tell
-    #[arg(long, value_name = "NAME")]
-    pub format: Option<String>,
-    /// Take the queries from another scene in the same world frame
-    #[arg(long, value_name = "SCENE")]
-    pub queries: Option<String>,
     /// The frame to localise; repeatable (3823 finds 003823)
     #[arg(long, value_name = "FRAME", required_unless_present = "all")]
     pub query: Vec<String>,
     /// Localise every frame
     #[arg(long, conflicts_with = "query")]
     pub all: bool,
-    /// A frame with known pose and cloud to localise against; repeatable
-    #[arg(long, value_name = "FRAME")]
-    pub reference: Vec<String>,
-    /// How references are chosen where --reference names none: random:K, nearest:K, maxf:K (those
-    /// with the most feature matches) or retrieve:K (those that the index of `posescope index` ranks
-    /// first) of the frames within the radius of the query's known position
-    #[arg(
-        long,
-        value_name = "HOW",
-        default_value = "random:1",
-        conflicts_with = "reference"
-    )]
-    pub references: Selection,
-    /// The index that retrieve:K asks [default: where `posescope index` puts it]
-    #[arg(long, value_name = "FILE")]
-    pub index: Option<PathBuf>,
-    /// How far the query may be from its reference: the disc that the direct methods search [m]
-    #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
-    pub radius: f64,
-    /// How far from the query's known position references may be, where that is more than the radius
-    /// [m] [default: the radius]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    pub prior: Option<f64>,
-    /// The methods to run
-    #[arg(
-        long,
-        value_name = "fb,pm,mi,hy",
-        value_delimiter = ',',
-        value_parser = method,
-        default_value = "fb,pm,mi,hy"
-    )]
-    pub method: Vec<Method>,
-    /// Fuse the poses of several references into one; otherwise each reference gives its own
-    #[arg(
-        long,
-        value_name = "maxf,avg,wavg,r-wavg",
-        value_delimiter = ',',
-        value_parser = fusion
-    )]
-    pub fusion: Vec<&'static fusion::Entry>,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
     #[command(flatten)]
-    pub config: ConfigArgs,
-    /// Number of threads [default: one per core]; results do not depend on it
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
+    pub job: JobArgs,
     #[command(flatten)]
     pub recording: RecordingArgs,
-    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10), with the
-    /// recording up to there; repeatable
-    #[arg(long = "break", value_name = "EXPR")]
-    pub breakpoints: Vec<Breakpoint>,
     /// Write the results as JSON, one object per line; - for stdout
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -151,25 +95,32 @@ pub struct ViewArgs {
     /// Where the frames are, or the folder of a run; see `posescope run --help`
     #[arg(default_value = "street", value_name = "SCENE|RUN")]
     pub scene: String,
+    /// The frame to begin with
+    #[arg(long, value_name = "FRAME")]
+    pub query: Option<String>,
+    #[command(flatten)]
+    pub job: JobArgs,
+}
+
+/// How a query is localised, whether somebody looks on or not.
+#[derive(Debug, Args)]
+pub struct JobArgs {
     /// The format of the scene, if its content does not tell
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
     /// Take the queries from another scene in the same world frame
     #[arg(long, value_name = "SCENE")]
     pub queries: Option<String>,
-    /// The frame to begin with
-    #[arg(long, value_name = "FRAME")]
-    pub query: Option<String>,
     /// A frame with known pose and cloud to localise against; repeatable
     #[arg(long, value_name = "FRAME")]
     pub reference: Vec<String>,
     /// How references are chosen where --reference names none: random:K, nearest:K, maxf:K (those
     /// with the most feature matches) or retrieve:K (those that the index of `posescope index` ranks
-    /// first)
+    /// first) of the frames within the radius of the query's known position
     #[arg(
         long,
         value_name = "HOW",
-        default_value = "random:1",
+        default_value_t = Self::REFERENCES,
         conflicts_with = "reference"
     )]
     pub references: Selection,
@@ -177,7 +128,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "FILE")]
     pub index: Option<PathBuf>,
     /// How far the query may be from its reference: the disc that the direct methods search [m]
-    #[arg(long, value_name = "METRES", default_value_t = 15.0, value_parser = positive)]
+    #[arg(long, value_name = "METRES", default_value_t = Self::RADIUS_M, value_parser = positive)]
     pub radius: f64,
     /// How far from the query's known position references may be, where that is more than the radius
     /// [m] [default: the radius]
@@ -208,9 +159,41 @@ pub struct ViewArgs {
     /// Number of threads [default: one per core]; results do not depend on it
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10); repeatable
+    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10), with the
+    /// recording up to there; repeatable
     #[arg(long = "break", value_name = "EXPR")]
     pub breakpoints: Vec<Breakpoint>,
+}
+
+impl JobArgs {
+    const REFERENCES: Selection = Selection::Random(1);
+    const RADIUS_M: f64 = 15.0;
+
+    /// How far from the query's known position references may be [m].
+    pub fn reach_m(&self) -> f64 {
+        self.prior.unwrap_or(self.radius)
+    }
+}
+
+/// As without any option.
+impl Default for JobArgs {
+    fn default() -> Self {
+        Self {
+            format: None,
+            queries: None,
+            reference: Vec::new(),
+            references: Self::REFERENCES,
+            index: None,
+            radius: Self::RADIUS_M,
+            prior: None,
+            method: Method::ALL.to_vec(),
+            fusion: Vec::new(),
+            seed: 0,
+            config: ConfigArgs::default(),
+            threads: None,
+            breakpoints: Vec::new(),
+        }
+    }
 }
 
 /// Where the recording goes: Rerun's own options, which can be combined.

@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::args::{ConfigArgs, RecordingArgs, RunArgs};
+use super::args::{JobArgs, RecordingArgs, RunArgs};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
-use posescope::evaluate::Selection;
-use posescope::event::Method;
 #[cfg(feature = "app")]
 use posescope::session::RunMode;
 
@@ -25,25 +23,16 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
     run::run(
         &RunArgs {
             scene: "street".to_owned(),
-            format: None,
-            queries: None,
             query: vec![QUERY.to_owned()],
             all: false,
-            reference: vec![REFERENCE.to_owned()],
-            references: Selection::Random(1),
-            index: None,
-            radius: 15.0,
-            prior: None,
-            method: Method::ALL.to_vec(),
-            fusion: Vec::new(),
-            seed: 0,
-            config: ConfigArgs::default(),
-            threads: None,
+            job: JobArgs {
+                reference: vec![REFERENCE.to_owned()],
+                ..JobArgs::default()
+            },
             recording: RecordingArgs {
                 save: Some(recording),
                 ..RecordingArgs::default()
             },
-            breakpoints: Vec::new(),
             json: None,
         },
         terminal,

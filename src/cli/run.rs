@@ -33,18 +33,18 @@ struct Task {
 
 /// Runs the command.
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.threads)?;
-    let params = params::resolve(&args.config)?;
-    let references = scene::open(&args.scene, args.format.as_deref())?;
-    let others = match &args.queries {
-        Some(queries) => Some(scene::open(queries, args.format.as_deref())?),
+    use_threads(args.job.threads)?;
+    let params = params::resolve(&args.job.config)?;
+    let references = scene::open(&args.scene, args.job.format.as_deref())?;
+    let others = match &args.job.queries {
+        Some(queries) => Some(scene::open(queries, args.job.format.as_deref())?),
         None => None,
     };
     let queries = others.as_deref().unwrap_or(references.as_ref());
     let plan = Plan {
         args,
         params: &params,
-        localizer: Localizer::new(references.as_ref(), queries, &params, args.seed),
+        localizer: Localizer::new(references.as_ref(), queries, &params, args.job.seed),
     };
     let tasks = plan.tasks()?;
     let mut json = match &args.json {
@@ -56,15 +56,15 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let estimates = tasks.iter().map(|task| task.references.frames.len());
     let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
     let mut audience = Audience::new(bar.clone(), plan.recorder(&tasks)?);
-    if !args.breakpoints.is_empty() {
-        let breakpoints = Breakpoints::new(args.breakpoints.iter().cloned());
+    if !args.job.breakpoints.is_empty() {
+        let breakpoints = Breakpoints::new(args.job.breakpoints.iter().cloned());
         audience.stop = Some(StopAtBreakpoint::new(breakpoints));
     }
     let outcome = tasks.iter().enumerate().try_for_each(|(index, task)| {
         let request = Request {
-            radius_m: args.radius,
+            radius_m: args.job.radius,
             references: task.references.clone(),
-            fusions: args.fusion.clone(),
+            fusions: args.job.fusion.clone(),
             setting: None,
         };
         plan.localizer.localize(
@@ -133,7 +133,7 @@ impl Plan<'_> {
     fn methods(&self) -> Vec<Method> {
         Method::ALL
             .into_iter()
-            .filter(|method| self.args.method.contains(method))
+            .filter(|method| self.args.job.method.contains(method))
             .collect()
     }
 
@@ -149,13 +149,14 @@ impl Plan<'_> {
                 .collect::<Result<Vec<_>, _>>()?
         };
         let named = args
+            .job
             .reference
             .iter()
             .map(|name| references.find(name))
             .collect::<Result<Vec<_>, _>>()?;
-        let index = match args.references {
+        let index = match args.job.references {
             Selection::Retrieved(_) if named.is_empty() => Some(Retriever::find(
-                args.index.as_deref(),
+                args.job.index.as_deref(),
                 references,
                 &args.scene,
                 self.params,
@@ -165,9 +166,9 @@ impl Plan<'_> {
         let chooser = Chooser {
             localizer: &self.localizer,
             params: self.params,
-            selection: args.references,
-            radius_m: args.prior.unwrap_or(args.radius),
-            seed: args.seed,
+            selection: args.job.references,
+            radius_m: args.job.reach_m(),
+            seed: args.job.seed,
             index: index.as_ref().map(|index| index as &dyn Ranking),
         };
         wanted
@@ -189,9 +190,9 @@ impl Plan<'_> {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(
                 "{}: no frame with pose and scan within {} m of query {name}; \
-                 raise --radius or name one with --reference",
+                 raise --radius or --prior, or name one with --reference",
                 self.localizer.references().name(),
-                self.args.radius
+                self.args.job.reach_m()
             )));
         }
         Ok(chosen)
@@ -218,7 +219,7 @@ impl Plan<'_> {
             queries: names(of, &mut tasks.iter().map(|task| task.query)),
             references: names(from, &mut references.copied()),
             configuration: self.params.to_toml(),
-            seed: self.args.seed,
+            seed: self.args.job.seed,
         };
         Ok(Some(Recorder::open(&targets, &identity, &self.methods())?))
     }

@@ -11,7 +11,7 @@ use posescope::params::Params;
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode};
 
-use super::args::{ConfigArgs, RecordingArgs, RunArgs, ViewArgs};
+use super::args::{ConfigArgs, JobArgs, RecordingArgs, RunArgs, ViewArgs};
 use super::failure::CliError;
 use super::terminal::Terminal;
 use super::{demo, params, run};
@@ -24,27 +24,15 @@ impl ViewArgs {
     pub fn demo() -> Self {
         Self {
             scene: "street".to_owned(),
-            format: None,
-            queries: None,
             query: None,
-            reference: Vec::new(),
-            references: Selection::Random(1),
-            index: None,
-            radius: 15.0,
-            prior: None,
-            method: Method::ALL.to_vec(),
-            fusion: Vec::new(),
-            seed: 0,
-            config: ConfigArgs::default(),
-            threads: None,
-            breakpoints: Vec::new(),
+            job: JobArgs::default(),
         }
     }
 }
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
-    run::use_threads(args.threads)?;
+    run::use_threads(args.job.threads)?;
     let setup = setup(args, mode)?;
     let headless = setup.clone();
     match app::open(setup) {
@@ -73,33 +61,35 @@ fn record_instead(
     run::run(
         &RunArgs {
             scene: setup.scene_argument.clone(),
-            format: args.format.clone(),
-            queries: setup.queries_argument.clone(),
             query: vec![query],
             all: false,
-            reference: references
-                .map(|&frame| setup.references.frames()[frame].clone())
-                .collect(),
-            references: match setup.pick {
-                ReferencePick::By(selection) => selection,
-                ReferencePick::ByHand => args.references,
+            job: JobArgs {
+                format: args.job.format.clone(),
+                queries: setup.queries_argument.clone(),
+                reference: references
+                    .map(|&frame| setup.references.frames()[frame].clone())
+                    .collect(),
+                references: match setup.pick {
+                    ReferencePick::By(selection) => selection,
+                    ReferencePick::ByHand => args.job.references,
+                },
+                index: setup.index.file().cloned(),
+                radius: setup.uncertainty_radius_m,
+                prior: setup.prior_m,
+                method: setup.methods.clone(),
+                fusion: setup.fusions.clone(),
+                seed: setup.seed,
+                config: ConfigArgs {
+                    config: None,
+                    assignments: setup.params.changes(),
+                },
+                threads: args.job.threads,
+                breakpoints: args.job.breakpoints.clone(),
             },
-            index: setup.index.file().cloned(),
-            radius: setup.uncertainty_radius_m,
-            prior: setup.prior_m,
-            method: setup.methods.clone(),
-            fusion: setup.fusions.clone(),
-            seed: setup.seed,
-            config: ConfigArgs {
-                config: None,
-                assignments: setup.params.changes(),
-            },
-            threads: None,
             recording: RecordingArgs {
                 save: Some(recording),
                 ..RecordingArgs::default()
             },
-            breakpoints: args.breakpoints.clone(),
             json: None,
         },
         terminal,
@@ -113,17 +103,23 @@ fn setup(args: &ViewArgs, mode: RunMode) -> Result<Setup, CliError> {
         false => of_a_scene(args)?,
     };
     setup.mode = mode;
-    setup.breakpoints = args.breakpoints.iter().map(ToString::to_string).collect();
+    setup.breakpoints = args
+        .job
+        .breakpoints
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     Ok(setup)
 }
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
-    let references: Arc<dyn Scene> = scene::open(&args.scene, args.format.as_deref())?.into();
-    let queries: Arc<dyn Scene> = match &args.queries {
-        Some(queries) => scene::open(queries, args.format.as_deref())?.into(),
+    let references: Arc<dyn Scene> = scene::open(&args.scene, args.job.format.as_deref())?.into();
+    let queries: Arc<dyn Scene> = match &args.job.queries {
+        Some(queries) => scene::open(queries, args.job.format.as_deref())?.into(),
         None => Arc::clone(&references),
     };
     let named: Vec<usize> = args
+        .job
         .reference
         .iter()
         .map(|name| references.find(name))
@@ -132,21 +128,21 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         scene_argument: args.scene.clone(),
         offered: (0..queries.frames().len()).collect(),
         references,
-        queries_argument: args.queries.clone(),
+        queries_argument: args.job.queries.clone(),
         queries,
         query: 0,
         pick: match named.as_slice() {
-            [] => ReferencePick::By(args.references),
+            [] => ReferencePick::By(args.job.references),
             _ => ReferencePick::ByHand,
         },
         chosen: named.into(),
-        index: Arc::new(IndexFile::new(&args.scene, args.index.clone())),
-        methods: methods(&args.method),
-        fusions: args.fusion.clone(),
-        params: params::resolve(&args.config)?,
-        uncertainty_radius_m: args.radius,
-        prior_m: args.prior,
-        seed: args.seed,
+        index: Arc::new(IndexFile::new(&args.scene, args.job.index.clone())),
+        methods: methods(&args.job.method),
+        fusions: args.job.fusion.clone(),
+        params: params::resolve(&args.job.config)?,
+        uncertainty_radius_m: args.job.radius,
+        prior_m: args.job.prior,
+        seed: args.job.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,
         results: BTreeMap::new(),
@@ -162,7 +158,7 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
         setup.pick == ReferencePick::ByHand || !setup.candidates(query).is_empty()
     };
     let is_demo = args.scene == "street"
-        && args.queries.is_none()
+        && args.job.queries.is_none()
         && args.query.is_none()
         && setup.pick == ReferencePick::By(Selection::Random(1));
     setup.query = match &args.query {
@@ -207,7 +203,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         )));
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
-    let format = args.format.as_deref().or(file.format.as_deref());
+    let format = args.job.format.as_deref().or(file.format.as_deref());
     let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
     let other = file
         .queries
@@ -263,7 +259,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         pick: ReferencePick::By(selection),
         index: Arc::new(IndexFile::new(
             &file.scenes[pair.scene_index],
-            args.index.clone(),
+            args.job.index.clone(),
         )),
         methods: file
             .methods
@@ -272,8 +268,8 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             .collect(),
         fusions: file.fusions(),
         params,
-        prior_m: args.prior.or(file.prior_m),
-        uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.radius),
+        prior_m: args.job.prior.or(file.prior_m),
+        uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.job.radius),
         seed: file.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,

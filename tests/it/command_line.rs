@@ -129,6 +129,15 @@ fn a_reference_is_chosen_within_the_radius_and_never_the_query_itself() {
     let within = references(&["--references", "random:5", "--radius", "1.5"]);
     assert_eq!(within, (Some(0), vec!["000004".to_owned()]));
     assert_eq!(references(&["--radius", "0.5"]).0, Some(3));
+    let farther = [
+        "--references",
+        "random:5",
+        "--radius",
+        "0.5",
+        "--prior",
+        "1.5",
+    ];
+    assert_eq!(references(&farther), within);
 }
 
 #[test]

@@ -11,7 +11,9 @@ use posescope::event::Method;
 use posescope::params::Params;
 use posescope::scene::{IndexOptions, Retriever};
 use posescope::session::{IndexFile, Part, State};
+use posescope::sink::rerun::entities;
 
+use crate::recording::{chunks, timelines};
 use crate::walls_scene::Walls;
 use crate::window::{finished, is_said, results, settle, setup};
 
@@ -74,6 +76,15 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
         let name = bar.stage.name();
         assert!(name != "detect" && name != "color" || bar.reused, "{name}");
     }
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = folder.path().join("fused.rrd");
+    let save = Command::SaveRecording(recording.clone());
+    window.state_mut().send(save);
+    window.run_steps(2);
+    let recorded = timelines(&chunks(&recording));
+    assert!(recorded.contains_key(&entities::fusion_weights(Method::Feature)));
+    assert!(!recorded.contains_key(entities::RETRIEVAL_TABLE));
+
     let command = window.state().desk().setup.command_line();
     assert!(
         command.contains("--reference 000000 --reference 000002"),
@@ -185,6 +196,11 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     let ranking = window.state().desk().setup.chosen.ranking.clone();
     let first = &ranking.expect("an index ranks").frames[0];
     let found = first.ranked.verification().expect("the walls are the same");
+    let recording = folder.path().join("ranked.rrd");
+    let save = Command::SaveRecording(recording.clone());
+    window.state_mut().send(save);
+    window.run_steps(2);
+    assert!(timelines(&chunks(&recording)).contains_key(entities::RETRIEVAL_TABLE));
     let name = format!("{} matches with {}", found.matches.len(), first.name);
     assert!(is_said(&window, &name), "{name}");
 }

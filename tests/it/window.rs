@@ -10,9 +10,11 @@ use posescope::app::{App, Command, Comparing, ReferencePick, Setup};
 use posescope::evaluate::{Localizer, QueryResult, Request, Unwatched};
 use posescope::event::{Event, Method, Stage};
 use posescope::params::Params;
+use posescope::scene;
 use posescope::scene::Scene;
 use posescope::session::{RunMode, State};
 
+use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
 /// The small world, waiting at its first step.
@@ -365,6 +367,29 @@ fn a_session_is_saved_and_restored() {
     window.step();
     window.step();
     assert!(is_said(&window, "session.json"));
+}
+
+#[test]
+fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
+    let sequence = SmallSequence::of(&[0, 1]);
+    let folder = sequence.folder();
+    let scene = folder.to_str().expect("a plain path");
+    let path = sequence.path().join("session.json");
+    let mut window = finished(setup());
+    let save = Command::SaveSession(path.clone());
+    window.state_mut().send(save);
+    window.step();
+    let saved = std::fs::read_to_string(&path).expect("saved");
+    let elsewhere = saved.replace("\"walls\"", &format!("{scene:?}"));
+    assert_ne!(saved, elsewhere);
+    std::fs::write(&path, elsewhere).expect("writable");
+    window.state_mut().send(Command::RestoreSession(path));
+    window.step();
+    assert_eq!(settle(&mut window), State::Finished);
+    let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
+    let loaded = window.state().desk().run().loaded.clone();
+    let problem = &loaded.expect("it ran").problems[0];
+    assert_eq!(problem.query.photo.gray, photo.expect("readable").gray);
 }
 
 #[test]

@@ -1,15 +1,13 @@
 //! All queries with what is known of them.
 
-use egui::{Color32, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
+use egui::{Color32, RichText, ScrollArea, Ui};
 
 use super::View;
+use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::obey::has_failed;
 use crate::app::{Command, Scope, theme};
 use crate::evaluate::QueryResult;
 use crate::event::{Method, Side};
-
-/// Size of a thumbnail on the screen \[points\].
-const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 
 /// The list of queries.
 #[derive(Default)]
@@ -67,20 +65,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
     let name = &desk.setup.queries.frames()[query];
     let is_here = query == desk.setup.query;
     ui.horizontal(|ui| {
-        match desk.queries.thumbnail(Side::Query, query) {
-            Some(texture) => {
-                ui.add(
-                    egui::Image::new(texture)
-                        .fit_to_exact_size(THUMBNAIL)
-                        .alt_text(name),
-                );
-            }
-            None => {
-                let (rect, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
-                let fill = ui.visuals().faint_bg_color;
-                ui.painter().rect_filled(rect, 2.0, fill);
-            }
-        }
+        thumbnail(ui, desk, Side::Query, query);
         ui.vertical(|ui| {
             let text = RichText::new(name).monospace();
             if ui.selectable_label(is_here, text).clicked() {

@@ -1,17 +1,16 @@
 //! The references of the query: how they are chosen, which frames could be, what is made of several.
 
-use egui::{ComboBox, DragValue, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
+use egui::{ComboBox, DragValue, RichText, ScrollArea, Ui};
 
 use super::View;
 use super::queries::dots;
+use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ReferencePick, Scope, theme};
 use crate::evaluate::{QueryResult, Selection};
 use crate::event::Side;
 use crate::fusion;
 use crate::geometry::PoseError;
 
-/// Size of a thumbnail on the screen \[points\].
-const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 /// The ways of choosing, each with the count that it begins with.
 const WAYS: [(&str, Selection); 4] = [
     ("at random", Selection::Random(1)),
@@ -166,20 +165,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
             }
             scope.send(Command::SetReferences(frames));
         }
-        match desk.queries.thumbnail(Side::Reference, frame) {
-            Some(texture) => {
-                ui.add(
-                    egui::Image::new(texture)
-                        .fit_to_exact_size(THUMBNAIL)
-                        .alt_text(name),
-                );
-            }
-            None => {
-                let (rect, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
-                let fill = ui.visuals().faint_bg_color;
-                ui.painter().rect_filled(rect, 2.0, fill);
-            }
-        }
+        thumbnail(ui, desk, Side::Reference, frame);
         ui.vertical(|ui| {
             ui.label(RichText::new(name).monospace().color(theme::REFERENCE));
             ui.horizontal(|ui| {
