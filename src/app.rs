@@ -7,6 +7,7 @@
 //! A view keeps no copy of the run. It is handed a [`Scope`], the run at the cursor, and answers
 //! with commands; so looking back costs no second run, and whatever a person can do, a test can do.
 
+mod adapter;
 mod camera;
 mod command;
 mod desk;

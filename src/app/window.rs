@@ -3,6 +3,7 @@
 use egui::ViewportBuilder;
 
 use super::App;
+use super::adapter;
 use super::setup::Setup;
 
 /// Why no window could be opened, and what would help.
@@ -39,6 +40,7 @@ pub fn window_options() -> eframe::NativeOptions {
             .with_inner_size([1500.0, 950.0]),
         // There are no wide gradients, and it costs time for every pixel on a software adapter.
         dithering: false,
+        wgpu_options: adapter::configuration(),
         ..eframe::NativeOptions::default()
     }
 }

@@ -23,9 +23,15 @@ impl Terminal {
             (false, 1) => (LevelFilter::Info, LevelFilter::Warn),
             (false, _) => (LevelFilter::Debug, LevelFilter::Info),
         };
+        let quieter = match foreign {
+            LevelFilter::Error => LevelFilter::Off,
+            level => level,
+        };
         let logger = env_logger::Builder::new()
             .filter_level(foreign)
             .filter_module("posescope", own)
+            // It shouts where no Vulkan driver is installed, which the window says in one line.
+            .filter_module("wgpu_hal::vulkan::instance", quieter)
             .parse_default_env()
             .build();
         let level = logger.filter();

@@ -141,14 +141,22 @@ impl Projection {
         let p = &point.position;
         let along = |row: &[f32; 4]| row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3];
         let depth = along(&self.rows[2]);
-        if depth <= 0.1 {
+        if depth.is_nan() || depth <= 0.1 {
             return None;
         }
         let inverse = depth.recip();
         let u = along(&self.rows[0]) * inverse;
         let v = along(&self.rows[1]) * inverse;
-        Some(((u + 0.5).floor() as i32, (v + 0.5).floor() as i32, depth))
+        Some((floor(u + 0.5), floor(v + 0.5), depth))
     }
+}
+
+/// [`f32::floor`] as a whole number. That of the standard library is a call for every point, unless
+/// it is compiled for processors with SSE4.1 alone.
+#[inline]
+fn floor(value: f32) -> i32 {
+    let truncated = value as i32;
+    truncated.saturating_sub(i32::from(truncated as f32 > value))
 }
 
 #[cfg(test)]
@@ -203,6 +211,18 @@ mod tests {
     }
 
     #[test]
+    fn a_point_without_a_depth_holds_no_pixel() {
+        let mut rasterizer = Rasterizer::new(&camera(), 1);
+        let points = [
+            point(f32::NAN, f32::NAN, f32::NAN, 1.0),
+            point(-0.8, -0.6, 2.0, 2.0),
+        ];
+        let pixels = rasterizer.splat(&points, &Pose::identity());
+        assert_eq!(pixels.len(), 1);
+        assert_eq!(pixels[0].intensity, 2.0);
+    }
+
+    #[test]
     fn squares_are_cut_at_the_border() {
         let mut rasterizer = Rasterizer::new(&camera(), 3);
         let corner = point(-0.4, -0.3, 1.0, 7.0);
@@ -224,6 +244,12 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn floor_is_that_of_the_standard_library(bits: u32) {
+            let value = f32::from_bits(bits);
+            prop_assert_eq!(floor(value), value.floor() as i32);
+        }
+
         #[test]
         fn a_reused_rasterizer_draws_as_a_new_one(
             xs in prop::collection::vec((-2.0_f32..2.0, -2.0_f32..2.0, -1.0_f32..6.0), 0..60),

@@ -2,38 +2,25 @@
 //!
 //! After a change that is meant, `UPDATE_SNAPSHOTS=1 cargo test looks` writes them anew.
 
-use egui_kittest::{Harness, SnapshotOptions, SnapshotResults};
-use posescope::app::{App, Command, Setup, views};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use posescope::app::{Command, views};
 use posescope::event::Method;
 use posescope::session::{RunMode, State};
 
-use crate::window::{has_adapter, settle, setup, wait};
-
-/// A window that is painted, or `None` where there is nothing to paint with.
-fn painted(setup: Setup) -> Option<Harness<'static, App>> {
-    if !has_adapter() {
-        return None;
-    }
-    Some(
-        Harness::builder()
-            .with_size([760.0, 520.0])
-            .wgpu()
-            .build_eframe(|creation| App::new(creation, setup)),
-    )
-}
+use crate::painted::{Painted, painted};
+use crate::window::{settle, setup, wait};
 
 #[test]
 fn every_view_looks_as_it_did() {
-    let Some(mut window) = painted(setup()) else {
+    let Some(mut painted) = painted(setup(), [760.0, 520.0]) else {
         return;
     };
-    settle(&mut window);
-    // Glyph edges and points differ by little from one rasterizer to the next.
-    let options = SnapshotOptions::new().threshold(2.0).max_failed_pixels(900);
-    let mut results = SnapshotResults::new();
-    let mut shoot = |window: &mut Harness<'_, App>, moment: &str, of: &[&str]| {
+    settle(&mut painted.window);
+    let mut unlike = Vec::new();
+    let mut shoot = |painted: &mut Painted, moment: &str, of: &[&str]| {
         let is_wanted = |entry: &&views::Entry| of.is_empty() || of.contains(&entry.name);
         for entry in views::ALL.iter().filter(is_wanted) {
+            let window = &mut painted.window;
             window.state_mut().send(Command::Maximize(Some(entry.name)));
             // What is in sight asks for its thumbnails.
             window.run_steps(2);
@@ -41,35 +28,47 @@ fn every_view_looks_as_it_did() {
                 !app.desk().is_probing() && !app.desk().queries.is_painting()
             });
             window.run_steps(4);
-            let name = format!("{}-{moment}", entry.name);
-            results.add(window.try_snapshot_options(name, &options));
+            if let Some(trouble) = window.query_by_label_contains("Nothing is drawn") {
+                panic!("{:?}", trouble.accesskit_node().value());
+            }
+            let compared = painted.compare(&format!("{}-{moment}", entry.name));
+            unlike.extend(compared.err());
         }
     };
-    shoot(&mut window, "waiting", &[]);
-    window.state_mut().send(Command::Run);
-    wait(&mut window, |app| *app.desk().state() == State::Finished);
-    window
+    shoot(&mut painted, "waiting", &[]);
+    painted.window.state_mut().send(Command::Run);
+    wait(&mut painted.window, |app| {
+        *app.desk().state() == State::Finished
+    });
+    painted
+        .window
         .state_mut()
         .send(Command::SelectMethod(Method::Feature));
-    shoot(&mut window, "features", &[]);
-    window
+    shoot(&mut painted, "features", &[]);
+    painted
+        .window
         .state_mut()
         .send(Command::SelectMethod(Method::MutualInformation));
-    shoot(&mut window, "search", &[]);
-    window.state_mut().send(Command::SwitchTheme);
-    shoot(&mut window, "light", &[]);
-    window.state_mut().send(Command::SetReferences(vec![0, 2]));
+    shoot(&mut painted, "search", &[]);
+    painted.window.state_mut().send(Command::SwitchTheme);
+    shoot(&mut painted, "light", &[]);
+    painted
+        .window
+        .state_mut()
+        .send(Command::SetReferences(vec![0, 2]));
     let all = posescope::fusion::ALL.iter().collect();
-    window.state_mut().send(Command::SetFusions(all));
-    window.run_steps(2);
-    wait(&mut window, |app| *app.desk().state() == State::Finished);
-    window.state_mut().send(Command::Last);
+    painted.window.state_mut().send(Command::SetFusions(all));
+    painted.window.run_steps(2);
+    wait(&mut painted.window, |app| {
+        *app.desk().state() == State::Finished
+    });
+    painted.window.state_mut().send(Command::Last);
     shoot(
-        &mut window,
+        &mut painted,
         "fused",
         &["references", "fusion", "report", "space"],
     );
-    results.unwrap();
+    assert!(unlike.is_empty(), "{}", unlike.join("\n"));
 }
 
 /// Without a run there is something to say too.

@@ -9,7 +9,8 @@ use posescope::geometry::Pose;
 use posescope::grid::Phase;
 use posescope::session::RunMode;
 
-use crate::window::{has_adapter, settle, setup, window};
+use crate::painted::{Painted, painted};
+use crate::window::{settle, setup, window};
 
 fn finished() -> Harness<'static, App> {
     let mut setup = setup();
@@ -297,20 +298,14 @@ fn without_a_graphics_card_the_view_says_so() {
     assert!(window.query_by_label_contains("No graphics card").is_some());
 }
 
-/// The window drawn by any adapter there is; `None`, and a line that says so, without one.
-fn drawn() -> Option<Harness<'static, App>> {
-    if !has_adapter() {
-        return None;
-    }
+/// The window with its run over, drawn by any adapter there is; `None` without one.
+fn drawn() -> Option<Painted> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
-    let mut window = Harness::builder()
-        .with_size([1500.0, 950.0])
-        .wgpu()
-        .build_eframe(|creation| App::new(creation, setup));
-    settle(&mut window);
-    window.step();
-    Some(window)
+    let mut painted = painted(setup, [1500.0, 950.0])?;
+    settle(&mut painted.window);
+    painted.window.step();
+    Some(painted)
 }
 
 /// How many pixels of the 3-D view have nearly a colour.
@@ -331,16 +326,17 @@ fn count(window: &mut Harness<'_, App>, [r, g, b]: [u8; 3]) -> usize {
 
 #[test]
 fn the_layers_are_drawn_and_can_be_taken_away() {
-    let Some(mut window) = drawn() else { return };
+    let Some(mut painted) = drawn() else { return };
+    let window = &mut painted.window;
     const TRUTH: [u8; 3] = [0x00, 0x9E, 0x73];
     assert!(window.query_by_label_contains("No graphics card").is_none());
     assert!(window.query_by_label_contains("Nothing is drawn").is_none());
-    let with_truth = count(&mut window, TRUTH);
+    let with_truth = count(window, TRUTH);
     assert!(with_truth > 50, "{with_truth} pixels of the truth");
     window.state_mut().send(Command::ShowTruth);
     window.step();
     window.step();
     // Inlier rays have the same colour, but are pale.
-    let without = count(&mut window, TRUTH);
+    let without = count(window, TRUTH);
     assert!(without < with_truth / 2, "{without} of {with_truth}");
 }

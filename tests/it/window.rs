@@ -50,21 +50,6 @@ pub fn window(setup: Setup) -> Harness<'static, App> {
         .build_eframe(|creation| App::new(creation, setup))
 }
 
-/// Whether there is anything to paint with; a line that says so where there is not.
-pub fn has_adapter() -> bool {
-    use eframe::wgpu;
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let options = wgpu::RequestAdapterOptions::default();
-    let mut future = std::pin::pin!(instance.request_adapter(&options));
-    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
-    let found = std::future::Future::poll(future.as_mut(), &mut context);
-    let is_there = matches!(found, std::task::Poll::Ready(Ok(_)));
-    if !is_there {
-        println!("skipped: no graphics adapter; Mesa's software Vulkan is one");
-    }
-    is_there
-}
-
 /// Draws frames until the worker needs somebody.
 pub fn settle(window: &mut Harness<'_, App>) -> State {
     wait(window, |app| {

@@ -2,7 +2,10 @@
 // pixel.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
-@group(0) @binding(1) var depths: texture_depth_2d;
+// A depth texture, read as any other: OpenGL cannot load single texels of one that is declared as
+// depth, and wants a sampler that does not filter.
+@group(0) @binding(1) var depths: texture_2d<f32>;
+@group(0) @binding(2) var nearest: sampler;
 
 struct Seen {
     @builtin(position) clip: vec4f,
@@ -45,5 +48,6 @@ struct Behind {
 @fragment
 fn backdrop(seen: Seen) -> Behind {
     let at = vec2u(seen.clip.xy);
-    return Behind(textureLoad(picture, at, 0), textureLoad(depths, at, 0));
+    let uv = seen.clip.xy / vec2f(textureDimensions(depths));
+    return Behind(textureLoad(picture, at, 0), textureSampleLevel(depths, nearest, uv, 0.0).r);
 }

@@ -214,7 +214,9 @@ impl Target {
         let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
         let cloud_color = view(&texture(COLOR, 1, attached | sampled));
         let cloud_depth = view(&texture(DEPTH, 1, attached | sampled));
-        let layers = [shown(&cloud_color), shown(&cloud_depth)];
+        let nearest = device.create_sampler(&wgpu::SamplerDescriptor::default());
+        let nearest = wgpu::BindingResource::Sampler(&nearest);
+        let layers = [shown(&cloud_color), shown(&cloud_depth), nearest];
         let backdrop = bind(device, &made.backdrop_layout, layers);
         let whole = view(&resolved);
         let bind_group = bind(device, &made.blit_layout, [shown(&whole)]);

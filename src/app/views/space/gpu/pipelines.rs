@@ -74,10 +74,10 @@ impl Made {
             multisampled: false,
         };
         let color = texture(wgpu::TextureSampleType::Float { filterable: false });
-        let depth = texture(wgpu::TextureSampleType::Depth);
+        let nearest = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
         let fragment = wgpu::ShaderStages::FRAGMENT;
         let blit_layout = layout(device, fragment, &[color]);
-        let backdrop_layout = layout(device, fragment, &[color, depth]);
+        let backdrop_layout = layout(device, fragment, &[color, color, nearest]);
         let spot = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];
         let line = wgpu::vertex_attr_array![
             0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Float32

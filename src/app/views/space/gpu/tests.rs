@@ -29,7 +29,10 @@ impl Card {
             println!("skipped: no graphics adapter");
             return None;
         };
-        let descriptor = wgpu::DeviceDescriptor::default();
+        let descriptor = wgpu::DeviceDescriptor {
+            required_limits: adapter.limits(),
+            ..wgpu::DeviceDescriptor::default()
+        };
         let (device, queue) = at_once(adapter.request_device(&descriptor))?.ok()?;
         let pipelines = Pipelines::new(&device, COLOR);
         assert_eq!(pipelines.trouble(), None);
