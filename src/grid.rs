@@ -6,8 +6,8 @@
 
 use nalgebra::{Translation3, Vector3};
 
+use crate::describe::{About, Describe, ParamVisitor};
 use crate::geometry::{Pose, yaw};
-use crate::params::{About, Describe, ParamVisitor};
 use crate::render::Score;
 
 /// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.

@@ -24,6 +24,7 @@ pub mod camera;
 pub mod cloud;
 pub mod cost;
 pub mod depth;
+pub mod describe;
 pub mod estimator;
 pub mod evaluate;
 pub mod event;

@@ -9,7 +9,7 @@ pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud};
 pub use score::{Comparison, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
-use crate::params::{About, Describe, ParamVisitor};
+use crate::describe::{About, Describe, ParamVisitor};
 
 /// How the cloud is coloured and splatted.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use posescope::describe::ParamError;
 use posescope::evaluate::{ChoiceError, DrawError, FolderError, RunError};
-use posescope::params::ParamError;
 use posescope::scene::{NoIndex, SceneError};
 use posescope::sink::rerun::{ComparisonError, RecordError};
 use posescope::trace::Cancelled;

@@ -1,7 +1,7 @@
 //! 1 − normalised mutual information, the cost of MI (paper, section 2.4).
 
 use super::{Cost, Explanation, IntensityPair};
-use crate::params::{About, Describe, ParamVisitor};
+use crate::describe::{About, Describe, ParamVisitor};
 
 /// Parameters of the mutual-information cost.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
 use super::{Cost, Explanation, IntensityPair};
-use crate::params::{About, Describe, ParamVisitor};
+use crate::describe::{About, Describe, ParamVisitor};
 
 /// Parameters of the photometric cost.
 #[derive(Clone, Debug, PartialEq)]

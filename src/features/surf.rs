@@ -8,7 +8,7 @@ use super::detector::detect;
 use super::integral::IntegralImage;
 use super::orientation::OrientationEstimator;
 use super::{Features, Keypoint};
-use crate::params::{About, Describe, ParamVisitor};
+use crate::describe::{About, Describe, ParamVisitor};
 
 /// What [`surf`] looks for.
 #[derive(Clone, Copy, Debug, PartialEq)]

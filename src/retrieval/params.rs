@@ -1,8 +1,8 @@
 //! The parameters of retrieval.
 
 use super::verification::Tolerance;
+use crate::describe::{About, Describe, ParamVisitor};
 use crate::features::SurfParams;
-use crate::params::{About, Describe, ParamVisitor};
 
 /// What an index is made of and how it is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,8 @@ use egui::{ComboBox, DragValue, RichText, ScrollArea, TextEdit, Ui};
 
 use super::View;
 use crate::app::{Command, Scope};
-use crate::params::{About, Choice, ParamVisitor, Params};
+use crate::describe::{About, Choice, Described, ParamVisitor};
+use crate::params::Params;
 
 /// The list of parameters.
 #[derive(Default)]
@@ -97,8 +98,8 @@ struct Editor<'a, 'b> {
     group: &'static str,
     index: &'a mut usize,
     shown: &'a [bool],
-    defaults: &'a [crate::params::Described],
-    references: Option<&'a Vec<crate::params::Described>>,
+    defaults: &'a [Described],
+    references: Option<&'a Vec<Described>>,
     is_titled: bool,
 }
 

@@ -1,6 +1,6 @@
 //! Parameters of FB.
 
-use crate::params::{About, Choice, Describe, ParamVisitor};
+use crate::describe::{About, Choice, Describe, ParamVisitor};
 use crate::robust::{AcceptanceRule, MlesacParams};
 
 /// Which depth a reference keypoint takes.
