@@ -62,16 +62,14 @@ pub fn mlesac<C>(
         let Some(sample) = index::sample_array::<_, SAMPLE>(&mut rng, found) else {
             break;
         };
-        let hypothesis = p3p(
+        let solutions = p3p(
             &sample.map(|i| bearings[i]),
             &sample.map(|i| correspondences[i].point),
-        )
-        .into_iter()
-        .map(|pose| Hypothesis {
+        );
+        let hypothesis = likeliest(solutions.into_iter().map(|pose| Hypothesis {
             pose,
             score: likelihood.score(&pose),
-        })
-        .max_by(|a, b| f64::total_cmp(&a.score.log_likelihood, &b.score.log_likelihood));
+        }));
 
         let old = best.map_or(f64::NEG_INFINITY, |best| {
             best.hypothesis.score.log_likelihood
@@ -124,6 +122,15 @@ pub fn mlesac<C>(
     })
 }
 
+/// The likeliest of the solutions of one sample, of equally likely ones the last.
+///
+/// One whose likelihood is not a number says nothing about the others.
+fn likeliest(solutions: impl Iterator<Item = Hypothesis>) -> Option<Hypothesis> {
+    solutions
+        .filter(|solution| !solution.score.log_likelihood.is_nan())
+        .max_by(|a, b| f64::total_cmp(&a.score.log_likelihood, &b.score.log_likelihood))
+}
+
 /// Trials after which a sample without false matches has been drawn with the given confidence,
 /// if `inliers` of `total` matches are true.
 ///
@@ -140,6 +147,7 @@ fn trials_for(inliers: usize, total: usize, confidence: f64) -> usize {
 mod tests {
     use super::*;
     use crate::geometry::Pose;
+    use crate::robust::Score;
     use nalgebra::{Point2, Point3, Vector2, Vector3};
     use rand::RngExt;
 
@@ -310,6 +318,25 @@ mod tests {
                 assert!(found.inliers.len() >= NEEDED);
             }
         }
+    }
+
+    #[test]
+    fn a_solution_without_a_likelihood_does_not_hide_the_others_of_its_sample() {
+        let solution = |log_likelihood| Hypothesis {
+            pose: truth(),
+            score: Score {
+                log_likelihood,
+                mixing: 0.5,
+                inliers: 10,
+            },
+        };
+        let chosen = |likelihoods: &[f64]| {
+            likeliest(likelihoods.iter().copied().map(solution)).map(|h| h.score.log_likelihood)
+        };
+        assert_eq!(chosen(&[-20.0, f64::NAN, -10.0]), Some(-10.0));
+        assert_eq!(chosen(&[-20.0, -f64::NAN]), Some(-20.0));
+        assert_eq!(chosen(&[f64::NAN]), None);
+        assert_eq!(chosen(&[]), None);
     }
 
     #[test]
