@@ -93,6 +93,13 @@ pub enum JobError {
     },
 }
 
+impl JobError {
+    /// Whether the watcher asked the job to stop.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Localize(LocalizeError::Cancelled(_)))
+    }
+}
+
 /// What the worker says to the session.
 pub(super) enum Message {
     Chosen(References),
@@ -112,7 +119,8 @@ pub(super) enum Message {
     Broke(String),
 }
 
-/// Starts the worker. Nobody joins it: it ends by itself, or at the next event after a cancel.
+/// Starts the worker. Nobody joins it: it ends by itself, or at the next event or checkpoint after a
+/// cancel.
 pub(super) fn spawn(
     job: Job,
     control: Arc<Control>,
@@ -131,7 +139,7 @@ pub(super) fn spawn(
             let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate, on_choice)));
             let last_words = match outcome {
                 Ok(Ok(_)) => Message::Finished,
-                Ok(Err(JobError::Localize(LocalizeError::Cancelled(_)))) => Message::Cancelled,
+                Ok(Err(error)) if error.is_cancelled() => Message::Cancelled,
                 Ok(Err(error)) => Message::Broke(error.to_string()),
                 Err(panic) => {
                     Message::Broke(format!("internal error: {}", words_of(panic.as_ref())))
