@@ -96,7 +96,10 @@ pub enum JobError {
 impl JobError {
     /// Whether the watcher asked the job to stop.
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Localize(LocalizeError::Cancelled(_)))
+        matches!(
+            self,
+            Self::Localize(LocalizeError::Cancelled(_)) | Self::Choice(ChoiceError::Cancelled(_))
+        )
     }
 }
 
@@ -174,7 +177,7 @@ impl Job {
         let references = scene(self.references.as_ref());
         let queries = scene(self.queries.as_ref());
         let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
-        let chosen = self.choose(&localizer)?;
+        let chosen = self.choose(&localizer, watch)?;
         on_choice(&chosen);
         let request = Request {
             radius_m: self.uncertainty_radius_m,
@@ -191,7 +194,11 @@ impl Job {
         Ok(results)
     }
 
-    fn choose(&self, localizer: &Localizer<'_>) -> Result<References, JobError> {
+    fn choose(
+        &self,
+        localizer: &Localizer<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<References, JobError> {
         if !self.chosen.frames.is_empty() {
             return Ok(self.chosen.clone());
         }
@@ -214,7 +221,7 @@ impl Job {
             seed: self.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),
         };
-        let chosen = chooser.choose(self.query, &|_| false)?;
+        let chosen = chooser.choose(self.query, &|_| false, watch)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear {
                 query: query(),
