@@ -11,8 +11,8 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 
 use super::setup::Setup;
 use super::textures::color_image;
-use crate::evaluate::{QueryResult, Watch};
 use crate::event::{KindSet, Side};
+use crate::localize::{QueryResult, Watch};
 use crate::picture;
 use crate::scene::Scene;
 use crate::session::JobError;

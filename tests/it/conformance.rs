@@ -10,13 +10,15 @@ use posescope::cloud::Cloud;
 use posescope::cost::{Cost, Explanation, IntensityPair};
 use posescope::estimator::{self, Outcome};
 use posescope::event::{
-    DepthsLifted, Event, FeatureState, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind,
-    KindSet, MatchesDecided, Method, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
+    DepthsLifted, Event, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind, KindSet,
+    MatchesDecided, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
 };
+use posescope::features::FeatureState;
 use posescope::geometry::Pose;
 use posescope::history::History;
 use posescope::image::gaussian_smoothed;
 use posescope::memo::Memo;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::render::{Scorer, color_cloud};

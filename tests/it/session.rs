@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use posescope::evaluate::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
-use posescope::event::{Event, Method, ReferencesFused, Stage, StageEnded, StageStarted};
+use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
 use posescope::fusion;
+use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State};
 use posescope::trace::{Cancelled, Record, Sink};
