@@ -253,8 +253,8 @@ impl From<Cancelled> for Halt {
     }
 }
 
-/// Separates "no pose" from "asked to stop".
-fn settle<T>(result: Result<T, Halt>) -> Result<Result<T, Failure>, Cancelled> {
+/// Separates a failure, which is an answer, from being asked to stop.
+fn separate_failure<T>(result: Result<T, Halt>) -> Result<Result<T, Failure>, Cancelled> {
     match result {
         Ok(value) => Ok(Ok(value)),
         Err(Halt::Failed(failure)) => Ok(Err(failure)),

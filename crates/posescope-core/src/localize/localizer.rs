@@ -6,6 +6,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use super::watch::checkpoint;
 use super::{
     QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, tell_ranking,
 };
@@ -138,6 +139,7 @@ impl<'a> Localizer<'a> {
                     Some(problem) => problem,
                     None => {
                         places.push(place);
+                        checkpoint(watch)?;
                         problems.push(Problem {
                             query: Arc::clone(&loaded),
                             reference: self.references.reference(reference)?,
@@ -191,7 +193,7 @@ impl<'a> Localizer<'a> {
                     }
                 }
                 if !request.fusions.is_empty() {
-                    self.count_matches(&mut work, members);
+                    self.count_matches(&mut work, members, watch)?;
                 }
                 for fusion in &request.fusions {
                     let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
@@ -333,11 +335,17 @@ impl<'a> Localizer<'a> {
     }
 
     /// FB counts them anyway; for the direct methods the same features are matched.
-    fn count_matches(&self, work: &mut Work<'_>, members: &[usize]) {
+    fn count_matches(
+        &self,
+        work: &mut Work<'_>,
+        members: &[usize],
+        watch: &mut dyn Watch,
+    ) -> Result<(), Cancelled> {
         for &problem in members {
             if work.matches[problem].is_some() {
                 continue;
             }
+            checkpoint(watch)?;
             let counted = estimator::methods().find_map(|method| {
                 let candidate = work.candidate(problem, method)?;
                 candidate.outcome.counts
@@ -355,6 +363,7 @@ impl<'a> Localizer<'a> {
                 }
             });
         }
+        Ok(())
     }
 
     fn fuse(
