@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use posescope::estimator;
 use posescope::localize::{
     Chooser, Localizer, QueryResult, Ranking, References, Request, Selection, Unwatched,
 };
@@ -131,8 +132,7 @@ fn show(
 impl Plan<'_> {
     /// In the order of the registry, each once.
     fn methods(&self) -> Vec<Method> {
-        Method::ALL
-            .into_iter()
+        estimator::methods()
             .filter(|method| self.args.job.method.contains(method))
             .collect()
     }

@@ -8,7 +8,7 @@ use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope::cloud::Cloud;
 use posescope::cost::{Cost, Explanation, IntensityPair};
-use posescope::estimator::{self, Outcome};
+use posescope::estimator::{self, Outcome, Parts};
 use posescope::event::{
     DepthsLifted, Event, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind, KindSet,
     MatchesDecided, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
@@ -16,7 +16,7 @@ use posescope::event::{
 use posescope::features::FeatureState;
 use posescope::geometry::Pose;
 use posescope::history::History;
-use posescope::image::gaussian_smoothed;
+use posescope::image::{FloatImage, gaussian_smoothed};
 use posescope::memo::Memo;
 use posescope::method::Method;
 use posescope::params::Params;
@@ -54,9 +54,9 @@ fn hopeless() -> Vec<(&'static str, Problem)> {
 }
 
 fn estimators() -> impl Iterator<Item = (&'static str, Box<dyn estimator::Estimator>)> {
-    estimator::ALL
+    estimator::all()
         .iter()
-        .map(|entry| (entry.method.name(), (entry.new)(&Params::default())))
+        .map(|entry| (entry.method.name(), entry.make(&Params::default())))
 }
 
 fn silent(estimator: &dyn estimator::Estimator, problem: &Problem) -> Outcome {
@@ -216,9 +216,9 @@ fn long() -> (Problem, Params) {
 #[test]
 fn between_two_looks_at_the_flag_lie_at_most_300_hypotheses_or_1000_trials() {
     let (problem, params) = long();
-    for entry in estimator::ALL {
+    for entry in estimator::all() {
         let name = entry.method.name();
-        let estimator = (entry.new)(&params);
+        let estimator = entry.make(&params);
         let moments = on_many_threads(|| moments(estimator.as_ref(), &problem, KindSet::ALL));
         // Telling looks up too, but may tell what was worked out long before. What counts is how many
         // hypotheses are told between two looks that nothing is told at.
@@ -238,9 +238,9 @@ fn between_two_looks_at_the_flag_lie_at_most_300_hypotheses_or_1000_trials() {
             assert!(since <= 300, "{name}");
             before = Some(pair[0]);
         }
-        match entry.method {
-            Method::Feature | Method::Hybrid => assert!(tried > 90, "{name}: {tried}"),
-            Method::Photometric | Method::MutualInformation => {
+        match entry.parts {
+            Parts::Features | Parts::Hybrid(_) => assert!(tried > 90, "{name}: {tried}"),
+            Parts::Cost(_) => {
                 assert!(scored > 1000, "{name}: {scored}");
             }
         }
@@ -250,9 +250,9 @@ fn between_two_looks_at_the_flag_lie_at_most_300_hypotheses_or_1000_trials() {
 #[test]
 fn every_stage_that_takes_time_looks_up_more_than_its_events_do() {
     let (problem, params) = long();
-    for entry in estimator::ALL {
+    for entry in estimator::all() {
         let name = entry.method.name();
-        let estimator = (entry.new)(&params);
+        let estimator = entry.make(&params);
         let loud = moments(estimator.as_ref(), &problem, KindSet::ALL);
         let quiet = moments(estimator.as_ref(), &problem, KindSet::NONE);
         let looks = |moments: &[Moment]| {
@@ -264,7 +264,7 @@ fn every_stage_that_takes_time_looks_up_more_than_its_events_do() {
         let told = loud.len() - looks(&loud);
         assert!(looks(&loud) + 20 > told, "{name}: {told}");
     }
-    let fb = (estimator::entry(Method::Feature).new)(&params);
+    let fb = estimator::entry(Method::FB).make(&params);
     let all = moments(
         fb.as_ref(),
         &problem,
@@ -279,9 +279,9 @@ fn every_stage_that_takes_time_looks_up_more_than_its_events_do() {
 #[test]
 fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
     let (problem, params) = long();
-    for entry in estimator::ALL {
+    for entry in estimator::all() {
         let name = entry.method.name();
-        let estimator = (entry.new)(&params);
+        let estimator = entry.make(&params);
         for wanted in [KindSet::ALL, KindSet::NONE] {
             let looks = moments(estimator.as_ref(), &problem, wanted)
                 .iter()
@@ -316,8 +316,11 @@ fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
 struct Counting(AtomicUsize);
 
 impl Cost for Counting {
-    fn query_smoothing_px(&self) -> f64 {
-        0.0
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, 0.0)
+    }
+    fn query_channel_name(&self) -> String {
+        "grey".to_owned()
     }
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
         self.0.fetch_add(1, Ordering::Relaxed);
@@ -362,12 +365,12 @@ fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
     params
         .assign("grid.coarse_step=0.05")
         .expect("a good value");
-    for entry in estimator::ALL {
-        let outcome = silent((entry.new)(&params).as_ref(), &problem);
-        match entry.method {
+    for entry in estimator::all() {
+        let outcome = silent(entry.make(&params).as_ref(), &problem);
+        match entry.parts {
             // FB searches no grid, and the hybrid takes its pose.
-            Method::Feature | Method::Hybrid => assert!(outcome.pose.is_ok()),
-            Method::Photometric | Method::MutualInformation => {
+            Parts::Features | Parts::Hybrid(_) => assert!(outcome.pose.is_ok()),
+            Parts::Cost(_) => {
                 let failure = outcome.pose.expect_err("400 million hypotheses");
                 assert_eq!(failure.code(), "D9");
                 let said = failure.to_string();
@@ -396,7 +399,7 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
     ] {
         params.assign(change).expect("a good value");
     }
-    let fb = (estimator::entry(Method::Feature).new)(&params);
+    let fb = estimator::entry(Method::FB).make(&params);
     let quiet = silent(fb.as_ref(), &problem);
     let told = || {
         let mut history = History::default();
@@ -482,9 +485,10 @@ fn the_outcome_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
     let problem = solvable();
-    for entry in estimator::ALL {
+    for entry in estimator::all() {
         let mut history = History::default();
-        let outcome = (entry.new)(&Params::default())
+        let outcome = entry
+            .make(&Params::default())
             .estimate(&problem, &mut Trace::to(&mut history))
             .expect("nobody cancels");
         let Some(cost) = outcome.cost else { continue };
@@ -502,9 +506,10 @@ fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
 
 /// Checks that every query feature is in one state and that the counts add up.
 fn check_states(problem: &Problem) {
-    let entry = &estimator::ALL[0];
+    let entry = estimator::entry(Method::FB);
     let mut history = History::default();
-    let outcome = (entry.new)(&Params::default())
+    let outcome = entry
+        .make(&Params::default())
         .estimate(problem, &mut Trace::to(&mut history))
         .expect("nobody cancels");
     let counts = outcome.counts.expect("features were used");
@@ -605,37 +610,34 @@ fn what_does_not_depend_on_a_changed_parameter_is_reused() {
     let reused_after = |method: Method, change: &str| -> Vec<&'static str> {
         let problem = remembering();
         let entry = estimator::entry(method);
-        let first = stages_of((entry.new)(&Params::default()).as_ref(), &problem);
+        let first = stages_of(entry.make(&Params::default()).as_ref(), &problem);
         assert!(first.iter().all(|(_, reused)| !reused), "{first:?}");
         let mut params = Params::default();
         params.assign(change).expect("a good assignment");
-        stages_of((entry.new)(&params).as_ref(), &problem)
+        stages_of(entry.make(&params).as_ref(), &problem)
             .into_iter()
             .filter_map(|(stage, reused)| reused.then_some(stage.name()))
             .collect()
     };
     let positions = ["color", "position_coarse", "position_fine"];
     assert_eq!(
-        reused_after(Method::Feature, "fb.accept=paper"),
+        reused_after(Method::FB, "fb.accept=paper"),
         ["detect", "match", "ransac"]
     );
     assert_eq!(
-        reused_after(Method::Feature, "fb.depth_radius=0.5"),
+        reused_after(Method::FB, "fb.depth_radius=0.5"),
         ["detect", "match"]
     );
-    assert_eq!(reused_after(Method::Feature, "fb.ratio=0.7"), ["detect"]);
-    assert!(reused_after(Method::Feature, "surf.threshold=900").is_empty());
+    assert_eq!(reused_after(Method::FB, "fb.ratio=0.7"), ["detect"]);
+    assert!(reused_after(Method::FB, "surf.threshold=900").is_empty());
     assert_eq!(
         // Around the same coarse yaw the fine angles are the same too.
-        reused_after(Method::MutualInformation, "grid.yaw_step=2"),
+        reused_after(Method::MI, "grid.yaw_step=2"),
         [&positions[..], &["yaw_fine"]].concat()
     );
+    assert_eq!(reused_after(Method::MI, "mi.bins=8"), ["color"]);
     assert_eq!(
-        reused_after(Method::MutualInformation, "mi.bins=8"),
-        ["color"]
-    );
-    assert_eq!(
-        reused_after(Method::Photometric, "mi.bins=8"),
+        reused_after(Method::PM, "mi.bins=8"),
         [&positions[..], &["yaw_coarse", "yaw_fine"]].concat()
     );
 }

@@ -31,7 +31,7 @@ pub fn setup() -> Setup {
         chosen: vec![0].into(),
         pick: ReferencePick::ByHand,
         index: Arc::default(),
-        methods: Method::ALL.to_vec(),
+        methods: Method::PAPER.to_vec(),
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
@@ -133,7 +133,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
             0,
             1,
             &[request],
-            &Method::ALL,
+            &Method::PAPER,
             &mut Unwatched,
             |result, _| {
                 results.push(result);
@@ -185,7 +185,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     press(&mut window, Modifiers::NONE, Key::Num3);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.part.method(), Some(Method::MutualInformation));
+    assert_eq!(span.part.method(), Some(Method::MI));
 }
 
 #[test]
@@ -228,9 +228,7 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
 #[test]
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::MutualInformation));
+    window.state_mut().send(Command::SelectMethod(Method::MI));
     window.step();
     window.step();
     window.state_mut().send(Command::SetParam {
@@ -241,7 +239,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     assert_eq!(settle(&mut window), State::Finished);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.part.method(), Some(Method::MutualInformation));
+    assert_eq!(span.part.method(), Some(Method::MI));
     assert_eq!(desk.cursor + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
         let bars = desk.run().stages().iter();
@@ -307,7 +305,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     let mut setup = Setup {
         references: Arc::clone(&scene),
         queries: Arc::clone(&scene),
-        methods: vec![Method::Photometric],
+        methods: vec![Method::PM],
         ..setup()
     };
     // A million hypotheses.
