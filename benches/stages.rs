@@ -212,6 +212,7 @@ fn stopped(bencher: Bencher, name: &str) {
         let estimator = estimator::entry(method).make(&Params::default());
         estimator.estimate(&PAIR, &mut Trace::watched(&mut UntilStopped, flag))
     };
+    LazyLock::force(&PAIR);
     let begun = Instant::now();
     run(&AtomicBool::new(false)).expect("nobody stops it");
     let whole = begun.elapsed();
