@@ -9,7 +9,7 @@ mod memory;
 use std::sync::Arc;
 
 pub(crate) use disk::{DiskCache, user_folder};
-pub(crate) use memory::Recent;
+pub(crate) use memory::{Limit, Recent};
 
 /// A value that can be kept as bytes.
 pub(crate) trait Stored: Sized {
@@ -22,7 +22,7 @@ pub(crate) trait Stored: Sized {
 
 /// Values by their key. A key names everything that the value depends on.
 pub(crate) struct Cache<T> {
-    recent: Recent<T>,
+    recent: Recent<String, Arc<T>>,
     disk: Option<Arc<DiskCache>>,
 }
 
@@ -51,8 +51,7 @@ impl<T: Stored> Cache<T> {
             }
             made
         }));
-        self.recent.insert(key, Arc::clone(&value));
-        value
+        self.recent.insert(key.to_owned(), value)
     }
 }
 

@@ -16,10 +16,7 @@ pub use hybrid::{Hybrid, hybrid_outcome};
 pub use mutual_information::mutual_information;
 pub use photometric::photometric;
 
-use std::sync::Arc;
-
 use crate::event::Method;
-use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -81,11 +78,6 @@ pub trait Estimator: Send + Sync {
     /// # Errors
     /// Only [`Cancelled`]: a query without a pose is an [`Outcome`] with a [`Failure`].
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled>;
-
-    /// Features of photos may come from this cache, and go there. It saves time and nothing else.
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        let _ = features;
-    }
 
     /// The cost that this estimator minimises, at any pose of the query; `None` if it has none.
     fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {

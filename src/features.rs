@@ -18,19 +18,19 @@
 //! All of it runs on all threads of the current [`rayon`] pool and gives the same result
 //! on any number of them.
 
-mod cache;
 mod descriptor;
 mod detector;
 mod hessian;
 mod integral;
 mod matching;
 mod orientation;
+mod remembered;
 mod surf;
 
 use nalgebra::Point2;
 
-pub use cache::FeatureCache;
 pub use matching::{Match, MatchVerdict, Neighbours, classify, nearest_neighbours};
+pub use remembered::remembered;
 pub use surf::{SurfParams, surf};
 
 /// A blob: the place in an image that a descriptor describes.

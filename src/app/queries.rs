@@ -14,7 +14,7 @@ use super::textures::color_image;
 use crate::evaluate::{QueryResult, Unwatched};
 use crate::event::Side;
 use crate::picture;
-use crate::scene::Scene;
+use crate::scene::{FrameStore, Scene};
 
 /// Width of a thumbnail \[px\].
 const THUMBNAIL_WIDTH: u32 = 124;
@@ -94,15 +94,17 @@ impl Queries {
         let started = thread::Builder::new()
             .name("queries".to_owned())
             .spawn(move || {
+                let frames = Arc::default();
                 for &query in &setup.offered {
                     if flag.load(Ordering::Relaxed) {
                         break;
                     }
-                    let outcome = catch_unwind(AssertUnwindSafe(|| localize(&setup, query)))
-                        .unwrap_or_else(|_| {
-                            let name = &setup.queries.frames()[query];
-                            Err(format!("internal error at query {name}"))
-                        });
+                    let outcome =
+                        catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames)))
+                            .unwrap_or_else(|_| {
+                                let name = &setup.queries.frames()[query];
+                                Err(format!("internal error at query {name}"))
+                            });
                     if outbox.send((query, outcome)).is_err() {
                         break;
                     }
@@ -199,9 +201,13 @@ fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
     Some(color_image(&small))
 }
 
-fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
+fn localize(
+    setup: &Setup,
+    query: usize,
+    frames: &Arc<FrameStore>,
+) -> Result<Vec<QueryResult>, String> {
     let mut setup = setup.clone();
     setup.go_to(query);
-    let results = setup.job(None).work(&mut Unwatched, |_| {});
+    let results = setup.job(frames).work(&mut Unwatched, |_| {});
     results.map_err(|error| error.to_string())
 }

@@ -9,8 +9,8 @@ use crate::evaluate::{QueryResult, References, Selection, frames_within};
 use crate::event::Method;
 use crate::fusion;
 use crate::params::Params;
-use crate::scene::Scene;
-use crate::session::{IndexFile, Job, Loaded, RunMode};
+use crate::scene::{FrameStore, Scene};
+use crate::session::{IndexFile, Job, RunMode};
 
 /// How the references of a query are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub(super) fn job(&self, at_hand: Option<Arc<Loaded>>) -> Job {
+    pub(super) fn job(&self, frames: &Arc<FrameStore>) -> Job {
         Job {
             references: Arc::clone(&self.references),
             queries: Arc::clone(&self.queries),
@@ -92,7 +92,7 @@ impl Setup {
             uncertainty_radius_m: self.uncertainty_radius_m,
             prior_m: self.prior_m,
             seed: self.seed,
-            at_hand,
+            frames: Arc::clone(frames),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::{Cost, Explanation, IntensityPair};
 use crate::describe::{About, Describe, ParamVisitor};
+use crate::memo::bits_of_fields;
 
 /// Parameters of the mutual-information cost.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,8 @@ pub struct MutualInformationParams {
     /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
     pub bins: usize,
 }
+
+bits_of_fields!(MutualInformationParams { sigma_px, bins });
 
 impl Default for MutualInformationParams {
     fn default() -> Self {

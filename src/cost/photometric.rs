@@ -2,6 +2,7 @@
 
 use super::{Cost, Explanation, IntensityPair};
 use crate::describe::{About, Describe, ParamVisitor};
+use crate::memo::bits_of_fields;
 
 /// Parameters of the photometric cost.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +13,8 @@ pub struct PhotometricParams {
     /// literal formula, which squares E once more.
     pub power: usize,
 }
+
+bits_of_fields!(PhotometricParams { sigma_px, power });
 
 impl Default for PhotometricParams {
     fn default() -> Self {

@@ -15,8 +15,8 @@ use crate::event::{
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
 use crate::image::gaussian_smoothed;
-use crate::memo::Recalled;
-use crate::problem::{Problem, ReferenceTuple};
+use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
+use crate::problem::Problem;
 use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud};
 use crate::trace::{Cancelled, Trace};
 
@@ -26,8 +26,8 @@ pub struct Direct {
     pub(super) cost: Box<dyn Cost>,
     pub(super) render: RenderParams,
     pub(super) grid: GridParams,
-    /// All parameters of the cost, as a key of what is remembered.
-    pub(super) cost_key: String,
+    /// All parameters of the cost.
+    pub(super) cost_key: Key,
 }
 
 impl Estimator for Direct {
@@ -151,7 +151,7 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        reference.memo.recall(&self.render, || {
+        reference.memo.recall(Exact::of(&self.render), || {
             color_cloud(
                 &reference.cloud,
                 &reference.photo.gray,
@@ -164,9 +164,9 @@ impl Direct {
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
         let sigma = self.cost.query_smoothing_px();
-        let smoothed = query
-            .memo
-            .recall(&sigma, || gaussian_smoothed(&query.photo.gray, sigma));
+        let smoothed = query.memo.recall(Exact::of(&sigma), || {
+            gaussian_smoothed(&query.photo.gray, sigma)
+        });
         Scorer::new(
             &cloud.points,
             smoothed.value,
@@ -183,10 +183,22 @@ struct Memory<'a> {
     problem: &'a Problem,
 }
 
-/// Remembered scores. They keep their reference alive, so that its address stays its own.
-struct LatticeScores {
-    scores: Vec<Score>,
-    _reference: Arc<ReferenceTuple>,
+/// What scores depend on beside the query.
+#[derive(PartialEq, Eq, Hash)]
+struct ScoresKey {
+    reference: MemoId,
+    cost: Key,
+    render: Exact<RenderParams>,
+    lattice: Exact<Lattice>,
+}
+
+/// Remembered scores.
+struct LatticeScores(Vec<Score>);
+
+impl Remembered for LatticeScores {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
 }
 
 impl Memory<'_> {
@@ -196,17 +208,16 @@ impl Memory<'_> {
         score: impl FnOnce() -> Vec<Score>,
     ) -> Recalled<LatticeScores> {
         let Self { direct, problem } = self;
-        let reference = &problem.reference;
-        let key = (
-            Arc::as_ptr(reference),
-            &direct.cost_key,
-            &direct.render,
-            lattice,
-        );
-        problem.query.memo.recall(&key, || LatticeScores {
-            scores: score(),
-            _reference: Arc::clone(reference),
-        })
+        let Some(id) = problem.reference.memo.id() else {
+            return Recalled::made(Arc::new(LatticeScores(score())));
+        };
+        let key = ScoresKey {
+            reference: id,
+            cost: direct.cost_key.clone(),
+            render: Exact::of(&direct.render),
+            lattice: Exact::of(lattice),
+        };
+        problem.query.memo.recall(key, || LatticeScores(score()))
     }
 }
 
@@ -243,7 +254,7 @@ impl Search<'_> {
             reused,
         } = self.memory.scores(&lattice, || self.scorer.score(&poses));
         trace.note_reuse(reused);
-        for (&(cell, offset), &score) in hypotheses.iter().zip(&found.scores) {
+        for (&(cell, offset), &score) in hypotheses.iter().zip(&found.0) {
             scores[cell] = Some(score);
             let cost = score.eligible_cost(self.least_covered);
             let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));

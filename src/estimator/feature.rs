@@ -11,20 +11,22 @@ use nalgebra::Point2;
 use self::journey::Journey;
 pub use self::params::{DepthRule, FeatureParams};
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, settle};
+use crate::camera::Intrinsics;
 use crate::depth::{DepthReading, ProjectedCloudIndex};
 use crate::event::{
     ConsensusJudged, DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried,
     LiftedMatch, MatchesDecided, Method, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    FeatureCache, Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
+    Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, remembered,
 };
 use crate::geometry::Pose;
-use crate::memo::Recalled;
+use crate::memo::{Exact, MemoId, Recalled, Remembered};
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::robust::{
-    AcceptanceRule, Consensus, MlesacError, Trial, effective_area_px, inliers_beyond_chance, mlesac,
+    AcceptanceRule, Consensus, MlesacError, MlesacParams, Trial, effective_area_px,
+    inliers_beyond_chance, mlesac,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
@@ -32,10 +34,31 @@ use crate::trace::{Cancelled, Trace};
 /// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
 const MINIMUM: usize = 4;
 
-/// Remembered matches. They keep their reference alive, so that its address stays its own.
-struct Decisions {
-    decisions: Arc<[Option<Match>]>,
-    _reference: Arc<ReferenceTuple>,
+/// What the matches of two photos depend on beside the query's photo.
+#[derive(PartialEq, Eq, Hash)]
+struct MatchesKey {
+    reference: MemoId,
+    surf: Exact<SurfParams>,
+    ratio: Exact<f64>,
+    unique: bool,
+}
+
+/// Remembered matches.
+struct Decisions(Arc<[Option<Match>]>);
+
+impl Remembered for Decisions {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+}
+
+/// All that a consensus depends on.
+#[derive(PartialEq, Eq, Hash)]
+struct ConsensusKey {
+    camera: Exact<Intrinsics>,
+    params: Exact<MlesacParams>,
+    seed: u64,
+    correspondences: Exact<[Correspondence]>,
 }
 
 /// What MLESAC found, and all it tried on the way.
@@ -44,11 +67,20 @@ struct Solved {
     outcome: Result<Consensus, MlesacError<Infallible>>,
 }
 
+impl Remembered for Solved {
+    fn heap_bytes(&self) -> usize {
+        let found = self.outcome.as_ref().map_or(0, |consensus| {
+            size_of_val(consensus.inliers.as_slice())
+                + size_of_val(consensus.residuals_px.as_slice())
+        });
+        size_of_val(self.trials.as_slice()) + found
+    }
+}
+
 /// The feature-based estimator.
 pub struct FeatureBased {
     surf: SurfParams,
     params: FeatureParams,
-    remembered: Option<Arc<FeatureCache>>,
 }
 
 impl Estimator for FeatureBased {
@@ -63,10 +95,6 @@ impl Estimator for FeatureBased {
             cost: None,
         })
     }
-
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        self.remembered = Some(Arc::clone(features));
-    }
 }
 
 impl FeatureBased {
@@ -75,7 +103,6 @@ impl FeatureBased {
         Self {
             surf: params.surf,
             params: params.fb.clone(),
-            remembered: None,
         }
     }
 
@@ -126,7 +153,7 @@ impl FeatureBased {
         let matches = trace.stage(Stage::Match, |trace| {
             let decisions = self.best_matches(problem, query, reference);
             trace.note_reuse(decisions.reused);
-            let decisions = &decisions.value.decisions;
+            let Decisions(decisions) = &*decisions.value;
             trace.emit(|| MatchesDecided {
                 decisions: Arc::clone(decisions),
             })?;
@@ -193,10 +220,7 @@ impl FeatureBased {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let features = memo.recall(&self.surf, || match &self.remembered {
-            Some(cache) => Arc::unwrap_or_clone(cache.surf(&photo.gray, &self.surf)),
-            None => surf(&photo.gray, &self.surf),
-        });
+        let features = remembered(&photo.gray, memo, &self.surf);
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features.value),
@@ -210,12 +234,17 @@ impl FeatureBased {
         query: &Features,
         reference: &Features,
     ) -> Recalled<Decisions> {
-        let FeatureParams { ratio, unique, .. } = self.params;
-        let key = (Arc::as_ptr(&problem.reference), self.surf, ratio, unique);
-        problem.query.memo.recall(&key, || Decisions {
-            decisions: best_matches(query, reference, &self.params),
-            _reference: Arc::clone(&problem.reference),
-        })
+        let find = || Decisions(best_matches(query, reference, &self.params));
+        let Some(id) = problem.reference.memo.id() else {
+            return Recalled::made(Arc::new(find()));
+        };
+        let key = MatchesKey {
+            reference: id,
+            surf: Exact::of(&self.surf),
+            ratio: Exact::of(&self.params.ratio),
+            unique: self.params.unique,
+        };
+        problem.query.memo.recall(key, find)
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -226,7 +255,7 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = tuple.memo.recall(&"projected", || {
+        let cloud = tuple.memo.recall((), || {
             ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
         });
         let cloud = cloud.value;
@@ -269,8 +298,13 @@ impl FeatureBased {
         let intrinsics = &problem.query.intrinsics;
         let params = &self.params.mlesac;
         let seed = problem.random_seed("mlesac");
-        let key = (intrinsics, params, seed, correspondences);
-        let solved = problem.query.memo.recall(&key, || {
+        let key = ConsensusKey {
+            camera: Exact::of(intrinsics),
+            params: Exact::of(params),
+            seed,
+            correspondences: Exact::of(correspondences),
+        };
+        let solved = problem.query.memo.recall(key, || {
             let mut trials = Vec::new();
             let outcome = mlesac(correspondences, intrinsics, params, seed, |trial| {
                 trials.push(*trial);

@@ -1,12 +1,9 @@
 //! HY, the hybrid (paper, section 2.5): FB is the more accurate where it finds enough matches, MI
 //! still gives a moderate pose where FB finds none.
 
-use std::sync::Arc;
-
 use super::direct::Direct;
 use super::{Estimator, FeatureBased, Outcome, mutual_information};
 use crate::event::{BranchTaken, Method, Stage};
-use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -63,10 +60,6 @@ impl Estimator for Hybrid {
             let direct = self.mutual_information.estimate(problem, trace)?;
             Ok(hybrid_outcome(&indirect, &direct))
         })
-    }
-
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        self.feature.remember(features);
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -3,6 +3,7 @@
 use super::direct::Direct;
 use crate::cost::MutualInformation;
 use crate::event::Method;
+use crate::memo::{Exact, Key};
 use crate::params::Params;
 
 /// The estimator that maximises the normalised mutual information.
@@ -12,6 +13,6 @@ pub fn mutual_information(params: &Params) -> Direct {
         cost: Box::new(MutualInformation::new(&params.mi)),
         render: params.render.clone(),
         grid: params.grid.clone(),
-        cost_key: format!("{:?}", params.mi),
+        cost_key: Key::new(Exact::of(&params.mi)),
     }
 }

@@ -3,6 +3,7 @@
 use super::direct::Direct;
 use crate::cost::Photometric;
 use crate::event::Method;
+use crate::memo::{Exact, Key};
 use crate::params::Params;
 
 /// The estimator that minimises the robust photometric error.
@@ -12,6 +13,6 @@ pub fn photometric(params: &Params) -> Direct {
         cost: Box::new(Photometric::new(&params.pm)),
         render: params.render.clone(),
         grid: params.grid.clone(),
-        cost_key: format!("{:?}", params.pm),
+        cost_key: Key::new(Exact::of(&params.pm)),
     }
 }

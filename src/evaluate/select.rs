@@ -12,7 +12,7 @@ use rand_pcg::Pcg64;
 use super::Localizer;
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
-use crate::features::FeatureCache;
+use crate::features::remembered;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Query;
@@ -136,10 +136,10 @@ pub fn tell_ranking(
     trace: &mut Trace<'_>,
 ) -> Result<(), Cancelled> {
     let photo = |reference: &RankedReference| {
-        let read = references.photo(reference.ranked.frame);
+        let read = references.query(reference.ranked.frame);
         read.inspect_err(|error| log::warn!("{error}"))
             .ok()
-            .map(Arc::new)
+            .map(|frame| Arc::clone(&frame.photo))
     };
     trace.stage(Stage::Retrieve, |trace| {
         trace.emit(|| ReferencesRanked {
@@ -199,7 +199,7 @@ pub enum ChoiceError {
 
 /// Chooses references for queries.
 pub struct Chooser<'a> {
-    /// Whose features are compared, and where they are kept.
+    /// Whose frames are ranked, and what is known about them.
     pub localizer: &'a Localizer<'a>,
     /// Parameters of features and matching.
     pub params: &'a Params,
@@ -253,7 +253,6 @@ impl Chooser<'_> {
                 let by_matches = ByMatches {
                     scene: references,
                     params: self.params,
-                    features: self.localizer.features(),
                 };
                 self.ranked(query, &within, &by_matches)
             }
@@ -315,12 +314,10 @@ impl Ranking for Retriever {
 
 /// Ranks by exhaustive matching of features.
 pub struct ByMatches<'a> {
-    /// The references' scene.
+    /// The references' scene. Features are kept with its frames where these are remembered.
     pub scene: &'a dyn Scene,
     /// Parameters of features and matching.
     pub params: &'a Params,
-    /// Where features are kept.
-    pub features: &'a FeatureCache,
 }
 
 impl Ranking for ByMatches<'_> {
@@ -334,11 +331,13 @@ impl Ranking for ByMatches<'_> {
         candidates: &[usize],
         count: usize,
     ) -> Result<Vec<Ranked>, SceneError> {
-        let of_query = self.features.surf(&query.photo.gray, &self.params.surf);
+        let surf = &self.params.surf;
+        let of_query = remembered(&query.photo.gray, &query.memo, surf).value;
         let mut ranked = Vec::new();
         for &candidate in candidates {
-            let photo = self.scene.photo(candidate)?;
-            let features = self.features.surf(&photo.gray, &self.params.surf);
+            // Neither its pose nor its cloud is needed.
+            let frame = self.scene.query(candidate)?;
+            let features = remembered(&frame.photo.gray, &frame.memo, surf).value;
             ranked.push((
                 count_matches(&of_query, &features, &self.params.fb),
                 candidate,

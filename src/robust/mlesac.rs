@@ -9,6 +9,7 @@ use super::consensus::{Consensus, Hypothesis, MlesacError, Trial};
 use super::likelihood::Likelihood;
 use super::local::{Settled, inliers, residuals, settle};
 use crate::camera::Intrinsics;
+use crate::memo::bits_of_fields;
 use crate::solver::Loss;
 use crate::solver::{Correspondence, p3p};
 
@@ -37,6 +38,16 @@ pub struct MlesacParams {
     /// Loss of the refinement.
     pub loss: Loss,
 }
+
+bits_of_fields!(MlesacParams {
+    sigma_px,
+    inlier_threshold_px,
+    confidence,
+    max_trials,
+    min_trials,
+    em_iterations,
+    loss,
+});
 
 /// The trials are capped at what 7 % true matches need. The others were tried on synthetic scenes
 /// with 1 px of noise and 10 to 70 % true matches out of 200 and 1,000: fewer than 100 trials at
