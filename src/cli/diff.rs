@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::evaluate::{Change, Comparison, Row, Tolerance, read_rows, read_run};
+use posescope::measure::{Change, Comparison, Row, Tolerance, read_rows};
+use posescope::run::read_run;
 use posescope::sink::rerun::{Targets, record_comparison};
 
 use super::args::DiffArgs;
@@ -106,7 +107,7 @@ pub fn text(comparison: &Comparison) -> String {
 fn error(row: &Row) -> String {
     match (&row.error, row.status) {
         (Some(error), _) => format!("{:.2} m {:.2}°", error.translation_m, error.rotation_deg),
-        (None, posescope::evaluate::Status::Ok) => "a pose".to_owned(),
-        (None, posescope::evaluate::Status::Failed) => "no pose".to_owned(),
+        (None, posescope::localize::Status::Ok) => "a pose".to_owned(),
+        (None, posescope::localize::Status::Failed) => "no pose".to_owned(),
     }
 }

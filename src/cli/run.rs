@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use posescope::evaluate::{
+use posescope::localize::{
     Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
-use posescope::event::Method;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
-use posescope::evaluate::{QueryResult, Status};
+use posescope::localize::{QueryResult, Status};
 
 /// One row per query, reference and method.
 pub fn results(results: &[(QueryResult, Duration)]) -> Table {

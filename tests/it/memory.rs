@@ -6,15 +6,17 @@ use std::sync::{Arc, Barrier, Mutex};
 
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
-use posescope::evaluate::{
-    Chooser, Draw, LocalizeError, Localizer, QueryResult, References, Request, Selection,
-    StageTimes, Unwatched, Watch,
-};
-use posescope::event::{Event, Method, StageEnded};
+use posescope::event::{Event, StageEnded};
 use posescope::geometry::Pose;
 use posescope::image::Photo;
+use posescope::localize::{
+    Chooser, LocalizeError, Localizer, QueryResult, References, Request, Selection, StageTimes,
+    Unwatched, Watch,
+};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Query, ReferenceTuple};
+use posescope::run::Draw;
 use posescope::scene::{AtHand, FrameStore, Scene, SceneError};
 use posescope::trace::{Cancelled, Record, Sink};
 

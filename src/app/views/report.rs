@@ -5,7 +5,7 @@ use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 use super::View;
 use crate::app::desk::Comparing;
 use crate::app::{Scope, theme};
-use crate::evaluate::{QueryResult, Status};
+use crate::localize::{QueryResult, Status};
 use crate::session::Span;
 
 /// The report of the run, so far.

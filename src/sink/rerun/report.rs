@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::scene::Origin;
-use crate::evaluate::{QueryResult, Status};
+use crate::localize::{QueryResult, Status};
 use crate::params::Params;
 use crate::problem::Problem;
 

@@ -1,0 +1,176 @@
+//! Scenes: anything that yields frames (photo, intrinsics, perhaps a pose, perhaps a cloud).
+
+mod error;
+mod frames;
+
+use std::sync::Arc;
+
+use xxhash_rust::xxh3::Xxh3;
+
+pub use error::SceneError;
+pub use frames::{AtHand, FrameStore};
+
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use crate::geometry::Pose;
+use crate::image::Photo;
+use crate::memo::Memo;
+use crate::problem::{Query, ReferenceTuple};
+
+/// A sequence of frames in one world frame. Frames are addressed by position, `0..frames().len()`.
+pub trait Scene: Send + Sync {
+    /// What the scene is called in results and recordings: no path, so that results do not depend on
+    /// where the data lie.
+    fn name(&self) -> &str;
+
+    /// The frames' names, as their files are called, in their order.
+    fn frames(&self) -> &[String];
+
+    /// The camera of the frame, and with it the size of its photo.
+    fn intrinsics(&self, frame: usize) -> Intrinsics;
+
+    /// `world_from_camera`, where it is known.
+    fn pose(&self, frame: usize) -> Option<Pose>;
+
+    /// When the frame was taken \[s\], where it is known.
+    fn time_s(&self, frame: usize) -> Option<f64>;
+
+    /// Whether a cloud was scanned with this frame.
+    fn has_cloud(&self, frame: usize) -> bool;
+
+    /// The photo.
+    ///
+    /// # Errors
+    /// When it cannot be read or is not of the size that its camera has.
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError>;
+
+    /// The cloud, in the camera's frame.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be used.
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError>;
+
+    /// The frame as a query.
+    ///
+    /// # Errors
+    /// As [`Scene::photo`].
+    fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
+        Ok(Arc::new(Query {
+            name: self.frames()[frame].clone(),
+            photo: Arc::new(self.photo(frame)?),
+            intrinsics: self.intrinsics(frame),
+            memo: Memo::off(),
+        }))
+    }
+
+    /// The frame as a reference tuple: the photo of [`Scene::query`], with which it remembers, and
+    /// pose and cloud. A scene that has these need not have its own.
+    ///
+    /// # Errors
+    /// As [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
+    fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
+        let world_from_camera = pose_of(self, frame)?;
+        let query = self.query(frame)?;
+        reference_of(self, frame, world_from_camera, &query)
+    }
+
+    /// A number that changes with the photos, as far as can be told without reading them: what was
+    /// made from them before is stale then.
+    fn fingerprint(&self) -> u64 {
+        fingerprint(self, &[])
+    }
+}
+
+fn pose_of(scene: &(impl Scene + ?Sized), frame: usize) -> Result<Pose, SceneError> {
+    scene.pose(frame).ok_or_else(|| SceneError::NoPose {
+        scene: scene.name().to_owned(),
+        frame: scene.frames()[frame].clone(),
+    })
+}
+
+/// The reference tuple of a frame whose photo is read already.
+fn reference_of(
+    scene: &(impl Scene + ?Sized),
+    frame: usize,
+    world_from_camera: Pose,
+    query: &Query,
+) -> Result<Arc<ReferenceTuple>, SceneError> {
+    Ok(Arc::new(ReferenceTuple {
+        name: query.name.clone(),
+        photo: Arc::clone(&query.photo),
+        intrinsics: query.intrinsics,
+        world_from_camera,
+        cloud: scene.cloud(frame)?,
+        memo: query.memo.shared(),
+    }))
+}
+
+/// A number for what a scene is and holds, and whatever else its format knows.
+///
+/// The first frame's camera stands for all, and those that differ from the one before follow the
+/// names: an index that was built when scenes had one camera each is still valid.
+pub fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
+    let mut sum = Xxh3::new();
+    let mut add = |part: &str| {
+        sum.update(part.as_bytes());
+        sum.update(b"\n");
+    };
+    let frames = scene.frames();
+    let cameras = (0..frames.len()).map(|frame| (frame, scene.intrinsics(frame)));
+    let mut last = None;
+    let changes: Vec<_> = cameras
+        .filter(|(_, camera)| last.replace(*camera) != Some(*camera))
+        .collect();
+    add(scene.name());
+    if let Some((_, first)) = changes.first() {
+        add(&format!("{first:?}"));
+    }
+    for name in frames {
+        add(name);
+    }
+    for (frame, camera) in changes.iter().skip(1) {
+        add(&format!("{frame} {camera:?}"));
+    }
+    sum.update(more);
+    sum.digest()
+}
+
+impl dyn Scene + '_ {
+    /// The frame of a name; numbers match whatever their leading zeros (`3823` finds `003823`).
+    ///
+    /// # Errors
+    /// [`SceneError::UnknownFrame`] says which frames there are.
+    pub fn find(&self, name: &str) -> Result<usize, SceneError> {
+        let frames = self.frames();
+        let number = name.parse::<u64>().ok();
+        frames
+            .iter()
+            .position(|frame| frame == name)
+            .or_else(|| {
+                frames
+                    .iter()
+                    .position(|frame| number.is_some() && frame.parse().ok() == number)
+            })
+            .ok_or_else(|| SceneError::UnknownFrame {
+                scene: self.name().to_owned(),
+                frame: name.to_owned(),
+                known: match frames {
+                    [] => "none".to_owned(),
+                    [only] => only.clone(),
+                    [first, .., last] => format!("{first} … {last}, {} in all", frames.len()),
+                },
+            })
+    }
+}
+
+/// A format's place in the registry.
+pub struct Entry {
+    /// The name that `--format` takes.
+    pub name: &'static str,
+    /// What a scene argument of this format looks like.
+    pub about: &'static str,
+    /// Whether a scene argument is of this format, judged by its content.
+    pub recognizes: fn(&str) -> bool,
+    /// Opens the scene.
+    pub open: fn(&str) -> Result<Box<dyn Scene>, SceneError>,
+}
