@@ -9,6 +9,7 @@
 mod key;
 
 use std::any::{Any, TypeId};
+use std::convert::Infallible;
 use std::fmt;
 use std::hash::Hash;
 use std::sync::Arc;
@@ -102,19 +103,32 @@ impl Memo {
         key: impl Any + Hash + Eq + Send + Sync,
         make: impl FnOnce() -> T,
     ) -> Recalled<T> {
+        let Ok(recalled) = self.try_recall(key, || Ok::<_, Infallible>(make()));
+        recalled
+    }
+
+    /// As [`Self::recall`], for a value whose making can be stopped: then nothing is remembered.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn try_recall<T: Remembered, E>(
+        &self,
+        key: impl Any + Hash + Eq + Send + Sync,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Recalled<T>, E> {
         let Some(values) = &self.0 else {
-            return Recalled::made(Arc::new(make()));
+            return Ok(Recalled::made(Arc::new(make()?)));
         };
         let key = (TypeId::of::<T>(), Key::new(key));
         if let Some(kept) = values.recent.get(&key)
             && let Ok(value) = kept.value.downcast()
         {
-            return Recalled {
+            return Ok(Recalled {
                 value,
                 reused: true,
-            };
+            });
         }
-        let made = Arc::new(make());
+        let made = Arc::new(make()?);
         let kept = values.recent.insert(
             key,
             Kept {
@@ -122,7 +136,7 @@ impl Memo {
                 value: Arc::clone(&made) as Arc<dyn Any + Send + Sync>,
             },
         );
-        Recalled::made(kept.value.downcast().unwrap_or(made))
+        Ok(Recalled::made(kept.value.downcast().unwrap_or(made)))
     }
 }
 
@@ -186,6 +200,16 @@ mod tests {
         assert_eq!(*again.value, 4);
         assert!(!memo.recall(("half", 8), || 4.0_f64).reused);
         assert!(!memo.recall(("half", 9), || 4_u32).reused);
+    }
+
+    #[test]
+    fn what_was_stopped_is_not_remembered() {
+        let memo = Memo::of(4);
+        let stopped = memo.try_recall("a", || Err::<u32, _>("stopped"));
+        assert_eq!(stopped.err(), Some("stopped"));
+        let again = memo.try_recall("a", || Ok::<u32, &str>(7));
+        let again = again.expect("it is made");
+        assert!(!again.reused && *again.value == 7);
     }
 
     #[test]

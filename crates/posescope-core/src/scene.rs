@@ -174,3 +174,73 @@ pub struct Entry {
     /// Opens the scene.
     pub open: fn(&str) -> Result<Box<dyn Scene>, SceneError>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use xxhash_rust::xxh3::xxh3_64;
+
+    /// Frames `a`, `b`, `c` with these focal lengths, and nothing else.
+    struct Bare([String; 3], [f64; 3]);
+
+    impl Scene for Bare {
+        fn name(&self) -> &str {
+            "bare"
+        }
+        fn frames(&self) -> &[String] {
+            &self.0
+        }
+        fn intrinsics(&self, frame: usize) -> Intrinsics {
+            Intrinsics {
+                fx: self.1[frame],
+                fy: 1.5,
+                cx: 2.0,
+                cy: 1.0,
+                width: 5,
+                height: 3,
+            }
+        }
+        fn pose(&self, _frame: usize) -> Option<Pose> {
+            None
+        }
+        fn time_s(&self, _frame: usize) -> Option<f64> {
+            None
+        }
+        fn has_cloud(&self, _frame: usize) -> bool {
+            false
+        }
+        fn photo(&self, _frame: usize) -> Result<Photo, SceneError> {
+            Ok(Photo::from_gray(crate::image::GrayImage::new(5, 3)))
+        }
+        fn cloud(&self, _frame: usize) -> Result<Cloud, SceneError> {
+            Ok(Cloud::default())
+        }
+    }
+
+    fn bare(focal_lengths: [f64; 3]) -> Bare {
+        Bare(["a", "b", "c"].map(str::to_owned), focal_lengths)
+    }
+
+    #[test]
+    fn the_fingerprint_of_a_scene_with_one_camera_stays_what_it_was() {
+        let camera = "Intrinsics { fx: 1.5, fy: 1.5, cx: 2.0, cy: 1.0, width: 5, height: 3 }";
+        let written = format!("bare\n{camera}\na\nb\nc\nmore");
+        let scene = bare([1.5; 3]);
+        assert_eq!(fingerprint(&scene, b"more"), xxh3_64(written.as_bytes()));
+        assert_eq!(scene.fingerprint(), fingerprint(&scene, b""));
+    }
+
+    #[test]
+    fn a_fingerprint_tells_which_frame_has_which_camera() {
+        let all = [
+            [1.5, 1.5, 1.5],
+            [1.5, 1.5, 2.0],
+            [1.5, 2.0, 1.5],
+            [1.5, 2.0, 2.0],
+            [2.0, 1.5, 1.5],
+        ];
+        let mut sums = all.map(|lengths| bare(lengths).fingerprint());
+        sums.sort_unstable();
+        assert!(sums.windows(2).all(|two| two[0] != two[1]));
+    }
+}
