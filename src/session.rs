@@ -4,7 +4,6 @@
 //! The estimators know nothing of this. A gate, which is one more [`Sink`](crate::trace::Sink),
 //! holds the thread back between two events.
 
-mod at_hand;
 mod breakpoint;
 mod gate;
 mod index_file;

@@ -11,7 +11,8 @@ use super::setup::Setup;
 use super::textures::Textures;
 use crate::geometry::Pose;
 use crate::params::Params;
-use crate::session::{Breakpoints, Loaded, Part, Run, RunMode, Session, State};
+use crate::scene::FrameStore;
+use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +49,8 @@ pub struct Desk {
     pub setup: Setup,
     /// The parameters of the setup, shared with the prober.
     pub(super) params: Arc<Params>,
+    /// Frames of the setup's scenes, with what its runs have worked out about them.
+    frames: Arc<FrameStore>,
     pub(super) session: Session,
     pub(super) ctx: egui::Context,
     /// Position among the records of the present run.
@@ -164,11 +167,13 @@ impl Meaning {
 impl Desk {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
         let params = Arc::new(setup.params.clone());
-        let session = start(&setup, setup.mode, None, &ctx);
+        let frames = Arc::default();
+        let session = start(&setup, setup.mode, &frames, &ctx);
         Self {
             params,
             prober: Prober::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
+            frames,
             session,
             ctx,
             cursor: 0,
@@ -321,14 +326,9 @@ impl Desk {
 
     /// Another query, or other references: everything begins anew.
     pub(super) fn begin(&mut self, mode: RunMode) {
-        let at_hand = self.run().loaded.clone();
-        self.begin_with(mode, at_hand);
-    }
-
-    /// The run before is told to stop first, or it would go on beside the new one.
-    fn begin_with(&mut self, mode: RunMode, at_hand: Option<Arc<Loaded>>) {
+        // The run before is told to stop first, or it would go on beside the new one.
         self.session.cancel();
-        self.session = start(&self.setup, mode, at_hand, &self.ctx);
+        self.session = start(&self.setup, mode, &self.frames, &self.ctx);
         self.cursor = 0;
         self.follows = true;
         self.anchor = None;
@@ -355,8 +355,9 @@ impl Desk {
         self.params = Arc::new(self.setup.params.clone());
         self.kept = None;
         self.comparing = Comparing::default();
-        // Frames of another scene may have the same names.
-        self.begin_with(RunMode::Running, None);
+        // The scenes are others, even where they have the same names.
+        self.frames = Arc::default();
+        self.begin(RunMode::Running);
         self.follows = false;
         self.anchor = Some(Anchor::Record(cursor));
     }
@@ -374,19 +375,14 @@ impl Desk {
     }
 }
 
-fn start(
-    setup: &Setup,
-    mode: RunMode,
-    at_hand: Option<Arc<Loaded>>,
-    ctx: &egui::Context,
-) -> Session {
+fn start(setup: &Setup, mode: RunMode, frames: &Arc<FrameStore>, ctx: &egui::Context) -> Session {
     let ctx = ctx.clone();
     let breakpoints = setup
         .breakpoints
         .iter()
         .filter_map(|text| text.parse().ok());
     Session::start(
-        setup.job(at_hand),
+        setup.job(frames),
         mode,
         Breakpoints::new(breakpoints),
         move || ctx.request_repaint(),

@@ -10,8 +10,8 @@ use crate::fusion;
 use crate::localize::{QueryResult, References, Selection, frames_within};
 use crate::method::Method;
 use crate::params::Params;
-use crate::scene::Scene;
-use crate::session::{IndexFile, Job, Loaded, RunMode};
+use crate::scene::{FrameStore, Scene};
+use crate::session::{IndexFile, Job, RunMode};
 
 /// How the references of a query are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub(super) fn job(&self, at_hand: Option<Arc<Loaded>>) -> Job {
+    pub(super) fn job(&self, frames: &Arc<FrameStore>) -> Job {
         Job {
             references: Arc::clone(&self.references),
             queries: Arc::clone(&self.queries),
@@ -93,7 +93,7 @@ impl Setup {
             uncertainty_radius_m: self.uncertainty_radius_m,
             prior_m: self.prior_m,
             seed: self.seed,
-            at_hand,
+            frames: Arc::clone(frames),
         }
     }
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread;
 
-use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
 use super::run::Part;
@@ -18,7 +17,7 @@ use crate::localize::{
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::scene::{NoIndex, Scene};
+use crate::scene::{FrameStore, NoIndex, Scene};
 use crate::trace::Record;
 
 /// One query, its references, and what to do with them.
@@ -49,8 +48,8 @@ pub struct Job {
     pub prior_m: Option<f64>,
     /// Seed of every random choice.
     pub seed: u64,
-    /// Frames that an earlier job has read, with all that was worked out about them.
-    pub at_hand: Option<Arc<Loaded>>,
+    /// Where frames are remembered, with all that is worked out about them, for the next job too.
+    pub frames: Arc<FrameStore>,
 }
 
 /// The photos and clouds of a job.
@@ -172,11 +171,11 @@ impl Job {
         watch: &mut dyn Watch,
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
-        let before = self.at_hand.as_deref();
-        let scene = |scene| AtHand { scene, before };
-        let references = scene(self.references.as_ref());
-        let queries = scene(self.queries.as_ref());
-        let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
+        let scenes = (
+            self.frames.of(&self.references),
+            self.frames.of(&self.queries),
+        );
+        let localizer = Localizer::at_hand(scenes, &self.params, self.seed);
         let chosen = self.choose(&localizer, watch)?;
         on_choice(&chosen);
         let request = Request {

@@ -10,6 +10,7 @@ mod evaluation;
 mod frame_cache;
 mod kitti;
 mod looks;
+mod memory;
 mod painted;
 mod picture_views;
 mod real_pair;

@@ -29,7 +29,7 @@ fn job(query: usize) -> Job {
         uncertainty_radius_m: 3.0,
         prior_m: None,
         seed: 7,
-        at_hand: None,
+        frames: Arc::default(),
     }
 }
 
@@ -280,10 +280,9 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
 
 #[test]
 fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
-    let mut first = start(job(1), RunMode::Running, &[]);
-    settle(&mut first);
     let mut again = job(1);
-    again.at_hand = first.run().loaded.clone();
+    let mut first = start(again.clone(), RunMode::Running, &[]);
+    settle(&mut first);
     again.params.assign("fb.ratio=0.7").expect("a good value");
     let mut second = start(again, RunMode::Running, &[]);
     settle(&mut second);

@@ -22,6 +22,7 @@ pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
 
 use crate::describe::Describe;
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
+use crate::memo::Key;
 
 /// What the query and the synthetic view show at one covered pixel, each 0 … 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,8 +38,8 @@ pub trait Cost: Send + Sync {
     /// What the cost looks at in the query, each pixel 0 … 255.
     fn query_channel(&self, photo: &GrayImage) -> FloatImage;
 
-    /// Names what [`Self::query_channel`] makes, with all that it depends on.
-    fn query_channel_name(&self) -> String;
+    /// All that [`Self::query_channel`] depends on beside the photo: costs of the same key share one.
+    fn query_channel_key(&self) -> Key;
 
     /// What the cloud is coloured with before views of it are rendered: the value 0 … 255 at a place
     /// between the pixels of the reference photo \[px\]. Its grey values by cubic convolution, unless
@@ -50,10 +51,10 @@ pub trait Cost: Send + Sync {
         Box::new(|x, y| cubic_interpolated(photo, x, y))
     }
 
-    /// Names what [`Self::reference_channel`] makes, with all that it depends on: costs of the same
-    /// name share one coloured cloud.
-    fn reference_channel_name(&self) -> String {
-        "grey".to_owned()
+    /// All that [`Self::reference_channel`] depends on beside the photo: costs of the same key share
+    /// one coloured cloud.
+    fn reference_channel_key(&self) -> Key {
+        Key::new("grey")
     }
 
     /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
@@ -85,6 +86,9 @@ pub enum ExplanationKind {
 pub trait CostParams: Describe + fmt::Debug + Send + Sync {
     /// The cost with these parameters.
     fn cost(&self) -> Box<dyn Cost>;
+
+    /// A key that is equal for equal parameters of the same cost, and only for those.
+    fn key(&self) -> Key;
 
     /// The same parameters.
     fn boxed(&self) -> Box<dyn CostParams>;
@@ -156,8 +160,8 @@ impl Clone for CostSettings {
 
 impl PartialEq for CostSettings {
     fn eq(&self, other: &Self) -> bool {
-        let words = |settings: &Self| format!("{:?}", settings.0);
-        words(self) == words(other)
+        let keys = |settings: &Self| -> Vec<Key> { settings.0.iter().map(|p| p.key()).collect() };
+        keys(self) == keys(other)
     }
 }
 

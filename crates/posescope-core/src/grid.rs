@@ -8,6 +8,7 @@ use nalgebra::{Translation3, Vector3};
 
 use crate::describe::{About, Describe, ParamVisitor};
 use crate::geometry::{Pose, yaw};
+use crate::memo::{Bits, bits_of_fields};
 use crate::render::Score;
 
 /// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.
@@ -130,6 +131,12 @@ pub struct Offset {
     pub yaw_rad: f64,
 }
 
+bits_of_fields!(Offset {
+    right_m,
+    forward_m,
+    yaw_rad
+});
+
 impl Offset {
     /// The offset of a camera `reference_from_camera`. What no offset has is left out: height, pitch
     /// and roll.
@@ -163,6 +170,12 @@ pub enum Phase {
     YawCoarse,
     /// Yaw angles around the coarse yaw.
     YawFine,
+}
+
+impl Bits for Phase {
+    fn write(&self, words: &mut Vec<u64>) {
+        words.push(*self as u64);
+    }
 }
 
 impl Phase {
@@ -239,6 +252,15 @@ pub struct Lattice {
     /// Positions farther from the reference than this are left out \[m\].
     reach_m: f64,
 }
+
+bits_of_fields!(Lattice {
+    phase,
+    columns,
+    rows,
+    step,
+    centre,
+    reach_m,
+});
 
 impl Lattice {
     /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].

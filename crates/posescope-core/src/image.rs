@@ -5,8 +5,16 @@ use std::path::Path;
 pub use image::{GrayImage, RgbImage};
 use image::{ImageBuffer, Luma};
 
+use crate::memo::Remembered;
+
 /// A grey image of real values in 0 … 255.
 pub type FloatImage = ImageBuffer<Luma<f32>, Vec<f32>>;
+
+impl Remembered for FloatImage {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.as_raw().as_slice())
+    }
+}
 
 /// A photograph: the grey values that the estimators work on, and its colours where it has any.
 #[derive(Clone, Debug)]
@@ -49,6 +57,12 @@ impl Photo {
     /// Width and height \[px\].
     pub fn dimensions(&self) -> (u32, u32) {
         self.gray.dimensions()
+    }
+
+    /// Memory that the pixels take \[bytes\].
+    pub fn bytes(&self) -> usize {
+        let color = self.color.as_ref().map_or(0, |color| color.as_raw().len());
+        self.gray.as_raw().len() + color
     }
 }
 

@@ -14,10 +14,10 @@ pub struct Query {
     /// The frame's name in its scene.
     pub name: String,
     /// The photo.
-    pub photo: Photo,
+    pub photo: Arc<Photo>,
     /// The query camera.
     pub intrinsics: Intrinsics,
-    /// What estimators worked out about this query.
+    /// What estimators worked out about this frame.
     pub memo: Memo,
 }
 
@@ -27,14 +27,14 @@ pub struct ReferenceTuple {
     /// The frame's name in its scene.
     pub name: String,
     /// The photo I_R.
-    pub photo: Photo,
+    pub photo: Arc<Photo>,
     /// The reference camera.
     pub intrinsics: Intrinsics,
     /// Where the reference camera stood.
     pub world_from_camera: Pose,
     /// The cloud P_R, in the reference camera's frame.
     pub cloud: Cloud,
-    /// What estimators worked out about this reference.
+    /// What estimators worked out about this frame.
     pub memo: Memo,
 }
 

@@ -152,7 +152,7 @@ impl Scene for Street {
         })
     }
 
-    fn intrinsics(&self) -> Intrinsics {
+    fn intrinsics(&self, _frame: usize) -> Intrinsics {
         self.size.intrinsics()
     }
 

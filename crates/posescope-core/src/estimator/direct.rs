@@ -14,10 +14,10 @@ use crate::event::{
 };
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
-use crate::memo::Recalled;
+use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::{Problem, ReferenceTuple};
+use crate::problem::Problem;
 use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by};
 use crate::trace::{Cancelled, Trace};
 
@@ -27,8 +27,8 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     render: RenderParams,
     grid: GridParams,
-    /// The cost with all its parameters, as a key of what is remembered.
-    cost_key: String,
+    /// All parameters of the cost.
+    cost_key: Key,
 }
 
 impl Direct {
@@ -41,7 +41,7 @@ impl Direct {
             cost: cost.cost(),
             render: params.render.clone(),
             grid: params.grid.clone(),
-            cost_key: format!("{} {cost:?}", entry.name),
+            cost_key: cost.key(),
         }
     }
 }
@@ -175,8 +175,8 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        let key = (&self.render, self.cost.reference_channel_name());
-        reference.memo.recall(&key, || {
+        let key = (Exact::of(&self.render), self.cost.reference_channel_key());
+        reference.memo.recall(key, || {
             color_cloud_by(
                 &reference.cloud,
                 &reference.intrinsics,
@@ -188,7 +188,7 @@ impl Direct {
 
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let channel = query.memo.recall(&self.cost.query_channel_name(), || {
+        let channel = query.memo.recall(self.cost.query_channel_key(), || {
             self.cost.query_channel(&query.photo.gray)
         });
         Scorer::new(
@@ -208,10 +208,22 @@ struct Memory<'a> {
     problem: &'a Problem,
 }
 
-/// Remembered scores. They keep their reference alive, so that its address stays its own.
-struct LatticeScores {
-    scores: Vec<Score>,
-    _reference: Arc<ReferenceTuple>,
+/// What scores depend on beside the query.
+#[derive(PartialEq, Eq, Hash)]
+struct ScoresKey {
+    reference: MemoId,
+    cost: Key,
+    render: Exact<RenderParams>,
+    lattice: Exact<Lattice>,
+}
+
+/// Remembered scores.
+struct LatticeScores(Vec<Score>);
+
+impl Remembered for LatticeScores {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
 }
 
 impl Memory<'_> {
@@ -221,19 +233,19 @@ impl Memory<'_> {
         score: impl FnOnce() -> Result<Vec<Score>, Cancelled>,
     ) -> Result<Recalled<LatticeScores>, Cancelled> {
         let Self { direct, problem } = self;
-        let reference = &problem.reference;
-        let key = (
-            Arc::as_ptr(reference),
-            &direct.cost_key,
-            &direct.render,
-            lattice,
-        );
-        problem.query.memo.try_recall(&key, || {
-            Ok(LatticeScores {
-                scores: score()?,
-                _reference: Arc::clone(reference),
-            })
-        })
+        let Some(id) = problem.reference.memo.id() else {
+            return Ok(Recalled::made(Arc::new(LatticeScores(score()?))));
+        };
+        let key = ScoresKey {
+            reference: id,
+            cost: direct.cost_key.clone(),
+            render: Exact::of(&direct.render),
+            lattice: Exact::of(lattice),
+        };
+        problem
+            .query
+            .memo
+            .try_recall(key, || Ok(LatticeScores(score()?)))
     }
 }
 
@@ -283,7 +295,7 @@ impl Search<'_> {
         })?;
         trace.note_reuse(found.reused);
         if found.reused {
-            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.scores) {
+            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.0) {
                 scores[cell] = Some(score);
                 self.tell(lattice.phase, offset, score, &mut least, trace)?;
             }

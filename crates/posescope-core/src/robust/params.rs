@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::memo::bits_of_fields;
 use crate::solver::Loss;
 
 /// Correspondences in a sample: as many as the minimal solver takes.
@@ -29,6 +30,16 @@ pub struct MlesacParams {
     /// Loss of the refinement.
     pub loss: Loss,
 }
+
+bits_of_fields!(MlesacParams {
+    sigma_px,
+    inlier_threshold_px,
+    confidence,
+    max_trials,
+    min_trials,
+    em_iterations,
+    loss,
+});
 
 /// The trials are capped at what 7 % true matches need. The others were tried on synthetic scenes
 /// with 1 px of noise and 10 to 70 % true matches out of 200 and 1,000: fewer than 100 trials at
