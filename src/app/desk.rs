@@ -292,7 +292,8 @@ impl Desk {
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
         {
-            self.prober.ask(&problem, &self.params, pose);
+            let methods = self.setup.direct_methods();
+            self.prober.ask(&problem, &methods, &self.params, pose);
         }
     }
 
@@ -325,6 +326,8 @@ impl Desk {
 
     /// Another query, or other references: everything begins anew.
     pub(super) fn begin(&mut self, mode: RunMode) {
+        // The run before would go on beside the new one.
+        self.session.cancel();
         self.session = start(&self.setup, mode, &self.frames, &self.ctx);
         self.cursor = 0;
         self.follows = true;
@@ -332,6 +335,16 @@ impl Desk {
         self.hovered = None;
         self.selected_feature = None;
         self.prober.forget();
+    }
+
+    /// What all queries were run with holds no longer.
+    pub(super) fn stop_queries(&mut self) {
+        if self.queries.stop_all() {
+            self.note(
+                "The run over all queries has stopped: its settings were changed",
+                false,
+            );
+        }
     }
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
@@ -352,6 +365,7 @@ impl Desk {
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
     pub(super) fn begin_again(&mut self) {
+        self.stop_queries();
         let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
         let follows = self.follows && self.session.is_alive();
         self.params = Arc::new(self.setup.params.clone());

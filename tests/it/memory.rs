@@ -140,11 +140,7 @@ fn three_methods_color_a_cloud_once_and_read_each_frame_once() {
     let params = without_features();
     let localizer = Localizer::new(&scene, &scene, &params, 7);
     let mut notebook = Notebook::default();
-    let direct = [
-        Method::Photometric,
-        Method::MutualInformation,
-        Method::Hybrid,
-    ];
+    let direct = [Method::PM, Method::MI, Method::HY];
     let results = localize(&localizer, vec![0].into(), &direct, &mut notebook);
     assert!(results.iter().all(|(result, _)| result.pose.is_some()));
     assert_eq!(notebook.of("color"), [1, 2]);
@@ -167,11 +163,13 @@ fn features_are_found_once_for_ranking_and_for_every_reference() {
         seed: 7,
         index: None,
     };
-    let chosen = chooser.choose(1, &|_| false).expect("readable");
+    let chosen = chooser
+        .choose(1, &|_| false, &mut Unwatched)
+        .expect("readable");
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(scene.clouds(), [0; 5]);
     let mut notebook = Notebook::default();
-    localize(&localizer, chosen, &[Method::Feature], &mut notebook);
+    localize(&localizer, chosen, &[Method::FB], &mut notebook);
     assert_eq!(notebook.of("detect"), [0, 2]);
     assert_eq!(scene.photos(), [1, 1, 1, 0, 0]);
     assert_eq!(scene.clouds(), [1, 0, 1, 0, 0]);
@@ -186,7 +184,7 @@ fn a_hybrid_takes_as_long_whoever_watches() {
         let scene = Walls::new();
         let all = |watch: &mut dyn Watch| {
             let localizer = Localizer::new(&scene, &scene, &params, 7);
-            localize(&localizer, vec![0].into(), &Method::ALL, watch)
+            localize(&localizer, vec![0].into(), &Method::PAPER, watch)
         };
         let unseen = all(&mut Unwatched);
         let watched = all(&mut Notebook::default());
@@ -232,7 +230,7 @@ fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
     let (references, queries) = AtHand::pair(&scene, &scene);
     let store = Arc::clone(references.store());
     let localizer = Localizer::at_hand((references, queries), &params, 7);
-    localize(&localizer, vec![0].into(), &Method::ALL, &mut Unwatched);
+    localize(&localizer, vec![0].into(), &Method::PAPER, &mut Unwatched);
     let of_two = store.bytes();
     // Both photos, the cloud, and what follows from them.
     assert!(of_two > 2 * 24_000 + 12 * 12_000, "{of_two}");
@@ -246,7 +244,7 @@ fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
             let keep = |_, _| Ok::<(), LocalizeError>(());
             let requests = [request(vec![0, 2].into())];
             localizer
-                .localize(0, query, &requests, &Method::ALL, &mut Unwatched, keep)
+                .localize(0, query, &requests, &Method::PAPER, &mut Unwatched, keep)
                 .expect("good data");
             // Nobody holds anything now: the next look makes room.
             store_is_within(&small, &counting, of_two / 2);
@@ -491,7 +489,7 @@ fn a_query_may_have_another_camera_than_its_reference() {
     let scene = TwoCameras(Walls::new());
     let params = Params::default();
     let localizer = Localizer::new(&scene, &scene, &params, 7);
-    let direct = [Method::Photometric, Method::MutualInformation];
+    let direct = [Method::PM, Method::MI];
     for (result, _) in localize(&localizer, vec![0].into(), &direct, &mut Unwatched) {
         let error = result.error.expect("a pose");
         assert!(error.translation_m < 0.6, "{}: {error:?}", result.method);

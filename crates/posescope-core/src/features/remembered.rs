@@ -2,7 +2,7 @@
 
 use image::GrayImage;
 
-use super::{Features, SurfParams, surf};
+use super::{Features, SurfParams, surf, surf_interruptible};
 use crate::memo::{Exact, Memo, Recalled, Remembered, bits_of_fields};
 
 bits_of_fields!(SurfParams {
@@ -27,6 +27,21 @@ impl Remembered for Features {
 /// describing takes half of the time of the feature-based method. 2,000 features take 0.6 MB.
 pub fn remembered(image: &GrayImage, memo: &Memo, params: &SurfParams) -> Recalled<Features> {
     memo.recall(Exact::of(params), || surf(image, params))
+}
+
+/// As [`remembered`], of which `checkpoint` can stop the search as in [`surf_interruptible`].
+///
+/// # Errors
+/// Those of `checkpoint`.
+pub fn remembered_interruptible<E>(
+    image: &GrayImage,
+    memo: &Memo,
+    params: &SurfParams,
+    checkpoint: impl FnMut() -> Result<(), E>,
+) -> Result<Recalled<Features>, E> {
+    memo.try_recall(Exact::of(params), || {
+        surf_interruptible(image, params, checkpoint)
+    })
 }
 
 #[cfg(test)]
