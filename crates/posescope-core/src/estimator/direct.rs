@@ -27,7 +27,7 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     render: RenderParams,
     grid: GridParams,
-    /// All parameters of the cost.
+    /// Which cost, with all its parameters.
     cost_key: Key,
 }
 
@@ -41,7 +41,7 @@ impl Direct {
             cost: cost.cost(),
             render: params.render.clone(),
             grid: params.grid.clone(),
-            cost_key: cost.key(),
+            cost_key: Key::new((entry.name, cost.key())),
         }
     }
 }
