@@ -326,7 +326,7 @@ impl Desk {
 
     /// Another query, or other references: everything begins anew.
     pub(super) fn begin(&mut self, mode: RunMode) {
-        // The run before is told to stop first, or it would go on beside the new one.
+        // The run before would go on beside the new one.
         self.session.cancel();
         self.session = start(&self.setup, mode, &self.frames, &self.ctx);
         self.cursor = 0;

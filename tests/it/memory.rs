@@ -163,7 +163,9 @@ fn features_are_found_once_for_ranking_and_for_every_reference() {
         seed: 7,
         index: None,
     };
-    let chosen = chooser.choose(1, &|_| false, &mut Unwatched).expect("readable");
+    let chosen = chooser
+        .choose(1, &|_| false, &mut Unwatched)
+        .expect("readable");
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(scene.clouds(), [0; 5]);
     let mut notebook = Notebook::default();

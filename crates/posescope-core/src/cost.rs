@@ -38,7 +38,7 @@ pub trait Cost: Send + Sync {
     /// What the cost looks at in the query, each pixel 0 … 255.
     fn query_channel(&self, photo: &GrayImage) -> FloatImage;
 
-    /// All that [`Self::query_channel`] depends on beside the photo: costs of the same key share one.
+    /// What [`Self::query_channel`] makes: all that it depends on beside the photo.
     fn query_channel_key(&self) -> Key;
 
     /// What the cloud is coloured with before views of it are rendered: the value 0 … 255 at a place
@@ -51,8 +51,8 @@ pub trait Cost: Send + Sync {
         Box::new(|x, y| cubic_interpolated(photo, x, y))
     }
 
-    /// All that [`Self::reference_channel`] depends on beside the photo: costs of the same key share
-    /// one coloured cloud.
+    /// What [`Self::reference_channel`] makes: all that it depends on beside the photo. Costs of equal
+    /// keys share one coloured cloud.
     fn reference_channel_key(&self) -> Key {
         Key::new("grey")
     }
@@ -87,11 +87,11 @@ pub trait CostParams: Describe + fmt::Debug + Send + Sync {
     /// The cost with these parameters.
     fn cost(&self) -> Box<dyn Cost>;
 
-    /// A key that is equal for equal parameters of the same cost, and only for those.
-    fn key(&self) -> Key;
-
     /// The same parameters.
     fn boxed(&self) -> Box<dyn CostParams>;
+
+    /// The parameters to the last bit, as a key of what depends on them.
+    fn key(&self) -> Key;
 }
 
 /// What two images share, as a number 0 … 1.
@@ -160,7 +160,10 @@ impl Clone for CostSettings {
 
 impl PartialEq for CostSettings {
     fn eq(&self, other: &Self) -> bool {
-        let keys = |settings: &Self| -> Vec<Key> { settings.0.iter().map(|p| p.key()).collect() };
+        let keys = |settings: &Self| -> Vec<Key> {
+            let params = settings.0.iter();
+            params.map(|params| params.key()).collect()
+        };
         keys(self) == keys(other)
     }
 }

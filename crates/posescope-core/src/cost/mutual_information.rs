@@ -71,12 +71,12 @@ impl CostParams for MutualInformationParams {
         Box::new(MutualInformation::new(self))
     }
 
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
-    }
-
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
     }
 }
 
@@ -101,7 +101,7 @@ impl Cost for MutualInformation {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("smoothed", Exact::of(&self.params.sigma_px)))
+        Key::new(("grey", Exact::of(&self.params.sigma_px)))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

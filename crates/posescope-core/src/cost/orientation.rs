@@ -95,12 +95,12 @@ impl CostParams for OrientationParams {
         Box::new(Orientation::new(self))
     }
 
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
-    }
-
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
     }
 }
 
@@ -146,7 +146,7 @@ impl Cost for Orientation {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("orientation", Exact::of(&self.params)))
+        self.reference_channel_key()
     }
 
     /// Between two orientations lies no third that the photo shows: that of the nearest pixel counts.
@@ -163,7 +163,7 @@ impl Cost for Orientation {
     }
 
     fn reference_channel_key(&self) -> Key {
-        self.query_channel_key()
+        self.params.key()
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

@@ -64,12 +64,12 @@ impl CostParams for PhotometricParams {
         Box::new(Photometric::new(self))
     }
 
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
-    }
-
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
     }
 }
 
@@ -118,7 +118,7 @@ impl Cost for Photometric {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("smoothed", Exact::of(&self.params.sigma_px)))
+        Key::new(("grey", Exact::of(&self.params.sigma_px)))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

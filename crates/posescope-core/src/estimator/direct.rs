@@ -27,7 +27,7 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     render: RenderParams,
     grid: GridParams,
-    /// All parameters of the cost.
+    /// Which cost, with all its parameters.
     cost_key: Key,
 }
 
@@ -41,7 +41,7 @@ impl Direct {
             cost: cost.cost(),
             render: params.render.clone(),
             grid: params.grid.clone(),
-            cost_key: cost.key(),
+            cost_key: Key::new((entry.name, cost.key())),
         }
     }
 }
@@ -175,7 +175,10 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        let key = (Exact::of(&self.render), self.cost.reference_channel_key());
+        let key = ColoringKey {
+            render: Exact::of(&self.render),
+            channel: self.cost.reference_channel_key(),
+        };
         reference.memo.recall(key, || {
             color_cloud_by(
                 &reference.cloud,
@@ -199,6 +202,13 @@ impl Direct {
             self.cost.as_ref(),
         )
     }
+}
+
+/// What a coloured cloud depends on beside the reference.
+#[derive(PartialEq, Eq, Hash)]
+struct ColoringKey {
+    render: Exact<RenderParams>,
+    channel: Key,
 }
 
 /// Where the scores of a lattice are remembered: with the query, under all that they depend on.
@@ -242,10 +252,8 @@ impl Memory<'_> {
             render: Exact::of(&direct.render),
             lattice: Exact::of(lattice),
         };
-        problem
-            .query
-            .memo
-            .try_recall(key, || Ok(LatticeScores(score()?)))
+        let memo = &problem.query.memo;
+        memo.try_recall(key, || Ok(LatticeScores(score()?)))
     }
 }
 

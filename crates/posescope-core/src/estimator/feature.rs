@@ -62,14 +62,15 @@ impl Remembered for Decisions {
     }
 }
 
-/// All that a consensus depends on, and whether its trials are kept with it.
+/// All that a consensus depends on.
 #[derive(PartialEq, Eq, Hash)]
 struct ConsensusKey {
     camera: Exact<Intrinsics>,
     params: Exact<MlesacParams>,
     seed: u64,
     correspondences: Exact<[Correspondence]>,
-    with_trials: bool,
+    /// Whether the trials are kept.
+    is_heard: bool,
 }
 
 /// What MLESAC found.
@@ -85,7 +86,7 @@ impl Remembered for Solved {
             size_of_val(consensus.inliers.as_slice())
                 + size_of_val(consensus.residuals_px.as_slice())
         });
-        size_of_val(self.trials.as_slice()) + found
+        self.trials.as_deref().map_or(0, size_of_val) + found
     }
 }
 
@@ -232,8 +233,8 @@ impl FeatureBased {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let features =
-            remembered_interruptible(&photo.gray, memo, &self.surf, || trace.checkpoint())?;
+        let checkpoint = || trace.checkpoint();
+        let features = remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?;
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features.value),
@@ -250,12 +251,7 @@ impl FeatureBased {
     ) -> Result<Recalled<Decisions>, Cancelled> {
         let mut find = || {
             let checkpoint = || trace.checkpoint();
-            Ok(Decisions(best_matches(
-                query,
-                reference,
-                &self.params,
-                checkpoint,
-            )?))
+            best_matches(query, reference, &self.params, checkpoint).map(Decisions)
         };
         let Some(id) = problem.reference.memo.id() else {
             return Ok(Recalled::made(Arc::new(find()?)));
@@ -329,7 +325,7 @@ impl FeatureBased {
             params: Exact::of(params),
             seed,
             correspondences: Exact::of(correspondences),
-            with_trials: is_heard,
+            is_heard,
         };
         let solved = problem.query.memo.try_recall(key, || {
             let trials = is_heard.then(Vec::new);

@@ -29,7 +29,7 @@ pub fn remembered(image: &GrayImage, memo: &Memo, params: &SurfParams) -> Recall
     memo.recall(Exact::of(params), || surf(image, params))
 }
 
-/// As [`remembered`]; `checkpoint` is called between the passes over the image.
+/// As [`remembered`], of which `checkpoint` can stop the search as in [`surf_interruptible`].
 ///
 /// # Errors
 /// Those of `checkpoint`.
