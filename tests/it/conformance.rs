@@ -287,7 +287,7 @@ fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
                 .iter()
                 .filter(|moment| **moment == Moment::LooksUp)
                 .count();
-            let stops = (1..=looks).filter(|i| *i < 60 || looks - i < 12 || i % 997 == 0);
+            let stops = (1..=looks).filter(|i| *i < 40 || looks - i < 4 || i % 1999 == 0);
             for stop in stops {
                 let flag = AtomicBool::new(false);
                 let mut sink = Attended::new(&flag, wanted, Some(stop));
@@ -392,11 +392,15 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
         memo: Memo::of(64),
         ..(*other.query).clone()
     });
-    for change in [
+    let changes = [
         "fb.max_trials=30000",
         "fb.confidence=0.999999",
         "fb.ratio=1",
-    ] {
+        "fb.unique=false",
+        "fb.depth_radius=50",
+        "fb.inlier=0.2",
+    ];
+    for change in changes {
         params.assign(change).expect("a good value");
     }
     let fb = estimator::entry(Method::FB).make(&params);
