@@ -2,11 +2,11 @@
 
 use nalgebra::Vector2;
 
+use super::appearance::{Appearance, Rgb, blend, grey};
+use super::contact::Part;
 use super::facade::Facade;
-use super::material::{Appearance, Rgb, blend, grey};
 use super::noise::{Footprint, derive, floor, hash2, unit, value2};
 use super::pattern::{bar, glyphs, rectangle, step, stripes};
-use super::shape::Part;
 
 /// How far windows are set back from the wall \[m\].
 const RECESS: f64 = 0.12;

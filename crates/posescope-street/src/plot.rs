@@ -4,8 +4,9 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg32;
 
+use super::appearance::Rgb;
 use super::frame::Frame;
-use super::material::{Material, Rgb, Solid};
+use super::material::{Material, Solid};
 use super::network::Network;
 use super::path::right_of;
 use super::shade::Blot;

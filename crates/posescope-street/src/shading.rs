@@ -4,10 +4,10 @@ use std::cell::Cell;
 
 use nalgebra::{Point3, Vector3};
 
+use super::appearance::{Appearance, Rgb};
 use super::frame::Ray;
 use super::headlamp::Headlamp;
 use super::look::{Look, schlick};
-use super::material::{Appearance, Rgb};
 use super::noise::{value2, value3};
 use super::town::{Sight, Town};
 
