@@ -4,6 +4,9 @@ use std::cell::RefCell;
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
+use super::camera::{Nudge, Place};
+use super::desk::Comparing;
+use super::setup::ReferencePick;
 use crate::fusion;
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -52,7 +55,7 @@ pub enum Command {
     /// Localise all queries, without stepping, to know which fail.
     RunAllQueries,
     /// Choose the references in another way.
-    PickReferences(super::ReferencePick),
+    PickReferences(ReferencePick),
     /// Use other reference frames.
     SetReferences(Vec<usize>),
     /// Fuse what several references give, in these ways, and run again.
@@ -77,7 +80,7 @@ pub enum Command {
     /// Forget A.
     Unpin,
     /// Show another of the two runs.
-    Compare(super::Comparing),
+    Compare(Comparing),
     /// Show A instead of B, or the other way round.
     Flip,
     /// Blink between query and synthetic view.
@@ -95,9 +98,9 @@ pub enum Command {
     /// Take the camera in hand at a pose (`world_from_camera`), or let it go.
     TakeCamera(Option<Pose>),
     /// Take the camera to a place of the search.
-    JumpCamera(super::camera::Place),
+    JumpCamera(Place),
     /// Move the camera in hand, in its own frame \[m, rad\].
-    MoveCamera(super::camera::Nudge),
+    MoveCamera(Nudge),
     /// Save the run as a recording.
     SaveRecording(std::path::PathBuf),
     /// Send the run to a running Rerun viewer.
@@ -153,7 +156,6 @@ pub struct Shortcut {
 
 /// Every key. Where two keys do the same, the second follows with the same words.
 pub fn shortcuts() -> Vec<Shortcut> {
-    use super::camera::{Nudge, Place};
     const NONE: Modifiers = Modifiers::NONE;
     const SHIFT: Modifiers = Modifiers::SHIFT;
     const ALT: Modifiers = Modifiers::ALT;

@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::command;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
-use super::scope::{Scope, ShownAt};
 use super::setup::Setup;
+use super::shown::ShownAt;
 use super::textures::Textures;
 use crate::geometry::Pose;
 use crate::params::Params;
@@ -201,26 +200,11 @@ impl Desk {
         self.session.state()
     }
 
-    /// The present run at the cursor.
-    pub(super) fn scope<'a>(&'a self, commands: &'a command::Queue) -> Scope<'a> {
-        Scope {
-            run: self.run(),
-            cursor: self.cursor,
-            desk: self,
-            commands,
-        }
-    }
-
-    /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept_scope<'a>(&'a self, commands: &'a command::Queue) -> Option<Scope<'a>> {
+    /// The place in the kept run that corresponds to the cursor.
+    pub(super) fn kept_cursor(&self) -> Option<usize> {
         let kept = self.kept.as_ref()?;
         let same = Meaning::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
-        Some(Scope {
-            run: &kept.run,
-            cursor: same.unwrap_or(kept.cursor),
-            desk: self,
-            commands,
-        })
+        Some(same.unwrap_or(kept.cursor))
     }
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::job::Loaded;
+use super::loaded::Loaded;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;

@@ -8,18 +8,16 @@ use std::thread;
 use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
-use super::run::Part;
+use super::loaded::Loaded;
+use super::message::Message;
 use crate::fusion;
-use crate::geometry::Pose;
 use crate::localize::{
     ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
-    Selection, StageTimes, Watch, words_of,
+    Selection, Watch, words_of,
 };
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::Problem;
 use crate::scene::{NoIndex, Scene};
-use crate::trace::Record;
 
 /// One query, its references, and what to do with them.
 #[derive(Clone)]
@@ -53,15 +51,6 @@ pub struct Job {
     pub at_hand: Option<Arc<Loaded>>,
 }
 
-/// The photos and clouds of a job.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The query and each of its references.
-    pub problems: Vec<Problem>,
-    /// Where the query camera was, if that is known. The estimators do not see it.
-    pub truth: Option<Pose>,
-}
-
 /// Why a job has no results.
 #[derive(Debug, thiserror::Error)]
 pub enum JobError {
@@ -91,25 +80,6 @@ pub enum JobError {
         /// The radius.
         radius_m: f64,
     },
-}
-
-/// What the worker says to the session.
-pub(super) enum Message {
-    Chosen(References),
-    Loaded(Arc<Loaded>),
-    Began(Part),
-    Told(Box<Record>),
-    Waits {
-        breakpoint: Option<String>,
-    },
-    Goes,
-    Ended {
-        result: Box<QueryResult>,
-        times: Option<StageTimes>,
-    },
-    Finished,
-    Cancelled,
-    Broke(String),
 }
 
 /// Starts the worker. Nobody joins it: it ends by itself, or at the next event after a cancel.

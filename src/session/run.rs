@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::job::Loaded;
+use super::loaded::Loaded;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
 use crate::history::History;
 use crate::localize::{QueryResult, StageTimes};
