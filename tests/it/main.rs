@@ -8,6 +8,7 @@ mod data;
 mod decisions;
 mod evaluation;
 mod frame_cache;
+mod imports;
 mod kitti;
 mod looks;
 mod painted;
