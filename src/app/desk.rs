@@ -9,6 +9,7 @@ use super::setup::Setup;
 use super::shown::ShownAt;
 use super::textures::Textures;
 use crate::geometry::Pose;
+use crate::localize::{QueryResult, Status};
 use crate::params::Params;
 use crate::session::{Breakpoints, Loaded, Part, Run, RunMode, Session, State};
 
@@ -83,7 +84,7 @@ pub struct Desk {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: BTreeMap<usize, Vec<crate::localize::QueryResult>>,
+    pub results: BTreeMap<usize, Vec<QueryResult>>,
 }
 
 /// A place in a run that can be found again in another one.
@@ -361,4 +362,14 @@ fn start(
         Breakpoints::new(breakpoints),
         move || ctx.request_repaint(),
     )
+}
+
+/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
+pub(super) fn has_failed(result: &QueryResult) -> bool {
+    /// The failure radius of the paper for KITTI \[m\].
+    const FAILURE_RADIUS_M: f64 = 10.0;
+    result.status == Status::Failed
+        || result
+            .error
+            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
 }

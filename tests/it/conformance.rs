@@ -285,7 +285,7 @@ fn stages_of(estimator: &dyn estimator::Estimator, problem: &Problem) -> Vec<(St
         .collect()
 }
 
-fn remembering() -> Problem {
+pub fn remembering() -> Problem {
     let mut problem = solvable();
     let mut query = (*problem.query).clone();
     query.memo = Memo::of(64);

@@ -178,6 +178,24 @@ fn a_circle_is_found_whatever_way_it_goes_round() {
         ]),
         [["a::other", "a::part"]]
     );
+    assert_eq!(
+        found(&[
+            ("a", "mod part; fn f() { part::g() }"),
+            ("a::part", "use crate::b::B;"),
+            ("b", "use crate::a::A;"),
+        ]),
+        [["a", "a::part", "b"]]
+    );
+    // Nor past one outside that the module is not at home with.
+    assert_eq!(
+        found(&[
+            ("a", "mod b; mod c; use b::B;"),
+            ("a::b", "use super::{A, c::C};"),
+            ("a::c", "mod d; fn f() { d::g() }"),
+            ("a::c::d", "use crate::a::b::B;"),
+        ]),
+        [["a::b", "a::c", "a::c::d"]]
+    );
     // Nobody imports from the crate's root what is made there out of the rest.
     assert_eq!(
         found(&[("", "use a::A; pub struct B;"), ("a", "use crate::B;")]),
@@ -286,28 +304,31 @@ fn file_of(
     Some(path[..end].to_vec())
 }
 
-/// The circles of a graph, each sorted, but for those of a module with what is inside it.
+/// The circles of a graph, each sorted, but for those that only lead from a module to what is inside it
+/// and back.
 fn circles(graph: &Graph) -> Vec<Vec<Module>> {
-    let is_family = |a: &Module, b: &Module| a.starts_with(b) || b.starts_with(a);
-    components(graph)
-        .into_iter()
-        .filter(|circle| {
-            // The root of the crate is no home to everybody: it may not be part of a circle.
-            let is_home = |home: &Module| {
-                !home.is_empty() && circle.iter().all(|module| module.starts_with(home))
-            };
-            let inside: Graph = circle
-                .iter()
-                .map(|module| {
-                    let outside_family =
-                        |other: &&Module| circle.contains(*other) && !is_family(module, other);
-                    let others = graph[module].iter().filter(outside_family).cloned();
-                    (module.clone(), others.collect())
-                })
-                .collect();
-            !circle.iter().any(is_home) || !components(&inside).is_empty()
-        })
-        .collect()
+    let mut circles = Vec::new();
+    for component in components(graph) {
+        let is_home = |home: &&Module| component.iter().all(|module| module.starts_with(home));
+        // The root of the crate is no home: everybody is inside it.
+        match component
+            .iter()
+            .find(is_home)
+            .filter(|home| !home.is_empty())
+        {
+            Some(home) => {
+                let inside = |module: &&Module| *module != home && component.contains(*module);
+                let imported = |by: &Module| graph[by].iter().filter(inside).cloned().collect();
+                let inner = component.iter().filter(inside);
+                let inner: Graph = inner
+                    .map(|module| (module.clone(), imported(module)))
+                    .collect();
+                circles.extend(self::circles(&inner));
+            }
+            None => circles.push(component),
+        }
+    }
+    circles
 }
 
 /// The sets of two and more modules in which each can be reached from each.
@@ -342,8 +363,11 @@ fn components(graph: &Graph) -> Vec<Vec<Module>> {
     components
 }
 
-/// Every `use`, and every path in the code that begins with `crate`, `super` or `self`.
+/// Every `use`, and every path in the code that begins with `crate`, `super`, `self` or a module that
+/// is declared there.
 fn imports(tokens: &[String]) -> Vec<Import> {
+    let declared = tokens.windows(3).filter(|w| w[0] == "mod" && w[2] == ";");
+    let modules: BTreeSet<&str> = declared.map(|w| w[1].as_str()).collect();
     let mut imports = Vec::new();
     let mut at = 0;
     while let Some(token) = tokens.get(at) {
@@ -359,7 +383,10 @@ fn imports(tokens: &[String]) -> Vec<Import> {
             }
             // Until here, `mod tests { … }` is the last thing in a file.
             "mod" if is_next(1, "tests") && is_next(2, "{") => break,
-            "crate" | "super" | "self" if is_next(1, "::") && before(1) != Some("in") => {
+            word if is_next(1, "::")
+                && (["crate", "super", "self"].contains(&word) || modules.contains(word))
+                && !matches!(before(1), Some("in" | "::")) =>
+            {
                 let mut path = vec![token.clone()];
                 at += 1;
                 while tokens.get(at).is_some_and(|token| token == "::") {

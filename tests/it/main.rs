@@ -11,6 +11,7 @@ mod frame_cache;
 mod imports;
 mod kitti;
 mod looks;
+mod own_cost;
 mod painted;
 mod picture_views;
 mod real_pair;

@@ -10,6 +10,7 @@ mod hybrid;
 mod mutual_information;
 mod photometric;
 
+pub use direct::Direct;
 pub use failure::Failure;
 pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches};
 pub use hybrid::{Hybrid, hybrid_outcome};
@@ -72,6 +73,17 @@ pub struct Outcome {
     pub counts: Option<FeatureCounts>,
     /// What the cost was like, if a cost was minimised.
     pub cost: Option<CostSummary>,
+}
+
+impl Outcome {
+    /// No pose, and nothing to say but why.
+    pub fn failed(failure: Failure) -> Self {
+        Self {
+            pose: Err(failure),
+            counts: None,
+            cost: None,
+        }
+    }
 }
 
 /// A way to find the query's pose.

@@ -29,6 +29,8 @@ pub enum Side {
 pub enum Stage {
     /// A whole estimator; within the hybrid also the one it runs inside.
     Estimator(Method),
+    /// A direct estimator with a cost of somebody's own, by its name.
+    OwnCost(&'static str),
     /// References are chosen by what they look like.
     Retrieve,
     /// FB: features of both photos.
@@ -56,6 +58,7 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Estimator(method) => method.name(),
+            Self::OwnCost(name) => name,
             Self::Retrieve => "retrieve",
             Self::Detect => "detect",
             Self::Match => "match",

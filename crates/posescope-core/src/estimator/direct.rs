@@ -2,6 +2,7 @@
 //! (paper, appendix B).
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -16,14 +17,15 @@ use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
 use crate::image::gaussian_smoothed;
 use crate::memo::Recalled;
-use crate::method::Method;
+use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
 pub struct Direct {
-    pub(super) method: Method,
+    /// The whole of it, as it is told.
+    pub(super) stage: Stage,
     pub(super) cost: Box<dyn Cost>,
     pub(super) render: RenderParams,
     pub(super) grid: GridParams,
@@ -33,20 +35,14 @@ pub struct Direct {
 
 impl Estimator for Direct {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        let found = trace.stage(Stage::Estimator(self.method), |trace| {
-            self.search(problem, trace)
-        });
+        let found = trace.stage(self.stage, |trace| self.search(problem, trace));
         Ok(match settle(found)? {
             Ok((pose, cost)) => Outcome {
                 pose: Ok(pose),
                 counts: None,
                 cost: Some(cost),
             },
-            Err(failure) => Outcome {
-                pose: Err(failure),
-                counts: None,
-                cost: None,
-            },
+            Err(failure) => Outcome::failed(failure),
         })
     }
 
@@ -58,6 +54,22 @@ impl Estimator for Direct {
 }
 
 impl Direct {
+    /// The direct estimator of a cost of one's own: it renders and searches as PM and MI do, by
+    /// `params.render` and `params.grid`. What it tells stands in a stage of this name.
+    ///
+    /// What is remembered of its scores is never taken for that of another cost, not even of one with
+    /// the same name: every estimator that is made here has a key of its own.
+    pub fn new(name: &'static str, cost: Box<dyn Cost>, params: &Params) -> Self {
+        static MADE: AtomicU64 = AtomicU64::new(0);
+        Self {
+            stage: Stage::OwnCost(name),
+            cost,
+            render: params.render.clone(),
+            grid: params.grid.clone(),
+            cost_key: format!("own cost {}", MADE.fetch_add(1, Ordering::Relaxed)),
+        }
+    }
+
     fn search(
         &self,
         problem: &Problem,

@@ -2,13 +2,14 @@
 
 use super::direct::Direct;
 use crate::cost::MutualInformation;
+use crate::event::Stage;
 use crate::method::Method;
 use crate::params::Params;
 
 /// The estimator that maximises the normalised mutual information.
 pub fn mutual_information(params: &Params) -> Direct {
     Direct {
-        method: Method::MutualInformation,
+        stage: Stage::Estimator(Method::MutualInformation),
         cost: Box::new(MutualInformation::new(&params.mi)),
         render: params.render.clone(),
         grid: params.grid.clone(),

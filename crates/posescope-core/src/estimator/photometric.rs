@@ -2,13 +2,14 @@
 
 use super::direct::Direct;
 use crate::cost::Photometric;
+use crate::event::Stage;
 use crate::method::Method;
 use crate::params::Params;
 
 /// The estimator that minimises the robust photometric error.
 pub fn photometric(params: &Params) -> Direct {
     Direct {
-        method: Method::Photometric,
+        stage: Stage::Estimator(Method::Photometric),
         cost: Box::new(Photometric::new(&params.pm)),
         render: params.render.clone(),
         grid: params.grid.clone(),
