@@ -32,24 +32,24 @@ pub enum Command {
     Forward(usize),
     /// Move the cursor back.
     Back(usize),
-    /// To the first record.
+    /// Move the cursor to the first record.
     First,
-    /// To the last record, and stay there as more come in.
+    /// Move the cursor to the last record, and keep it there as more come in.
     Last,
-    /// To this record.
+    /// Move the cursor to this record.
     MoveCursor(usize),
-    /// To the last record that an estimator has told.
+    /// Move the cursor to the last record that an estimator has told.
     SelectMethod(Method),
     /// Localise another query.
     SelectQuery(usize),
     /// Localise the next query, or the one before.
     NextQuery {
-        /// The one before.
+        /// Whether the one before is meant.
         back: bool,
     },
     /// Localise the next query with a failed method.
     NextFailure {
-        /// Look backwards.
+        /// Whether to look backwards.
         back: bool,
     },
     /// Localise all queries, without stepping, to know which fail.
@@ -71,7 +71,7 @@ pub enum Command {
         /// The value as text.
         value: String,
     },
-    /// All parameters to their defaults.
+    /// Set all parameters to their defaults.
     ResetParams,
     /// Replace the breakpoints.
     SetBreakpoints(Vec<String>),
@@ -117,11 +117,11 @@ pub enum Command {
     RestoreSession(std::path::PathBuf),
     /// Bring a view to the front.
     ShowView(&'static str),
-    /// All the room for a view; for none, for that under the pointer, or back to all views.
+    /// Give all the room to a view; for none, for that under the pointer, or back to all views.
     Maximize(Option<&'static str>),
-    /// The first layout.
+    /// Go back to the first layout.
     ResetLayout,
-    /// Dark or light.
+    /// Change from dark to light or back.
     SwitchTheme,
     /// Show or hide the list of keys.
     Help,
@@ -134,7 +134,7 @@ pub enum Command {
 pub struct Queue(RefCell<Vec<Command>>);
 
 impl Queue {
-    /// Adds one.
+    /// Adds a command.
     pub fn send(&self, command: Command) {
         self.0.borrow_mut().push(command);
     }
@@ -148,9 +148,9 @@ impl Queue {
 pub struct Shortcut {
     /// The key with its modifiers.
     pub keys: KeyboardShortcut,
-    /// What it does.
+    /// The command that the key sends.
     pub command: Command,
-    /// The same in words.
+    /// What it does, in the words of the list of keys.
     pub help: &'static str,
 }
 

@@ -28,7 +28,7 @@ pub enum Comparing {
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
-    /// One line.
+    /// What to tell, in one line.
     pub text: String,
     /// Whether something went wrong.
     pub is_error: bool,
@@ -36,7 +36,7 @@ pub struct Note {
 
 /// A run that was kept to be compared with.
 pub struct Kept {
-    /// The run.
+    /// The run as it was kept.
     pub run: Run,
     /// Where the cursor was.
     pub cursor: usize,
@@ -44,7 +44,7 @@ pub struct Kept {
 
 /// Everything that the views draw from.
 pub struct Desk {
-    /// What is run.
+    /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
     /// The parameters of the setup, shared with the prober.
     pub(super) params: Arc<Params>,
@@ -90,9 +90,9 @@ pub struct Desk {
 /// A place in a run that can be found again in another one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Anchor {
-    /// By what it means.
+    /// The place by what it means to the estimator.
     Meaning(Meaning),
-    /// By its number.
+    /// The place by the number of its record.
     Record(usize),
 }
 

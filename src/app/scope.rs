@@ -175,10 +175,10 @@ impl<'a> Scope<'a> {
 /// What a cost can be compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CostBounds {
-    /// What no relation at all costs.
+    /// Cost of images that have nothing to do with each other.
     pub shuffled: Option<f64>,
-    /// The result of the search.
+    /// Cost at the result of the search.
     pub best: Option<f64>,
-    /// The true pose.
+    /// Cost at the true pose.
     pub truth: Option<f64>,
 }

@@ -29,7 +29,7 @@ pub enum ShownAt {
 }
 
 impl ShownAt {
-    /// In words.
+    /// The reason in words, as a caption.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pointer => "under the pointer",

@@ -38,7 +38,7 @@ pub struct Job {
     pub methods: Vec<Method>,
     /// What to make of several references.
     pub fusions: Vec<&'static fusion::Entry>,
-    /// Their parameters.
+    /// The parameters of all methods.
     pub params: Params,
     /// How far the query may be from a reference \[m\].
     pub uncertainty_radius_m: f64,
@@ -63,13 +63,13 @@ pub enum JobError {
     /// There is no index to ask.
     #[error(transparent)]
     Index(#[from] NoIndex),
-    /// Nobody said which.
+    /// Nobody said which references to take.
     #[error("no reference is chosen for query {query}")]
     NoneNamed {
         /// The query frame's name.
         query: String,
     },
-    /// Nothing is near enough.
+    /// No frame is near enough to be a reference.
     #[error(
         "no frame with pose and scan within {radius_m} m of query {query}; raise the radius or \
          choose references by hand"

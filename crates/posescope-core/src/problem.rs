@@ -14,7 +14,7 @@ use crate::memo::Memo;
 pub struct Query {
     /// The frame's name in its scene.
     pub name: String,
-    /// The photo.
+    /// The photo I_Q.
     pub photo: Photo,
     /// The query camera.
     pub intrinsics: Intrinsics,
@@ -129,9 +129,9 @@ fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<()
 /// Several references are several problems that share their query.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// What is sought.
+    /// The photo whose pose is sought.
     pub query: Arc<Query>,
-    /// What is known.
+    /// The photo, pose and cloud that are known.
     pub reference: Arc<ReferenceTuple>,
     /// How far from the reference the query may be \[m\].
     ///

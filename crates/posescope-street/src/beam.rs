@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 /// A pyramid of rays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beam {
-    /// Where they begin.
+    /// The point where all rays begin.
     pub(super) origin: Point3<f64>,
     /// The normals of its four sides, towards its inside.
     sides: [Vector3<f64>; 4],

@@ -45,6 +45,6 @@ pub(super) struct Contact {
     /// Coordinates on the surface \[m\]: along it from its left edge as seen from outside, and up
     /// from the solid's base.
     pub(super) uv: Vector2<f64>,
-    /// What was met.
+    /// The part of the solid that was met.
     pub(super) part: Part,
 }

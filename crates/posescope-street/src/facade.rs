@@ -16,7 +16,7 @@ pub(super) enum Wall {
 /// The face of the ground floor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GroundFloor {
-    /// Windows as above.
+    /// Windows like those of the storeys above.
     Flats,
     /// Shop windows below a sign.
     Shop,
@@ -25,9 +25,9 @@ pub(super) enum GroundFloor {
 /// The design of a house's walls; lengths in metres.
 #[derive(Clone, Debug)]
 pub(super) struct Facade {
-    /// Of the front.
+    /// Width of the front.
     pub(super) width: f64,
-    /// Of the sides.
+    /// Width of the sides.
     pub(super) depth: f64,
     /// Height of the eaves.
     pub(super) eaves: f64,
@@ -47,7 +47,7 @@ pub(super) struct Facade {
     pub(super) trim: Rgb,
     /// Height of the stone base.
     pub(super) plinth: f64,
-    /// The ground floor.
+    /// What the ground floor shows to the street.
     pub(super) ground: GroundFloor,
     /// Bay of the door in the front, from the left.
     pub(super) door: i32,

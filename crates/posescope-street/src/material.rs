@@ -43,7 +43,7 @@ pub(super) enum Material {
     Hedge(Rgb),
     /// The leaves of a tree or a bush, or its twigs.
     Leaves {
-        /// Colour.
+        /// Colour of the leaves.
         colour: Rgb,
         /// Share of them that is there: 1 in summer.
         density: f64,
@@ -67,7 +67,7 @@ pub(super) enum Material {
 /// A solid of the town.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
-    /// Its geometry.
+    /// Where its surface is.
     pub(super) shape: Shape,
     /// What it is made of.
     pub(super) material: Material,

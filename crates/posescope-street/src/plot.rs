@@ -16,7 +16,7 @@ use super::weather::Season;
 /// A rectangle of land.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plot {
-    /// Its middle.
+    /// The middle of the plot.
     pub(super) centre: Point2<f64>,
     /// The direction that its front faces.
     pub(super) ahead: Vector2<f64>,
@@ -68,7 +68,7 @@ impl Plot {
 
 /// A town in the making.
 pub(super) struct Builder<'a> {
-    /// Its streets.
+    /// The streets of the town.
     pub(super) network: &'a Network,
     /// Randomness of what never changes.
     pub(super) rng: Pcg32,

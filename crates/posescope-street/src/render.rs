@@ -34,11 +34,11 @@ const MID_LEVEL: f64 = 110.0;
 pub(super) struct View<'a> {
     /// What it looks at.
     pub(super) town: &'a Town,
-    /// The light.
+    /// The weather and the light.
     pub(super) look: &'a Look,
-    /// Its optics.
+    /// Focal lengths, principal point and image size.
     pub(super) intrinsics: &'a Intrinsics,
-    /// Where it is.
+    /// Pose of the camera.
     pub(super) world_from_camera: &'a Pose,
     /// Seed of what differs between frames.
     pub(super) frame_seed: u32,

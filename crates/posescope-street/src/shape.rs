@@ -29,9 +29,9 @@ pub(super) enum Shape {
     Pole {
         /// Middle of the base.
         base: Point3<f64>,
-        /// \[m\].
+        /// Radius of the cylinder \[m\].
         radius: f64,
-        /// \[m\].
+        /// Height of the cylinder \[m\].
         height: f64,
     },
     /// A spheroid with a vertical axis.

@@ -53,9 +53,9 @@ pub(super) enum Target {
 /// The first surface on a ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
-    /// Along the ray \[m\].
+    /// Distance along the ray \[m\].
     pub(super) distance: f64,
-    /// Where it is.
+    /// The point where the ray meets it.
     pub(super) point: Point3<f64>,
     /// Its outward normal.
     pub(super) normal: Vector3<f64>,

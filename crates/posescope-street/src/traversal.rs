@@ -46,7 +46,7 @@ impl Traversal {
         self.poses.len()
     }
 
-    /// The camera.
+    /// The camera that takes all images of the drive.
     pub fn intrinsics(&self) -> Intrinsics {
         self.intrinsics
     }

@@ -11,9 +11,9 @@ use super::look::Look;
 /// What trees bear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Season {
-    /// Leaves.
+    /// Trees bear leaves.
     Summer,
-    /// Twigs.
+    /// Trees are bare.
     Winter,
 }
 

@@ -9,17 +9,17 @@ pub enum RecordError {
     /// The file cannot be created.
     #[error("cannot create the recording {}: {source}", path.display())]
     Create {
-        /// The file.
+        /// The file of the recording.
         path: PathBuf,
-        /// Why.
+        /// What the system said.
         source: io::Error,
     },
     /// The file was created but could not be written to its end.
     #[error("the recording {} is incomplete: {message}", path.display())]
     Incomplete {
-        /// The file.
+        /// The file of the recording.
         path: PathBuf,
-        /// Why.
+        /// What went wrong.
         message: String,
     },
     /// The URL is not that of a viewer.
@@ -36,9 +36,9 @@ pub enum RecordError {
     /// The port is not free.
     #[error("cannot serve the recording on port {port}: {source}")]
     Serve {
-        /// The port.
+        /// The port that others hold.
         port: u16,
-        /// Why.
+        /// What the system said.
         source: io::Error,
     },
     /// A viewer did not take the recording.
@@ -47,9 +47,9 @@ pub enum RecordError {
     /// Something could not be put into the form of a recording.
     #[error("cannot record {what}: {message}")]
     Encode {
-        /// What.
+        /// The thing that was to be recorded.
         what: String,
-        /// Why.
+        /// What went wrong.
         message: String,
     },
 }

@@ -52,7 +52,7 @@ impl Identity {
 
 /// Targets that are ready to be written to.
 pub(super) struct OpenTargets {
-    /// All of them.
+    /// The sinks that get every message.
     pub(super) sinks: Vec<Box<dyn LogSink>>,
     /// The file among them, which can also tell what became of it.
     pub(super) file: Option<RecordingFile>,

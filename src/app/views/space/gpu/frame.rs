@@ -9,7 +9,7 @@ use crate::app::views::space::lens::{Lens, NEAR_M};
 /// A corner of a face, or a point of the cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spot {
-    /// In the scene \[m\].
+    /// Position in the scene \[m\].
     pub(crate) at: [f32; 3],
     pub(crate) color: Color32,
 }
@@ -20,7 +20,7 @@ pub(crate) struct Line {
     /// Both ends, in the scene \[m\].
     pub(crate) ends: [[f32; 3]; 2],
     pub(crate) color: Color32,
-    /// In egui's points.
+    /// Width in egui's points.
     pub(crate) width: f32,
 }
 
@@ -73,7 +73,7 @@ pub(crate) struct Frame {
     /// The cloud. It is uploaded again only when it is another one.
     pub(crate) points: Arc<Points>,
     pub(crate) lines: Vec<Line>,
-    /// Three corners each.
+    /// The corners of triangles, three after each other.
     pub(crate) faces: Vec<Spot>,
 }
 
