@@ -130,9 +130,7 @@ fn color_of(bar: &StageBar) -> Color32 {
         }
         (Stage::DepthLift, _) => Color32::from_rgb(0xB0, 0x9A, 0x5B),
         (Stage::Consensus, _) => Color32::from_rgb(0x9A, 0x7F, 0xB0),
-        (Stage::Accept | Stage::Assess | Stage::Fuse | Stage::OwnCost(_), _) => {
-            Color32::from_rgb(0x5F, 0x9E, 0x8F)
-        }
+        (Stage::Accept | Stage::Assess | Stage::Fuse, _) => Color32::from_rgb(0x5F, 0x9E, 0x8F),
     }
 }
 

@@ -8,7 +8,7 @@ use super::run_folder::{FolderError, RunFolder};
 use crate::estimator::Failure;
 use crate::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes, Status,
-    Watch,
+    Unwatched, Watch,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -195,7 +195,7 @@ impl Execution<'_> {
                 seed: self.run.seed,
                 index,
             };
-            chooser.choose(frame, &|frame| left_out.contains(&frame))
+            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut Unwatched)
         };
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;

@@ -27,26 +27,6 @@ const KNOWN: &[(&str, &[&str])] = &[
         "crates/posescope-core/src",
         &["localize::localizer", "localize::select"],
     ),
-    (
-        "crates/posescope-core/src",
-        &[
-            "robust::consensus",
-            "robust::likelihood",
-            "robust::local",
-            "robust::mlesac",
-        ],
-    ),
-    (
-        "crates/posescope-core/src",
-        &[
-            "cost",
-            "cost::mutual_information",
-            "cost::photometric",
-            "grid",
-            "params",
-            "render::score",
-        ],
-    ),
 ];
 
 /// A module by its path below the crate; empty for `lib.rs`.

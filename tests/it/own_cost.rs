@@ -1,9 +1,10 @@
 //! The ways of a library's user: one call for one query, a cost of one's own.
 
 use posescope::event::{Stage, StageEnded, ViewRendered};
+use posescope::image::{FloatImage, GrayImage, gaussian_smoothed};
 use posescope::{
-    Cost, Direct, Failure, History, IntensityPair, Params, Problem, Trace, estimator, localize,
-    localize_by, localize_traced,
+    Cost, Direct, Failure, History, IntensityPair, Method, Params, Problem, Trace, estimator,
+    localize, localize_by, localize_traced,
 };
 
 use crate::conformance::remembering;
@@ -13,8 +14,12 @@ use crate::two_walls::solvable;
 struct Mean(fn(&IntensityPair) -> f64);
 
 impl Cost for Mean {
-    fn query_smoothing_px(&self) -> f64 {
-        0.0
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, 0.0)
+    }
+
+    fn query_channel_name(&self) -> String {
+        "grey".to_owned()
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
@@ -32,7 +37,7 @@ fn brightness(pair: &IntensityPair) -> f64 {
 }
 
 fn outcome(cost: fn(&IntensityPair) -> f64, problem: &Problem) -> estimator::Outcome {
-    let estimator = Direct::new("mine", Box::new(Mean(cost)), &Params::default());
+    let estimator = Direct::searching("mine", Box::new(Mean(cost)), &Params::default());
     localize_by(&estimator, problem, &mut Trace::off()).expect("nobody cancels")
 }
 
@@ -40,8 +45,8 @@ fn outcome(cost: fn(&IntensityPair) -> f64, problem: &Problem) -> estimator::Out
 fn one_call_gives_what_the_estimator_gives() {
     let problem = solvable();
     let params = Params::default();
-    for entry in estimator::ALL {
-        let expected = (entry.new)(&params).estimate(&problem, &mut Trace::off());
+    for entry in estimator::all() {
+        let expected = entry.make(&params).estimate(&problem, &mut Trace::off());
         let outcome = localize(&problem, entry.method, &params);
         assert_eq!(Ok(&outcome), expected.as_ref(), "{}", entry.method.name());
         let mut history = History::default();
@@ -55,7 +60,7 @@ fn one_call_gives_what_the_estimator_gives() {
 #[test]
 fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
     let problem = solvable();
-    let estimator = Direct::new("mine", Box::new(Mean(difference)), &Params::default());
+    let estimator = Direct::searching("mine", Box::new(Mean(difference)), &Params::default());
     let mut history = History::default();
     let outcome = localize_by(&estimator, &problem, &mut Trace::to(&mut history));
     let pose = outcome.expect("nobody cancels").pose.expect("textured");
@@ -64,7 +69,7 @@ fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
     let last = history.last::<StageEnded>().expect("it ended");
     assert_eq!(
         (last.stage, last.stage.name()),
-        (Stage::OwnCost("mine"), "mine")
+        (Stage::Estimator(Method::named("mine")), "mine")
     );
     // It explains nothing, which is no reason not to show its views.
     let view = history.last::<ViewRendered>().expect("shown at the end");

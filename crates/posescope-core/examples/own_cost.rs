@@ -6,6 +6,7 @@ mod walls;
 use std::error::Error;
 
 use posescope_core::geometry::PoseError;
+use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
 use posescope_core::{
     Cloud, Cost, Direct, IntensityPair, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace,
     localize_by,
@@ -17,8 +18,13 @@ use walls::CAMERA;
 struct CrossCorrelation;
 
 impl Cost for CrossCorrelation {
-    fn query_smoothing_px(&self) -> f64 {
-        1.0
+    /// It looks at the query slightly smoothed, and at the reference as it is.
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, 1.0)
+    }
+
+    fn query_channel_name(&self) -> String {
+        "smoothed by 1 px".to_owned()
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
@@ -55,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let query = Query::new("query", photo(dusk)?, CAMERA)?;
     let problem = Problem::new(query, reference, 3.0)?;
 
-    let estimator = Direct::new("ncc", Box::new(CrossCorrelation), &Params::default());
+    let estimator = Direct::searching("ncc", Box::new(CrossCorrelation), &Params::default());
     let outcome = localize_by(&estimator, &problem, &mut Trace::off())?;
     let truth = Pose::translation(0.0, 0.0, 1.0);
     let error = PoseError::between(&truth, &outcome.pose?);

@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let truth = world_from_reference * Pose::translation(0.0, 0.0, 1.0);
     let params = Params::default();
-    for method in [Method::Feature, Method::MutualInformation] {
+    for method in [Method::FB, Method::MI] {
         let mut history = History::default();
         let mut trace = Trace::to(&mut history);
         let outcome = localize_traced(&problem, method, &params, &mut trace)?;

@@ -29,8 +29,6 @@ pub enum Side {
 pub enum Stage {
     /// A whole estimator; within the hybrid also the one it runs inside.
     Estimator(Method),
-    /// A direct estimator with a cost of somebody's own, by its name.
-    OwnCost(&'static str),
     /// References are chosen by what they look like.
     Retrieve,
     /// FB: features of both photos.
@@ -58,7 +56,6 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Estimator(method) => method.name(),
-            Self::OwnCost(name) => name,
             Self::Retrieve => "retrieve",
             Self::Detect => "detect",
             Self::Match => "match",

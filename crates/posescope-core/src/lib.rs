@@ -25,7 +25,7 @@
 //! let reference = ReferenceTuple::new("day", black()?, camera, Pose::identity(), cloud)?;
 //! let problem = Problem::new(query, reference, 15.0)?;
 //!
-//! let outcome = localize(&problem, Method::Feature, &Params::default());
+//! let outcome = localize(&problem, Method::FB, &Params::default());
 //! // Two black photos have nothing in common, which is an answer.
 //! assert_eq!(outcome.pose, Err(Failure::TooFewFeatures { query: 0, reference: 0 }));
 //! # Ok::<(), posescope_core::InputError>(())
