@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::command;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
-use super::scope::{Scope, ShownAt};
 use super::setup::Setup;
+use super::shown::ShownAt;
 use super::textures::Textures;
 use crate::geometry::Pose;
+use crate::localize::{QueryResult, Status};
 use crate::params::Params;
 use crate::scene::FrameStore;
 use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
@@ -29,7 +29,7 @@ pub enum Comparing {
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
-    /// One line.
+    /// What to tell, in one line.
     pub text: String,
     /// Whether something went wrong.
     pub is_error: bool,
@@ -37,7 +37,7 @@ pub struct Note {
 
 /// A run that was kept to be compared with.
 pub struct Kept {
-    /// The run.
+    /// The run as it was kept.
     pub run: Run,
     /// Where the cursor was.
     pub cursor: usize,
@@ -45,7 +45,7 @@ pub struct Kept {
 
 /// Everything that the views draw from.
 pub struct Desk {
-    /// What is run.
+    /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
     /// The parameters of the setup, shared with the prober.
     pub(super) params: Arc<Params>,
@@ -87,15 +87,15 @@ pub struct Desk {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: BTreeMap<usize, Vec<crate::localize::QueryResult>>,
+    pub results: BTreeMap<usize, Vec<QueryResult>>,
 }
 
 /// A place in a run that can be found again in another one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Anchor {
-    /// By what it means.
+    /// The place by what it means to the estimator.
     Meaning(Meaning),
-    /// By its number.
+    /// The place by the number of its record.
     Record(usize),
 }
 
@@ -206,26 +206,11 @@ impl Desk {
         self.session.state()
     }
 
-    /// The present run at the cursor.
-    pub(super) fn scope<'a>(&'a self, commands: &'a command::Queue) -> Scope<'a> {
-        Scope {
-            run: self.run(),
-            cursor: self.cursor,
-            desk: self,
-            commands,
-        }
-    }
-
-    /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept_scope<'a>(&'a self, commands: &'a command::Queue) -> Option<Scope<'a>> {
+    /// The place in the kept run that corresponds to the cursor.
+    pub(super) fn kept_cursor(&self) -> Option<usize> {
         let kept = self.kept.as_ref()?;
         let same = Meaning::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
-        Some(Scope {
-            run: &kept.run,
-            cursor: same.unwrap_or(kept.cursor),
-            desk: self,
-            commands,
-        })
+        Some(same.unwrap_or(kept.cursor))
     }
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
@@ -387,4 +372,14 @@ fn start(setup: &Setup, mode: RunMode, frames: &Arc<FrameStore>, ctx: &egui::Con
         Breakpoints::new(breakpoints),
         move || ctx.request_repaint(),
     )
+}
+
+/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
+pub(super) fn has_failed(result: &QueryResult) -> bool {
+    /// The failure radius of the paper for KITTI \[m\].
+    const FAILURE_RADIUS_M: f64 = 10.0;
+    result.status == Status::Failed
+        || result
+            .error
+            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
 }

@@ -13,24 +13,15 @@ use posescope::run::{read_results, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode};
 
-use super::args::{ConfigArgs, JobArgs, RecordingArgs, RunArgs, ViewArgs};
+use super::args::{
+    ConfigArgs, DEMO_QUERY, DEMO_REFERENCE, JobArgs, RecordingArgs, RunArgs, ViewArgs,
+};
 use super::failure::CliError;
 use super::terminal::Terminal;
-use super::{demo, params, run};
+use super::{params, run};
 
 /// Where the window saves things unless somebody says otherwise.
 const FOLDER: &str = "recordings";
-
-impl ViewArgs {
-    /// The window of the bare command.
-    pub fn demo() -> Self {
-        Self {
-            scene: "street".to_owned(),
-            query: None,
-            job: JobArgs::default(),
-        }
-    }
-}
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
@@ -165,8 +156,8 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
         && setup.pick == ReferencePick::By(Selection::Random(1));
     setup.query = match &args.query {
         _ if is_demo => {
-            setup.chosen = vec![setup.references.find(demo::REFERENCE)?].into();
-            setup.queries.find(demo::QUERY)?
+            setup.chosen = vec![setup.references.find(DEMO_REFERENCE)?].into();
+            setup.queries.find(DEMO_QUERY)?
         }
         Some(name) => setup.queries.find(name)?,
         None => {

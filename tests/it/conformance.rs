@@ -587,7 +587,7 @@ fn problem_of_strangers() -> Problem {
     problem(photo(1.0, 99), photo(0.0, 5), cloud_of_the_walls())
 }
 
-fn remembering() -> Problem {
+pub fn remembering() -> Problem {
     let mut problem = solvable();
     let mut query = (*problem.query).clone();
     query.memo = Memo::of(64);

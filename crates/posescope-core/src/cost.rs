@@ -60,8 +60,12 @@ pub trait Cost: Send + Sync {
     /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64>;
 
-    /// Why the cost of these pairs is what it is; `None` where there is no cost.
-    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation>;
+    /// Why the cost of these pairs is what it is; `None` where there is no cost, and for a cost that
+    /// has nothing of the kind to show.
+    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
+        let _ = pairs;
+        None
+    }
 }
 
 /// What a cost was made of.

@@ -74,6 +74,17 @@ pub struct Outcome {
     pub cost: Option<CostSummary>,
 }
 
+impl Outcome {
+    /// No pose, and nothing to say but why.
+    pub fn failed(failure: Failure) -> Self {
+        Self {
+            pose: Err(failure),
+            counts: None,
+            cost: None,
+        }
+    }
+}
+
 /// A way to find the query's pose.
 pub trait Estimator: Send + Sync {
     /// Localises the query.

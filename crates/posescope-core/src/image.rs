@@ -5,6 +5,7 @@ use std::path::Path;
 pub use image::{GrayImage, RgbImage};
 use image::{ImageBuffer, Luma};
 
+use crate::input::InputError;
 use crate::memo::Remembered;
 
 /// A grey image of real values in 0 … 255.
@@ -32,6 +33,23 @@ impl Photo {
             gray: image::imageops::grayscale(&color),
             color: Some(color),
         }
+    }
+
+    /// A photo of a grey camera from its values, row by row from the top left.
+    ///
+    /// # Errors
+    /// [`InputError::PixelCount`] when the values are not as many as the image has pixels.
+    pub fn from_gray_values(width: u32, height: u32, values: Vec<u8>) -> Result<Self, InputError> {
+        let given = values.len();
+        let is_whole = u64::from(width) * u64::from(height) == given as u64;
+        GrayImage::from_raw(width, height, values)
+            .filter(|_| is_whole)
+            .map(Self::from_gray)
+            .ok_or(InputError::PixelCount {
+                width,
+                height,
+                given,
+            })
     }
 
     /// A photo of a grey camera.
@@ -112,6 +130,17 @@ fn catmull_rom_weights(t: f32) -> [f32; 4] {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn grey_values_are_taken_row_by_row_and_must_be_as_many_as_pixels() {
+        let photo = Photo::from_gray_values(3, 2, vec![0, 1, 2, 3, 4, 5]).expect("six");
+        assert_eq!(photo.gray.get_pixel(1, 1).0, [4]);
+        for given in [5, 7] {
+            let refused = Photo::from_gray_values(3, 2, vec![0; given]).expect_err("not six");
+            let expected = format!("{given} grey values given, 3 x 2 px need 6");
+            assert_eq!(refused.to_string(), expected);
+        }
+    }
 
     #[test]
     fn smoothing_keeps_a_constant_and_spreads_a_dot_like_a_gaussian() {

@@ -2,6 +2,7 @@
 //! (paper, appendix B).
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -44,6 +45,22 @@ impl Direct {
             cost_key: Key::new((entry.name, cost.key())),
         }
     }
+
+    /// The estimator of a cost that is in no registry: it renders and searches as the others do, by
+    /// `params.render` and `params.grid`, and tells what it does as the method of this name.
+    ///
+    /// What is remembered of its scores is never taken for that of another cost, not even of one with
+    /// the same name: every estimator that is made here has a key of its own.
+    pub fn searching(name: &'static str, cost: Box<dyn Cost>, params: &Params) -> Self {
+        static MADE: AtomicU64 = AtomicU64::new(0);
+        Self {
+            method: Method::named(name),
+            cost,
+            render: params.render.clone(),
+            grid: params.grid.clone(),
+            cost_key: Key::new(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
+        }
+    }
 }
 
 impl Estimator for Direct {
@@ -57,11 +74,7 @@ impl Estimator for Direct {
                 counts: None,
                 cost: Some(cost),
             },
-            Err(failure) => Outcome {
-                pose: Err(failure),
-                counts: None,
-                cost: None,
-            },
+            Err(failure) => Outcome::failed(failure),
         })
     }
 

@@ -3,12 +3,12 @@
 //! The one way through for a single query, for an experiment over thousands, and for whoever wants
 //! to watch either.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::watch::checkpoint;
 use super::{
-    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, tell_ranking,
+    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, localize_by,
+    tell_ranking,
 };
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::KindSet;
@@ -296,22 +296,14 @@ impl<'a> Localizer<'a> {
     ) -> Result<Candidate, Cancelled> {
         let mut timings = StageTimings::default();
         let attention = watch.attention();
-        let estimated = catch_unwind(AssertUnwindSafe(|| {
-            let estimator = estimator::entry(method).make(self.params);
-            let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
-            let mut fanout = Fanout::new(sinks);
-            let mut trace = match &attention {
-                Some(flag) => Trace::watched(&mut fanout, flag),
-                None => Trace::to(&mut fanout),
-            };
-            estimator.estimate(&work.problems[problem], &mut trace)
-        }));
-        let outcome = match estimated {
-            Ok(outcome) => outcome?,
-            Err(panic) => failed(Failure::Internal {
-                message: words_of(panic.as_ref()),
-            }),
+        let estimator = estimator::entry(method).make(self.params);
+        let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
+        let mut fanout = Fanout::new(sinks);
+        let mut trace = match &attention {
+            Some(flag) => Trace::watched(&mut fanout, flag),
+            None => Trace::to(&mut fanout),
         };
+        let outcome = localize_by(estimator.as_ref(), &work.problems[problem], &mut trace)?;
         Ok(self.judged(work, problem, method, outcome, timings.into_times()))
     }
 
@@ -445,22 +437,4 @@ impl Work<'_> {
             |candidate: &Candidate| matches!(candidate.outcome.pose, Err(Failure::Internal { .. }));
         (!panicked(first) && !panicked(second)).then_some((first, second))
     }
-}
-
-fn failed(failure: Failure) -> Outcome {
-    Outcome {
-        pose: Err(failure),
-        counts: None,
-        cost: None,
-    }
-}
-
-/// What a panic said, on one line.
-pub fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
-    let words = panic
-        .downcast_ref::<String>()
-        .map(String::as_str)
-        .or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("a panic without a message");
-    words.replace('\n', " ")
 }
