@@ -228,6 +228,7 @@ fn open() -> Option<Window> {
         params: Params::default(),
         uncertainty_radius_m: 15.0,
         prior_m: None,
+        failure_radius_m: 10.0,
         seed: 0,
         breakpoints: Vec::new(),
         mode: RunMode::Running,

@@ -24,10 +24,11 @@ mod table;
 #[cfg(feature = "cli")]
 mod tables;
 mod timing;
+mod verdict;
 mod watch;
 
 pub use diff::{Change, Comparison, Difference, Tolerance};
-pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes, is_success};
+pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes};
 pub use experiment::{
     Defaults, Draw, DrawError, Experiment, default_failure_radius_m, default_prior_m, defaults,
 };
@@ -52,4 +53,5 @@ pub use select::{
 #[cfg(feature = "cli")]
 pub use table::Table;
 pub use timing::{StageTimes, StageTimings};
+pub use verdict::Verdict;
 pub use watch::{Unwatched, Watch};

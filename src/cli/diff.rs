@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::evaluate::{Change, Comparison, Row, Tolerance, read_rows, read_run};
+use posescope::evaluate::{Change, Comparison, Tolerance, read_rows, read_run};
 use posescope::sink::rerun::{Targets, record_comparison};
 
 use super::args::DiffArgs;
@@ -95,18 +95,10 @@ pub fn text(comparison: &Comparison) -> String {
             one.change.name(),
             one.before.query,
             one.before.method,
-            error(&one.before),
-            error(&one.after),
+            one.verdicts[0].words(one.before.error.as_ref()),
+            one.verdicts[1].words(one.after.error.as_ref()),
             one.before.group()
         );
     }
     text
-}
-
-fn error(row: &Row) -> String {
-    match (&row.error, row.status) {
-        (Some(error), _) => format!("{:.2} m {:.2}°", error.translation_m, error.rotation_deg),
-        (None, posescope::evaluate::Status::Ok) => "a pose".to_owned(),
-        (None, posescope::evaluate::Status::Failed) => "no pose".to_owned(),
-    }
 }

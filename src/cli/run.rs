@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use posescope::evaluate::{
     Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
+    default_failure_radius_m,
 };
 use posescope::event::Method;
 use posescope::params::Params;
@@ -83,7 +84,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     bar.finish_and_clear();
 
     // Whatever went wrong, what was computed is shown and the recording is closed.
-    let shown = show(args, &results, terminal);
+    let shown = plan.show(&results, terminal);
     let reached = audience.stop.as_ref().and_then(StopAtBreakpoint::reached);
     if let (Some(breakpoint), false) = (reached, terminal.is_quiet()) {
         eprintln!("Stopped at {breakpoint}");
@@ -112,23 +113,27 @@ pub fn use_threads(threads: Option<std::num::NonZeroUsize>) -> Result<(), CliErr
         .map_err(|error| CliError::Usage(error.to_string()))
 }
 
-fn show(
-    args: &RunArgs,
-    results: &[(QueryResult, Duration)],
-    terminal: &Terminal,
-) -> Result<(), CliError> {
-    if terminal.is_quiet() || results.is_empty() {
-        return Ok(());
-    }
-    let table = table::results(results);
-    if args.json.as_deref().is_some_and(output::is_stdout) {
-        eprintln!("{table}");
-        return Ok(());
-    }
-    output::print(&table)
-}
-
 impl Plan<'_> {
+    fn failure_radius_m(&self) -> f64 {
+        default_failure_radius_m(self.localizer.references().name())
+    }
+
+    fn show(
+        &self,
+        results: &[(QueryResult, Duration)],
+        terminal: &Terminal,
+    ) -> Result<(), CliError> {
+        if terminal.is_quiet() || results.is_empty() {
+            return Ok(());
+        }
+        let table = table::results(results, self.failure_radius_m());
+        if self.args.json.as_deref().is_some_and(output::is_stdout) {
+            eprintln!("{table}");
+            return Ok(());
+        }
+        output::print(&table)
+    }
+
     /// In the order of the registry, each once.
     fn methods(&self) -> Vec<Method> {
         Method::ALL
@@ -220,6 +225,7 @@ impl Plan<'_> {
             references: names(from, &mut references.copied()),
             configuration: self.params.to_toml(),
             seed: self.args.job.seed,
+            failure_radius_m: self.failure_radius_m(),
         };
         Ok(Some(Recorder::open(&targets, &identity, &self.methods())?))
     }

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::app::{self, ReferencePick, Setup, WindowError};
-use posescope::evaluate::{QueryResult, Selection, read_results, read_run};
+use posescope::evaluate::{
+    QueryResult, Selection, default_failure_radius_m, read_results, read_run,
+};
 use posescope::event::Method;
 use posescope::params::Params;
 use posescope::scene::{self, Scene};
@@ -124,6 +126,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<_, _>>()?;
+    let failure_radius_m = default_failure_radius_m(references.name());
     let mut setup = Setup {
         scene_argument: args.scene.clone(),
         offered: (0..queries.frames().len()).collect(),
@@ -142,6 +145,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         params: params::resolve(&args.job.config)?,
         uncertainty_radius_m: args.job.radius,
         prior_m: args.job.prior,
+        failure_radius_m,
         seed: args.job.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,
@@ -230,10 +234,14 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             results.entry(frame).or_default().push(result);
         }
     }
-    let is_failure = |results: &&Vec<QueryResult>| results.iter().any(|r| r.pose.is_none());
+    let failure_radius_m = file.failure_radius_m;
+    let is_failure = |results: &[QueryResult]| {
+        let mut results = results.iter();
+        results.any(|result| !result.is_success(failure_radius_m))
+    };
     let first = results
         .iter()
-        .find(|(_, results)| is_failure(results))
+        .find(|(_, results)| is_failure(results.as_slice()))
         .or_else(|| results.iter().next());
     let query = match (&args.query, first) {
         (Some(name), _) => queries.find(name)?,
@@ -270,6 +278,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         params,
         prior_m: args.job.prior.or(file.prior_m),
         uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.job.radius),
+        failure_radius_m,
         seed: file.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,

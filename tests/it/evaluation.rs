@@ -10,7 +10,7 @@ use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::evaluate::{
     Companion, Draw, Execution, QueryResult, RUN_SCHEMA, RunFile, RunFolder, Scenes, Unwatched,
-    Watch, is_success, read_results,
+    Watch, read_results,
 };
 use posescope::geometry::Pose;
 use posescope::image::Photo;
@@ -119,7 +119,7 @@ fn a_run_folder_holds_what_is_promised() {
     assert_eq!(junit.matches("<testcase ").count(), 24);
     let failed: Vec<String> = results
         .iter()
-        .filter(|result| !is_success(result, 0.000001))
+        .filter(|result| !result.is_success(0.000001))
         .map(|result| format!("{}-{}", result.query, result.method))
         .collect();
     assert!(failed.len() > 3, "{failed:?}");

@@ -24,5 +24,6 @@ mod space;
 mod surf_warp;
 mod synth;
 mod two_walls;
+mod verdicts;
 mod walls_scene;
 mod window;
