@@ -12,11 +12,11 @@ use std::error::Error;
 use std::sync::Arc;
 
 use posescope::estimator;
-use posescope::event::Method;
 use posescope::features::{MatchVerdict, SurfParams, classify, nearest_neighbours, surf};
 use posescope::geometry::PoseError;
 use posescope::image::GrayImage;
 use posescope::memo::Memo;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, ReferenceTuple};
 use posescope::scene::{self, Scene};

@@ -22,9 +22,9 @@ use std::time::Instant;
 
 use posescope::cloud::Cloud;
 use posescope::estimator::{self, Outcome};
-use posescope::event::Method;
 use posescope::image::Photo;
 use posescope::memo::Memo;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};

@@ -17,38 +17,22 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub use posescope_core::{
+    camera, cloud, cost, depth, describe, estimator, event, features, fusion, geometry, grid,
+    history, image, localize, memo, method, params, problem, render, retrieval, robust, solver,
+    trace,
+};
+
 #[cfg(feature = "app")]
 pub mod app;
-mod cache;
-pub mod camera;
-pub mod cloud;
-pub mod cost;
-pub mod depth;
-pub mod describe;
-pub mod estimator;
-pub mod evaluate;
-pub mod event;
-pub mod features;
-mod files;
-pub mod fusion;
-pub mod geometry;
-pub mod grid;
-pub mod history;
-pub mod image;
-pub mod memo;
+pub mod measure;
 #[cfg(feature = "rerun")]
 mod narration;
 #[cfg(feature = "rerun")]
 mod palette;
-pub mod params;
 #[cfg(feature = "rerun")]
 mod picture;
-pub mod problem;
-pub mod render;
-pub mod retrieval;
-pub mod robust;
+pub mod run;
 pub mod scene;
 pub mod session;
 pub mod sink;
-pub mod solver;
-pub mod trace;

@@ -2,7 +2,7 @@
 //! colour-blind eyes (after Okabe and Ito), and nothing is told by hue alone: names, labels and
 //! shapes say the same.
 
-use crate::event::FeatureState;
+use crate::features::FeatureState;
 
 /// An RGB triple.
 pub(crate) type Rgb = [u8; 3];

@@ -14,7 +14,7 @@ mod run;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver};
 
-use crate::evaluate::References;
+use crate::localize::References;
 
 pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use gate::RunMode;

@@ -4,9 +4,9 @@ use std::cell::RefCell;
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-use crate::event::Method;
 use crate::fusion;
 use crate::geometry::Pose;
+use crate::method::Method;
 
 /// Something to be done between two frames.
 #[derive(Clone, Debug, PartialEq)]

@@ -84,7 +84,7 @@ pub struct Desk {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: BTreeMap<usize, Vec<crate::evaluate::QueryResult>>,
+    pub results: BTreeMap<usize, Vec<crate::localize::QueryResult>>,
 }
 
 /// A place in a run that can be found again in another one.

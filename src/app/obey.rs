@@ -8,10 +8,11 @@ use super::command::Command;
 use super::desk::{Comparing, Desk, Kept};
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
-use crate::evaluate::References;
-use crate::event::{Method, PhaseSearched};
+use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
+use crate::localize::References;
+use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, State};
 use crate::sink::rerun::Targets;
 

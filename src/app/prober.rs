@@ -7,8 +7,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::estimator;
-use crate::event::Method;
 use crate::geometry::Pose;
+use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::Comparison;

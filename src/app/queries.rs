@@ -11,8 +11,8 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 
 use super::setup::Setup;
 use super::textures::color_image;
-use crate::evaluate::{QueryResult, Unwatched};
 use crate::event::Side;
+use crate::localize::{QueryResult, Unwatched};
 use crate::picture;
 use crate::scene::Scene;
 

@@ -7,7 +7,7 @@ use egui::Ui;
 
 use super::command::{Command, Queue};
 use super::desk::Desk;
-use crate::evaluate::Watch as _;
+use crate::localize::Watch as _;
 use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::setup::{ReferencePick, Setup};
-use crate::evaluate::default_failure_radius_m;
-use crate::event::Method;
-use crate::files;
 use crate::fusion;
+use crate::method::Method;
 use crate::params::Params;
+use crate::run::default_failure_radius_m;
 use crate::scene::{self, Scene};
 use crate::session::IndexFile;
+use posescope_core::files;
 
 /// The version of the file's form.
 const SCHEMA: &str = "posescope.session/1";

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use super::command::{Command, Queue};
 use super::desk::Desk;
-use crate::event::{DebugEvent, Method, MinimumAssessed, Moment, ReferencesFused, ViewRendered};
+use crate::event::{DebugEvent, MinimumAssessed, Moment, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
+use crate::method::Method;
 use crate::problem::Problem;
 use crate::render::Comparison;
 use crate::session::{Part, Run, Span};

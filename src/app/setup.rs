@@ -5,9 +5,9 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::evaluate::{QueryResult, References, Selection, frames_within};
-use crate::event::Method;
 use crate::fusion;
+use crate::localize::{QueryResult, References, Selection, frames_within};
+use crate::method::Method;
 use crate::params::Params;
 use crate::scene::Scene;
 use crate::session::{IndexFile, Job, Loaded, RunMode};

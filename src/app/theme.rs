@@ -2,7 +2,8 @@
 
 use egui::Color32;
 
-use crate::event::{FeatureState, Method};
+use crate::features::FeatureState;
+use crate::method::Method;
 use crate::palette::{self, Rgb};
 
 /// Colour of the reference.

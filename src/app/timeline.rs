@@ -5,7 +5,7 @@ use egui::{Align2, Color32, FontId, Rect, Sense, Slider, Stroke, StrokeKind, Ui,
 use super::command::{Command, Queue};
 use super::desk::Desk;
 use super::theme;
-use crate::event::Method;
+use crate::method::Method;
 use crate::session::{Part, Run, StageBar};
 
 /// Height of a stage's bar \[points\].

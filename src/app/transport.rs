@@ -6,8 +6,8 @@ use super::command::{Command, Queue};
 use super::desk::{Comparing, Desk};
 use super::setup::ReferencePick;
 use super::theme;
-use crate::evaluate::Selection;
-use crate::event::Method;
+use crate::localize::Selection;
+use crate::method::Method;
 use crate::session::State;
 
 pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
-use posescope::evaluate::{Experiment, Format, Gate, Selection, Shard, Tolerance};
-use posescope::event::Method;
 use posescope::fusion;
+use posescope::localize::Selection;
+use posescope::measure::{Format, Gate, Tolerance};
+use posescope::method::Method;
+use posescope::run::{Experiment, Shard};
 use posescope::scene::street::{Size, Street};
 use posescope::session::Breakpoint;
 

@@ -1,8 +1,9 @@
 //! Who watches the command line's queries: a progress bar, and perhaps a recording.
 
-use posescope::evaluate::{QueryResult, StageTimes, Watch};
-use posescope::event::{Event, KindSet, Method};
+use posescope::event::{Event, KindSet};
 use posescope::geometry::Pose;
+use posescope::localize::{QueryResult, StageTimes, Watch};
+use posescope::method::Method;
 use posescope::problem::Problem;
 use posescope::session::StopAtBreakpoint;
 use posescope::sink::Progress;

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::evaluate::{Change, Comparison, Tolerance, read_rows, read_run};
+use posescope::measure::{Change, Comparison, Tolerance, read_rows};
+use posescope::run::read_run;
 use posescope::sink::rerun::{Targets, record_comparison};
 
 use super::args::DiffArgs;

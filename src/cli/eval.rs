@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use posescope::evaluate::{
-    Change, Comparison, Draw, Execution, Experiment, Gate, Pair, RUN_SCHEMA, Ranking, Report,
-    RunFile, RunFolder, Scenes, Selection, Tolerance, default_failure_radius_m, default_prior_m,
-    defaults, merge, read_rows, read_run, write_report,
-};
-use posescope::event::Method;
+use posescope::localize::{Ranking, Selection};
+use posescope::measure::{Change, Comparison, Gate, Report, Tolerance, read_rows, write_report};
+use posescope::method::Method;
 use posescope::params::Params;
+use posescope::run::{
+    Draw, Execution, Experiment, Pair, RUN_SCHEMA, RunFile, RunFolder, Scenes,
+    default_failure_radius_m, default_prior_m, defaults, merge, read_run,
+};
 use posescope::scene::{self, Retriever, Scene};
 
 use super::args::EvalArgs;

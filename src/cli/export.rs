@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use posescope::evaluate::{Choice, Export, ExportError, FolderError, export, read_run};
+use posescope::measure::{Choice, Export, ExportError, export};
+use posescope::run::{FolderError, read_run};
 
 use super::args::ExportArgs;
 use super::failure::CliError;

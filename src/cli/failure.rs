@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use posescope::describe::ParamError;
-use posescope::evaluate::{ChoiceError, DrawError, FolderError, RunError};
+use posescope::localize::ChoiceError;
+use posescope::run::{DrawError, FolderError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::sink::rerun::{ComparisonError, RecordError};
 use posescope::trace::Cancelled;

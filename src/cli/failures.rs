@@ -6,10 +6,9 @@ use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use posescope::evaluate::{
-    Companion, FailedQuery, FolderError, Item, LocalizeError, RunError, RunFile, RunFolder, Watch,
-};
+use posescope::localize::{LocalizeError, Watch};
 use posescope::params::Params;
+use posescope::run::{Companion, FailedQuery, FolderError, Item, RunError, RunFile, RunFolder};
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
 use super::args::EvalArgs;

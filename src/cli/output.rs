@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use posescope::evaluate::QueryResult;
+use posescope::localize::QueryResult;
 
 use super::failure::CliError;
 

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use posescope::evaluate::{
+use posescope::localize::{
     Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
-    default_failure_radius_m,
 };
-use posescope::event::Method;
+use posescope::method::Method;
 use posescope::params::Params;
+use posescope::run::default_failure_radius_m;
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint};
 use posescope::sink::rerun::{Identity, Recorder, Targets};

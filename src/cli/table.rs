@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
-use posescope::evaluate::{QueryResult, Status, Verdict};
 use posescope::geometry::PoseError;
+use posescope::localize::{QueryResult, Status, Verdict};
 
 /// One row per query, reference and method.
 pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Table {

@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::app::{self, ReferencePick, Setup, WindowError};
-use posescope::evaluate::{
-    QueryResult, Selection, default_failure_radius_m, read_results, read_run,
-};
-use posescope::event::Method;
+use posescope::localize::{QueryResult, Selection};
+use posescope::method::Method;
 use posescope::params::Params;
+use posescope::run::{default_failure_radius_m, read_results, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode};
 

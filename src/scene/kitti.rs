@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, Vector3};
 
 pub use writer::SequenceWriter;
 
-use super::{Entry, Scene, SceneError, fingerprint};
+use super::{Entry, Scene, SceneError};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, matrix_from_pose, pose_from_matrix};
@@ -223,7 +223,7 @@ impl Scene for KittiOdometry {
         let size = |frame| std::fs::metadata(self.photo_path(frame)).map_or(0, |file| file.len());
         let sizes = (0..self.frames.len()).map(size);
         let bytes: Vec<u8> = sizes.flat_map(u64::to_le_bytes).collect();
-        fingerprint(self, &bytes)
+        posescope_core::scene::fingerprint(self, &bytes)
     }
 }
 

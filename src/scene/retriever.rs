@@ -1,18 +1,21 @@
 //! Retrieval in a scene: from photos to an index, and from a photo to the frames that resemble it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Scene, SceneError};
-use crate::cache::user_folder;
 use crate::features::{SurfParams, surf};
 use crate::image::Photo;
+use crate::localize::Ranking;
 use crate::params::Params;
+use crate::problem::Query;
 use crate::retrieval::{
-    BuildError, Index, IndexError, Progress, Request, Retrieval, RetrievalParams, Summary, build,
+    BuildError, Criterion, Index, IndexError, Progress, Ranked, Request, Retrieval,
+    RetrievalParams, Summary, build,
 };
+use posescope_core::files::user_cache_folder;
 
 /// The extension of the files.
 const EXTENSION: &str = "posescope-index";
@@ -68,7 +71,11 @@ impl Retriever {
             let hash = xxh3_64(folder.as_os_str().as_encoded_bytes());
             name.push_str(&format!("-{hash:016x}"));
         }
-        Some(user_folder("index")?.join(name).with_extension(EXTENSION))
+        Some(
+            user_cache_folder("index")?
+                .join(name)
+                .with_extension(EXTENSION),
+        )
     }
 
     /// What the index of a scene is to hold.
@@ -175,4 +182,23 @@ fn recipe(params: &Params, retrieval: &[&str]) -> BTreeMap<String, String> {
         })
         .map(|row| (row.key, row.value.to_string()))
         .collect()
+}
+
+impl Ranking for Retriever {
+    fn criterion(&self) -> Criterion {
+        Criterion::Words
+    }
+
+    fn rank(
+        &self,
+        query: &Query,
+        candidates: &[usize],
+        count: usize,
+    ) -> Result<Vec<Ranked>, SceneError> {
+        let candidates: HashSet<usize> = candidates.iter().copied().collect();
+        let retrieval = self.retrieve(&query.photo, |frame| candidates.contains(&frame));
+        let mut ranked = retrieval.ranked;
+        ranked.truncate(count);
+        Ok(ranked)
+    }
 }

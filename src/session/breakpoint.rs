@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::event::{Event, Method, Stage, StageStarted};
+use crate::event::{Event, Stage, StageStarted};
 use crate::grid::Phase;
+use crate::method::Method;
 use crate::trace::{Cancelled, Record, Sink};
 
 /// A number that events carry, under the name that breakpoints know it by.

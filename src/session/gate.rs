@@ -7,9 +7,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use super::breakpoint::Breakpoints;
 use super::job::{Loaded, Message};
 use super::run::Part;
-use crate::evaluate::{QueryResult, StageTimes, Watch};
-use crate::event::{Event, Method, StageEnded};
+use crate::event::{Event, StageEnded};
 use crate::geometry::Pose;
+use crate::localize::{QueryResult, StageTimes, Watch};
+use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
 

@@ -9,13 +9,13 @@ use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
 use super::run::Part;
-use crate::evaluate::{
+use crate::fusion;
+use crate::geometry::Pose;
+use crate::localize::{
     ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
     Selection, StageTimes, Watch, words_of,
 };
-use crate::event::Method;
-use crate::fusion;
-use crate::geometry::Pose;
+use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::scene::{NoIndex, Scene};

@@ -4,9 +4,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::job::Loaded;
-use crate::evaluate::{QueryResult, StageTimes};
-use crate::event::{DebugEvent, Event, Method, ReferencesFused, Stage};
+use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
 use crate::history::History;
+use crate::localize::{QueryResult, StageTimes};
+use crate::method::Method;
 use crate::params::Params;
 use crate::trace::Record;
 

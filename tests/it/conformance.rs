@@ -8,11 +8,13 @@ use nalgebra::Point3;
 use posescope::cloud::Cloud;
 use posescope::estimator::{self, Outcome};
 use posescope::event::{
-    DepthsLifted, Event, FeatureState, FeaturesClassified, FeaturesDetected, KindSet,
-    MatchesDecided, Method, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
+    DepthsLifted, Event, FeaturesClassified, FeaturesDetected, KindSet, MatchesDecided,
+    PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
 };
+use posescope::features::FeatureState;
 use posescope::history::History;
 use posescope::memo::Memo;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::trace::{Cancelled, Record, Sink, Trace};

@@ -2,9 +2,9 @@
 
 use posescope::cloud::Cloud;
 use posescope::estimator::{self, Failure, Outcome};
-use posescope::evaluate::evaluate;
-use posescope::event::Method;
 use posescope::geometry::Pose;
+use posescope::localize::evaluate;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::trace::Trace;

@@ -8,13 +8,13 @@ use std::process::{Command as Process, Stdio};
 use assert_cmd::Command;
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
-use posescope::evaluate::{
-    Companion, Draw, Execution, QueryResult, RUN_SCHEMA, RunFile, RunFolder, Scenes, Unwatched,
-    Watch, read_results,
-};
 use posescope::geometry::Pose;
 use posescope::image::Photo;
+use posescope::localize::{QueryResult, Unwatched, Watch};
 use posescope::params::Params;
+use posescope::run::{
+    Companion, Draw, Execution, RUN_SCHEMA, RunFile, RunFolder, Scenes, read_results,
+};
 use posescope::scene::{self, Scene, SceneError};
 
 use crate::binary::{CACHE, posescope};

@@ -4,7 +4,7 @@
 
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{Command, views};
-use posescope::event::Method;
+use posescope::method::Method;
 use posescope::session::{RunMode, State};
 
 use crate::painted::{Painted, painted};

@@ -7,10 +7,12 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command};
 use posescope::event::{
-    DebugEvent, DepthsLifted, FeatureState, FeaturesClassified, FeaturesDetected, MatchesDecided,
-    Method, MinimumAssessed, Side, ViewRendered,
+    DebugEvent, DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided,
+    MinimumAssessed, Side, ViewRendered,
 };
+use posescope::features::FeatureState;
 use posescope::features::Features;
+use posescope::method::Method;
 use posescope::session::{RunMode, State};
 
 use crate::two_walls::CAMERA;

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use posescope::estimator;
-use posescope::event::{DepthsLifted, FeaturesDetected, Method, Side};
+use posescope::event::{DepthsLifted, FeaturesDetected, Side};
 use posescope::geometry::{Pose, PoseError};
 use posescope::history::History;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::robust::mlesac;

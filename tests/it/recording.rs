@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::estimator;
-use posescope::evaluate::{StageTimes, Watch as _, evaluate};
-use posescope::event::{FeatureState, Kind, KindSet, Method, ReferencesRanked, Stage};
+use posescope::event::{Kind, KindSet, ReferencesRanked, Stage};
+use posescope::features::FeatureState;
 use posescope::geometry::Pose;
+use posescope::localize::{StageTimes, Watch as _, evaluate};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use posescope::sink::rerun::{Identity, Recorder, Targets, entities};

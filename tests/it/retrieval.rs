@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use assert_cmd::Command;
-use posescope::evaluate::{LocalizeError, Localizer, QueryResult, References, Request, Watch};
-use posescope::event::{Event, Method, ReferencesRanked, Stage};
+use posescope::event::{Event, ReferencesRanked, Stage};
 use posescope::geometry::Pose;
+use posescope::localize::{LocalizeError, Localizer, QueryResult, References, Request, Watch};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};

@@ -5,10 +5,10 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command};
 use posescope::cost::Explanation;
 use posescope::event::{
-    ConsensusJudged, DebugEvent, HypothesisTried, Method, Moment, PhaseSearched, PoseScored,
-    ViewRendered,
+    ConsensusJudged, DebugEvent, HypothesisTried, Moment, PhaseSearched, PoseScored, ViewRendered,
 };
 use posescope::grid::{Phase, least_covered};
+use posescope::method::Method;
 use posescope::session::{RunMode, Span, State};
 
 use crate::window::{settle, setup, window};

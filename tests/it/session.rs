@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use posescope::evaluate::{LocalizeError, Localizer, QueryResult, Request, Unwatched};
-use posescope::event::{Event, Method, ReferencesFused, Stage, StageEnded, StageStarted};
+use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
 use posescope::fusion;
+use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State};
 

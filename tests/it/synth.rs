@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use posescope::cloud::Cloud;
 use posescope::estimator;
-use posescope::event::Method;
 use posescope::geometry::PoseError;
 use posescope::image::Photo;
 use posescope::memo::Memo;
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Size, Street};

@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use posescope::app::{Command, Setup};
-use posescope::evaluate::{QueryResult, measure, read_results, read_rows, read_run};
-use posescope::event::Method;
+use posescope::localize::QueryResult;
+use posescope::measure::{measure, read_rows};
+use posescope::method::Method;
+use posescope::run::read_results;
 use posescope::scene::{self, Scene};
 
 use crate::binary::posescope;
@@ -73,8 +75,6 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
 fn the_window_counts_the_failures_that_the_run_counts() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3, 4, 5]);
     let out = sequence.path().join("run");
-    // Some of MI's poses are nearer than this and some are not, all are nearer than 10 m.
-    let radius_m = 0.3;
     posescope()
         .arg("eval")
         .arg(sequence.folder())
@@ -86,15 +86,20 @@ fn the_window_counts_the_failures_that_the_run_counts() {
             "--radius",
             "3",
         ])
-        .args(["--max-recordings", "0", "--failure-radius"])
-        .arg(radius_m.to_string())
-        .arg("--out")
+        .args(["--max-recordings", "0", "--out"])
         .arg(&out)
         .assert()
         .code(0);
-    let run = read_run(&out).expect("a run");
-    assert_eq!(run.failure_radius_m, radius_m);
-    let measures = measure(&read_rows(&out).expect("results"), run.failure_radius_m);
+    let rows = read_rows(&out).expect("results");
+    let mut errors: Vec<f64> = rows
+        .iter()
+        .filter_map(|row| Some(row.error?.translation_m))
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    // Nearer than 10 m, all of them.
+    let failure_radius_m = errors[errors.len() / 2];
+    assert!(failure_radius_m < 10.0);
+    let measures = measure(&rows, failure_radius_m);
     let failed = measures[0].queries - measures[0].successes;
     assert!(failed > 0 && failed < 6, "{failed} of 6 failed");
 
@@ -104,7 +109,7 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     }
     let mut window = window(Setup {
         offered: results.keys().copied().filter(|query| *query < 3).collect(),
-        failure_radius_m: run.failure_radius_m,
+        failure_radius_m,
         results,
         ..setup()
     });

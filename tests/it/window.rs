@@ -7,8 +7,9 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Command, Comparing, ReferencePick, Setup};
-use posescope::evaluate::{Localizer, QueryResult, Request, Unwatched};
-use posescope::event::{Event, Method, Stage};
+use posescope::event::{Event, Stage};
+use posescope::localize::{Localizer, QueryResult, Request, Unwatched};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scene;
 use posescope::scene::Scene;
@@ -137,7 +138,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
             &mut Unwatched,
             |result, _| {
                 results.push(result);
-                Ok::<(), posescope::evaluate::LocalizeError>(())
+                Ok::<(), posescope::localize::LocalizeError>(())
             },
         )
         .expect("readable");

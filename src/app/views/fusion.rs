@@ -5,9 +5,10 @@ use egui_plot::{MarkerShape, Plot, PlotUi, Points};
 
 use super::View;
 use crate::app::{Scope, theme};
-use crate::event::{Event, Method, ReferencesFused};
+use crate::event::{Event, ReferencesFused};
 use crate::fusion::{Fate, Share};
 use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
 use crate::session::Part;
 
 /// Width of the bar of a weight of 1 \[points\].

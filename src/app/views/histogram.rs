@@ -9,8 +9,8 @@ use egui::{RichText, ScrollArea, Ui};
 use super::View;
 use crate::app::{Scope, Shown};
 use crate::cost::Explanation;
-use crate::event::Method;
 use crate::grid::Offset;
+use crate::method::Method;
 
 /// The joint histogram, or the residuals, of the synthetic view that is shown.
 #[derive(Default)]

@@ -22,8 +22,8 @@ use super::canvas::Placement;
 use super::ink::{Ink, Mark};
 use crate::app::{Command, Scope, theme};
 use crate::camera::Intrinsics;
-use crate::event::Method;
 use crate::features::Keypoint;
+use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::Run;
 

@@ -6,8 +6,9 @@ use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::desk::Desk;
 use crate::app::{Command, Scope, theme};
-use crate::evaluate::{QueryResult, Verdict};
-use crate::event::{Method, Side};
+use crate::event::Side;
+use crate::localize::{QueryResult, Verdict};
+use crate::method::Method;
 
 /// The list of queries.
 #[derive(Default)]

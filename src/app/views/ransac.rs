@@ -11,7 +11,8 @@ use egui_plot::{GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotUi, P
 
 use super::View;
 use crate::app::{Command, Scope, theme};
-use crate::event::{HypothesisTried, Method};
+use crate::event::HypothesisTried;
+use crate::method::Method;
 use crate::session::{Loaded, Span};
 
 use trials::Trials;

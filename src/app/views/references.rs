@@ -6,10 +6,10 @@ use super::View;
 use super::queries::dots;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ReferencePick, Scope, theme};
-use crate::evaluate::{QueryResult, Selection};
 use crate::event::Side;
 use crate::fusion;
 use crate::geometry::PoseError;
+use crate::localize::{QueryResult, Selection};
 
 /// The ways of choosing, each with the count that it begins with.
 const WAYS: [(&str, Selection); 4] = [

@@ -5,7 +5,7 @@ use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 use super::View;
 use crate::app::desk::{Comparing, Desk};
 use crate::app::{Scope, theme};
-use crate::evaluate::{QueryResult, Verdict};
+use crate::localize::{QueryResult, Verdict};
 use crate::session::Span;
 
 /// The report of the run, so far.

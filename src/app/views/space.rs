@@ -409,7 +409,7 @@ impl Space {
         }
         if let Some((least, greatest)) = content.search.costs().filter(|_| self.layers.cost) {
             let method = match scope.method() {
-                Some(method @ crate::event::Method::Hybrid) => method,
+                Some(method @ crate::method::Method::Hybrid) => method,
                 _ => scope.direct_method(),
             };
             bars.push(Bar {

@@ -11,8 +11,8 @@ use egui::{ScrollArea, Slider, Ui};
 use super::View;
 use super::readout::Readout;
 use crate::app::{Command, Scope};
-use crate::event::Method;
 use crate::geometry::Pose;
+use crate::method::Method;
 
 use maps::{Maps, Shown, progress};
 use marks::{Mark, legend, moved, place};

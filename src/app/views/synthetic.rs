@@ -12,8 +12,9 @@ use super::View;
 use super::canvas::{self, Lens};
 use crate::app::textures::color_image;
 use crate::app::{Command, Scope, Shown};
-use crate::event::{Method, Moment, ViewRendered};
+use crate::event::{Moment, ViewRendered};
 use crate::geometry::Pose;
+use crate::method::Method;
 use crate::problem::Problem;
 
 /// How long each of two blinking pictures is shown \[s\].

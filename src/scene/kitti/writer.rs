@@ -14,8 +14,8 @@ use nalgebra::{Matrix3, Matrix3x4, Point3, Vector3};
 
 use super::SceneError;
 use crate::camera::Intrinsics;
-use crate::files::write_whole;
 use crate::geometry::{Pose, matrix_from_pose};
+use posescope_core::files::write_whole;
 
 const IMAGES: &str = "image_2";
 const SCANS: &str = "velodyne";

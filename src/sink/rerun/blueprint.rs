@@ -7,7 +7,8 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGr
 use super::entities;
 use super::layout::{self, Node, View};
 use super::stream::Stream;
-use crate::event::{FeatureState, Method};
+use crate::features::FeatureState;
+use crate::method::Method;
 use crate::palette;
 use crate::problem::Problem;
 

@@ -11,8 +11,9 @@ use super::layout::{self, Node, View};
 use super::scene::Origin;
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets};
-use crate::evaluate::{FolderError, QueryResult, read_results};
+use crate::localize::QueryResult;
 use crate::palette::{self, Rgb};
+use crate::run::{FolderError, read_results};
 
 /// The runs' names in the recording, and their colours.
 const RUNS: [(&str, Rgb); 2] = [("a", palette::REFERENCE), ("b", palette::ESTIMATE)];

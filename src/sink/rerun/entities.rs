@@ -1,6 +1,7 @@
 //! Where things are in a recording: its application, its timelines, its entity paths.
 
-use crate::event::{Method, Side};
+use crate::event::Side;
+use crate::method::Method;
 
 /// The application that every recording belongs to.
 pub const APPLICATION_ID: &str = "posescope";
@@ -51,7 +52,7 @@ pub const REPORT: &str = "report";
 pub const LOG: &str = "log";
 
 /// The name of a match whose state is not yet decided, beside those of
-/// [`FeatureState::NAMES`](crate::event::FeatureState::NAMES).
+/// [`FeatureState::NAMES`](crate::features::FeatureState::NAMES).
 pub const UNDECIDED: &str = "undecided";
 
 /// The coloured cloud of a reference; that of the first one is `world/cloud` itself.

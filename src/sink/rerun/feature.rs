@@ -10,9 +10,9 @@ use super::entities::{self, UNDECIDED};
 use super::place::Place;
 use super::scene::log_rays;
 use super::stream::Stream;
-use crate::event::{
-    DepthsLifted, Event, FeatureState, FeaturesDetected, HypothesisTried, LiftedMatch, Side,
-};
+use crate::depth::LiftedMatch;
+use crate::event::{DepthsLifted, Event, FeaturesDetected, HypothesisTried, Side};
+use crate::features::FeatureState;
 use crate::features::{Features, Match, MatchVerdict};
 use crate::geometry::Pose;
 use crate::palette::{self, Rgb};

@@ -5,8 +5,9 @@ use rerun::{BarChart, Points3D, TextDocument};
 use super::entities;
 use super::scene::Origin;
 use super::stream::Stream;
-use crate::event::{Method, ReferencesFused};
+use crate::event::ReferencesFused;
 use crate::fusion::{Fate, Share};
+use crate::method::Method;
 use crate::palette;
 
 /// The fusions of one query so far, as a table each.

@@ -1,7 +1,7 @@
 //! What an event is about.
 
 use super::scene::Origin;
-use crate::event::Method;
+use crate::method::Method;
 use crate::problem::Problem;
 
 /// The surroundings of an event.

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::scene::Origin;
-use crate::evaluate::{QueryResult, Verdict};
 use crate::geometry::PoseError;
+use crate::localize::{QueryResult, Verdict};
 use crate::params::Params;
 use crate::problem::Problem;
 

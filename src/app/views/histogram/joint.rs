@@ -9,7 +9,7 @@ use super::comparison;
 use crate::app::views::readout::Readout;
 use crate::app::{Scope, theme};
 use crate::cost::JointHistogram;
-use crate::event::Method;
+use crate::method::Method;
 use crate::picture;
 use crate::render::Comparison;
 

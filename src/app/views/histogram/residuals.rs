@@ -6,7 +6,7 @@ use egui_plot::{Bar, BarChart, HoverPosition, LineStyle, Plot, VLine};
 use super::comparison;
 use crate::app::{Scope, theme};
 use crate::cost::{IntensityPair, PhotometricWeights};
-use crate::event::Method;
+use crate::method::Method;
 use crate::render::Comparison;
 
 /// Width of a bar \[grey values\].

@@ -15,7 +15,7 @@ use crate::app::views::canvas::Placement;
 use crate::app::views::ink::Ink;
 use crate::app::views::legend;
 use crate::app::{Command, Scope, theme};
-use crate::event::FeatureState;
+use crate::features::FeatureState;
 use crate::features::Keypoint;
 use crate::palette;
 use crate::problem::{Problem, ReferenceTuple};

@@ -4,8 +4,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::app::Scope;
-use crate::event::{Event, FeatureState, LiftedMatch, Method, Side};
+use crate::depth::LiftedMatch;
+use crate::event::{Event, Side};
+use crate::features::FeatureState;
 use crate::features::{Features, Keypoint, Match, MatchVerdict};
+use crate::method::Method;
 use crate::session::{Part, Run, Span};
 
 /// Position of "undecided" behind those of [`FeatureState::NAMES`].

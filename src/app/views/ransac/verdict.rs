@@ -5,11 +5,10 @@ use nalgebra::{Point2, Point3};
 
 use super::trials::Trials;
 use crate::app::{Command, Scope};
-use crate::evaluate::Status;
-use crate::event::{
-    ConsensusJudged, DepthsLifted, FeaturesDetected, LiftedMatch, PoseRefined, Side,
-};
+use crate::depth::LiftedMatch;
+use crate::event::{ConsensusJudged, DepthsLifted, FeaturesDetected, PoseRefined, Side};
 use crate::geometry::Pose;
+use crate::localize::Status;
 use crate::robust::{AcceptanceRule, Hypothesis, Trial};
 use crate::session::Span;
 

@@ -8,8 +8,8 @@ use super::site::{Site, spot};
 use super::story::{FeatureStory, SearchStory};
 use crate::app::{Scope, theme};
 use crate::camera::Intrinsics;
-use crate::event::Method;
 use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
 
 /// Whose camera it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

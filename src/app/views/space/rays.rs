@@ -7,7 +7,7 @@ use super::gpu::Line;
 use super::site::Site;
 use super::story::FeatureStory;
 use crate::app::theme;
-use crate::event::FeatureState;
+use crate::features::FeatureState;
 
 /// The rays, and how many of each kind.
 #[derive(Default)]

@@ -5,9 +5,12 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::app::Scope;
-use crate::event::{CloudColored, Event, FeatureState, LiftedMatch, Method, PoseScored};
+use crate::depth::LiftedMatch;
+use crate::event::{CloudColored, Event, PoseScored};
+use crate::features::FeatureState;
 use crate::geometry::Pose;
 use crate::grid::{Offset, ScoredLattice};
+use crate::method::Method;
 use crate::render::ColoredCloud;
 use crate::session::Run;
 

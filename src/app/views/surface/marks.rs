@@ -5,9 +5,9 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec
 use super::scale::number;
 use super::search::{Minimum, Search};
 use crate::app::{Command, Scope, theme};
-use crate::event::Method;
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase};
+use crate::method::Method;
 
 /// What is at a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::app::Scope;
-use crate::event::{Event, Method, MinimumAssessed, Moment, PoseScored};
+use crate::event::{Event, MinimumAssessed, Moment, PoseScored};
 use crate::geometry::Pose;
 use crate::grid::{self, Lattice, Offset, Phase, ScoredLattice};
+use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::Span;
 

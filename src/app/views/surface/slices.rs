@@ -6,8 +6,8 @@ use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotUi, VLine};
 use super::scale::number;
 use super::search::{Search, Searched};
 use crate::app::{Scope, theme};
-use crate::event::Method;
 use crate::grid::{Lattice, Offset, Phase};
+use crate::method::Method;
 
 /// What changes along a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

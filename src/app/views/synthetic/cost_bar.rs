@@ -5,7 +5,7 @@ use egui::{Color32, Mesh, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 use crate::app::scope::CostBounds;
 use crate::app::theme;
 use crate::app::views::ink::{Ink, Mark};
-use crate::event::Method;
+use crate::method::Method;
 
 /// Height of the bar with its marks \[points\].
 const HEIGHT: f32 = 16.0;

@@ -9,7 +9,7 @@ use crate::app::textures::color_image;
 use crate::app::views::legend;
 use crate::app::{Scope, Shown, theme};
 use crate::cost::Explanation;
-use crate::event::Method;
+use crate::method::Method;
 use crate::problem::Problem;
 use crate::render::Comparison;
 use crate::{palette, picture};

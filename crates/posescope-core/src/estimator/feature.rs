@@ -1,0 +1,379 @@
+//! FB, the indirect feature-based method (paper, section 2.2 and appendix A).
+
+mod journey;
+mod params;
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use nalgebra::Point2;
+
+use self::journey::Journey;
+pub use self::params::{DepthRule, FeatureParams};
+use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, settle};
+use crate::depth::LiftedMatch;
+use crate::depth::{DepthReading, ProjectedCloudIndex};
+use crate::event::{
+    ConsensusJudged, DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried,
+    MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
+};
+use crate::features::{
+    FeatureCache, Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
+};
+use crate::geometry::Pose;
+use crate::memo::Recalled;
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::{Problem, ReferenceTuple};
+use crate::robust::{
+    AcceptanceRule, Consensus, MlesacError, Trial, effective_area_px, inliers_beyond_chance, mlesac,
+};
+use crate::solver::Correspondence;
+use crate::trace::{Cancelled, Trace};
+
+/// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
+const MINIMUM: usize = 4;
+
+/// Remembered matches. They keep their reference alive, so that its address stays its own.
+struct Decisions {
+    decisions: Arc<[Option<Match>]>,
+    _reference: Arc<ReferenceTuple>,
+}
+
+/// What MLESAC found, and all it tried on the way.
+struct Solved {
+    trials: Vec<Trial>,
+    outcome: Result<Consensus, MlesacError<Infallible>>,
+}
+
+/// The feature-based estimator.
+pub struct FeatureBased {
+    surf: SurfParams,
+    params: FeatureParams,
+    remembered: Option<Arc<FeatureCache>>,
+}
+
+impl Estimator for FeatureBased {
+    fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+        let mut counts = FeatureCounts::default();
+        let pose = trace.stage(Stage::Estimator(Method::Feature), |trace| {
+            self.localize(problem, &mut counts, trace)
+        });
+        Ok(Outcome {
+            pose: settle(pose)?,
+            counts: Some(counts),
+            cost: None,
+        })
+    }
+
+    fn remember(&mut self, features: &Arc<FeatureCache>) {
+        self.remembered = Some(Arc::clone(features));
+    }
+}
+
+impl FeatureBased {
+    /// The estimator with these parameters.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            surf: params.surf,
+            params: params.fb.clone(),
+            remembered: None,
+        }
+    }
+
+    /// The four steps of the paper. `counts` is true up to where it stops.
+    fn localize(
+        &self,
+        problem: &Problem,
+        counts: &mut FeatureCounts,
+        trace: &mut Trace<'_>,
+    ) -> Result<Pose, Halt> {
+        let (query, reference) = trace.stage(Stage::Detect, |trace| {
+            let query = self.detect(Side::Query, problem, trace)?;
+            let reference = self.detect(Side::Reference, problem, trace)?;
+            trace.note_reuse(query.reused && reference.reused);
+            let (query, reference) = (query.value, reference.value);
+            counts.query_keypoints = query.keypoints.len();
+            counts.reference_keypoints = reference.keypoints.len();
+            Ok::<_, Halt>((query, reference))
+        })?;
+        let mut journey = Journey::new(query.keypoints.len());
+        let outcome =
+            self.match_and_solve(problem, &query, &reference, &mut journey, counts, trace);
+        // The states are told for a failed query too: they show where its features went.
+        if !matches!(outcome, Err(Halt::Cancelled)) {
+            trace.emit(|| FeaturesClassified {
+                states: journey.states(),
+            })?;
+        }
+        outcome
+    }
+
+    fn match_and_solve(
+        &self,
+        problem: &Problem,
+        query: &Features,
+        reference: &Features,
+        journey: &mut Journey,
+        counts: &mut FeatureCounts,
+        trace: &mut Trace<'_>,
+    ) -> Result<Pose, Halt> {
+        if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
+            return Err(Halt::from(Failure::TooFewFeatures {
+                query: query.keypoints.len(),
+                reference: reference.keypoints.len(),
+            }));
+        }
+
+        let matches = trace.stage(Stage::Match, |trace| {
+            let decisions = self.best_matches(problem, query, reference);
+            trace.note_reuse(decisions.reused);
+            let decisions = &decisions.value.decisions;
+            trace.emit(|| MatchesDecided {
+                decisions: Arc::clone(decisions),
+            })?;
+            Ok::<_, Halt>(journey.after_matching(decisions))
+        })?;
+        counts.ratio_passed = journey.passed_ratio_test();
+        counts.unique = matches.len();
+        if matches.len() < MINIMUM {
+            return Err(Halt::from(Failure::TooFewMatches {
+                unique: matches.len(),
+                keypoints: query.keypoints.len(),
+            }));
+        }
+
+        let lifted = trace.stage(Stage::DepthLift, |trace| {
+            let lifted = self.lift(&matches, reference, &problem.reference, trace)?;
+            trace.emit(|| DepthsLifted {
+                matches: Arc::clone(&lifted),
+            })?;
+            Ok::<_, Halt>(lifted)
+        })?;
+        journey.after_depth_lift(&lifted);
+        let (members, correspondences): (Vec<usize>, Vec<Correspondence>) = lifted
+            .iter()
+            .filter_map(|lifted| {
+                let pixel = query.keypoints[lifted.query].pixel();
+                let point = lifted.point?;
+                Some((lifted.query, Correspondence { pixel, point }))
+            })
+            .unzip();
+        counts.with_depth = correspondences.len();
+        if correspondences.len() < MINIMUM {
+            return Err(Halt::from(Failure::TooFewDepths {
+                with_depth: correspondences.len(),
+                unique: matches.len(),
+            }));
+        }
+
+        let consensus = trace.stage(Stage::Consensus, |trace| {
+            let consensus = self.consensus(problem, &correspondences, trace)?;
+            trace.emit(|| PoseRefined {
+                reference_from_query: consensus.pose.inverse(),
+                inliers: consensus.inliers.len(),
+                correspondences: correspondences.len(),
+                trials: consensus.trials,
+            })?;
+            Ok::<_, Halt>(consensus)
+        })?;
+        journey.after_consensus(&members, &consensus);
+        counts.inliers = consensus.inliers.len();
+
+        trace.stage(Stage::Accept, |trace| {
+            self.accept(problem, &correspondences, &consensus, trace)
+        })
+    }
+
+    fn detect(
+        &self,
+        side: Side,
+        problem: &Problem,
+        trace: &mut Trace<'_>,
+    ) -> Result<Recalled<Features>, Cancelled> {
+        let (photo, memo) = match side {
+            Side::Query => (&problem.query.photo, &problem.query.memo),
+            Side::Reference => (&problem.reference.photo, &problem.reference.memo),
+        };
+        let features = memo.recall(&self.surf, || match &self.remembered {
+            Some(cache) => Arc::unwrap_or_clone(cache.surf(&photo.gray, &self.surf)),
+            None => surf(&photo.gray, &self.surf),
+        });
+        trace.emit(|| FeaturesDetected {
+            side,
+            features: Arc::clone(&features.value),
+        })?;
+        Ok(features)
+    }
+
+    fn best_matches(
+        &self,
+        problem: &Problem,
+        query: &Features,
+        reference: &Features,
+    ) -> Recalled<Decisions> {
+        let FeatureParams { ratio, unique, .. } = self.params;
+        let key = (Arc::as_ptr(&problem.reference), self.surf, ratio, unique);
+        problem.query.memo.recall(&key, || Decisions {
+            decisions: best_matches(query, reference, &self.params),
+            _reference: Arc::clone(&problem.reference),
+        })
+    }
+
+    /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
+    fn lift(
+        &self,
+        matches: &[(usize, usize)],
+        reference: &Features,
+        tuple: &ReferenceTuple,
+        trace: &mut Trace<'_>,
+    ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
+        let cloud = tuple.memo.recall(&"projected", || {
+            ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
+        });
+        let cloud = cloud.value;
+        trace.emit(|| ProjectedCloud {
+            points: tuple.cloud.len(),
+            in_view: cloud.len(),
+        })?;
+        Ok(matches
+            .iter()
+            .map(|&(query_index, reference_index)| {
+                let pixel: Point2<f64> = reference.keypoints[reference_index].pixel();
+                let reading = cloud.read(&pixel, self.params.depth_radius_px);
+                LiftedMatch {
+                    query: query_index,
+                    reference: reference_index,
+                    lidar_distance_px: reading.distance_px,
+                    depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
+                    point: self
+                        .depth(&reading)
+                        .map(|z| tuple.intrinsics.unproject(&pixel, z)),
+                }
+            })
+            .collect())
+    }
+
+    fn depth(&self, reading: &DepthReading) -> Option<f64> {
+        let depths = reading.within?;
+        match self.params.depth {
+            DepthRule::Guarded if depths.relative_spread() > self.params.depth_spread => None,
+            DepthRule::Guarded | DepthRule::Nearest => Some(depths.nearest),
+        }
+    }
+
+    fn consensus(
+        &self,
+        problem: &Problem,
+        correspondences: &[Correspondence],
+        trace: &mut Trace<'_>,
+    ) -> Result<Consensus, Halt> {
+        let intrinsics = &problem.query.intrinsics;
+        let params = &self.params.mlesac;
+        let seed = problem.random_seed("mlesac");
+        let key = (intrinsics, params, seed, correspondences);
+        let solved = problem.query.memo.recall(&key, || {
+            let mut trials = Vec::new();
+            let outcome = mlesac(correspondences, intrinsics, params, seed, |trial| {
+                trials.push(*trial);
+                Ok(())
+            });
+            Solved { trials, outcome }
+        });
+        trace.note_reuse(solved.reused);
+        for trial in &solved.value.trials {
+            trace.emit(|| HypothesisTried { trial: *trial })?;
+        }
+        solved.value.outcome.clone().map_err(|error| match error {
+            MlesacError::TooFewCorrespondences { found, .. } => Halt::from(Failure::NoConsensus {
+                correspondences: found,
+                best_inliers: 0,
+                trials: 0,
+            }),
+            MlesacError::NoModel {
+                trials,
+                best_inliers,
+            } => Halt::from(Failure::NoConsensus {
+                correspondences: correspondences.len(),
+                best_inliers,
+                trials,
+            }),
+            MlesacError::Cancelled(never) => match never {},
+        })
+    }
+
+    fn accept(
+        &self,
+        problem: &Problem,
+        correspondences: &[Correspondence],
+        consensus: &Consensus,
+        trace: &mut Trace<'_>,
+    ) -> Result<Pose, Halt> {
+        let reference_from_query = consensus.pose.inverse();
+        let inliers = consensus.inliers.len();
+        // False matches gather where the texture is, so chance has less room than the whole image.
+        let pixels: Vec<_> = correspondences.iter().map(|c| c.pixel).collect();
+        let acceptance = inliers_beyond_chance(
+            inliers,
+            correspondences.len(),
+            self.params.mlesac.inlier_threshold_px,
+            effective_area_px(&pixels, problem.query.intrinsics.area()),
+        );
+        let distance_m = reference_from_query.translation.vector.norm();
+        let radius_m = problem.uncertainty_radius_m;
+        let too_far = distance_m > radius_m * (1.0 + self.params.radius_slack);
+        let verdict = if !self.params.accept.accepts(&acceptance) {
+            Err(Failure::ChanceConsensus {
+                inliers,
+                correspondences: correspondences.len(),
+                needed: acceptance.needed.unwrap_or(correspondences.len() + 1),
+            })
+        } else if too_far && self.params.accept == AcceptanceRule::Consensus {
+            Err(Failure::OutsideRadius {
+                distance_m,
+                radius_m,
+            })
+        } else {
+            Ok(())
+        };
+        trace.emit(|| ConsensusJudged {
+            acceptance,
+            distance_m,
+            accepted: verdict.is_ok(),
+        })?;
+        verdict?;
+        Ok(problem.world_from_query(&reference_from_query))
+    }
+}
+
+/// The best match of each query feature, and whether it stands out.
+fn best_matches(
+    query: &Features,
+    reference: &Features,
+    params: &FeatureParams,
+) -> Arc<[Option<Match>]> {
+    let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
+    let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
+    let mut matches = classify(&forward, &backward, params.ratio as f32);
+    if !params.unique {
+        for found in matches.iter_mut().flatten() {
+            if let MatchVerdict::NotUnique { .. } = found.verdict {
+                found.verdict = MatchVerdict::Candidate;
+            }
+        }
+    }
+    matches.into()
+}
+
+/// How many features of the query have a match in the reference: FB's count after the ratio test and
+/// uniqueness, before any depth is looked up. Fusion weighs references by it.
+pub fn count_matches(query: &Features, reference: &Features, params: &FeatureParams) -> usize {
+    if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
+        return 0;
+    }
+    best_matches(query, reference, params)
+        .iter()
+        .flatten()
+        .filter(|found| found.verdict == MatchVerdict::Candidate)
+        .count()
+}

@@ -1,0 +1,378 @@
+//! What the estimators tell: one struct per event, one line in the list of kinds.
+//!
+//! Large payloads are shared (`Arc`), so keeping an event is cheap.
+
+use std::sync::Arc;
+
+use crate::depth::LiftedMatch;
+use crate::features::{FeatureState, Features, Match, MatchVerdict};
+use crate::fusion::share::Share;
+use crate::geometry::Pose;
+use crate::grid::{Offset, Phase, ScoredLattice};
+use crate::image::Photo;
+use crate::method::Method;
+use crate::render::{ColoredCloud, Comparison, Score};
+use crate::retrieval::ReferenceRanking;
+use crate::robust::{Acceptance, Trial};
+
+/// Which of the two photos.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Side {
+    /// The query photo.
+    Query,
+    /// The reference photo.
+    Reference,
+}
+
+/// A named part of an estimator, which a watcher can step over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// A whole estimator; within the hybrid also the one it runs inside.
+    Estimator(Method),
+    /// References are chosen by what they look like.
+    Retrieve,
+    /// FB: features of both photos.
+    Detect,
+    /// FB: exhaustive matching, ratio test, uniqueness.
+    Match,
+    /// FB: depth of the matched reference keypoints.
+    DepthLift,
+    /// FB: MLESAC over P3P hypotheses, refinement.
+    Consensus,
+    /// FB: is the result more than chance?
+    Accept,
+    /// PM, MI: colour the cloud.
+    Color,
+    /// PM, MI: one phase of the grid search.
+    Search(Phase),
+    /// PM, MI: what the result is worth.
+    Assess,
+    /// One pose from those of several references.
+    Fuse,
+}
+
+impl Stage {
+    /// A short name, the same in `--break`, in timings and in recordings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Estimator(method) => method.name(),
+            Self::Retrieve => "retrieve",
+            Self::Detect => "detect",
+            Self::Match => "match",
+            Self::DepthLift => "depth",
+            Self::Consensus => "ransac",
+            Self::Accept => "accept",
+            Self::Color => "color",
+            Self::Search(Phase::PositionCoarse) => "position_coarse",
+            Self::Search(Phase::PositionFine) => "position_fine",
+            Self::Search(Phase::YawCoarse) => "yaw_coarse",
+            Self::Search(Phase::YawFine) => "yaw_fine",
+            Self::Assess => "assess",
+            Self::Fuse => "fusion",
+        }
+    }
+}
+
+/// An event type: convertible into [`Event`], with its kind.
+pub trait DebugEvent: Into<Event> + Sized {
+    /// The kind of this type.
+    const KIND: Kind;
+    /// The event as this type, if it is of this kind.
+    fn from_event(event: &Event) -> Option<&Self>;
+}
+
+/// A set of event kinds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KindSet(u32);
+
+impl KindSet {
+    /// Every kind.
+    pub const ALL: Self = Self(u32::MAX);
+    /// No kind; stages are told all the same.
+    pub const NONE: Self = Self(0);
+
+    /// Just these kinds.
+    pub const fn of(kinds: &[Kind]) -> Self {
+        let mut bits = 0;
+        let mut i = 0;
+        while i < kinds.len() {
+            bits |= 1 << kinds[i] as u32;
+            i += 1;
+        }
+        Self(bits)
+    }
+
+    /// The kinds of either set.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether a kind is in the set.
+    #[inline]
+    pub const fn contains(self, kind: Kind) -> bool {
+        self.0 & (1 << kind as u32) != 0
+    }
+}
+
+macro_rules! events {
+    ($($name:ident),+ $(,)?) => {
+        /// Anything that an estimator tells.
+        #[derive(Clone, Debug)]
+        #[allow(missing_docs, reason = "each variant is named after the struct it holds")]
+        pub enum Event { $($name($name)),+ }
+
+        /// The kinds of event, one per struct.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[allow(missing_docs, reason = "each kind is named after its struct")]
+        pub enum Kind { $($name),+ }
+
+        impl Event {
+            /// The kind of this event.
+            pub fn kind(&self) -> Kind {
+                match self { $(Self::$name(_) => Kind::$name),+ }
+            }
+        }
+
+        $(
+            impl From<$name> for Event {
+                fn from(event: $name) -> Self { Self::$name(event) }
+            }
+            impl DebugEvent for $name {
+                const KIND: Kind = Kind::$name;
+                fn from_event(event: &Event) -> Option<&Self> {
+                    match event {
+                        Event::$name(event) => Some(event),
+                        _ => None,
+                    }
+                }
+            }
+        )+
+    };
+}
+
+events! {
+    StageStarted,
+    StageEnded,
+    FeaturesDetected,
+    MatchesDecided,
+    ProjectedCloud,
+    DepthsLifted,
+    HypothesisTried,
+    PoseRefined,
+    ConsensusJudged,
+    FeaturesClassified,
+    CloudColored,
+    PoseScored,
+    PhaseSearched,
+    ViewRendered,
+    MinimumAssessed,
+    BranchTaken,
+    ReferencesFused,
+    ReferencesRanked,
+}
+
+/// A stage begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageStarted {
+    /// Which.
+    pub stage: Stage,
+}
+
+/// A stage is over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageEnded {
+    /// Which.
+    pub stage: Stage,
+    /// Whether it did what it was for.
+    pub succeeded: bool,
+    /// Whether its result was remembered from an earlier run.
+    pub reused: bool,
+}
+
+/// SURF features of one photo.
+#[derive(Clone, Debug)]
+pub struct FeaturesDetected {
+    /// Of which photo.
+    pub side: Side,
+    /// Keypoints and descriptors.
+    pub features: Arc<Features>,
+}
+
+/// What matching decided about each query keypoint.
+#[derive(Clone, Debug)]
+pub struct MatchesDecided {
+    /// One per query keypoint, in their order; `None` where the reference has no feature.
+    pub decisions: Arc<[Option<Match>]>,
+}
+
+impl MatchesDecided {
+    /// Number of matches that are distinct and unique.
+    pub fn candidates(&self) -> usize {
+        let is_candidate = |found: &&Match| found.verdict == MatchVerdict::Candidate;
+        self.decisions.iter().flatten().filter(is_candidate).count()
+    }
+}
+
+/// The cloud was projected into the reference photo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProjectedCloud {
+    /// Points of the scan.
+    pub points: usize,
+    /// Points that the reference camera has in view.
+    pub in_view: usize,
+}
+
+/// Depths of the unique matches.
+#[derive(Clone, Debug)]
+pub struct DepthsLifted {
+    /// One per unique match, in the order of the query keypoints.
+    pub matches: Arc<[LiftedMatch]>,
+}
+
+impl DepthsLifted {
+    /// Number of matches with a depth.
+    pub fn with_depth(&self) -> usize {
+        let matches = self.matches.iter();
+        matches.filter(|lifted| lifted.point.is_some()).count()
+    }
+}
+
+/// One trial of MLESAC.
+#[derive(Clone, Debug)]
+pub struct HypothesisTried {
+    /// Sample, likelihood, support.
+    pub trial: Trial,
+}
+
+/// The best hypothesis after refinement on its inliers.
+#[derive(Clone, Debug)]
+pub struct PoseRefined {
+    /// The query camera in the reference camera's frame.
+    pub reference_from_query: Pose,
+    /// Correspondences with a residual within the threshold, for this pose.
+    pub inliers: usize,
+    /// Correspondences in all.
+    pub correspondences: usize,
+    /// Trials that MLESAC made.
+    pub trials: usize,
+}
+
+/// Whether the consensus was accepted, and why.
+#[derive(Clone, Debug)]
+pub struct ConsensusJudged {
+    /// The test for more inliers than chance explains.
+    pub acceptance: Acceptance,
+    /// Distance of the pose from the reference \[m\].
+    pub distance_m: f64,
+    /// Whether the pose is returned.
+    pub accepted: bool,
+}
+
+/// Every query feature with the state it ended in.
+#[derive(Clone, Debug)]
+pub struct FeaturesClassified {
+    /// One per query keypoint, in their order.
+    pub states: Arc<[FeatureState]>,
+}
+
+/// The cloud took the reference photo's grey values.
+#[derive(Clone, Debug)]
+pub struct CloudColored {
+    /// The coloured points, and how many were left out and why.
+    pub cloud: Arc<ColoredCloud>,
+}
+
+/// One hypothesis of the grid search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseScored {
+    /// Part of the search.
+    pub phase: Phase,
+    /// Number of this evaluation within the estimator's run.
+    pub evaluation: u64,
+    /// Where the hypothesis is.
+    pub offset: Offset,
+    /// Cost and covered pixels.
+    pub score: Score,
+    /// Covered pixels over those covered at the reference pose.
+    pub coverage: f64,
+    /// Whether it is the best of the phase so far.
+    pub is_best: bool,
+}
+
+/// One phase of the grid search is complete.
+#[derive(Clone, Debug)]
+pub struct PhaseSearched {
+    /// The cost and coverage surfaces.
+    pub surface: Arc<ScoredLattice>,
+    /// The best offset, if any hypothesis had a cost.
+    pub best: Option<Offset>,
+}
+
+/// Why a synthetic view was rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Moment {
+    /// At the reference pose.
+    Start,
+    /// At a new best hypothesis.
+    NewBest,
+    /// At the result.
+    End,
+}
+
+/// A synthetic view and its comparison with the query.
+#[derive(Clone, Debug)]
+pub struct ViewRendered {
+    /// Why it was rendered.
+    pub moment: Moment,
+    /// The evaluation it belongs to.
+    pub evaluation: u64,
+    /// Where the camera is.
+    pub offset: Offset,
+    /// The view, its cost and what made it.
+    pub comparison: Arc<Comparison>,
+}
+
+/// How the minimum of the search compares with other poses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MinimumAssessed {
+    /// Where the minimum is.
+    pub offset: Offset,
+    /// Cost at the reference pose.
+    pub initial: Option<f64>,
+    /// Cost at the minimum.
+    pub best: f64,
+    /// Cost at the minimum with the view's pixels shuffled: what no relation at all costs.
+    pub shuffled: Option<f64>,
+    /// Cost of the second-best local minimum of the coarse positions.
+    pub runner_up: Option<f64>,
+}
+
+/// Which way the hybrid went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BranchTaken {
+    /// The method whose pose the hybrid returns.
+    pub method: Method,
+    /// Why FB's pose was kept or not.
+    pub why: String,
+}
+
+/// Several references gave a pose each, and a fusion made one of them.
+#[derive(Clone, Debug)]
+pub struct ReferencesFused {
+    /// The fusion's name.
+    pub fusion: &'static str,
+    /// What each reference alone gave, and its weight, in the order of the references.
+    pub shares: Arc<[Share]>,
+    /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
+    pub pose: Option<Pose>,
+}
+
+/// Frames were ranked by what they look like, and the first of them became references.
+#[derive(Clone, Debug)]
+pub struct ReferencesRanked {
+    /// The best frames with their scores, and what verification made of them.
+    pub ranking: Arc<ReferenceRanking>,
+    /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
+    /// read.
+    pub photos: Arc<[Option<Arc<Photo>>]>,
+}

@@ -1,0 +1,76 @@
+//! Local image features: where they are, what they look like, and which of them look alike.
+//!
+//! SURF after Bay, Ess, Tuytelaars and Van Gool, *Speeded-Up Robust Features*, CVIU 110(3), 2008.
+//! Section and equation numbers in this module are those of that paper. [`surf`] goes through it
+//! from front to back:
+//!
+//! 1. `integral` sums the image so that the sum over any box takes four look-ups (3.1),
+//! 2. `hessian` and `detector` find blobs, the maxima of the determinant of a box-filter Hessian
+//!    over position and scale (3.2 to 3.4),
+//! 3. `orientation` turns each blob to its dominant gradient (4.1), unless the camera is known to
+//!    stay upright,
+//! 4. `descriptor` summarises the gradients around it in 64 numbers (4.2).
+//!
+//! `matching` then compares the descriptors of two images: [`nearest_neighbours`] finds
+//! the two nearest of every descriptor, and [`classify`] says of each whether its best match
+//! is distinct, mutual, or neither.
+//!
+//! All of it runs on all threads of the current [`rayon`] pool and gives the same result
+//! on any number of them.
+
+mod cache;
+mod descriptor;
+mod detector;
+mod hessian;
+mod integral;
+mod matching;
+mod orientation;
+mod state;
+mod surf;
+
+use nalgebra::Point2;
+
+pub use cache::FeatureCache;
+pub use matching::{Match, MatchVerdict, Neighbours, classify, nearest_neighbours};
+pub use state::FeatureState;
+pub use surf::{SurfParams, surf};
+
+/// A blob: the place in an image that a descriptor describes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Keypoint {
+    /// Column \[px\]; the centre of the top-left pixel is (0, 0).
+    pub x: f32,
+    /// Row \[px\], growing downwards.
+    pub y: f32,
+    /// Standard deviation σ of the Gaussian whose derivatives the filters stand for \[px\]: 1.2 for
+    /// filters of size 9 (section 3.3). A Gaussian blob is found at about 0.78 times its own.
+    pub scale: f32,
+    /// Direction of the dominant gradient \[rad\], from the x axis towards the y axis, so clockwise
+    /// on the screen, in −π to π; 0 where features are upright.
+    pub angle: f32,
+    /// Determinant of the Hessian, normalised for scale, of an image with values from 0 to 255;
+    /// see [`SurfParams::threshold`].
+    pub response: f32,
+    /// Whether the trace of the Hessian is positive: true for a dark blob on a bright ground, false
+    /// for a bright one on dark.
+    pub laplacian_positive: bool,
+}
+
+impl Keypoint {
+    /// The position as a point \[px\].
+    pub fn pixel(&self) -> Point2<f64> {
+        Point2::new(f64::from(self.x), f64::from(self.y))
+    }
+}
+
+/// 4 × 4 sub-regions times Σdx, Σ|dx|, Σdy, Σ|dy|, with unit Euclidean norm (section 4.2).
+pub type Descriptor = [f32; 64];
+
+/// The features of one image, the strongest first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Features {
+    /// Where the features are.
+    pub keypoints: Vec<Keypoint>,
+    /// What they look like: `descriptors[i]` belongs to `keypoints[i]`.
+    pub descriptors: Vec<Descriptor>,
+}

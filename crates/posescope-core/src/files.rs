@@ -1,0 +1,103 @@
+//! Writing files that are whole or not there, and where cached ones go.
+
+use std::env;
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use directories::ProjectDirs;
+
+/// Writes a file under a temporary name beside it, which begins with `tmp-` and ends with the same
+/// extension, and gives it its name when it is complete: no reader sees half of it, and a full disk
+/// leaves nothing.
+///
+/// # Errors
+/// What the system says.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    write_whole_with(path, |file| file.write_all(bytes))
+}
+
+/// As [`write_whole`], for what is not in memory.
+///
+/// # Errors
+/// What the system or `write` says.
+pub fn write_whole_with(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let suffix = path
+        .extension()
+        .map(|extension| format!(".{}", extension.to_string_lossy()))
+        .unwrap_or_default();
+    let mut builder = tempfile::Builder::new();
+    builder.prefix("tmp-").suffix(&suffix);
+    // Not private to the user, as temporary files are, but what the umask says.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder)?;
+    write(file.as_file_mut())?;
+    file.persist(path).map(drop::<File>)?;
+    Ok(())
+}
+
+/// Names the cache directory; empty turns caching off.
+const CACHE_VARIABLE: &str = "POSESCOPE_CACHE";
+
+/// The folder `name` of the user's cache directory, where the environment or else the system says; `None` where caching is turned
+/// off or the user has no cache directory.
+pub fn user_cache_folder(name: &str) -> Option<PathBuf> {
+    let folder = match env::var_os(CACHE_VARIABLE) {
+        Some(folder) => PathBuf::from(folder),
+        None => ProjectDirs::from("", "", "posescope")?
+            .cache_dir()
+            .to_owned(),
+    };
+    (!folder.as_os_str().is_empty()).then(|| folder.join(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_file_is_replaced_and_nothing_else_stays_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.txt");
+        for content in ["one", "two"] {
+            write_whole(&path, content.as_bytes()).expect("writable");
+            assert_eq!(fs::read_to_string(&path).expect("just written"), content);
+        }
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
+    }
+
+    #[test]
+    fn a_file_that_cannot_get_its_name_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let taken = folder.path().join("taken");
+        fs::create_dir_all(taken.join("by a folder")).expect("writable");
+        assert!(write_whole(&taken, b"bytes").is_err());
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_what_the_umask_lets_them() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
+        write_whole(&whole, b"").expect("writable");
+        fs::write(&plain, b"").expect("writable");
+        let mode = |path| {
+            fs::metadata(path)
+                .expect("just written")
+                .permissions()
+                .mode()
+        };
+        assert_eq!(mode(&whole), mode(&plain));
+    }
+}

@@ -1,0 +1,290 @@
+//! Fusion: one pose from several references, each of which gave a candidate (paper, section 3.2).
+//!
+//! Every reference is localised against by itself first. A fusion then decides how much each of them
+//! has to say, from nothing but the number of feature matches between the query and the reference:
+//! matches that passed the ratio test and are mutually best, before any depth is looked up. The
+//! direct methods take their weights from the same matches.
+//!
+//! A new fusion is one file, its `mod` line and its entry in [`ALL`].
+
+mod average;
+mod avg;
+mod maxf;
+mod r_wavg;
+pub mod share;
+mod wavg;
+
+use std::sync::Arc;
+
+pub use average::average_pose;
+pub use share::{Fate, Share};
+
+use crate::estimator::Failure;
+use crate::event::{ReferencesFused, Stage};
+use crate::geometry::Pose;
+use crate::trace::{Cancelled, Trace};
+
+/// A fusion's place in the registry.
+#[derive(Debug)]
+pub struct Entry {
+    /// The name on the command line, in results and in tables.
+    pub name: &'static str,
+    /// One phrase.
+    pub about: &'static str,
+    /// What each reference has to say, given the number of its matches: not negative, 0 leaves it
+    /// out, any common factor does not matter. At least one is positive where there is a reference.
+    pub weigh: fn(&[usize]) -> Vec<f64>,
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+/// Every fusion, in the paper's order.
+pub const ALL: &[Entry] = &[maxf::ENTRY, avg::ENTRY, wavg::ENTRY, r_wavg::ENTRY];
+
+/// The fusion of a name.
+pub fn find(name: &str) -> Option<&'static Entry> {
+    ALL.iter().find(|entry| entry.name == name)
+}
+
+/// What one reference alone gave.
+#[derive(Clone, Debug)]
+pub struct Candidate<'a> {
+    /// The reference frame's name.
+    pub reference: &'a str,
+    /// Feature matches between the query and the reference: ratio test and uniqueness passed.
+    pub matches: usize,
+    /// `world_from_camera` of the query, or why this reference gave none.
+    pub pose: Result<&'a Pose, &'a Failure>,
+}
+
+/// Fuses what the references gave each for itself.
+///
+/// Candidates without a pose are left out and the weights of the others grow in proportion; where
+/// all those with a weight failed, so does the fusion: a reference that was left out for its few
+/// matches does not come back.
+///
+/// # Errors
+/// Only [`Cancelled`].
+pub fn fuse(
+    fusion: &Entry,
+    candidates: &[Candidate<'_>],
+    trace: &mut Trace<'_>,
+) -> Result<Result<Pose, Failure>, Cancelled> {
+    trace.stage(Stage::Fuse, |trace| {
+        let shares = shares(fusion, candidates);
+        let members: Vec<(f64, &Pose)> = shares
+            .iter()
+            .filter(|share| share.fate == Fate::Kept)
+            .filter_map(|share| Some((share.weight, share.pose.as_ref()?)))
+            .collect();
+        let pose = average_pose(&members);
+        trace.emit(|| ReferencesFused {
+            fusion: fusion.name,
+            shares: Arc::from(shares.as_slice()),
+            pose,
+        })?;
+        Ok(pose.ok_or_else(|| no_pose(&shares, candidates)))
+    })
+}
+
+fn shares(fusion: &Entry, candidates: &[Candidate<'_>]) -> Vec<Share> {
+    let matches: Vec<usize> = candidates.iter().map(|c| c.matches).collect();
+    let weights = (fusion.weigh)(&matches);
+    let fate = |candidate: &Candidate<'_>, weight: f64| match candidate.pose {
+        _ if weight <= 0.0 => Fate::Dropped,
+        Err(_) => Fate::Failed,
+        Ok(_) => Fate::Kept,
+    };
+    let kept: f64 = candidates
+        .iter()
+        .zip(&weights)
+        .filter(|(candidate, weight)| fate(candidate, **weight) == Fate::Kept)
+        .map(|(_, weight)| weight)
+        .sum();
+    candidates
+        .iter()
+        .zip(weights)
+        .map(|(candidate, weight)| {
+            let fate = fate(candidate, weight);
+            Share {
+                reference: candidate.reference.to_owned(),
+                matches: candidate.matches,
+                weight: if fate == Fate::Kept {
+                    weight / kept
+                } else {
+                    0.0
+                },
+                fate,
+                pose: candidate.pose.ok().copied(),
+            }
+        })
+        .collect()
+}
+
+/// The reason names the reference that should have been the best.
+fn no_pose(shares: &[Share], candidates: &[Candidate<'_>]) -> Failure {
+    let failed = shares.iter().filter(|share| share.fate == Fate::Failed);
+    let weighed = failed.count();
+    let best = shares
+        .iter()
+        .zip(candidates)
+        .filter(|(share, _)| share.fate == Fate::Failed)
+        // The last of equals would win; the first one is wanted.
+        .rev()
+        .max_by_key(|(share, _)| share.matches);
+    match best {
+        Some((share, candidate)) if let Err(failure) = candidate.pose => {
+            Failure::NoReferenceSucceeded {
+                weighed,
+                references: shares.len(),
+                best: share.reference.clone(),
+                failure: Box::new(failure.clone()),
+            }
+        }
+        _ => Failure::NoReference { radius_m: None },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::History;
+    use proptest::prelude::*;
+
+    fn at(x: f64) -> Pose {
+        Pose::translation(x, 0.0, 0.0)
+    }
+
+    fn failure() -> Failure {
+        Failure::TooFewMatches {
+            unique: 2,
+            keypoints: 90,
+        }
+    }
+
+    fn fused(
+        name: &str,
+        candidates: &[(usize, Result<Pose, Failure>)],
+    ) -> (Result<Pose, Failure>, ReferencesFused) {
+        let names: Vec<String> = (0..candidates.len()).map(|i| format!("r{i}")).collect();
+        let candidates: Vec<_> = candidates
+            .iter()
+            .zip(&names)
+            .map(|((matches, pose), name)| Candidate {
+                reference: name,
+                matches: *matches,
+                pose: pose.as_ref(),
+            })
+            .collect();
+        let mut history = History::default();
+        let entry = find(name).expect("a fusion");
+        let pose = fuse(entry, &candidates, &mut Trace::to(&mut history)).expect("not cancelled");
+        let told = history
+            .records()
+            .iter()
+            .find_map(|record| {
+                <ReferencesFused as crate::event::DebugEvent>::from_event(&record.event)
+            })
+            .expect("it is told")
+            .clone();
+        (pose, told)
+    }
+
+    fn x(name: &str, candidates: &[(usize, Result<Pose, Failure>)]) -> f64 {
+        fused(name, candidates).0.expect("a pose").translation.x
+    }
+
+    #[test]
+    fn each_fusion_weighs_three_references_as_the_paper_says() {
+        // Half of the most matches is 50: the last one is dropped by r-wavg.
+        let candidates = [(100, Ok(at(0.0))), (50, Ok(at(3.0))), (49, Ok(at(30.0)))];
+        assert_eq!(x("maxf", &candidates), 0.0);
+        assert!((x("avg", &candidates) - 11.0).abs() < 1e-12);
+        let weighted = (50.0 * 3.0 + 49.0 * 30.0) / 199.0;
+        assert!((x("wavg", &candidates) - weighted).abs() < 1e-12);
+        assert!((x("r-wavg", &candidates) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_failed_candidate_is_left_out_and_the_others_share_its_weight() {
+        let candidates = [(60, Err(failure())), (30, Ok(at(1.0))), (90, Ok(at(5.0)))];
+        assert!((x("wavg", &candidates) - 4.0).abs() < 1e-12);
+        let (_, told) = fused("wavg", &candidates);
+        let fates: Vec<_> = told.shares.iter().map(|s| (s.fate, s.weight)).collect();
+        let expected = [(Fate::Failed, 0.0), (Fate::Kept, 0.25), (Fate::Kept, 0.75)];
+        assert_eq!(fates, expected);
+        assert_eq!(told.shares[2].pose, Some(at(5.0)));
+    }
+
+    #[test]
+    fn what_was_dropped_does_not_come_back_when_the_others_fail() {
+        let candidates = [(60, Err(failure())), (5, Ok(at(1.0))), (60, Err(failure()))];
+        for name in ["maxf", "r-wavg"] {
+            let reason = fused(name, &candidates).0.expect_err("no pose");
+            assert_eq!(reason.code(), "R3");
+            let text = reason.to_string();
+            assert!(text.contains("r0") && text.contains("2 unique"), "{text}");
+        }
+        assert!(fused("wavg", &candidates).0.is_ok());
+        let (_, told) = fused("r-wavg", &candidates);
+        assert_eq!(told.shares[1].fate, Fate::Dropped);
+    }
+
+    #[test]
+    fn without_a_single_match_no_reference_is_better_than_another() {
+        let candidates = [(0, Ok(at(0.0))), (0, Ok(at(2.0)))];
+        for name in ["avg", "wavg", "r-wavg"] {
+            assert!((x(name, &candidates) - 1.0).abs() < 1e-12, "{name}");
+        }
+        assert_eq!(x("maxf", &candidates), 0.0);
+    }
+
+    #[test]
+    fn without_a_reference_there_is_no_pose() {
+        for entry in ALL {
+            assert_eq!(fused_nothing(entry).code(), "R1");
+        }
+    }
+
+    fn fused_nothing(entry: &Entry) -> Failure {
+        fuse(entry, &[], &mut Trace::off())
+            .expect("not cancelled")
+            .expect_err("no pose")
+    }
+
+    proptest! {
+        #[test]
+        fn every_fusion_gives_weights_that_can_be_shared_out(
+            matches in prop::collection::vec(0usize..3000, 1..8),
+        ) {
+            for entry in ALL {
+                let weights = (entry.weigh)(&matches);
+                prop_assert_eq!(weights.len(), matches.len());
+                prop_assert!(weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0));
+                prop_assert!(weights.iter().sum::<f64>() > 0.0, "{}", entry.name);
+                // More matches never mean less to say.
+                for (i, a) in matches.iter().enumerate() {
+                    for (j, b) in matches.iter().enumerate() {
+                        if a > b {
+                            prop_assert!(weights[i] >= weights[j], "{}", entry.name);
+                        }
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn a_single_reference_is_taken_as_it_is(x in -1e6..1e6f64, angle in -3.0..3.0f64) {
+            let pose = Pose::new([x, 2.0, 3.0].into(), [0.0, angle, 0.0].into());
+            for entry in ALL {
+                let candidate = Candidate { reference: "r", matches: 7, pose: Ok(&pose) };
+                let fused = fuse(entry, &[candidate], &mut Trace::off()).expect("not cancelled");
+                prop_assert_eq!(fused, Ok(pose));
+            }
+        }
+    }
+}

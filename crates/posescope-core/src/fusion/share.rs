@@ -1,0 +1,29 @@
+//! What each reference has to do with the fused pose.
+
+use crate::geometry::Pose;
+
+/// What became of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It is part of the fused pose.
+    Kept,
+    /// The fusion gives it no weight.
+    Dropped,
+    /// It had weight, but its reference gave no pose.
+    Failed,
+}
+
+/// A candidate with its share of the fused pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Share {
+    /// The reference frame's name.
+    pub reference: String,
+    /// Its feature matches.
+    pub matches: usize,
+    /// Its share of the fused pose. Those of all references add up to 1, or to 0 without a pose.
+    pub weight: f64,
+    /// Whether it is part of the pose.
+    pub fate: Fate,
+    /// The pose that this reference alone gave.
+    pub pose: Option<Pose>,
+}

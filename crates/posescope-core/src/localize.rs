@@ -1,0 +1,21 @@
+//! Localising queries: choosing references, estimating, fusing, and measuring the outcome against the
+//! ground truth, which no problem and no estimator sees.
+
+mod localizer;
+mod result;
+mod select;
+mod timing;
+mod verdict;
+mod watch;
+
+pub use localizer::{LocalizeError, Localizer, Request, words_of};
+pub use result::{
+    CostReport, Diagnosis, PoseReport, QueryResult, Reason, SCHEMA, Setting, Status, evaluate,
+};
+pub use select::{
+    ByMatches, ChoiceError, Chooser, Ranking, References, Selection, draw, frames_within,
+    tell_ranking,
+};
+pub use timing::{StageTimes, StageTimings};
+pub use verdict::Verdict;
+pub use watch::{Unwatched, Watch};

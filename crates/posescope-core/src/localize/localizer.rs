@@ -1,0 +1,455 @@
+//! Localising queries: every reference by itself, then fused where that is asked for.
+//!
+//! The one way through for a single query, for an experiment over thousands, and for whoever wants
+//! to watch either.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use super::{
+    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, tell_ranking,
+};
+use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
+use crate::event::KindSet;
+use crate::features::FeatureCache;
+use crate::fusion;
+use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::{Problem, Query};
+use crate::retrieval::ReferenceRanking;
+use crate::scene::{Scene, SceneError};
+use crate::trace::Fanout;
+use crate::trace::{Cancelled, Sink, Trace};
+
+/// Features of as many photos are kept: those of a query and of the references around it.
+const REMEMBERED_PHOTOS: usize = 32;
+
+/// Why queries could not be localised, for those who have no error of their own.
+#[derive(Debug, thiserror::Error)]
+pub enum LocalizeError {
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The watcher asked the run to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What is asked of a query: a set of references and what to make of them.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// How far the query may be from a reference \[m\].
+    pub radius_m: f64,
+    /// The references, as positions in their scene, and how they were found. Without any, the query
+    /// fails.
+    pub references: References,
+    /// The fusions to make; without any, each reference gives a result of its own.
+    pub fusions: Vec<&'static fusion::Entry>,
+    /// What the results are marked with.
+    pub setting: Option<Setting>,
+}
+
+/// Localises the queries of one scene against the references of another, or of the same.
+pub struct Localizer<'a> {
+    references: &'a dyn Scene,
+    queries: &'a dyn Scene,
+    params: &'a Params,
+    seed: u64,
+    features: Arc<FeatureCache>,
+}
+
+/// What one method made of one problem.
+struct Candidate {
+    outcome: Outcome,
+    result: QueryResult,
+    times: StageTimes,
+}
+
+/// A query with all that was found out about it.
+struct Work<'a> {
+    query: &'a Query,
+    truth: Option<Pose>,
+    problems: Vec<Problem>,
+    /// Feature matches by problem, once they are known.
+    matches: Vec<Option<usize>>,
+    /// By method, in the order of [`Method::ALL`], and problem.
+    candidates: Vec<Vec<Option<Candidate>>>,
+}
+
+impl<'a> Localizer<'a> {
+    /// For these scenes, which may be the same.
+    pub fn new(
+        references: &'a dyn Scene,
+        queries: &'a dyn Scene,
+        params: &'a Params,
+        seed: u64,
+    ) -> Self {
+        Self {
+            references,
+            queries,
+            params,
+            seed,
+            features: Arc::new(FeatureCache::new(REMEMBERED_PHOTOS)),
+        }
+    }
+
+    /// The scene of the queries.
+    pub fn queries(&self) -> &'a dyn Scene {
+        self.queries
+    }
+
+    /// The scene of the references.
+    pub fn references(&self) -> &'a dyn Scene {
+        self.references
+    }
+
+    /// Features found on the way.
+    pub fn features(&self) -> &Arc<FeatureCache> {
+        &self.features
+    }
+
+    /// Localises one query and hands out the results by method, then request, then fusion (or
+    /// reference). A problem that two requests share is solved once.
+    ///
+    /// A panic of an estimator becomes the result of the query that it met.
+    ///
+    /// # Errors
+    /// Data that cannot be read, a run that its watcher cancelled, and what `hand_out` returns.
+    pub fn localize<E: From<SceneError> + From<Cancelled>>(
+        &self,
+        index: usize,
+        query: usize,
+        requests: &[Request],
+        methods: &[Method],
+        watch: &mut dyn Watch,
+        mut hand_out: impl FnMut(QueryResult, StageTimes) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let loaded = self.queries.query(query)?;
+        let mut places: Vec<(usize, u64)> = Vec::new();
+        let mut problems = Vec::new();
+        let mut members: Vec<Vec<usize>> = Vec::new();
+        for request in requests {
+            let mut of_request = Vec::new();
+            for &reference in &request.references.frames {
+                let place = (reference, request.radius_m.to_bits());
+                let known = places.iter().position(|known| *known == place);
+                of_request.push(match known {
+                    Some(problem) => problem,
+                    None => {
+                        places.push(place);
+                        problems.push(Problem {
+                            query: Arc::clone(&loaded),
+                            reference: self.references.reference(reference)?,
+                            uncertainty_radius_m: request.radius_m,
+                            seed: self.seed,
+                        });
+                        problems.len() - 1
+                    }
+                });
+            }
+            members.push(of_request);
+        }
+        let mut work = Work {
+            query: &loaded,
+            truth: self.queries.pose(query),
+            matches: vec![None; problems.len()],
+            candidates: Method::ALL
+                .map(|_| problems.iter().map(|_| None).collect())
+                .into(),
+            problems,
+        };
+        watch.begin_query(index, &work.problems, work.truth.as_ref());
+        self.tell_rankings(requests, watch)?;
+        for &method in methods {
+            for (request, members) in requests.iter().zip(&members) {
+                let mut emit = |result: QueryResult, times: StageTimes| {
+                    hand_out(self.marked(result, request.setting), times)
+                };
+                if members.is_empty() {
+                    let failure = Failure::NoReference {
+                        radius_m: Some(request.radius_m),
+                    };
+                    let fusions = request.fusions.iter().map(|fusion| Some(fusion.name));
+                    let lines = if request.fusions.is_empty() {
+                        vec![None]
+                    } else {
+                        fusions.collect()
+                    };
+                    for fusion in lines {
+                        let result = self.without_pose(&work, method, fusion, &failure);
+                        emit(result, StageTimes::default())?;
+                    }
+                    continue;
+                }
+                for &problem in members {
+                    self.solve(&mut work, problem, method, watch)?;
+                    if let (true, Some(candidate)) =
+                        (request.fusions.is_empty(), work.candidate(problem, method))
+                    {
+                        emit(candidate.result.clone(), candidate.times.clone())?;
+                    }
+                }
+                if !request.fusions.is_empty() {
+                    self.count_matches(&mut work, members);
+                }
+                for fusion in &request.fusions {
+                    let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
+                    emit(result, times)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Each ranking once, though several requests may take their references from it.
+    fn tell_rankings(&self, requests: &[Request], watch: &mut dyn Watch) -> Result<(), Cancelled> {
+        let mut told: Vec<&Arc<ReferenceRanking>> = Vec::new();
+        for ranking in requests
+            .iter()
+            .filter_map(|r| r.references.ranking.as_ref())
+        {
+            if !told.iter().any(|known| Arc::ptr_eq(known, ranking)) {
+                watch.begin_retrieval();
+                let sink: &mut dyn Sink = &mut *watch;
+                tell_ranking(ranking, self.references, &mut Trace::to(sink))?;
+                told.push(ranking);
+            }
+        }
+        Ok(())
+    }
+
+    fn marked(&self, result: QueryResult, setting: Option<Setting>) -> QueryResult {
+        let (scene, queries) = (self.references.name(), self.queries.name());
+        QueryResult {
+            query_scene: (queries != scene).then(|| queries.to_owned()),
+            setting,
+            ..result
+        }
+    }
+
+    fn without_pose(
+        &self,
+        work: &Work<'_>,
+        method: Method,
+        fusion: Option<&str>,
+        failure: &Failure,
+    ) -> QueryResult {
+        QueryResult {
+            fusion: fusion.map(str::to_owned),
+            ..QueryResult::new(
+                self.references.name(),
+                &work.query.name,
+                method,
+                self.seed,
+                Err(failure),
+                work.truth.as_ref(),
+            )
+        }
+    }
+
+    /// Solves one problem, unless it was solved before.
+    fn solve(
+        &self,
+        work: &mut Work<'_>,
+        problem: usize,
+        method: Method,
+        watch: &mut dyn Watch,
+    ) -> Result<(), Cancelled> {
+        if work.candidate(problem, method).is_some() {
+            return Ok(());
+        }
+        watch.begin_method(problem, method);
+        let candidate = match work.hybrid_parts(problem, method) {
+            // Whoever watches wants to see the hybrid at work.
+            Some((feature, direct)) if watch.wanted() == KindSet::NONE => {
+                let runs = [Some(&feature.times), Some(&direct.times)];
+                let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
+                let times = runs.into_iter().flatten().take(used);
+                let outcome = hybrid_outcome(&feature.outcome, &direct.outcome);
+                let times = StageTimes::inside(method.name(), times);
+                self.judged(work, problem, method, outcome, times)
+            }
+            _ => self.estimate(work, problem, method, watch)?,
+        };
+        watch.end_method(&candidate.result, &candidate.times);
+        let row = Method::ALL.iter().position(|known| *known == method);
+        if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
+            *slot = Some(candidate);
+        }
+        Ok(())
+    }
+
+    fn estimate(
+        &self,
+        work: &Work<'_>,
+        problem: usize,
+        method: Method,
+        watch: &mut dyn Watch,
+    ) -> Result<Candidate, Cancelled> {
+        let mut timings = StageTimings::default();
+        let attention = watch.attention();
+        let estimated = catch_unwind(AssertUnwindSafe(|| {
+            let mut estimator = (estimator::entry(method).new)(self.params);
+            estimator.remember(&self.features);
+            let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
+            let mut fanout = Fanout::new(sinks);
+            let mut trace = match &attention {
+                Some(flag) => Trace::watched(&mut fanout, flag),
+                None => Trace::to(&mut fanout),
+            };
+            estimator.estimate(&work.problems[problem], &mut trace)
+        }));
+        let outcome = match estimated {
+            Ok(outcome) => outcome?,
+            Err(panic) => failed(Failure::Internal {
+                message: words_of(panic.as_ref()),
+            }),
+        };
+        Ok(self.judged(work, problem, method, outcome, timings.into_times()))
+    }
+
+    fn judged(
+        &self,
+        work: &Work<'_>,
+        problem: usize,
+        method: Method,
+        outcome: Outcome,
+        times: StageTimes,
+    ) -> Candidate {
+        let result = evaluate(
+            self.references.name(),
+            &work.problems[problem],
+            method,
+            self.params,
+            &outcome,
+            work.truth.as_ref(),
+        );
+        Candidate {
+            outcome,
+            result,
+            times,
+        }
+    }
+
+    /// FB counts them anyway; for the direct methods the same features are matched.
+    fn count_matches(&self, work: &mut Work<'_>, members: &[usize]) {
+        for &problem in members {
+            if work.matches[problem].is_some() {
+                continue;
+            }
+            let counted = Method::ALL.iter().find_map(|&method| {
+                let candidate = work.candidate(problem, method)?;
+                candidate.outcome.counts
+            });
+            work.matches[problem] = Some(match counted {
+                Some(counts) => counts.unique,
+                None => {
+                    let Problem {
+                        query, reference, ..
+                    } = &work.problems[problem];
+                    let surf = &self.params.surf;
+                    let query = self.features.surf(&query.photo.gray, surf);
+                    let reference = self.features.surf(&reference.photo.gray, surf);
+                    count_matches(&query, &reference, &self.params.fb)
+                }
+            });
+        }
+    }
+
+    fn fuse(
+        &self,
+        work: &Work<'_>,
+        members: &[usize],
+        method: Method,
+        fusion: &fusion::Entry,
+        watch: &mut dyn Watch,
+    ) -> Result<(QueryResult, StageTimes), Cancelled> {
+        let solved: Vec<(&Problem, usize, &Candidate)> = members
+            .iter()
+            .filter_map(|&problem| {
+                let matches = work.matches[problem].unwrap_or_default();
+                let candidate = work.candidate(problem, method)?;
+                Some((&work.problems[problem], matches, candidate))
+            })
+            .collect();
+        let candidates: Vec<_> = solved
+            .iter()
+            .map(|(problem, matches, candidate)| fusion::Candidate {
+                reference: &problem.reference.name,
+                matches: *matches,
+                pose: candidate.outcome.pose.as_ref(),
+            })
+            .collect();
+        watch.begin_fusion(method);
+        let sink: &mut dyn Sink = watch;
+        let pose = fusion::fuse(fusion, &candidates, &mut Trace::to(sink))?;
+        let truth = work.truth.as_ref();
+        // Where one would start from with a single reference: the one with the most matches.
+        let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
+        let result = QueryResult {
+            references: solved
+                .iter()
+                .map(|(problem, ..)| problem.reference.name.clone())
+                .collect(),
+            fusion: Some(fusion.name.to_owned()),
+            initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
+                PoseError::between(truth, &problem.reference.world_from_camera)
+            }),
+            per_reference: Some(
+                solved
+                    .iter()
+                    .map(|(.., candidate)| candidate.result.nested())
+                    .collect(),
+            ),
+            ..QueryResult::new(
+                self.references.name(),
+                &work.query.name,
+                method,
+                self.seed,
+                pose.as_ref(),
+                truth,
+            )
+        };
+        watch.end_fusion(&result);
+        let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
+        Ok((result, times))
+    }
+}
+
+impl Work<'_> {
+    fn candidate(&self, problem: usize, method: Method) -> Option<&Candidate> {
+        let row = Method::ALL.iter().position(|known| *known == method)?;
+        self.candidates.get(row)?.get(problem)?.as_ref()
+    }
+
+    /// FB's and MI's candidates, where a hybrid can be made of them.
+    fn hybrid_parts(&self, problem: usize, method: Method) -> Option<(&Candidate, &Candidate)> {
+        if method != Method::Hybrid {
+            return None;
+        }
+        let feature = self.candidate(problem, Method::Feature)?;
+        let direct = self.candidate(problem, Method::MutualInformation)?;
+        let panicked =
+            |candidate: &Candidate| matches!(candidate.outcome.pose, Err(Failure::Internal { .. }));
+        (!panicked(feature) && !panicked(direct)).then_some((feature, direct))
+    }
+}
+
+fn failed(failure: Failure) -> Outcome {
+    Outcome {
+        pose: Err(failure),
+        counts: None,
+        cost: None,
+    }
+}
+
+/// What a panic said, on one line.
+pub fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
+    let words = panic
+        .downcast_ref::<String>()
+        .map(String::as_str)
+        .or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("a panic without a message");
+    words.replace('\n', " ")
+}

@@ -1,0 +1,250 @@
+//! One query, one method: the object of `run --json` and of a run folder.
+
+use nalgebra::Matrix3x4;
+use serde::{Deserialize, Serialize};
+
+use crate::estimator::{self, CostSummary, Failure, FeatureCounts, Outcome};
+use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::Problem;
+
+/// The version of the result's form.
+pub const SCHEMA: &str = "posescope.result/1";
+
+/// What one method made of one query. It holds no clock, so that equal runs give equal bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct QueryResult {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// The name of the references' scene.
+    pub scene: String,
+    /// The name of the query's scene, where it is another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub query_scene: Option<String>,
+    /// The query frame's name.
+    pub query: String,
+    /// The reference frames' names.
+    pub references: Vec<String>,
+    /// Short name of the method.
+    pub method: String,
+    /// Short name of the fusion, if references were fused.
+    pub fusion: Option<String>,
+    /// The seed of every random choice.
+    pub seed: u64,
+    /// What an experiment varies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<Setting>,
+    /// Whether there is a pose.
+    pub status: Status,
+    /// Why there is none.
+    pub reason: Option<Reason>,
+    /// The estimated pose.
+    pub pose: Option<PoseReport>,
+    /// Its error, where the truth is known.
+    pub error: Option<PoseError>,
+    /// The error of the reference pose, where the truth is known.
+    pub initial_error: Option<PoseError>,
+    /// Where the features went, if features were used.
+    pub counts: Option<FeatureCounts>,
+    /// What the cost was like, if a cost was minimised.
+    pub cost: Option<CostReport>,
+    /// What the run says about its own failure.
+    pub diagnosis: Vec<Diagnosis>,
+    /// What each reference alone gave, where several were fused; they have no such list.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub per_reference: Option<Vec<QueryResult>>,
+}
+
+/// What an experiment varies from one result of a query to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// The uncertainty radius \[m\].
+    pub radius_m: f64,
+    /// References asked for; there may be fewer within the radius.
+    pub references: usize,
+}
+
+/// Whether a query was localised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// There is a pose.
+    Ok,
+    /// There is a reason.
+    Failed,
+}
+
+/// A reason with its code.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reason {
+    /// The code, such as `R3`.
+    pub code: String,
+    /// One sentence with the numbers.
+    pub text: String,
+}
+
+/// A finding about why a pose is wrong or missing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// The code, such as `D2`.
+    pub code: String,
+    /// One sentence.
+    pub text: String,
+    /// The numbers behind it.
+    pub evidence: serde_json::Value,
+}
+
+/// A pose in the forms that people paste elsewhere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseReport {
+    /// `[R|t]`, row by row.
+    pub world_from_camera: [[f64; 4]; 3],
+    /// The camera centre \[m\].
+    pub position_m: [f64; 3],
+    /// The rotation, scalar last and not negative.
+    pub quaternion_xyzw: [f64; 4],
+}
+
+impl From<&Pose> for PoseReport {
+    fn from(pose: &Pose) -> Self {
+        let matrix = matrix_from_pose(pose);
+        let t = pose.translation.vector;
+        let q = pose.rotation.coords;
+        let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+        Self {
+            world_from_camera: std::array::from_fn(|row| {
+                std::array::from_fn(|column| matrix[(row, column)])
+            }),
+            position_m: [t.x, t.y, t.z],
+            quaternion_xyzw: [q.x * sign, q.y * sign, q.z * sign, q.w * sign],
+        }
+    }
+}
+
+impl PoseReport {
+    /// The pose; `None` where the numbers are none.
+    pub fn to_pose(&self) -> Option<Pose> {
+        let rows = &self.world_from_camera;
+        pose_from_matrix(&Matrix3x4::from_fn(|row, column| rows[row][column])).ok()
+    }
+}
+
+/// The cost of a direct method at the poses that matter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CostReport {
+    /// At the reference pose.
+    pub initial: Option<f64>,
+    /// At the estimate.
+    pub best: f64,
+    /// At the true pose, where it is known.
+    pub truth: Option<f64>,
+    /// At the estimate with the view's pixels shuffled.
+    pub shuffled: Option<f64>,
+    /// At the second-best local minimum.
+    pub runner_up: Option<f64>,
+    /// Share of the image that is covered at the estimate.
+    pub coverage_best: f64,
+    /// Share of the image that is covered at the reference pose.
+    pub coverage_reference: f64,
+    /// Hypotheses that were scored.
+    pub evaluations: u64,
+}
+
+impl CostReport {
+    fn new(summary: &CostSummary, truth: Option<f64>) -> Self {
+        Self {
+            initial: summary.initial,
+            best: summary.best,
+            truth,
+            shuffled: summary.shuffled,
+            runner_up: summary.runner_up,
+            coverage_best: summary.coverage_best,
+            coverage_reference: summary.coverage_reference,
+            evaluations: summary.evaluations,
+        }
+    }
+}
+
+/// Measures an outcome against the true pose, where it is known.
+pub fn evaluate(
+    scene: &str,
+    problem: &Problem,
+    method: Method,
+    params: &Params,
+    outcome: &Outcome,
+    truth: Option<&Pose>,
+) -> QueryResult {
+    let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth| {
+        let estimator = (estimator::entry(method).new)(params);
+        estimator.score_at(problem, truth)?.cost
+    });
+    QueryResult {
+        references: vec![problem.reference.name.clone()],
+        initial_error: truth
+            .map(|truth| PoseError::between(truth, &problem.reference.world_from_camera)),
+        counts: outcome.counts,
+        cost: outcome
+            .cost
+            .as_ref()
+            .map(|summary| CostReport::new(summary, cost_at_truth)),
+        ..QueryResult::new(
+            scene,
+            &problem.query.name,
+            method,
+            problem.seed,
+            outcome.pose.as_ref(),
+            truth,
+        )
+    }
+}
+
+impl QueryResult {
+    /// What follows from the pose alone; without references, counts and costs.
+    pub fn new(
+        scene: &str,
+        query: &str,
+        method: Method,
+        seed: u64,
+        pose: Result<&Pose, &Failure>,
+        truth: Option<&Pose>,
+    ) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            scene: scene.to_owned(),
+            query_scene: None,
+            query: query.to_owned(),
+            references: Vec::new(),
+            method: method.name().to_owned(),
+            fusion: None,
+            seed,
+            setting: None,
+            status: if pose.is_ok() {
+                Status::Ok
+            } else {
+                Status::Failed
+            },
+            reason: pose.err().map(|failure| Reason {
+                code: failure.code().to_owned(),
+                text: failure.to_string(),
+            }),
+            pose: pose.ok().map(PoseReport::from),
+            error: truth
+                .zip(pose.ok())
+                .map(|(truth, pose)| PoseError::between(truth, pose)),
+            initial_error: None,
+            counts: None,
+            cost: None,
+            diagnosis: Vec::new(),
+            per_reference: Some(Vec::new()),
+        }
+    }
+
+    /// The same, as it stands in the list of another result.
+    pub fn nested(&self) -> Self {
+        Self {
+            per_reference: None,
+            ..self.clone()
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! Choosing references by where they are, or by what they look like.
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_pcg::Pcg64;
+
+use super::Localizer;
+use crate::estimator::count_matches;
+use crate::event::{ReferencesRanked, Stage};
+use crate::features::FeatureCache;
+use crate::geometry::Pose;
+use crate::params::Params;
+use crate::problem::Query;
+use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
+use crate::scene::{Scene, SceneError};
+use crate::trace::{Cancelled, Trace};
+
+/// How references are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// K frames within the radius, drawn by the seed.
+    Random(usize),
+    /// The K nearest frames within the radius.
+    Nearest(usize),
+    /// The K frames within the radius that share the most feature matches with the query: what a
+    /// perfect index of the features could find.
+    Matched(usize),
+    /// The K frames that retrieval ranks first.
+    Retrieved(usize),
+}
+
+impl Selection {
+    const NAMES: [&'static str; 4] = ["random", "nearest", "maxf", "retrieve"];
+
+    fn parts(self) -> (&'static str, usize) {
+        match self {
+            Self::Random(count) => (Self::NAMES[0], count),
+            Self::Nearest(count) => (Self::NAMES[1], count),
+            Self::Matched(count) => (Self::NAMES[2], count),
+            Self::Retrieved(count) => (Self::NAMES[3], count),
+        }
+    }
+
+    /// K.
+    pub fn count(self) -> usize {
+        self.parts().1
+    }
+
+    /// The same way of choosing, with another K.
+    pub fn with_count(self, count: usize) -> Self {
+        match self {
+            Self::Random(_) => Self::Random(count),
+            Self::Nearest(_) => Self::Nearest(count),
+            Self::Matched(_) => Self::Matched(count),
+            Self::Retrieved(_) => Self::Retrieved(count),
+        }
+    }
+}
+
+impl fmt::Display for Selection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, count) = self.parts();
+        write!(f, "{name}:{count}")
+    }
+}
+
+impl FromStr for Selection {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected =
+            || "random:K, nearest:K, maxf:K or retrieve:K expected, with K from 1".to_owned();
+        let (how, count) = text.split_once(':').ok_or_else(expected)?;
+        let count: usize = count.parse().map_err(|_| expected())?;
+        if count == 0 {
+            return Err(expected());
+        }
+        match how {
+            "random" => Ok(Self::Random(count)),
+            "nearest" => Ok(Self::Nearest(count)),
+            "maxf" => Ok(Self::Matched(count)),
+            "retrieve" => Ok(Self::Retrieved(count)),
+            _ => Err(expected()),
+        }
+    }
+}
+
+/// Something that ranks reference frames for a query by what they look like: an index to ask.
+pub trait Ranking: Send + Sync {
+    /// What its scores are.
+    fn criterion(&self) -> Criterion;
+
+    /// The best `count` of the candidates, the best first, all of them as positions in the
+    /// references' scene.
+    ///
+    /// # Errors
+    /// When a frame or the index cannot be read.
+    fn rank(
+        &self,
+        query: &Query,
+        candidates: &[usize],
+        count: usize,
+    ) -> Result<Vec<Ranked>, SceneError>;
+}
+
+/// The references of a query.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct References {
+    /// Their positions in their scene.
+    pub frames: Vec<usize>,
+    /// How they were found, where something ranked them.
+    pub ranking: Option<Arc<ReferenceRanking>>,
+}
+
+impl From<Vec<usize>> for References {
+    fn from(frames: Vec<usize>) -> Self {
+        Self {
+            frames,
+            ranking: None,
+        }
+    }
+}
+
+/// Tells whoever watches how the references of a query were ranked.
+///
+/// # Errors
+/// Only [`Cancelled`]. A photo that cannot be read is not shown: watching never changes the answer.
+pub fn tell_ranking(
+    ranking: &Arc<ReferenceRanking>,
+    references: &dyn Scene,
+    trace: &mut Trace<'_>,
+) -> Result<(), Cancelled> {
+    let photo = |reference: &RankedReference| {
+        let read = references.photo(reference.ranked.frame);
+        read.inspect_err(|error| log::warn!("{error}"))
+            .ok()
+            .map(Arc::new)
+    };
+    trace.stage(Stage::Retrieve, |trace| {
+        trace.emit(|| ReferencesRanked {
+            ranking: Arc::clone(ranking),
+            photos: ranking.pictured().iter().map(photo).collect(),
+        })
+    })
+}
+
+/// Frames with pose and cloud within `radius_m` of a place, except those left out, the nearest
+/// first; of equally near ones, the earlier.
+pub fn frames_within(
+    scene: &dyn Scene,
+    place: &Pose,
+    radius_m: f64,
+    left_out: &dyn Fn(usize) -> bool,
+) -> Vec<usize> {
+    let mut within: Vec<(f64, usize)> = (0..scene.frames().len())
+        .filter(|&frame| !left_out(frame))
+        .filter_map(|frame| {
+            let offset = scene.pose(frame)?.translation.vector - place.translation.vector;
+            let distance = offset.norm();
+            (distance <= radius_m && scene.has_cloud(frame)).then_some((distance, frame))
+        })
+        .collect();
+    within.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    within.into_iter().map(|(_, frame)| frame).collect()
+}
+
+/// `count` of the candidates, drawn for a query: the draw depends on the seed and the query's name,
+/// not on its place among the queries.
+pub fn draw(mut candidates: Vec<usize>, count: usize, query: &str, seed: u64) -> Vec<usize> {
+    candidates.sort_unstable();
+    let text = format!("{seed}/{query}/references");
+    let seed = xxhash_rust::xxh3::xxh3_64(text.as_bytes());
+    candidates.shuffle(&mut Pcg64::seed_from_u64(seed));
+    candidates.truncate(count);
+    candidates
+}
+
+/// Why no references can be chosen.
+#[derive(Debug, thiserror::Error)]
+pub enum ChoiceError {
+    /// References are sought around the query, whose position nobody knows.
+    #[error("the position of query {query} is not known; name a frame with --reference")]
+    UnknownPosition {
+        /// The query frame's name.
+        query: String,
+    },
+    /// There is nothing that could rank frames.
+    #[error("retrieve:K needs an index of the references, and there is none")]
+    NoIndex,
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+/// Chooses references for queries.
+pub struct Chooser<'a> {
+    /// Whose features are compared, and where they are kept.
+    pub localizer: &'a Localizer<'a>,
+    /// Parameters of features and matching.
+    pub params: &'a Params,
+    /// How.
+    pub selection: Selection,
+    /// How far from the query's known position a reference may be \[m\].
+    pub radius_m: f64,
+    /// Seed of the draw.
+    pub seed: u64,
+    /// What [`Selection::Retrieved`] asks.
+    pub index: Option<&'a dyn Ranking>,
+}
+
+impl Chooser<'_> {
+    /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
+    /// that it must not be one; the query itself never is.
+    ///
+    /// # Errors
+    /// [`ChoiceError`].
+    pub fn choose(
+        &self,
+        query: usize,
+        left_out: &dyn Fn(usize) -> bool,
+    ) -> Result<References, ChoiceError> {
+        let (references, queries) = (self.localizer.references(), self.localizer.queries());
+        let name = &queries.frames()[query];
+        let place = queries.pose(query);
+        let is_same_scene = references.name() == queries.name();
+        let excluded = |frame| is_same_scene && frame == query || left_out(frame);
+        let mut within = match (place, self.selection) {
+            (Some(place), _) => frames_within(references, &place, self.radius_m, &excluded),
+            // What a place looks like is known even where nobody knows where it is.
+            (None, Selection::Retrieved(_)) => (0..references.frames().len())
+                .filter(|&frame| !excluded(frame) && references.has_cloud(frame))
+                .filter(|&frame| references.pose(frame).is_some())
+                .collect(),
+            (None, _) => {
+                return Err(ChoiceError::UnknownPosition {
+                    query: name.clone(),
+                });
+            }
+        };
+        let count = self.selection.count();
+        match self.selection {
+            Selection::Random(_) => Ok(draw(within, count, name, self.seed).into()),
+            Selection::Nearest(_) => {
+                within.truncate(count);
+                Ok(within.into())
+            }
+            Selection::Matched(_) => {
+                let by_matches = ByMatches {
+                    scene: references,
+                    params: self.params,
+                    features: self.localizer.features(),
+                };
+                self.ranked(query, &within, &by_matches)
+            }
+            Selection::Retrieved(_) => {
+                self.ranked(query, &within, self.index.ok_or(ChoiceError::NoIndex)?)
+            }
+        }
+    }
+
+    fn ranked(
+        &self,
+        query: usize,
+        candidates: &[usize],
+        by: &dyn Ranking,
+    ) -> Result<References, ChoiceError> {
+        let (references, queries) = (self.localizer.references(), self.localizer.queries());
+        let count = self.selection.count();
+        let depth = ReferenceRanking::depth(count);
+        let frames: Vec<RankedReference> = by
+            .rank(&*queries.query(query)?, candidates, depth)?
+            .into_iter()
+            .map(|ranked| RankedReference {
+                name: references.frames()[ranked.frame].clone(),
+                world_from_camera: references.pose(ranked.frame),
+                ranked,
+            })
+            .collect();
+        let chosen = frames.iter().take(count);
+        Ok(References {
+            frames: chosen.map(|reference| reference.ranked.frame).collect(),
+            ranking: Some(Arc::new(ReferenceRanking {
+                criterion: by.criterion(),
+                candidates: candidates.len(),
+                chosen: count.min(frames.len()),
+                frames,
+            })),
+        })
+    }
+}
+
+/// Ranks by exhaustive matching of features.
+pub struct ByMatches<'a> {
+    /// The references' scene.
+    pub scene: &'a dyn Scene,
+    /// Parameters of features and matching.
+    pub params: &'a Params,
+    /// Where features are kept.
+    pub features: &'a FeatureCache,
+}
+
+impl Ranking for ByMatches<'_> {
+    fn criterion(&self) -> Criterion {
+        Criterion::Matches
+    }
+
+    fn rank(
+        &self,
+        query: &Query,
+        candidates: &[usize],
+        count: usize,
+    ) -> Result<Vec<Ranked>, SceneError> {
+        let of_query = self.features.surf(&query.photo.gray, &self.params.surf);
+        let mut ranked = Vec::new();
+        for &candidate in candidates {
+            let photo = self.scene.photo(candidate)?;
+            let features = self.features.surf(&photo.gray, &self.params.surf);
+            ranked.push((
+                count_matches(&of_query, &features, &self.params.fb),
+                candidate,
+            ));
+        }
+        ranked.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        ranked.truncate(count);
+        let ranked = ranked.into_iter().map(|(matches, frame)| Ranked {
+            frame,
+            score: matches as f32,
+            geometry: Geometry::Unchecked,
+        });
+        Ok(ranked.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn selections_are_read_and_written_and_nonsense_is_refused() {
+        for text in ["random:3", "nearest:1", "maxf:5", "retrieve:20"] {
+            let selection: Selection = text.parse().expect("a selection");
+            assert_eq!(selection.to_string(), text);
+        }
+        for wrong in ["nearest", "nearest:0", "nearest:-1", "best:2", ""] {
+            assert!(wrong.parse::<Selection>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_draw_follows_from_seed_and_query_and_not_from_the_order_of_the_candidates() {
+        let all: Vec<usize> = (0..40).collect();
+        let drawn = draw(all.clone(), 5, "000070", 0);
+        assert_eq!(
+            drawn,
+            draw(all.iter().rev().copied().collect(), 5, "000070", 0)
+        );
+        assert_eq!(draw(all.clone(), 2, "000070", 0), drawn[..2]);
+        assert_ne!(drawn, draw(all.clone(), 5, "000071", 0));
+        assert_ne!(drawn, draw(all, 5, "000070", 1));
+    }
+}

@@ -1,0 +1,311 @@
+//! The contract between an estimator and those who watch it.
+//!
+//! An estimator is a straight-line function that tells what it does:
+//!
+//! ```
+//! use posescope_core::event::{Stage, ProjectedCloud};
+//! use posescope_core::trace::{Cancelled, Trace};
+//!
+//! fn estimate(trace: &mut Trace<'_>) -> Result<usize, Cancelled> {
+//!     trace.stage(Stage::DepthLift, |trace| {
+//!         let in_view = 3;
+//!         trace.emit(|| ProjectedCloud { points: 5, in_view })?;
+//!         Ok(in_view)
+//!     })
+//! }
+//! assert_eq!(estimate(&mut Trace::off()), Ok(3));
+//! ```
+//!
+//! The closure runs only where somebody wants that kind of event, so that building an image inside
+//! costs nothing in a run that nobody watches. A sink may block (the watcher paused) or answer
+//! [`Cancelled`], which `?` carries out of the estimator. Listening never changes the answer.
+
+mod fanout;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+pub use fanout::Fanout;
+
+use crate::event::{DebugEvent, Event, KindSet, Stage, StageEnded, StageStarted};
+
+/// The watcher asked the run to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the run was cancelled")]
+pub struct Cancelled;
+
+/// One event with its place in the run.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// Position among the events that were delivered, from 0.
+    pub index: u64,
+    /// How many stages are open around the event; a stage's own start and end count it.
+    pub depth: usize,
+    /// What happened.
+    pub event: Event,
+}
+
+/// Somebody who watches a run.
+pub trait Sink {
+    /// The kinds of event this sink wants now. Stage events come in any case.
+    ///
+    /// Asked at the start, and again whenever the run attends to its watcher.
+    fn wanted(&self) -> KindSet {
+        KindSet::ALL
+    }
+
+    /// Takes one event. May block.
+    ///
+    /// # Errors
+    /// [`Cancelled`] ends the run.
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled>;
+
+    /// Called when the run notices that its attention flag is up.
+    ///
+    /// # Errors
+    /// [`Cancelled`] ends the run.
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Ok(())
+    }
+}
+
+/// The narrator's end: what an estimator holds.
+pub struct Trace<'a> {
+    watcher: Option<Watcher<'a>>,
+}
+
+struct Watcher<'a> {
+    sink: &'a mut dyn Sink,
+    attention: Option<&'a AtomicBool>,
+    wanted: KindSet,
+    delivered: u64,
+    depth: usize,
+    /// Whether the stage that is open and innermost used a remembered result.
+    reused: bool,
+}
+
+impl<'a> Trace<'a> {
+    /// Nobody watches: no sink, no thread, no allocation.
+    pub const fn off() -> Self {
+        Self { watcher: None }
+    }
+
+    /// Every wanted event goes to `sink`, on the caller's thread.
+    pub fn to(sink: &'a mut dyn Sink) -> Self {
+        Self::new(sink, None)
+    }
+
+    /// As [`Self::to`]; whenever `attention` is raised, the sink's [`Sink::attend`] is called at the
+    /// next event or checkpoint, wanted or not, and the flag is lowered.
+    pub fn watched(sink: &'a mut dyn Sink, attention: &'a AtomicBool) -> Self {
+        Self::new(sink, Some(attention))
+    }
+
+    fn new(sink: &'a mut dyn Sink, attention: Option<&'a AtomicBool>) -> Self {
+        let wanted = sink.wanted();
+        Self {
+            watcher: Some(Watcher {
+                sink,
+                attention,
+                wanted,
+                delivered: 0,
+                depth: 0,
+                reused: false,
+            }),
+        }
+    }
+
+    /// Tells one event, if anybody wants its kind.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watcher asked the run to stop.
+    #[inline]
+    pub fn emit<E: DebugEvent>(&mut self, make: impl FnOnce() -> E) -> Result<(), Cancelled> {
+        let Some(watcher) = &mut self.watcher else {
+            return Ok(());
+        };
+        watcher.attend_if_asked()?;
+        if watcher.wanted.contains(E::KIND) {
+            watcher.deliver(make().into())?;
+        }
+        Ok(())
+    }
+
+    /// For long loops that tell nothing: lets the watcher pause or stop the run.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watcher asked the run to stop.
+    #[inline]
+    pub fn checkpoint(&mut self) -> Result<(), Cancelled> {
+        match &mut self.watcher {
+            Some(watcher) => watcher.attend_if_asked(),
+            None => Ok(()),
+        }
+    }
+
+    /// Says where the stage's result comes from: whether it was remembered from an earlier run.
+    pub fn note_reuse(&mut self, reused: bool) {
+        if let Some(watcher) = &mut self.watcher {
+            watcher.reused = reused;
+        }
+    }
+
+    /// Runs `body` as a named part of the estimator, which a watcher can step over and out of.
+    ///
+    /// # Errors
+    /// Those of `body`, and [`Cancelled`].
+    pub fn stage<T, X: From<Cancelled>>(
+        &mut self,
+        stage: Stage,
+        body: impl FnOnce(&mut Self) -> Result<T, X>,
+    ) -> Result<T, X> {
+        if let Some(watcher) = &mut self.watcher {
+            watcher.attend_if_asked()?;
+            watcher.depth += 1;
+            watcher.reused = false;
+            watcher.deliver(StageStarted { stage }.into())?;
+        }
+        let outcome = body(self);
+        if let Some(watcher) = &mut self.watcher {
+            let ended = StageEnded {
+                stage,
+                succeeded: outcome.is_ok(),
+                reused: std::mem::take(&mut watcher.reused),
+            };
+            let told = watcher.deliver(ended.into());
+            watcher.depth -= 1;
+            if outcome.is_ok() {
+                told?;
+            }
+        }
+        outcome
+    }
+}
+
+impl Watcher<'_> {
+    #[inline]
+    fn attend_if_asked(&mut self) -> Result<(), Cancelled> {
+        match self.attention {
+            Some(flag) if flag.load(Ordering::Relaxed) => self.attend(flag),
+            _ => Ok(()),
+        }
+    }
+
+    #[cold]
+    fn attend(&mut self, flag: &AtomicBool) -> Result<(), Cancelled> {
+        flag.store(false, Ordering::Release);
+        self.sink.attend()?;
+        self.wanted = self.sink.wanted();
+        Ok(())
+    }
+
+    fn deliver(&mut self, event: Event) -> Result<(), Cancelled> {
+        let record = Record {
+            index: self.delivered,
+            depth: self.depth,
+            event,
+        };
+        self.delivered += 1;
+        self.sink.accept(&record)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::{Kind, ProjectedCloud};
+
+    /// Keeps what it gets; stops the run at event number `stop_at`.
+    struct Notebook {
+        wanted: KindSet,
+        records: Vec<Record>,
+        stop_at: Option<u64>,
+        attended: usize,
+    }
+
+    impl Notebook {
+        fn wanting(wanted: KindSet) -> Self {
+            Self {
+                wanted,
+                records: Vec::new(),
+                stop_at: None,
+                attended: 0,
+            }
+        }
+    }
+
+    impl Sink for Notebook {
+        fn wanted(&self) -> KindSet {
+            self.wanted
+        }
+        fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+            self.records.push(record.clone());
+            if self.stop_at == Some(record.index) {
+                Err(Cancelled)
+            } else {
+                Ok(())
+            }
+        }
+        fn attend(&mut self) -> Result<(), Cancelled> {
+            self.attended += 1;
+            Ok(())
+        }
+    }
+
+    fn two_stages(trace: &mut Trace<'_>) -> Result<(), Cancelled> {
+        trace.stage(Stage::DepthLift, |trace| {
+            trace.emit(|| ProjectedCloud {
+                points: 2,
+                in_view: 1,
+            })?;
+            trace.stage(Stage::Consensus, |_| Ok(()))
+        })
+    }
+
+    #[test]
+    fn an_unwanted_event_is_not_even_built_but_stages_are_told() {
+        let mut notebook = Notebook::wanting(KindSet::NONE);
+        let mut trace = Trace::to(&mut notebook);
+        trace
+            .emit(|| -> ProjectedCloud { panic!("nobody wants this") })
+            .expect("not cancelled");
+        two_stages(&mut trace).expect("not cancelled");
+        let depths: Vec<_> = notebook.records.iter().map(|r| r.depth).collect();
+        assert_eq!(depths, [1, 2, 2, 1]);
+    }
+
+    #[test]
+    fn a_cancelled_run_still_closes_its_stages() {
+        let mut notebook = Notebook::wanting(KindSet::ALL);
+        notebook.stop_at = Some(1);
+        let outcome = two_stages(&mut Trace::to(&mut notebook));
+        assert_eq!(outcome, Err(Cancelled));
+        let last = notebook.records.last().expect("some were told");
+        assert!(matches!(
+            last.event,
+            Event::StageEnded(StageEnded {
+                stage: Stage::DepthLift,
+                succeeded: false,
+                ..
+            })
+        ));
+    }
+
+    #[test]
+    fn raised_attention_reaches_the_sink_once_even_without_a_wanted_event() {
+        let mut notebook = Notebook::wanting(KindSet::NONE);
+        let attention = AtomicBool::new(true);
+        let mut trace = Trace::watched(&mut notebook, &attention);
+        for _ in 0..3 {
+            trace.checkpoint().expect("not cancelled");
+        }
+        assert_eq!(notebook.attended, 1);
+    }
+
+    #[test]
+    fn records_are_numbered_without_gaps() {
+        let mut notebook = Notebook::wanting(KindSet::of(&[Kind::ProjectedCloud]));
+        two_stages(&mut Trace::to(&mut notebook)).expect("not cancelled");
+        let indices: Vec<_> = notebook.records.iter().map(|r| r.index).collect();
+        assert_eq!(indices, [0, 1, 2, 3, 4]);
+    }
+}

@@ -1,0 +1,29 @@
+//! Measures of many results: tables, plots, gates, comparisons, exports.
+
+mod diff;
+#[cfg(feature = "cli")]
+mod export;
+mod gate;
+#[cfg(feature = "cli")]
+mod junit;
+mod metrics;
+mod paper;
+#[cfg(feature = "cli")]
+mod plots;
+#[cfg(feature = "cli")]
+mod report;
+#[cfg(feature = "cli")]
+mod table;
+#[cfg(feature = "cli")]
+mod tables;
+
+pub use diff::{Change, Comparison, Difference, Tolerance};
+#[cfg(feature = "cli")]
+pub use export::{Choice, Export, ExportError, ExportedFile, Format, export};
+pub use gate::{Gate, Passage};
+pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
+pub use paper::{Sought, figure as paper_figure};
+#[cfg(feature = "cli")]
+pub use report::{Report, SUMMARY_SCHEMA, read_rows, write_report};
+#[cfg(feature = "cli")]
+pub use table::Table;

@@ -1,0 +1,197 @@
+//! Two runs side by side, query by query.
+
+use std::collections::BTreeMap;
+
+use super::metrics::Row;
+use crate::localize::Verdict;
+
+/// Changes of a pose's error that are not worth mentioning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Of the translation error \[m\].
+    pub metres: f64,
+    /// Of the geodesic rotation error \[°\].
+    pub degrees: f64,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self {
+            metres: 0.1,
+            degrees: 0.5,
+        }
+    }
+}
+
+/// What happened to a query from one run to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Change {
+    /// It succeeded and does no longer: a regression.
+    Broken,
+    /// It failed and does no longer.
+    Fixed,
+    /// It succeeds in both, and its error grew by more than the tolerance.
+    Worse,
+    /// It succeeds in both, and its error shrank by more than the tolerance.
+    Better,
+}
+
+impl Change {
+    /// In one word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Broken => "broken",
+            Self::Fixed => "fixed",
+            Self::Worse => "worse",
+            Self::Better => "better",
+        }
+    }
+}
+
+/// A query and method of which the runs differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// What happened.
+    pub change: Change,
+    /// The result in the first run.
+    pub before: Row,
+    /// The result in the second run.
+    pub after: Row,
+    /// What became of the query in the first and in the second run, each by its failure radius.
+    pub verdicts: [Verdict; 2],
+}
+
+/// All differences of two runs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Comparison {
+    /// By change, then in the order of the first run.
+    pub differences: Vec<Difference>,
+    /// Results that both have.
+    pub common: usize,
+    /// Results that only the first run has.
+    pub only_before: usize,
+    /// Results that only the second run has.
+    pub only_after: usize,
+}
+
+impl Comparison {
+    /// Compares two runs. Each has its own failure radius \[m\].
+    pub fn of(before: (&[Row], f64), after: (&[Row], f64), tolerance: &Tolerance) -> Self {
+        let key = |row: &Row| format!("{:?}/{}/{}", row.group(), row.query, row.method);
+        let mut others: BTreeMap<String, &Row> =
+            after.0.iter().map(|row| (key(row), row)).collect();
+        let mut comparison = Self::default();
+        for row in before.0 {
+            let Some(other) = others.remove(&key(row)) else {
+                comparison.only_before += 1;
+                continue;
+            };
+            comparison.common += 1;
+            let verdicts = [row.verdict(before.1), other.verdict(after.1)];
+            let [was, is] = verdicts.map(Verdict::is_success);
+            if let Some(change) = change(was, is, row, other, tolerance) {
+                comparison.differences.push(Difference {
+                    change,
+                    before: row.clone(),
+                    after: other.clone(),
+                    verdicts,
+                });
+            }
+        }
+        comparison.only_after = others.len();
+        comparison.differences.sort_by_key(|one| one.change);
+        comparison
+    }
+
+    /// How many queries changed in this way.
+    pub fn count(&self, change: Change) -> usize {
+        let changes = self.differences.iter();
+        changes.filter(|one| one.change == change).count()
+    }
+
+    /// Whether a query is broken.
+    pub fn is_regression(&self) -> bool {
+        self.count(Change::Broken) > 0
+    }
+}
+
+fn change(was: bool, is: bool, before: &Row, after: &Row, tolerance: &Tolerance) -> Option<Change> {
+    match (was, is) {
+        (true, false) => return Some(Change::Broken),
+        (false, true) => return Some(Change::Fixed),
+        (false, false) => return None,
+        (true, true) => {}
+    }
+    let (before, after) = (before.error?, after.error?);
+    let metres = after.translation_m - before.translation_m;
+    let degrees = after.rotation_deg - before.rotation_deg;
+    // Where one error grows and the other shrinks, the bad news counts.
+    if metres > tolerance.metres || degrees > tolerance.degrees {
+        Some(Change::Worse)
+    } else if metres < -tolerance.metres || degrees < -tolerance.degrees {
+        Some(Change::Better)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::tests::{row, rows};
+    use super::*;
+
+    fn compare(before: &[Row], after: &[Row]) -> Comparison {
+        Comparison::of((before, 10.0), (after, 10.0), &Tolerance::default())
+    }
+
+    #[test]
+    fn equal_runs_do_not_differ() {
+        let comparison = compare(&rows(), &rows());
+        assert_eq!(comparison.differences, []);
+        assert_eq!(comparison.common, 8);
+        assert!(!comparison.is_regression());
+    }
+
+    #[test]
+    fn fixed_broken_and_changed_queries_are_told_apart() {
+        let before = [
+            row("a", "fb", Some(0.1)),
+            row("b", "fb", None),
+            row("c", "fb", Some(1.0)),
+            row("d", "fb", Some(1.0)),
+            row("e", "fb", Some(1.0)),
+            row("f", "fb", Some(11.0)),
+            row("gone", "fb", None),
+        ];
+        let after = [
+            row("a", "fb", Some(12.0)),
+            row("b", "fb", Some(0.3)),
+            row("c", "fb", Some(1.2)),
+            row("d", "fb", Some(0.5)),
+            row("e", "fb", Some(1.05)),
+            row("f", "fb", None),
+            row("new", "fb", None),
+            row("newer", "fb", None),
+        ];
+        let comparison = compare(&before, &after);
+        let changes: Vec<_> = comparison
+            .differences
+            .iter()
+            .map(|one| (one.change, one.before.query.as_str()))
+            .collect();
+        let expected = [
+            (Change::Broken, "a"),
+            (Change::Fixed, "b"),
+            (Change::Worse, "c"),
+            (Change::Better, "d"),
+        ];
+        assert_eq!(changes, expected);
+        let counts = (
+            comparison.common,
+            comparison.only_before,
+            comparison.only_after,
+        );
+        assert_eq!(counts, (6, 1, 2));
+        assert!(comparison.is_regression());
+    }
+}

@@ -1,0 +1,386 @@
+//! The poses of a run in formats of other programs.
+//!
+//! A run holds poses `world_from_camera` with x right, y down, z forward. A query without a pose is
+//! left out where the format can do without, and refuses the format where it cannot: no pose is
+//! invented.
+
+use std::path::Path;
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+
+use super::report::read_rows;
+use super::table::Table;
+use super::{measure, tables};
+use crate::geometry::Pose;
+use crate::localize::QueryResult;
+use crate::run::{Camera, Item, RunFile};
+use crate::run::{FolderError, read_results};
+
+/// A format to export to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// TUM RGB-D and evo: `time x y z qx qy qz qw`, camera to world.
+    Tum,
+    /// KITTI odometry: twelve numbers of `[R|t]`, camera to world; line and frame number belong
+    /// together.
+    Kitti,
+    /// A COLMAP text model without points: world to camera.
+    Colmap,
+    /// visuallocalization.net: `name qw qx qy qz x y z`, world to camera.
+    Vloc,
+    /// Every result with its figures.
+    Csv,
+    /// The tables of the run.
+    Latex,
+}
+
+impl Format {
+    /// All formats by their names.
+    pub const ALL: [(&'static str, Self); 6] = [
+        ("tum", Self::Tum),
+        ("kitti", Self::Kitti),
+        ("colmap", Self::Colmap),
+        ("vloc", Self::Vloc),
+        ("csv", Self::Csv),
+        ("latex", Self::Latex),
+    ];
+
+    /// The format of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let found = Self::ALL.iter().find(|(known, _)| *known == name);
+        found.map(|(_, format)| *format)
+    }
+}
+
+/// Which of several results of a query is meant.
+#[derive(Clone, Debug, Default)]
+pub struct Choice {
+    /// The method.
+    pub method: Option<String>,
+    /// The fusion.
+    pub fusion: Option<String>,
+    /// The uncertainty radius \[m\].
+    pub radius_m: Option<f64>,
+    /// The number of references asked for.
+    pub references: Option<usize>,
+    /// The scene of the references.
+    pub scene: Option<String>,
+}
+
+impl Choice {
+    fn takes(&self, result: &QueryResult) -> bool {
+        let setting = result.setting;
+        let is =
+            |wanted: &Option<String>, found: &str| wanted.as_deref().is_none_or(|w| w == found);
+        is(&self.method, &result.method)
+            && is(&self.scene, &result.scene)
+            && (self.fusion.is_none() || self.fusion == result.fusion)
+            && (self.radius_m).is_none_or(|radius| setting.is_some_and(|s| s.radius_m == radius))
+            && (self.references).is_none_or(|count| setting.is_some_and(|s| s.references == count))
+    }
+}
+
+/// Why a run cannot be exported in a format.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The run cannot be read.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// It is not clear what to export.
+    #[error(
+        "query {query} has several results; say which with --method ({}), --fusion, --radius, \
+         --references or --scene",
+        methods.join(", ")
+    )]
+    Ambiguous {
+        /// The query.
+        query: String,
+        /// The methods of the run.
+        methods: Vec<String>,
+    },
+    /// Nothing is left.
+    #[error("the run has no such results")]
+    Nothing,
+    /// The format cannot hold a missing pose.
+    #[error(
+        "kitti: line and frame number belong together, so that a missing pose cannot be told: {missing}; \
+         tum, vloc, colmap and csv leave it out"
+    )]
+    Gap {
+        /// What is missing.
+        missing: String,
+    },
+    /// The format wants a time that the scene does not know.
+    #[error("tum: the frames of {scene} have no times; kitti, vloc, colmap and csv need none")]
+    NoTime {
+        /// The scene of the queries.
+        scene: String,
+    },
+}
+
+/// A file of an export.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExportedFile {
+    /// Its name, where an export has several.
+    pub name: &'static str,
+    /// What is in it.
+    pub text: String,
+}
+
+/// An export.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Export {
+    /// One file, or those of a folder.
+    pub files: Vec<ExportedFile>,
+    /// Queries left out because they have no pose.
+    pub left_out: usize,
+}
+
+/// A query with its result.
+struct Localized<'a> {
+    item: Item<'a>,
+    pose: Option<Pose>,
+}
+
+/// Exports a run.
+///
+/// # Errors
+/// [`ExportError`].
+pub fn export(
+    folder: &Path,
+    run: &RunFile,
+    format: Format,
+    choice: &Choice,
+) -> Result<Export, ExportError> {
+    match format {
+        Format::Csv => return single(csv(folder, run, choice)?),
+        Format::Latex => {
+            let measures = measure(&read_rows(folder)?, run.failure_radius_m);
+            let tables = tables::tables(run, &measures);
+            let text: Vec<String> = tables.iter().map(Table::latex).collect();
+            return single(text.join("\n"));
+        }
+        Format::Tum | Format::Kitti | Format::Colmap | Format::Vloc => {}
+    }
+    let localized = localized(folder, run, choice)?;
+    if localized.is_empty() {
+        return Err(ExportError::Nothing);
+    }
+    let left_out = localized.iter().filter(|one| one.pose.is_none()).count();
+    let files = match format {
+        Format::Tum => vec![plain(tum(&localized)?)],
+        Format::Kitti => vec![plain(kitti(&localized)?)],
+        Format::Vloc => vec![plain(vloc(&localized))],
+        _ => colmap(&localized),
+    };
+    Ok(Export { files, left_out })
+}
+
+fn plain(text: String) -> ExportedFile {
+    ExportedFile { name: "", text }
+}
+
+fn single(text: String) -> Result<Export, ExportError> {
+    Ok(Export {
+        files: vec![plain(text)],
+        left_out: 0,
+    })
+}
+
+/// One result per query, in the order of the run.
+fn localized<'a>(
+    folder: &Path,
+    run: &'a RunFile,
+    choice: &Choice,
+) -> Result<Vec<Localized<'a>>, ExportError> {
+    let per_item = run.results_per_item();
+    let mut all = Vec::new();
+    let mut results = read_results::<QueryResult>(folder)?;
+    for item in run.items() {
+        let mut chosen: Option<QueryResult> = None;
+        for result in results.by_ref().take(per_item) {
+            let result = result?;
+            if !choice.takes(&result) {
+                continue;
+            }
+            if chosen.is_some() {
+                return Err(ExportError::Ambiguous {
+                    query: item.query.to_owned(),
+                    methods: run.methods.clone(),
+                });
+            }
+            chosen = Some(result);
+        }
+        if let Some(result) = chosen {
+            let pose = result.pose.as_ref().map(|report| {
+                let [x, y, z, w] = report.quaternion_xyzw;
+                Pose::from_parts(
+                    Translation3::from(report.position_m),
+                    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
+                )
+            });
+            all.push(Localized { item, pose });
+        }
+    }
+    Ok(all)
+}
+
+fn tum(localized: &[Localized<'_>]) -> Result<String, ExportError> {
+    let mut text = "# time x y z qx qy qz qw\n".to_owned();
+    for Localized { item, pose } in localized {
+        let Some(pose) = pose else { continue };
+        let time = item.time_s.ok_or_else(|| ExportError::NoTime {
+            scene: item.pair.query_scene.clone(),
+        })?;
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        text += &format!(
+            "{time} {} {} {} {} {} {} {}\n",
+            t.x, t.y, t.z, q.x, q.y, q.z, q.w
+        );
+    }
+    Ok(text)
+}
+
+fn kitti(localized: &[Localized<'_>]) -> Result<String, ExportError> {
+    let mut text = String::new();
+    for (line, Localized { item, pose }) in localized.iter().enumerate() {
+        let gap = |missing: String| ExportError::Gap { missing };
+        if item.query.parse() != Ok(line) {
+            return Err(gap(format!("frame {line} is none of the queries")));
+        }
+        let Some(pose) = pose else {
+            return Err(gap(format!("query {} has no pose", item.query)));
+        };
+        let matrix = crate::geometry::matrix_from_pose(pose);
+        let rows = (0..3).flat_map(|row| (0..4).map(move |column| (row, column)));
+        let numbers: Vec<String> = rows.map(|place| matrix[place].to_string()).collect();
+        text += &format!("{}\n", numbers.join(" "));
+    }
+    Ok(text)
+}
+
+/// `qw qx qy qz x y z` of world to camera.
+fn camera_from_world(pose: &Pose) -> String {
+    let pose = pose.inverse();
+    let (t, q) = (pose.translation.vector, pose.rotation.coords);
+    format!("{} {} {} {} {} {} {}", q.w, q.x, q.y, q.z, t.x, t.y, t.z)
+}
+
+fn vloc(localized: &[Localized<'_>]) -> String {
+    let lines = localized.iter().filter_map(|one| {
+        let pose = camera_from_world(one.pose.as_ref()?);
+        Some(format!("{} {pose}\n", one.item.query))
+    });
+    lines.collect()
+}
+
+fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
+    let mut cameras: Vec<Camera> = Vec::new();
+    let mut images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points\n".to_owned();
+    for (index, one) in localized.iter().enumerate() {
+        let camera = one.item.pair.camera;
+        let known = cameras.iter().position(|known| *known == camera);
+        let camera = known.unwrap_or_else(|| {
+            cameras.push(camera);
+            cameras.len() - 1
+        });
+        let Some(pose) = &one.pose else { continue };
+        images += &format!(
+            "{} {} {} {}\n\n",
+            index + 1,
+            camera_from_world(pose),
+            camera + 1,
+            one.item.query
+        );
+    }
+    let mut text = "# CAMERA_ID MODEL WIDTH HEIGHT FX FY CX CY\n".to_owned();
+    for (index, camera) in cameras.iter().enumerate() {
+        // The centre of COLMAP's first pixel is (0.5, 0.5).
+        text += &format!(
+            "{} PINHOLE {} {} {} {} {} {}\n",
+            index + 1,
+            camera.width,
+            camera.height,
+            camera.fx,
+            camera.fy,
+            camera.cx + 0.5,
+            camera.cy + 0.5
+        );
+    }
+    let file = |name, text| ExportedFile { name, text };
+    vec![
+        file("cameras.txt", text),
+        file("images.txt", images),
+        file("points3D.txt", "# no points\n".to_owned()),
+    ]
+}
+
+fn csv(folder: &Path, run: &RunFile, choice: &Choice) -> Result<String, ExportError> {
+    let mut table = Table::new(
+        "results",
+        "",
+        [
+            "scene",
+            "query_scene",
+            "query",
+            "method",
+            "fusion",
+            "radius_m",
+            "references_asked",
+            "references",
+            "status",
+            "reason",
+            "success",
+            "x_m",
+            "y_m",
+            "z_m",
+            "qx",
+            "qy",
+            "qz",
+            "qw",
+            "translation_m",
+            "rotation_deg",
+            "max_euler_deg",
+        ],
+    );
+    for result in read_results::<QueryResult>(folder)? {
+        let result = result?;
+        if !choice.takes(&result) {
+            continue;
+        }
+        let success = result.is_success(run.failure_radius_m);
+        let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+        let setting = result.setting;
+        let mut cells = vec![
+            result.scene.clone(),
+            result.query_scene.unwrap_or(result.scene),
+            result.query,
+            result.method,
+            result.fusion.unwrap_or_default(),
+            optional(setting.map(|setting| setting.radius_m)),
+            setting
+                .map(|s| s.references.to_string())
+                .unwrap_or_default(),
+            result.references.join(" "),
+            if result.pose.is_some() {
+                "ok"
+            } else {
+                "failed"
+            }
+            .to_owned(),
+            result.reason.map(|reason| reason.code).unwrap_or_default(),
+            u8::from(success).to_string(),
+        ];
+        let pose = result.pose.as_ref();
+        cells.extend((0..3).map(|i| optional(pose.map(|pose| pose.position_m[i]))));
+        cells.extend((0..4).map(|i| optional(pose.map(|pose| pose.quaternion_xyzw[i]))));
+        let error = result.error.as_ref();
+        cells.push(optional(error.map(|error| error.translation_m)));
+        cells.push(optional(error.map(|error| error.rotation_deg)));
+        cells.push(optional(error.map(|error| error.max_euler_deg)));
+        table.push(cells);
+    }
+    let bytes = table.csv();
+    let bytes = bytes.map_err(|error| FolderError::io(folder)(error.into()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}

@@ -1,0 +1,188 @@
+//! Gates: conditions that the figures of a run must meet.
+
+use std::str::FromStr;
+
+use super::metrics::Measures;
+
+/// What a gate looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Metric {
+    Success,
+    Recall { metres: f64, degrees: f64 },
+    MedianMetres,
+    MedianDegrees,
+    RmseMetres,
+    RmseDegrees,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Comparison {
+    AtLeast,
+    Above,
+    AtMost,
+    Below,
+}
+
+/// A condition such as `success@mi >= 0.9` or `recall@0.5m,5deg@fb >= 0.8`.
+///
+/// It holds where it holds in every group of the run: for each scene, setting and fusion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gate {
+    text: String,
+    metric: Metric,
+    method: String,
+    comparison: Comparison,
+    limit: f64,
+}
+
+/// What became of a gate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Passage {
+    /// The gate as it was given.
+    pub gate: String,
+    /// Whether it holds everywhere.
+    pub passed: bool,
+    /// The worst figure and where it was found.
+    pub found: String,
+}
+
+impl FromStr for Gate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || {
+            format!(
+                "`{text}`: METRIC@METHOD >= NUMBER expected, where METRIC is success, \
+                 recall@0.5m,5deg, median_m, median_deg, rmse_m or rmse_deg, and the comparison \
+                 >=, >, <= or <"
+            )
+        };
+        let (sign, comparison) = [
+            (">=", Comparison::AtLeast),
+            ("<=", Comparison::AtMost),
+            (">", Comparison::Above),
+            ("<", Comparison::Below),
+        ]
+        .into_iter()
+        .find(|(sign, _)| text.contains(sign))
+        .ok_or_else(expected)?;
+        let (left, right) = text.split_once(sign).ok_or_else(expected)?;
+        let (metric, method) = left.trim().rsplit_once('@').ok_or_else(expected)?;
+        let limit: f64 = right.trim().parse().map_err(|_| expected())?;
+        if !limit.is_finite() || crate::method::Method::from_name(method).is_none() {
+            return Err(expected());
+        }
+        Ok(Self {
+            text: text.trim().to_owned(),
+            metric: metric_of(metric).ok_or_else(expected)?,
+            method: method.to_owned(),
+            comparison,
+            limit,
+        })
+    }
+}
+
+fn metric_of(text: &str) -> Option<Metric> {
+    Some(match text {
+        "success" => Metric::Success,
+        "median_m" => Metric::MedianMetres,
+        "median_deg" => Metric::MedianDegrees,
+        "rmse_m" => Metric::RmseMetres,
+        "rmse_deg" => Metric::RmseDegrees,
+        _ => {
+            let (metres, degrees) = text.strip_prefix("recall@")?.split_once(',')?;
+            Metric::Recall {
+                metres: metres.strip_suffix('m')?.parse().ok()?,
+                degrees: degrees.strip_suffix("deg")?.parse().ok()?,
+            }
+        }
+    })
+}
+
+impl Gate {
+    /// Holds it against the figures of a run. A figure that does not exist passes no gate.
+    pub fn check(&self, measures: &[Measures]) -> Passage {
+        let of_method = measures.iter().filter(|one| one.method == self.method);
+        let mut worst: Option<(f64, Option<f64>, String)> = None;
+        for one in of_method {
+            let value = self.value(one);
+            // How far on the good side; what is missing is on the worst.
+            let margin = value.map_or(f64::NEG_INFINITY, |value| match self.comparison {
+                Comparison::AtLeast | Comparison::Above => value - self.limit,
+                Comparison::AtMost | Comparison::Below => self.limit - value,
+            });
+            if worst.as_ref().is_none_or(|(known, ..)| margin < *known) {
+                worst = Some((margin, value, one.group.to_string()));
+            }
+        }
+        let Some((margin, value, group)) = worst else {
+            return self.passage(false, format!("the run has no results of {}", self.method));
+        };
+        let passed = match self.comparison {
+            Comparison::AtLeast | Comparison::AtMost => margin >= 0.0,
+            Comparison::Above | Comparison::Below => margin > 0.0,
+        };
+        let found = value.map_or("no figure".to_owned(), |value| format!("{value:.4}"));
+        self.passage(passed, format!("{found} ({group})"))
+    }
+
+    fn passage(&self, passed: bool, found: String) -> Passage {
+        Passage {
+            gate: self.text.clone(),
+            passed,
+            found,
+        }
+    }
+
+    fn value(&self, measures: &Measures) -> Option<f64> {
+        let errors = &measures.of_successes;
+        match self.metric {
+            Metric::Success => Some(measures.success_rate),
+            Metric::Recall { metres, degrees } => measures.recall_within(metres, degrees),
+            Metric::MedianMetres => errors.median_m,
+            Metric::MedianDegrees => errors.median_deg,
+            Metric::RmseMetres => errors.rmse_m,
+            Metric::RmseDegrees => errors.rmse_deg,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::{measure, tests::rows};
+    use super::*;
+
+    fn passes(gate: &str) -> bool {
+        let gate: Gate = gate.parse().expect("a gate");
+        gate.check(&measure(&rows(), 10.0)).passed
+    }
+
+    #[test]
+    fn gates_hold_where_the_figures_by_hand_say_so() {
+        assert!(passes("success@mi >= 0.75"));
+        assert!(!passes("success@mi > 0.75"));
+        assert!(passes("recall@0.5m,5deg@fb >= 0.5"));
+        assert!(!passes("recall@0.5m,5deg@fb >= 0.51"));
+        assert!(passes("median_m@fb < 0.3"));
+        assert!(!passes("rmse_deg@mi<=1"));
+        // There is no result of pm.
+        assert!(!passes("success@pm >= 0"));
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_what_was_expected() {
+        for wrong in [
+            "success >= 0.9",
+            "success@xx >= 0.9",
+            "success@fb = 0.9",
+            "recall@fb >= 1",
+            "recall@0.5,5@fb >= 1",
+            "success@fb >= much",
+            "success@fb >= nan",
+            "",
+        ] {
+            let error = wrong.parse::<Gate>().expect_err(wrong);
+            assert!(error.contains("METRIC@METHOD"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! `junit.xml`: one case per query and method, for the test report of a CI service.
+
+use std::path::Path;
+
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+
+use super::gate::Passage;
+use super::metrics::Row;
+use crate::localize::{Reason, Setting};
+use crate::run::RunFile;
+use crate::run::{FolderError, read_results};
+
+/// What a case is made of.
+#[derive(serde::Deserialize)]
+struct Case {
+    #[serde(flatten)]
+    row: Row,
+    reason: Option<Reason>,
+}
+
+/// The report as XML. It holds no clock.
+///
+/// # Errors
+/// A line of the results that is none.
+pub fn junit(folder: &Path, run: &RunFile, passages: &[Passage]) -> Result<String, FolderError> {
+    let mut report = Report::new("posescope");
+    // Results come by query; a suite holds those of a method.
+    let mut suites: Vec<TestSuite> = Vec::new();
+    for case in read_results::<Case>(folder)? {
+        let Case { row, reason } = case?;
+        let mut name = row.scene.clone();
+        if let Some(queries) = &row.query_scene {
+            name += &format!(" ← {queries}");
+        }
+        name += &format!(" {}", row.method);
+        let status = match &reason {
+            _ if row.is_success(run.failure_radius_m) => TestCaseStatus::success(),
+            Some(reason) => failure(&reason.code, &reason.text),
+            None => {
+                let error = row.error.map_or(f64::NAN, |error| error.translation_m);
+                failure("far", &format!("the pose is {error:.2} m from the truth"))
+            }
+        };
+        let case = TestCase::new(
+            case_name(&row.query, row.setting, row.fusion.as_deref()),
+            status,
+        );
+        match suites.iter_mut().find(|suite| suite.name.as_str() == name) {
+            Some(suite) => drop(suite.add_test_case(case)),
+            None => {
+                let mut suite = TestSuite::new(name);
+                suite.add_test_case(case);
+                suites.push(suite);
+            }
+        }
+    }
+    if !passages.is_empty() {
+        let mut suite = TestSuite::new("gates");
+        for passage in passages {
+            let status = if passage.passed {
+                TestCaseStatus::success()
+            } else {
+                failure("gate", &passage.found)
+            };
+            suite.add_test_case(TestCase::new(passage.gate.as_str(), status));
+        }
+        suites.push(suite);
+    }
+    report.add_test_suites(suites);
+    let xml = report.to_string();
+    xml.map_err(|error| FolderError::io(folder)(std::io::Error::other(error)))
+}
+
+fn failure(kind: &str, message: &str) -> TestCaseStatus {
+    let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+    status.set_type(kind).set_message(message);
+    status
+}
+
+fn case_name(query: &str, setting: Option<Setting>, fusion: Option<&str>) -> String {
+    let mut name = query.to_owned();
+    if let Some(setting) = setting {
+        name += &format!(" {} m {} ref", setting.radius_m, setting.references);
+    }
+    if let Some(fusion) = fusion {
+        name += &format!(" {fusion}");
+    }
+    name
+}

@@ -1,0 +1,326 @@
+//! What the results of many queries amount to.
+//!
+//! Medians and RMSE are over successes ([`Verdict`]), once over those of the method, once over
+//! queries that all methods succeed on; their rotation is the greatest Euler angle, as in the paper.
+//! In the recall, which goes by the rotation angle, a failure has an infinite error.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::PoseError;
+use crate::localize::{Setting, Status, Verdict};
+
+/// The limits of the recall: metres and degrees.
+pub const RECALL_LIMITS: [(f64, f64); 3] = [(0.25, 2.0), (0.5, 5.0), (5.0, 10.0)];
+
+/// A result, as far as the statistics want to know it: one line of `results.jsonl`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The references' scene.
+    pub scene: String,
+    /// The query's scene, where it is another one.
+    #[serde(default)]
+    pub query_scene: Option<String>,
+    /// The query frame.
+    pub query: String,
+    /// The method.
+    pub method: String,
+    /// The fusion.
+    pub fusion: Option<String>,
+    /// What the experiment varied.
+    #[serde(default)]
+    pub setting: Option<Setting>,
+    /// Whether there is a pose.
+    pub status: Status,
+    /// Its error, where the truth is known.
+    pub error: Option<PoseError>,
+}
+
+impl Row {
+    /// Whether there is a pose and, where the truth is known, a near one.
+    pub fn is_success(&self, failure_radius_m: f64) -> bool {
+        self.verdict(failure_radius_m).is_success()
+    }
+
+    /// What became of the query.
+    pub fn verdict(&self, failure_radius_m: f64) -> Verdict {
+        Verdict::new(self.status, self.error.as_ref(), failure_radius_m)
+    }
+
+    /// What is measured together with this row.
+    pub fn group(&self) -> Group {
+        Group {
+            scene: self.scene.clone(),
+            query_scene: self.query_scene.clone(),
+            setting: self.setting,
+            fusion: self.fusion.clone(),
+        }
+    }
+}
+
+/// Results that differ in query and method alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Group {
+    /// The references' scene.
+    pub scene: String,
+    /// The queries' scene, where it is another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub query_scene: Option<String>,
+    /// What the experiment varied.
+    pub setting: Option<Setting>,
+    /// The fusion.
+    pub fusion: Option<String>,
+}
+
+impl std::fmt::Display for Group {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.scene)?;
+        if let Some(queries) = &self.query_scene {
+            write!(f, " ← {queries}")?;
+        }
+        if let Some(setting) = &self.setting {
+            write!(f, ", {} m, {} ref.", setting.radius_m, setting.references)?;
+        }
+        match &self.fusion {
+            Some(fusion) => write!(f, ", {fusion}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Median and root mean square of errors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// How many errors.
+    pub count: usize,
+    /// Median translation error \[m\].
+    pub median_m: Option<f64>,
+    /// Median of the greatest Euler angle \[°\].
+    pub median_deg: Option<f64>,
+    /// Root mean square of the translation error \[m\].
+    pub rmse_m: Option<f64>,
+    /// Root mean square of the greatest Euler angle \[°\].
+    pub rmse_deg: Option<f64>,
+}
+
+impl Spread {
+    fn of(errors: &[PoseError]) -> Self {
+        let metres: Vec<f64> = errors.iter().map(|error| error.translation_m).collect();
+        let degrees: Vec<f64> = errors.iter().map(|error| error.max_euler_deg).collect();
+        Self {
+            count: errors.len(),
+            median_m: median(&metres),
+            median_deg: median(&degrees),
+            rmse_m: rmse(&metres),
+            rmse_deg: rmse(&degrees),
+        }
+    }
+}
+
+/// Of an even number the mean of the two in the middle.
+fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let upper = *sorted.get(sorted.len() / 2)?;
+    if sorted.len() % 2 == 1 {
+        return Some(upper);
+    }
+    Some((sorted[sorted.len() / 2 - 1] + upper) / 2.0)
+}
+
+fn rmse(values: &[f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let squares: f64 = values.iter().map(|value| value * value).sum();
+    Some((squares / values.len() as f64).sqrt())
+}
+
+/// What a method made of the queries of a group.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    /// What the queries have in common.
+    #[serde(flatten)]
+    pub group: Group,
+    /// The method.
+    pub method: String,
+    /// Queries asked.
+    pub queries: usize,
+    /// Of those, with a pose.
+    pub poses: usize,
+    /// Of those, within the failure radius.
+    pub successes: usize,
+    /// Successes over queries.
+    pub success_rate: f64,
+    /// Errors of the successes.
+    pub of_successes: Spread,
+    /// The same over queries that every method of the run succeeds on.
+    pub of_common: Spread,
+    /// Shares of the queries within [`RECALL_LIMITS`], with failures counted as infinite; nothing
+    /// where the truth is not known.
+    pub recall: Option<[f64; 3]>,
+    /// Every error, failures as infinite, for limits of one's own; nothing without truth.
+    #[serde(skip)]
+    pub errors: Option<Vec<(f64, f64)>>,
+}
+
+impl Measures {
+    /// Share of the queries within limits \[m, °\], with failures counted as infinite.
+    pub fn recall_within(&self, limit_m: f64, limit_deg: f64) -> Option<f64> {
+        let errors = self.errors.as_ref()?;
+        let within = |error: &&(f64, f64)| error.0 <= limit_m && error.1 <= limit_deg;
+        Some(share(errors.iter().filter(within).count(), errors.len()))
+    }
+}
+
+fn share(part: usize, whole: usize) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+/// Measures all groups of a run, in the order in which they and their methods first appear.
+pub fn measure(rows: &[Row], failure_radius_m: f64) -> Vec<Measures> {
+    let mut groups: Vec<(Group, Vec<&Row>)> = Vec::new();
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for row in rows {
+        let group = row.group();
+        let place = *places.entry(format!("{group:?}")).or_insert_with(|| {
+            groups.push((group, Vec::new()));
+            groups.len() - 1
+        });
+        groups[place].1.push(row);
+    }
+    groups
+        .into_iter()
+        .flat_map(|(group, rows)| measure_group(&group, &rows, failure_radius_m))
+        .collect()
+}
+
+fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Measures> {
+    let mut methods: Vec<&str> = Vec::new();
+    let mut succeeded: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for row in rows {
+        if !methods.contains(&row.method.as_str()) {
+            methods.push(&row.method);
+        }
+        let of_method = succeeded.entry(&row.method).or_default();
+        if row.is_success(failure_radius_m) {
+            of_method.insert(&row.query);
+        }
+    }
+    let is_common = |query: &str| succeeded.values().all(|queries| queries.contains(query));
+    let measure = |method: &str| {
+        let rows: Vec<&&Row> = rows.iter().filter(|row| row.method == method).collect();
+        let errors_of = |wanted: &dyn Fn(&Row) -> bool| {
+            let errors = rows.iter().filter(|row| wanted(row));
+            Spread::of(&errors.filter_map(|row| row.error).collect::<Vec<_>>())
+        };
+        let success = |row: &Row| row.is_success(failure_radius_m);
+        let count = |wanted: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| wanted(row)).count();
+        // A pose without an error is one whose truth is not known.
+        let has_truth = rows
+            .iter()
+            .all(|row| row.error.is_some() || row.status == Status::Failed);
+        let error = |row: &&&Row| match (row.error, success(row)) {
+            (Some(error), true) => (error.translation_m, error.rotation_deg),
+            _ => (f64::INFINITY, f64::INFINITY),
+        };
+        let mut measures = Measures {
+            group: group.clone(),
+            method: method.to_owned(),
+            queries: rows.len(),
+            poses: count(&|row| row.status == Status::Ok),
+            successes: count(&success),
+            success_rate: share(count(&success), rows.len()),
+            of_successes: errors_of(&success),
+            of_common: errors_of(&|row| success(row) && is_common(&row.query)),
+            recall: None,
+            errors: has_truth.then(|| rows.iter().map(error).collect()),
+        };
+        measures.recall = has_truth
+            .then(|| RECALL_LIMITS.map(|(m, deg)| measures.recall_within(m, deg).unwrap_or(0.0)));
+        measures
+    };
+    methods.into_iter().map(measure).collect()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A result of fb or mi with an error in metres, and as many degrees; none where it failed.
+    pub fn row(query: &str, method: &str, error: Option<f64>) -> Row {
+        Row {
+            scene: "street".to_owned(),
+            query_scene: None,
+            query: query.to_owned(),
+            method: method.to_owned(),
+            fusion: None,
+            setting: None,
+            status: if error.is_some() {
+                Status::Ok
+            } else {
+                Status::Failed
+            },
+            error: error.map(|error| PoseError {
+                translation_m: error,
+                rotation_deg: error,
+                max_euler_deg: error / 2.0,
+            }),
+        }
+    }
+
+    /// Four queries; mi fails on the second by 12 m, fb on the last by its own report.
+    pub fn rows() -> Vec<Row> {
+        let errors = [
+            ("a", Some(0.1), Some(1.0)),
+            ("b", Some(0.2), Some(12.0)),
+            ("c", Some(0.6), Some(3.0)),
+            ("d", None, Some(2.0)),
+        ];
+        errors
+            .iter()
+            .flat_map(|(query, fb, mi)| [row(query, "fb", *fb), row(query, "mi", *mi)])
+            .collect()
+    }
+
+    #[test]
+    fn four_queries_are_measured_as_by_hand() {
+        let measures = measure(&rows(), 10.0);
+        let [fb, mi] = measures.as_slice() else {
+            panic!("two methods: {measures:?}");
+        };
+        assert_eq!((fb.queries, fb.poses, fb.successes), (4, 3, 3));
+        assert_eq!((mi.queries, mi.poses, mi.successes), (4, 4, 3));
+        assert_eq!(fb.success_rate, 0.75);
+        assert_eq!(fb.of_successes.median_m, Some(0.2));
+        assert_eq!(mi.of_successes.median_m, Some(2.0));
+        // Both succeed on a and c.
+        assert_eq!(fb.of_common.count, 2);
+        assert_eq!(fb.of_common.median_m, Some(0.35));
+        assert_eq!(mi.of_common.median_deg, Some(1.0));
+        let rmse = mi.of_successes.rmse_m.expect("there are successes");
+        assert!((rmse - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        // Failures are infinite: they count among the queries, never among those within a limit.
+        assert_eq!(fb.recall, Some([0.5, 0.5, 0.75]));
+        assert_eq!(mi.recall, Some([0.0, 0.0, 0.75]));
+        assert_eq!(mi.recall_within(100.0, 180.0), Some(0.75));
+    }
+
+    #[test]
+    fn without_truth_there_is_a_success_rate_and_no_error() {
+        let mut rows = vec![row("a", "fb", Some(1.0)), row("b", "fb", None)];
+        rows[0].error = None;
+        let measures = measure(&rows, 10.0);
+        assert_eq!(measures[0].success_rate, 0.5);
+        assert_eq!(measures[0].of_successes.median_m, None);
+        assert_eq!(measures[0].recall, None);
+    }
+
+    #[test]
+    fn where_all_fail_there_is_no_median() {
+        let measures = measure(&[row("a", "fb", None)], 10.0);
+        assert_eq!(measures[0].of_successes, Spread::of(&[]));
+        assert_eq!(measures[0].recall, Some([0.0; 3]));
+    }
+}

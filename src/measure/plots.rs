@@ -1,0 +1,216 @@
+//! The figures of a run, as SVG.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::metrics::Measures;
+use super::tables::slug;
+use crate::run::Experiment;
+use crate::run::RunFile;
+
+/// A name and a drawing, or what went wrong.
+pub type Plot = (String, Result<String, String>);
+
+/// Okabe and Ito's colours, which colour-blind readers tell apart; by method.
+const COLORS: [(&str, RGBColor); 4] = [
+    ("fb", RGBColor(0x00, 0x72, 0xB2)),
+    ("pm", RGBColor(0xE6, 0x9F, 0x00)),
+    ("mi", RGBColor(0x00, 0x9E, 0x73)),
+    ("hy", RGBColor(0xD5, 0x5E, 0x00)),
+];
+
+/// One line of a plot.
+struct Line {
+    method: String,
+    points: Vec<(f64, f64)>,
+}
+
+/// The success rate over what the experiment varies, and the recall over the translation error.
+pub fn plots(run: &RunFile, measures: &[Measures]) -> Vec<Plot> {
+    let mut all = Vec::new();
+    for pair in &run.pairs {
+        let of_pair: Vec<&Measures> = measures
+            .iter()
+            .filter(|one| {
+                let queries = one.group.query_scene.as_ref().unwrap_or(&one.group.scene);
+                one.group.scene == pair.scene && *queries == pair.query_scene
+            })
+            .collect();
+        let name = |what: &str| match pair.scene == pair.query_scene {
+            true => format!("{what}-{}", slug(&pair.scene)),
+            false => format!("{what}-{}-{}", slug(&pair.scene), slug(&pair.query_scene)),
+        };
+        let axis = match run.experiment {
+            Some(Experiment::Single) => Some("uncertainty radius (m)"),
+            Some(Experiment::Multi) => Some("reference images (r-wavg)"),
+            _ => None,
+        };
+        if let Some(axis) = axis {
+            let lines = success_lines(run, &of_pair);
+            all.push((
+                name("success"),
+                draw(axis, "success rate (%)", &lines, true),
+            ));
+        }
+        let lines = recall_lines(&run.methods, &of_pair);
+        if !lines.is_empty() {
+            let axis = "translation error (m), failures infinite";
+            all.push((name("recall"), draw(axis, "queries (%)", &lines, false)));
+        }
+    }
+    all
+}
+
+fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
+    let is_multi = run.experiment == Some(Experiment::Multi);
+    let robust = |one: &&&Measures| !is_multi || one.group.fusion.as_deref() == Some("r-wavg");
+    let point = |one: &&Measures| {
+        let setting = one.group.setting?;
+        let x = if is_multi {
+            setting.references as f64
+        } else {
+            setting.radius_m
+        };
+        Some((x, 100.0 * one.success_rate))
+    };
+    lines(&run.methods, |method| {
+        let of_method = measures.iter().filter(|one| one.method == method);
+        of_method.filter(robust).filter_map(point).collect()
+    })
+}
+
+/// For the last group alone: the largest radius, or the most references. Steps, all as long as the
+/// longest: a method does not lose what it has found.
+fn recall_lines(methods: &[String], measures: &[&Measures]) -> Vec<Line> {
+    let mut all = lines(methods, |method| {
+        let last = measures.iter().rfind(|one| one.method == method);
+        let Some(errors) = last.and_then(|one| one.errors.as_ref()) else {
+            return Vec::new();
+        };
+        let mut metres: Vec<f64> = errors.iter().map(|error| error.0).collect();
+        metres.sort_unstable_by(f64::total_cmp);
+        let queries = metres.len() as f64;
+        let found = metres
+            .iter()
+            .take_while(|error| error.is_finite())
+            .enumerate();
+        let steps = found.flat_map(|(index, &error)| {
+            [index, index + 1].map(|count| (error, 100.0 * count as f64 / queries))
+        });
+        std::iter::once((0.0, 0.0)).chain(steps).collect()
+    });
+    let ends = all.iter().filter_map(|line| line.points.last());
+    let end = ends.map(|point| point.0).fold(0.0, f64::max);
+    for line in &mut all {
+        if let Some(&(_, share)) = line.points.last() {
+            line.points.push((end, share));
+        }
+    }
+    all
+}
+
+fn lines(methods: &[String], points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Line> {
+    let lines = methods.iter().map(|method| Line {
+        method: method.clone(),
+        points: points(method),
+    });
+    lines.filter(|line| !line.points.is_empty()).collect()
+}
+
+fn draw(x_axis: &str, y_axis: &str, lines: &[Line], dotted: bool) -> Result<String, String> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, (560, 380)).into_drawing_area();
+        draw_into(&area, x_axis, y_axis, lines, dotted).map_err(|error| error.to_string())?;
+        area.present().map_err(|error| error.to_string())?;
+    }
+    Ok(svg)
+}
+
+fn draw_into(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    x_axis: &str,
+    y_axis: &str,
+    lines: &[Line],
+    dotted: bool,
+) -> Result<(), Box<dyn std::error::Error>> {
+    area.fill(&WHITE)?;
+    let xs = || {
+        lines
+            .iter()
+            .flat_map(|line| line.points.iter().map(|point| point.0))
+    };
+    let (least, most) = (xs().fold(f64::INFINITY, f64::min), xs().fold(0.0, f64::max));
+    let least = if least.is_finite() { least } else { 0.0 };
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(36)
+        .y_label_area_size(44)
+        .build_cartesian_2d(least..most.max(least + 1e-3), 0.0..100.0)?;
+    chart
+        .configure_mesh()
+        .x_desc(x_axis)
+        .y_desc(y_axis)
+        .x_labels(6)
+        .light_line_style(WHITE)
+        .draw()?;
+    for line in lines {
+        let known = COLORS.iter().find(|(method, _)| *method == line.method);
+        let color = known.map_or(BLACK, |(_, color)| *color);
+        chart
+            .draw_series(LineSeries::new(
+                line.points.iter().copied(),
+                color.stroke_width(2),
+            ))?
+            .label(line.method.to_uppercase())
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+        if dotted {
+            let dots = line
+                .points
+                .iter()
+                .map(|&point| Circle::new(point, 3, color.filled()));
+            chart.draw_series(dots)?;
+        }
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerRight)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::{measure, tests::row};
+    use super::*;
+
+    #[test]
+    fn recall_rises_in_steps_and_stays_where_failures_begin() {
+        let rows = [
+            row("a", "fb", Some(3.0)),
+            row("b", "fb", Some(1.0)),
+            row("c", "fb", None),
+            row("d", "fb", None),
+            row("a", "mi", Some(2.0)),
+        ];
+        let measures = measure(&rows, 10.0);
+        let measures: Vec<&Measures> = measures.iter().collect();
+        let methods = ["fb", "mi"].map(str::to_owned);
+        let lines = recall_lines(&methods, &measures);
+        let fb = [
+            (0.0, 0.0),
+            (1.0, 0.0),
+            (1.0, 25.0),
+            (3.0, 25.0),
+            (3.0, 50.0),
+            (3.0, 50.0),
+        ];
+        assert_eq!(lines[0].points, fb);
+        assert_eq!(
+            lines[1].points,
+            [(0.0, 0.0), (2.0, 0.0), (2.0, 100.0), (3.0, 100.0)]
+        );
+    }
+}

@@ -1,0 +1,131 @@
+//! What a finished run is boiled down to: `summary.json`, `summary.md`, `junit.xml`, `tables/` and
+//! `plots/`. All of it follows from `run.toml` and `results.jsonl`, so that it can be written again.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::gate::{Gate, Passage};
+use super::metrics::{Measures, Row, measure};
+use super::table::Table;
+use super::{junit, plots, tables};
+use crate::run::RunFile;
+use crate::run::{FolderError, read_results};
+use posescope_core::files::write_whole;
+
+/// The version of `summary.json`.
+pub const SUMMARY_SCHEMA: &str = "posescope.summary/1";
+
+/// The figures of a run.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// By group and method.
+    pub measures: Vec<Measures>,
+    /// What became of the gates.
+    pub passages: Vec<Passage>,
+    /// The tables, the overview first.
+    pub tables: Vec<Table>,
+}
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    schema: &'a str,
+    failure_radius_m: f64,
+    groups: &'a [Measures],
+}
+
+/// Reads the results of a folder, without what nobody measures.
+///
+/// # Errors
+/// A line that is no result.
+pub fn read_rows(folder: &Path) -> Result<Vec<Row>, FolderError> {
+    read_results(folder)?.collect()
+}
+
+/// Measures a run and writes everything that follows from its results.
+///
+/// # Errors
+/// When a result cannot be read or a file not be written.
+pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Report, FolderError> {
+    let rows = read_rows(folder)?;
+    let measures = measure(&rows, run.failure_radius_m);
+    let passages: Vec<Passage> = gates.iter().map(|gate| gate.check(&measures)).collect();
+    let tables = tables::tables(run, &measures);
+    let summary = Summary {
+        schema: SUMMARY_SCHEMA,
+        failure_radius_m: run.failure_radius_m,
+        groups: &measures,
+    };
+    let json = serde_json::to_vec_pretty(&summary);
+    let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
+    write(&folder.join("summary.json"), &json)?;
+    let text = markdown(run, &tables, &passages);
+    write(&folder.join("summary.md"), text.as_bytes())?;
+    for table in &tables {
+        let path = |extension: &str| {
+            folder
+                .join("tables")
+                .join(format!("{}.{extension}", table.name))
+        };
+        let csv = table.csv();
+        let csv = csv.map_err(|error| FolderError::io(path("csv"))(error.into()))?;
+        write(&path("md"), table.markdown().as_bytes())?;
+        write(&path("csv"), &csv)?;
+        write(&path("tex"), table.latex().as_bytes())?;
+    }
+    for (name, svg) in plots::plots(run, &measures) {
+        let path = folder.join("plots").join(format!("{name}.svg"));
+        let svg = svg.map_err(|message| FolderError::io(&path)(std::io::Error::other(message)))?;
+        write(&path, svg.as_bytes())?;
+    }
+    let path = folder.join("junit.xml");
+    let xml = junit::junit(folder, run, &passages)?;
+    write(&path, xml.as_bytes())?;
+    Ok(Report {
+        measures,
+        passages,
+        tables,
+    })
+}
+
+fn write(path: &PathBuf, bytes: &[u8]) -> Result<(), FolderError> {
+    if let Some(parent) = path.parent() {
+        fs::create_dir_all(parent).map_err(FolderError::io(parent))?;
+    }
+    write_whole(path, bytes).map_err(FolderError::io(path))
+}
+
+fn markdown(run: &RunFile, tables: &[Table], passages: &[Passage]) -> String {
+    let scenes: Vec<String> = run
+        .pairs
+        .iter()
+        .map(|pair| match pair.scene == pair.query_scene {
+            true => pair.scene.clone(),
+            false => format!("{} ← {}", pair.scene, pair.query_scene),
+        })
+        .collect();
+    let prior = run.prior_m.map_or(String::new(), |metres| {
+        format!(" within {metres} m of the known position")
+    });
+    let mut text = format!(
+        "# {}\n\n{} queries, references {}{prior}, seed {}; a pose {} m off or more is a failure.\n\n",
+        scenes.join(", "),
+        run.plan().count(),
+        run.references,
+        run.seed,
+        run.failure_radius_m
+    );
+    for passage in passages {
+        let verdict = if passage.passed { "passed" } else { "FAILED" };
+        text += &format!("- {verdict}: `{}`: {}\n", passage.gate, passage.found);
+    }
+    if !passages.is_empty() {
+        text += "\n";
+    }
+    for table in tables {
+        text += &table.markdown();
+        text += "\n";
+    }
+    text
+}

@@ -1,0 +1,282 @@
+//! Going through the queries of a run.
+
+use std::collections::BTreeSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::run_file::{Item, Pair, RunFile};
+use super::run_folder::{FolderError, RunFolder};
+use crate::estimator::Failure;
+use crate::localize::{
+    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes, Watch,
+};
+use crate::method::Method;
+use crate::params::Params;
+use crate::scene::{Scene, SceneError};
+use crate::trace::Cancelled;
+
+/// The scenes of a run, opened.
+pub struct Scenes {
+    /// In the order of [`RunFile::scenes`].
+    pub references: Vec<Box<dyn Scene>>,
+    /// In the order of [`RunFile::queries`].
+    pub queries: Vec<Box<dyn Scene>>,
+}
+
+impl Scenes {
+    /// The scene that a pair takes its queries from.
+    pub fn of_queries(&self, pair: &Pair) -> &dyn Scene {
+        self.queries
+            .iter()
+            .find(|scene| scene.name() == pair.query_scene)
+            .unwrap_or(&self.references[pair.scene_index])
+            .as_ref()
+    }
+}
+
+/// Why a run stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// References cannot be chosen.
+    #[error(transparent)]
+    Choice(#[from] ChoiceError),
+    /// Somebody who watches asked it to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The folder cannot be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+}
+
+/// A query that a method failed on, by its own report or by the error of its pose.
+pub struct FailedQuery<'a> {
+    /// Its scenes.
+    pub localizer: &'a Localizer<'a>,
+    /// Its place in the plan.
+    pub item: Item<'a>,
+    /// Its position in its scene.
+    pub frame: usize,
+    /// The method.
+    pub method: Method,
+    /// The first of the requests that failed.
+    pub request: &'a Request,
+}
+
+/// Whoever accompanies a run.
+pub trait Companion {
+    /// The watcher of the next query.
+    fn watch(&mut self) -> &mut dyn Watch;
+
+    /// A method failed on a query whose results are about to be written.
+    ///
+    /// # Errors
+    /// What stops the run.
+    fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
+        let _ = query;
+        Ok(())
+    }
+
+    /// A query is done.
+    fn done(&mut self, item: &Item<'_>) {
+        let _ = item;
+    }
+}
+
+/// What a run needs besides its description.
+pub struct Execution<'a> {
+    /// The run.
+    pub run: &'a RunFile,
+    /// Its scenes.
+    pub scenes: &'a Scenes,
+    /// Its parameters, as in the description.
+    pub params: &'a Params,
+    /// What [`Selection::Retrieved`](super::Selection::Retrieved) asks, by the position of the references' scene.
+    pub indices: &'a [Box<dyn Ranking>],
+}
+
+impl Execution<'_> {
+    /// Localises the queries of the run that are not done yet, and appends their results. A query
+    /// that panics has failed results; the others go on.
+    ///
+    /// # Errors
+    /// [`RunError`]. What was done until then is in the folder.
+    pub fn go_on(
+        &self,
+        folder: &mut RunFolder,
+        companion: &mut dyn Companion,
+    ) -> Result<(), RunError> {
+        let items: Vec<Item<'_>> = self.run.items().collect();
+        let mut rest = items.get(folder.done()..).unwrap_or_default();
+        // One localizer per pair of scenes, whose features are kept as long.
+        while let Some(first) = rest.first() {
+            let same = |item: &&Item<'_>| std::ptr::eq(item.pair, first.pair);
+            let (now, later) = rest.split_at(rest.iter().take_while(same).count());
+            let references = self.scenes.references[first.pair.scene_index].as_ref();
+            let queries = self.scenes.of_queries(first.pair);
+            let localizer = Localizer::new(references, queries, self.params, self.run.seed);
+            let left_out = self.left_out(first.pair, references)?;
+            for item in now {
+                let results = self.results(item, &localizer, &left_out, companion)?;
+                folder.append(&results)?;
+                companion.done(item);
+            }
+            rest = later;
+        }
+        Ok(())
+    }
+
+    /// Frames of the references' scene that are queries themselves.
+    fn left_out(&self, pair: &Pair, references: &dyn Scene) -> Result<BTreeSet<usize>, SceneError> {
+        if pair.scene != pair.query_scene {
+            return Ok(BTreeSet::new());
+        }
+        pair.drawn
+            .iter()
+            .map(|name| references.find(name))
+            .collect()
+    }
+
+    fn results(
+        &self,
+        item: &Item<'_>,
+        localizer: &Localizer<'_>,
+        left_out: &BTreeSet<usize>,
+        companion: &mut dyn Companion,
+    ) -> Result<Vec<(QueryResult, StageTimes)>, RunError> {
+        let frame = localizer.queries().find(item.query)?;
+        let mut results = Vec::new();
+        let localized = catch_unwind(AssertUnwindSafe(|| -> Result<_, RunError> {
+            let requests = self.requests(localizer, frame, left_out)?;
+            let methods = self.run.methods();
+            localizer.localize(
+                item.index,
+                frame,
+                &requests,
+                &methods,
+                companion.watch(),
+                |result, times| {
+                    results.push((result, times));
+                    Ok::<(), RunError>(())
+                },
+            )?;
+            Ok(requests)
+        }));
+        match localized {
+            Ok(requests) => {
+                let requests = requests?;
+                self.tell_failures(item, localizer, frame, &requests, &results, companion)?;
+            }
+            Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
+        }
+        Ok(results)
+    }
+
+    fn requests(
+        &self,
+        localizer: &Localizer<'_>,
+        frame: usize,
+        left_out: &BTreeSet<usize>,
+    ) -> Result<Vec<Request>, RunError> {
+        let selection = self.run.selection();
+        let index = localizer.references().name();
+        let index = (self.scenes.references.iter())
+            .position(|scene| scene.name() == index)
+            .and_then(|at| self.indices.get(at))
+            .map(|index| index.as_ref());
+        let choose = |radius_m: f64| {
+            let chooser = Chooser {
+                localizer,
+                params: self.params,
+                selection,
+                radius_m,
+                seed: self.run.seed,
+                index,
+            };
+            chooser.choose(frame, &|frame| left_out.contains(&frame))
+        };
+        let mut requests = Vec::new();
+        let mut last: Option<(f64, References)> = None;
+        for setting in self.run.settings() {
+            let radius = self.run.prior_m.unwrap_or(setting.radius_m);
+            let chosen = match last.take() {
+                Some((known, chosen)) if known == radius => chosen,
+                _ => choose(radius)?,
+            };
+            requests.push(self.run.request(setting, &chosen));
+            last = Some((radius, chosen));
+        }
+        Ok(requests)
+    }
+
+    /// One call per method that failed in any of the requests.
+    fn tell_failures(
+        &self,
+        item: &Item<'_>,
+        localizer: &Localizer<'_>,
+        frame: usize,
+        requests: &[Request],
+        results: &[(QueryResult, StageTimes)],
+        companion: &mut dyn Companion,
+    ) -> Result<(), RunError> {
+        let methods = self.run.methods();
+        let per_method = (results.len() / methods.len().max(1)).max(1);
+        let per_request = self.run.fusions.len().max(1);
+        for (&method, of_method) in methods.iter().zip(results.chunks(per_method)) {
+            let failed = |(result, _): &(QueryResult, StageTimes)| {
+                !result.is_success(self.run.failure_radius_m)
+            };
+            let Some(request) = of_method
+                .iter()
+                .position(failed)
+                .and_then(|at| requests.get(at / per_request))
+            else {
+                continue;
+            };
+            companion.failed(&FailedQuery {
+                localizer,
+                item: *item,
+                frame,
+                method,
+                request,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The results of a query that cannot even be begun.
+    fn broken(&self, item: &Item<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
+        let failure = Failure::Internal {
+            message: message.to_owned(),
+        };
+        let pair = item.pair;
+        let fusions: Vec<Option<String>> = match self.run.fusions.as_slice() {
+            [] => vec![None],
+            fusions => fusions.iter().cloned().map(Some).collect(),
+        };
+        let mut results = Vec::new();
+        for method in self.run.methods() {
+            for setting in self.run.settings() {
+                for fusion in &fusions {
+                    let result = QueryResult {
+                        query_scene: (pair.scene != pair.query_scene)
+                            .then(|| pair.query_scene.clone()),
+                        setting: Some(setting),
+                        fusion: fusion.clone(),
+                        ..QueryResult::new(
+                            &pair.scene,
+                            item.query,
+                            method,
+                            self.run.seed,
+                            Err(&failure),
+                            None,
+                        )
+                    };
+                    results.push((result, StageTimes::default()));
+                }
+            }
+        }
+        results
+    }
+}

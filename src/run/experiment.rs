@@ -1,0 +1,207 @@
+//! The paper's experiments, and which frames they take as queries.
+
+use std::collections::BTreeSet;
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+
+use super::run_file::{Pair, describe};
+use crate::fusion;
+use crate::localize::Selection;
+use crate::method::Method;
+use crate::scene::{Scene, SceneError};
+
+/// One of the experiments of the paper's section 4.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Experiment {
+    /// One random reference within 10, 15, 20 and 25 m (section 4.3, table 1).
+    Single,
+    /// One to five references, four fusions (section 4.4, table 2).
+    Multi,
+    /// References from retrieval within a large prior (section 4.5, tables 3 and 4).
+    Large,
+}
+
+/// What an experiment asks where the user says nothing else.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Defaults {
+    /// The methods.
+    pub methods: &'static [Method],
+    /// Uncertainty radii \[m\].
+    pub radii_m: &'static [f64],
+    /// How references are chosen.
+    pub references: Selection,
+    /// The fusions; none for a single reference.
+    pub fusions: Vec<&'static fusion::Entry>,
+    /// Share of the frames that are queries.
+    pub share: f64,
+}
+
+const WITHOUT_HYBRID: &[Method] = &[
+    Method::Feature,
+    Method::Photometric,
+    Method::MutualInformation,
+];
+
+/// What is asked in an experiment, or without one: every frame against one reference within 15 m.
+pub fn defaults(experiment: Option<Experiment>) -> Defaults {
+    let robust: Vec<_> = fusion::find("r-wavg").into_iter().collect();
+    match experiment {
+        None => Defaults {
+            methods: &Method::ALL,
+            radii_m: &[15.0],
+            references: Selection::Random(1),
+            fusions: robust,
+            share: 1.0,
+        },
+        Some(Experiment::Single) => Defaults {
+            methods: WITHOUT_HYBRID,
+            radii_m: &[10.0, 15.0, 20.0, 25.0],
+            references: Selection::Random(1),
+            fusions: Vec::new(),
+            share: 0.1,
+        },
+        Some(Experiment::Multi) => Defaults {
+            methods: WITHOUT_HYBRID,
+            radii_m: &[10.0],
+            references: Selection::Random(5),
+            fusions: fusion::ALL.iter().collect(),
+            share: 0.1,
+        },
+        Some(Experiment::Large) => Defaults {
+            methods: &Method::ALL,
+            radii_m: &[15.0],
+            references: Selection::Retrieved(5),
+            fusions: robust,
+            share: 0.1,
+        },
+    }
+}
+
+/// How far retrieval looks around the query's known position \[m\], by the references' scene.
+pub fn default_prior_m(scene: &str) -> f64 {
+    if is_robotcar(scene) { 50.0 } else { 200.0 }
+}
+
+/// The translation error from which on a pose counts as a failure \[m\], by the references' scene.
+pub fn default_failure_radius_m(scene: &str) -> f64 {
+    if is_robotcar(scene) { 20.0 } else { 10.0 }
+}
+
+fn is_robotcar(scene: &str) -> bool {
+    scene.starts_with("robotcar")
+}
+
+/// Which frames become queries.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw<'a> {
+    /// Share of the frames with a known pose.
+    pub share: f64,
+    /// At most as many.
+    pub limit: Option<usize>,
+    /// Only these of those drawn; all, if none is named.
+    pub only: &'a [String],
+    /// Seed.
+    pub seed: u64,
+}
+
+/// Why there are no queries.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// Errors could not be measured, nor references be found.
+    #[error("{scene}: no frame has a known pose")]
+    NoPose {
+        /// The scene.
+        scene: String,
+    },
+    /// It exists, but is not one of the queries.
+    #[error("{scene}: frame {frame} is not among the {drawn} queries drawn")]
+    NotDrawn {
+        /// The scene.
+        scene: String,
+        /// The frame.
+        frame: String,
+        /// Number of queries.
+        drawn: usize,
+    },
+    /// There is no such frame.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+impl Draw<'_> {
+    /// Pairs a scene of references, the one at `scene_index`, with one of queries.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn pair(
+        &self,
+        scene_index: usize,
+        references: &dyn Scene,
+        queries: &dyn Scene,
+    ) -> Result<Pair, DrawError> {
+        let drawn = self.frames(queries)?;
+        let wanted: BTreeSet<usize> = self
+            .only
+            .iter()
+            .map(|name| {
+                let frame = queries.find(name)?;
+                if drawn.contains(&frame) {
+                    return Ok(frame);
+                }
+                Err(DrawError::NotDrawn {
+                    scene: queries.name().to_owned(),
+                    frame: queries.frames()[frame].clone(),
+                    drawn: drawn.len(),
+                })
+            })
+            .collect::<Result<_, DrawError>>()?;
+        let asked: Vec<usize> = drawn
+            .iter()
+            .copied()
+            .filter(|frame| wanted.is_empty() || wanted.contains(frame))
+            .collect();
+        let names = |frames: &[usize]| {
+            let frames = frames.iter();
+            let names = frames.map(|&frame| queries.frames()[frame].clone());
+            names.collect::<Vec<_>>()
+        };
+        let (camera, times_s) = describe(queries, &asked);
+        // Where every frame is a query, all the others are its references.
+        let left_out = if self.share < 1.0 { &drawn[..] } else { &[] };
+        Ok(Pair {
+            scene_index,
+            scene: references.name().to_owned(),
+            query_scene: queries.name().to_owned(),
+            camera,
+            drawn: names(left_out),
+            queries: names(&asked),
+            times_s,
+        })
+    }
+
+    /// In the order of the scene. Which ones depends on the seed and the scene's name.
+    fn frames(&self, scene: &dyn Scene) -> Result<Vec<usize>, DrawError> {
+        let mut frames: Vec<usize> = (0..scene.frames().len())
+            .filter(|&frame| scene.pose(frame).is_some())
+            .collect();
+        if frames.is_empty() {
+            return Err(DrawError::NoPose {
+                scene: scene.name().to_owned(),
+            });
+        }
+        let count = ((self.share * frames.len() as f64).round() as usize).max(1);
+        let count = count.min(self.limit.unwrap_or(count));
+        if count < frames.len() {
+            let text = format!("{}/{}/queries", self.seed, scene.name());
+            let seed = xxhash_rust::xxh3::xxh3_64(text.as_bytes());
+            frames.shuffle(&mut Pcg64::seed_from_u64(seed));
+            frames.truncate(count);
+            frames.sort_unstable();
+        }
+        Ok(frames)
+    }
+}

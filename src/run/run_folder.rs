@@ -1,0 +1,477 @@
+//! The folder of a run, written as the run goes.
+//!
+//! A query's results are appended together when all of them are there, so that a killed run loses at
+//! most the query in work. Whoever goes on cuts off what is incomplete and ends with the same bytes.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::run_file::{RUN_SCHEMA, RunFile};
+use crate::localize::{QueryResult, StageTimes};
+use posescope_core::files::write_whole;
+
+const RUN: &str = "run.toml";
+const RESULTS: &str = "results.jsonl";
+const TIMINGS: &str = "timings.jsonl";
+
+/// Why a run folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// It cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Something else is in the place of a new run.
+    #[error("{}: the folder is not empty{}", path.display(), if *.is_run {
+        "; --resume goes on with the run in it, another folder starts a new one"
+    } else {
+        ", and there is no run in it to go on with; name another with --out"
+    })]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+        /// Whether there is a run in it.
+        is_run: bool,
+    },
+    /// The folder holds another run.
+    #[error("{}: the run in it was asked for otherwise: `{there}` there, `{here}` here", path.display())]
+    OtherRun {
+        /// The folder.
+        path: PathBuf,
+        /// The first line of its `run.toml` that differs.
+        there: String,
+        /// What it would be.
+        here: String,
+    },
+    /// A file is not what it should be.
+    #[error("{}:{line}: {message}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// There is no run.
+    #[error("{}: no run here (there is no {RUN})", path.display())]
+    NoRun {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Somebody else writes there.
+    #[error("{}: another process is at work on this run", path.display())]
+    InUse {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Not all queries are done.
+    #[error("{}: {done} of {items} queries are done; go on with --resume", path.display())]
+    Incomplete {
+        /// The folder.
+        path: PathBuf,
+        /// Queries done.
+        done: usize,
+        /// Queries in all.
+        items: usize,
+    },
+}
+
+impl FolderError {
+    /// For `map_err`.
+    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
+        let path = path.into();
+        |source| Self::Io { path, source }
+    }
+}
+
+/// A run folder that is being written.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    results: File,
+    timings: File,
+    done: usize,
+}
+
+/// A line of `timings.jsonl`.
+#[derive(Serialize)]
+struct Timing<'a> {
+    query: &'a str,
+    method: &'a str,
+    #[serde(flatten)]
+    stages: &'a StageTimes,
+}
+
+impl RunFolder {
+    /// Starts a run in a new or empty folder.
+    ///
+    /// # Errors
+    /// [`FolderError::NotEmpty`], or what went wrong on the disk.
+    pub fn create(path: &Path, run: &RunFile) -> Result<Self, FolderError> {
+        if holds_anything(path)? {
+            return Err(FolderError::NotEmpty {
+                path: path.to_owned(),
+                is_run: path.join(RUN).exists(),
+            });
+        }
+        fs::create_dir_all(path).map_err(FolderError::io(path))?;
+        let text = toml_of(run);
+        let file = path.join(RUN);
+        write_whole(&file, text.as_bytes()).map_err(FolderError::io(&file))?;
+        Self::open(path)
+    }
+
+    /// Goes on with the run in the folder, or starts it where the folder is new or empty.
+    ///
+    /// # Errors
+    /// [`FolderError`]: another run, a damaged one, or one that is being written.
+    pub fn resume(path: &Path, run: &RunFile) -> Result<Self, FolderError> {
+        let results_per_item = run.results_per_item();
+        if !holds_anything(path)? {
+            return Self::create(path, run);
+        }
+        let file = path.join(RUN);
+        if !file.exists() {
+            return Err(FolderError::NotEmpty {
+                path: path.to_owned(),
+                is_run: false,
+            });
+        }
+        let there = fs::read_to_string(&file).map_err(FolderError::io(&file))?;
+        same_run(path, &there, &toml_of(run))?;
+        sweep(path).map_err(FolderError::io(path))?;
+        let mut folder = Self::open(path)?;
+        let results: Prefix = folder.prefix(RESULTS)?;
+        let timings: Prefix = folder.prefix(TIMINGS)?;
+        folder.check_order(run, &results, results_per_item)?;
+        let whole = |prefix: &Prefix| prefix.ends.len() / results_per_item;
+        folder.done = whole(&results).min(whole(&timings));
+        let lines = folder.done * results_per_item;
+        for (file, prefix) in [
+            (&mut folder.results, results),
+            (&mut folder.timings, timings),
+        ] {
+            let end = lines.checked_sub(1).map_or(0, |last| prefix.ends[last]);
+            let cut = file.set_len(end);
+            cut.and_then(|()| file.seek(SeekFrom::End(0)).map(drop))
+                .map_err(FolderError::io(path))?;
+        }
+        Ok(folder)
+    }
+
+    fn open(path: &Path) -> Result<Self, FolderError> {
+        let open = |name: &str| {
+            let file = path.join(name);
+            let options = OpenOptions::new()
+                .create(true)
+                .read(true)
+                .append(true)
+                .open(&file);
+            options.map_err(FolderError::io(file))
+        };
+        let results = open(RESULTS)?;
+        // A file system without locks cannot tell; then nobody asks it to.
+        if let Err(TryLockError::WouldBlock) = results.try_lock() {
+            return Err(FolderError::InUse {
+                path: path.to_owned(),
+            });
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            results,
+            timings: open(TIMINGS)?,
+            done: 0,
+        })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Queries that are done, in the order of the run's items.
+    pub fn done(&self) -> usize {
+        self.done
+    }
+
+    /// Appends all results of the next query.
+    ///
+    /// # Errors
+    /// When the disk does not take them.
+    pub fn append(&mut self, results: &[(QueryResult, StageTimes)]) -> Result<(), FolderError> {
+        let (mut lines, mut times) = (Vec::new(), Vec::new());
+        for (result, stages) in results {
+            push_line(&mut lines, result).map_err(FolderError::io(&self.path))?;
+            let timing = Timing {
+                query: &result.query,
+                method: &result.method,
+                stages,
+            };
+            push_line(&mut times, &timing).map_err(FolderError::io(&self.path))?;
+        }
+        // Results last: a query with results has all that belongs to it.
+        (self.timings.write_all(&times)).map_err(FolderError::io(self.path.join(TIMINGS)))?;
+        (self.results.write_all(&lines)).map_err(FolderError::io(self.path.join(RESULTS)))?;
+        self.done += 1;
+        Ok(())
+    }
+
+    /// Complete lines of a file.
+    fn prefix(&self, name: &str) -> Result<Prefix, FolderError> {
+        let path = self.path.join(name);
+        let file = File::open(&path).map_err(FolderError::io(&path))?;
+        let mut reader = BufReader::new(file);
+        let mut prefix = Prefix::default();
+        let (mut line, mut end) = (Vec::new(), 0);
+        loop {
+            line.clear();
+            let length = reader
+                .read_until(b'\n', &mut line)
+                .map_err(FolderError::io(&path))?;
+            let head = serde_json::from_slice::<Head>(&line);
+            match head {
+                Ok(head) if line.ends_with(b"\n") => {
+                    end += length as u64;
+                    prefix.ends.push(end);
+                    prefix.queries.push(head.query);
+                }
+                // What follows a torn line cannot be trusted either.
+                _ => return Ok(prefix),
+            }
+        }
+    }
+
+    fn check_order(
+        &self,
+        run: &RunFile,
+        results: &Prefix,
+        per_item: usize,
+    ) -> Result<(), FolderError> {
+        let expected = run.items().flat_map(|item| vec![item.query; per_item]);
+        let found = results.queries.iter().enumerate();
+        for ((line, found), expected) in found.zip(expected) {
+            if found != expected {
+                return Err(FolderError::Damaged {
+                    path: self.path.join(RESULTS),
+                    line: line + 1,
+                    message: format!("query {expected} expected, {found} found"),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What both kinds of line begin with.
+#[derive(serde::Deserialize)]
+struct Head {
+    query: String,
+}
+
+/// The readable lines at the beginning of a file, by their ends \[bytes\].
+#[derive(Default)]
+struct Prefix {
+    ends: Vec<u64>,
+    queries: Vec<String>,
+}
+
+fn push_line(bytes: &mut Vec<u8>, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer(&mut *bytes, value)?;
+    bytes.push(b'\n');
+    Ok(())
+}
+
+/// The text of `run.toml`.
+fn toml_of(run: &RunFile) -> String {
+    // Every field has a form in TOML; a test writes and reads one.
+    toml::to_string(run).unwrap_or_else(|error| unreachable!("{error}"))
+}
+
+fn same_run(path: &Path, there: &str, here: &str) -> Result<(), FolderError> {
+    if there == here {
+        return Ok(());
+    }
+    let different = there
+        .lines()
+        .zip(here.lines())
+        .find(|(there, here)| there != here);
+    let (there, here) = different.unwrap_or(("a shorter file", "a longer one"));
+    let short = |line: &str| line.chars().take(120).collect();
+    Err(FolderError::OtherRun {
+        path: path.to_owned(),
+        there: short(there),
+        here: short(here),
+    })
+}
+
+/// Whether the folder exists and has more in it than files that nobody finished.
+fn holds_anything(path: &Path) -> Result<bool, FolderError> {
+    let entries = match fs::read_dir(path) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        Err(error) => return Err(FolderError::io(path)(error)),
+    };
+    for entry in entries {
+        let entry = entry.map_err(FolderError::io(path))?;
+        if !entry.file_name().to_string_lossy().starts_with("tmp-") {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Removes files that a killed process did not finish.
+fn sweep(folder: &Path) -> io::Result<()> {
+    for below in ["", "tables", "plots"] {
+        let entries = match fs::read_dir(folder.join(below)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            entries => entries?,
+        };
+        for entry in entries {
+            let entry = entry?;
+            if entry.file_name().to_string_lossy().starts_with("tmp-") {
+                fs::remove_file(entry.path())?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Reads the description of the run in a folder.
+///
+/// # Errors
+/// [`FolderError::NoRun`], or what is wrong with the file.
+pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
+    let path = folder.join(RUN);
+    let text = match fs::read_to_string(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Err(FolderError::NoRun {
+                path: folder.to_owned(),
+            });
+        }
+        read => read.map_err(FolderError::io(&path))?,
+    };
+    let damaged = |line: usize, message: String| FolderError::Damaged {
+        path: path.clone(),
+        line,
+        message,
+    };
+    let run: RunFile = toml::from_str(&text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        let line = text[..at.min(text.len())].matches('\n').count() + 1;
+        damaged(line, error.message().to_owned())
+    })?;
+    if run.schema != RUN_SCHEMA {
+        let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
+        return Err(damaged(1, message));
+    }
+    run.check().map_err(|message| damaged(1, message))?;
+    Ok(run)
+}
+
+/// Reads the lines of `results.jsonl` one by one, as far as `T` wants to know them.
+///
+/// # Errors
+/// A line that is no result.
+pub fn read_results<T: DeserializeOwned>(
+    folder: &Path,
+) -> Result<impl Iterator<Item = Result<T, FolderError>>, FolderError> {
+    let path = folder.join(RESULTS);
+    let lines = lines_of(folder, RESULTS)?;
+    Ok(lines.enumerate().map(move |(index, line)| {
+        let line = line.map_err(FolderError::io(&path))?;
+        serde_json::from_str(&line).map_err(|error| FolderError::Damaged {
+            path: path.clone(),
+            line: index + 1,
+            message: error.to_string(),
+        })
+    }))
+}
+
+fn lines_of(
+    folder: &Path,
+    name: &str,
+) -> Result<impl Iterator<Item = io::Result<String>>, FolderError> {
+    let path = folder.join(name);
+    let file = File::open(&path).map_err(FolderError::io(path))?;
+    Ok(BufReader::new(file).lines())
+}
+
+/// Writes the shards of a run into one folder, as if it had never been split.
+///
+/// # Errors
+/// [`FolderError`]: parts of different runs, a part that is missing, twice there or not complete.
+pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> {
+    let mut runs = Vec::new();
+    for path in shards {
+        runs.push((path, read_run(path)?));
+    }
+    let Some((first_path, first)) = runs.first() else {
+        return Err(FolderError::NoRun {
+            path: target.to_owned(),
+        });
+    };
+    let whole = first.whole();
+    for (path, run) in &runs {
+        same_run(path, &toml_of(&run.whole()), &toml_of(&whole))?;
+    }
+    let per_item = whole.results_per_item();
+    let mut sources = Vec::new();
+    for (path, run) in &runs {
+        let lines = (lines_of(path, RESULTS)?, lines_of(path, TIMINGS)?);
+        let complete = lines_of(path, RESULTS)?.count() / per_item;
+        let items = run.items().count();
+        if complete != items {
+            return Err(FolderError::Incomplete {
+                path: (*path).clone(),
+                done: complete,
+                items,
+            });
+        }
+        sources.push((run.shard, lines));
+    }
+    let mut folder = RunFolder::create(target, &whole)?;
+    for item in whole.plan() {
+        let mut owners = sources
+            .iter_mut()
+            .filter(|(shard, _)| shard.is_none_or(|shard| shard.has(item.index)));
+        let problem = |message: &str| FolderError::Damaged {
+            path: first_path.join(RUN),
+            line: 1,
+            message: format!("query {} is in {message} of the parts to merge", item.query),
+        };
+        let Some((_, (results, timings))) = owners.next() else {
+            return Err(problem("none"));
+        };
+        if owners.next().is_some() {
+            return Err(problem("more than one"));
+        }
+        for _ in 0..per_item {
+            copy_line(timings, &mut folder.timings, target)?;
+        }
+        for _ in 0..per_item {
+            copy_line(results, &mut folder.results, target)?;
+        }
+        folder.done += 1;
+    }
+    Ok(whole)
+}
+
+fn copy_line(
+    lines: &mut impl Iterator<Item = io::Result<String>>,
+    file: &mut File,
+    target: &Path,
+) -> Result<(), FolderError> {
+    let line = lines.next().unwrap_or_else(|| Ok(String::new()));
+    let written = line.and_then(|line| writeln!(file, "{line}"));
+    written.map_err(FolderError::io(target))
+}
