@@ -11,7 +11,6 @@ use divan::Bencher;
 use eframe::egui_wgpu::{
     RenderState, RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup,
 };
-use eframe::wgpu;
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use nalgebra::Point3;

@@ -24,7 +24,7 @@ impl ViewArgs {
     /// The window of the bare command.
     pub fn demo() -> Self {
         Self {
-            scene: "street".to_owned(),
+            scene: demo::settings().scene.clone(),
             query: None,
             job: JobArgs::default(),
         }
@@ -160,14 +160,14 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
     let has_reference = |setup: &Setup, query| {
         setup.pick == ReferencePick::ByHand || !setup.candidates(query).is_empty()
     };
-    let is_demo = args.scene == "street"
+    let is_demo = args.scene == demo::settings().scene
         && args.job.queries.is_none()
         && args.query.is_none()
         && setup.pick == ReferencePick::By(Selection::Random(1));
     setup.query = match &args.query {
         _ if is_demo => {
-            setup.chosen = vec![setup.references.find(demo::REFERENCE)?].into();
-            setup.queries.find(demo::QUERY)?
+            setup.chosen = vec![setup.references.find(&demo::settings().reference)?].into();
+            setup.queries.find(&demo::settings().query)?
         }
         Some(name) => setup.queries.find(name)?,
         None => {

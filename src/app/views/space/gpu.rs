@@ -14,7 +14,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use eframe::egui_wgpu::{
     Callback, CallbackResources, CallbackTrait, RenderState, ScreenDescriptor,
 };
-use eframe::wgpu;
 use egui::{Color32, PaintCallbackInfo, Rect};
 
 use super::lens::{Lens, NEAR_M};

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use eframe::wgpu;
-
 use super::pipelines::{COLOR, DEPTH, Made, Pipelines, SAMPLES};
 use super::{Frame, Points, guarded};
 

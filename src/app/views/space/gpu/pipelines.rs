@@ -2,8 +2,6 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use eframe::wgpu;
-
 use super::{Line, Spot, guarded};
 
 /// Samples in a pixel: lines have smooth edges.
