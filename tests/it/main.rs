@@ -25,5 +25,6 @@ mod surf_warp;
 mod synth;
 mod two_walls;
 mod verdicts;
+mod view;
 mod walls_scene;
 mod window;
