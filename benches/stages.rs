@@ -4,27 +4,30 @@
 //!
 //! With `POSESCOPE_THREADS=1` in the environment everything runs on one thread.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
+use std::thread;
+use std::time::Instant;
 
 use divan::{Bencher, black_box};
 use nalgebra::{Point2, Point3, Unit, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::cost::{self, Cost};
 use posescope::estimator;
+use posescope::event::KindSet;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
 use posescope::grid::Offset;
-use posescope::image::gaussian_smoothed;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::render::{ColoredCloud, Scorer, color_cloud};
+use posescope::render::{ColoredCloud, Scorer, color_cloud_by};
 use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, IndexOptions, Retriever};
 use posescope::solver::{Correspondence, p3p};
-use posescope::trace::Trace;
+use posescope::trace::{Cancelled, Record, Sink, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -162,20 +165,17 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
     let mut params = Params::default();
     params.render.splat_px = SPLAT_PX;
     let entry = cost::ALL.iter().find(|entry| entry.name == name);
-    let cost: Box<dyn Cost> = (entry.expect("is listed").new)(&params);
+    let cost: Box<dyn Cost> = (entry.expect("is listed").params)().cost();
     let (query, reference) = (&PAIR.query, &PAIR.reference);
-    let cloud: ColoredCloud = color_cloud(
+    let cloud: ColoredCloud = color_cloud_by(
         &reference.cloud,
-        &reference.photo.gray,
         &reference.intrinsics,
         &params.render,
+        cost.reference_channel(&reference.photo.gray),
     );
     let scorer = Scorer::new(
         &cloud.points,
-        Arc::new(gaussian_smoothed(
-            &query.photo.gray,
-            cost.query_smoothing_px(),
-        )),
+        Arc::new(cost.query_channel(&query.photo.gray)),
         &query.intrinsics,
         SPLAT_PX,
         cost.as_ref(),
@@ -195,11 +195,57 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
         .bench(|| scorer.score(black_box(&poses)));
 }
 
-#[divan::bench(args = Method::ALL.map(Method::name), sample_count = 10)]
+#[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 10)]
 fn whole_estimator(bencher: Bencher, name: &str) {
-    let method = Method::from_name(name).expect("is listed");
-    let estimator = (estimator::entry(method).new)(&Params::default());
+    let method: Method = name.parse().expect("is listed");
+    let estimator = estimator::entry(method).make(&Params::default());
     bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
+}
+
+/// How long a run goes on after it was asked to stop. The moments at which it is asked are spread over
+/// the run, so that the slowest is what somebody at the window waits at worst.
+#[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 60, sample_size = 1)]
+fn stopped(bencher: Bencher, name: &str) {
+    const MOMENTS: u32 = 60;
+    let method: Method = name.parse().expect("is listed");
+    let run = move |flag: &AtomicBool| {
+        let estimator = estimator::entry(method).make(&Params::default());
+        estimator.estimate(&PAIR, &mut Trace::watched(&mut UntilStopped, flag))
+    };
+    let begun = Instant::now();
+    run(&AtomicBool::new(false)).expect("nobody stops it");
+    let whole = begun.elapsed();
+    let mut moment = 0;
+    bencher
+        .with_inputs(|| {
+            let flag = Arc::new(AtomicBool::new(false));
+            let worker = {
+                let flag = Arc::clone(&flag);
+                thread::spawn(move || run(&flag).is_err())
+            };
+            thread::sleep(whole * (moment % MOMENTS) / MOMENTS);
+            moment += 1;
+            (flag, worker)
+        })
+        .bench_local_values(|(flag, worker)| {
+            flag.store(true, Ordering::Release);
+            worker.join()
+        });
+}
+
+/// Wants to hear nothing, and stops the run when its flag is up.
+struct UntilStopped;
+
+impl Sink for UntilStopped {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Err(Cancelled)
+    }
 }
 
 /// Making a frame of the street, past the cache.

@@ -222,7 +222,7 @@ fn open() -> Option<Window> {
         chosen: vec![reference].into(),
         pick: ReferencePick::ByHand,
         index: Arc::default(),
-        methods: Method::ALL.to_vec(),
+        methods: Method::PAPER.to_vec(),
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 15.0,

@@ -140,7 +140,8 @@ impl Session {
         self.control.set_breakpoints(breakpoints);
     }
 
-    /// Asks the run to stop. It says [`State::Cancelled`] when it has.
+    /// Asks the run to stop, and does not wait for it. It says [`State::Cancelled`] when it has: an
+    /// estimator looks up after 256 hypotheses, one trial or one pass over an image.
     pub fn cancel(&self) {
         self.control.cancel();
     }

@@ -287,7 +287,8 @@ impl Desk {
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
         {
-            self.prober.ask(&problem, &self.params, pose);
+            let methods = self.setup.direct_methods();
+            self.prober.ask(&problem, &methods, &self.params, pose);
         }
     }
 
@@ -324,7 +325,9 @@ impl Desk {
         self.begin_with(mode, at_hand);
     }
 
+    /// The run before is told to stop first, or it would go on beside the new one.
     fn begin_with(&mut self, mode: RunMode, at_hand: Option<Arc<Loaded>>) {
+        self.session.cancel();
         self.session = start(&self.setup, mode, at_hand, &self.ctx);
         self.cursor = 0;
         self.follows = true;
@@ -332,6 +335,16 @@ impl Desk {
         self.hovered = None;
         self.selected_feature = None;
         self.prober.forget();
+    }
+
+    /// What all queries were run with holds no longer.
+    pub(super) fn stop_queries(&mut self) {
+        if self.queries.stop_all() {
+            self.note(
+                "The run over all queries has stopped: its settings were changed",
+                false,
+            );
+        }
     }
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
@@ -351,6 +364,7 @@ impl Desk {
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
     pub(super) fn begin_again(&mut self) {
+        self.stop_queries();
         let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
         let follows = self.follows && self.session.is_alive();
         self.params = Arc::new(self.setup.params.clone());

@@ -303,6 +303,7 @@ impl Desk {
     }
 
     fn pick_references(&mut self, pick: ReferencePick) {
+        self.stop_queries();
         self.setup.pick = pick;
         if pick != ReferencePick::ByHand {
             self.setup.chosen = References::default();
@@ -315,6 +316,7 @@ impl Desk {
             self.note("A query needs at least one reference", true);
             return;
         }
+        self.stop_queries();
         self.setup.pick = ReferencePick::ByHand;
         self.setup.chosen = frames.into();
         self.begin(RunMode::Running);

@@ -146,7 +146,7 @@ impl SavedSession {
             methods: self
                 .methods
                 .iter()
-                .filter_map(|name| Method::from_name(name))
+                .filter_map(|name| name.parse::<Method>().ok())
                 .collect(),
             fusions: self
                 .fusions

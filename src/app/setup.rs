@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::estimator;
 use crate::fusion;
 use crate::localize::{QueryResult, References, Selection, frames_within};
 use crate::method::Method;
@@ -98,6 +99,16 @@ impl Setup {
         }
     }
 
+    /// The methods whose cost can be looked at: those asked for that search one, those of the paper
+    /// where there are none.
+    pub fn direct_methods(&self) -> Vec<Method> {
+        let direct = estimator::direct_methods(&self.methods);
+        match direct.as_slice() {
+            [] => vec![Method::PM, Method::MI],
+            _ => direct,
+        }
+    }
+
     /// Goes to another query; where references are not chosen by hand, new ones are needed.
     pub(super) fn go_to(&mut self, query: usize) {
         self.query = query;
@@ -136,7 +147,7 @@ impl Setup {
         for &reference in &self.chosen.frames {
             words.extend(["--reference".to_owned(), frame(&self.references, reference)]);
         }
-        if self.methods != Method::ALL {
+        if self.methods != Method::PAPER {
             let names: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
             words.extend(["--method".to_owned(), names.join(",")]);
         }

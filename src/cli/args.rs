@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::estimator::UnknownMethod;
 use posescope::fusion;
 use posescope::localize::Selection;
 use posescope::measure::{Format, Gate, Tolerance};
@@ -188,7 +189,7 @@ impl Default for JobArgs {
             index: None,
             radius: Self::RADIUS_M,
             prior: None,
-            method: Method::ALL.to_vec(),
+            method: Method::PAPER.to_vec(),
             fusion: Vec::new(),
             seed: 0,
             config: ConfigArgs::default(),
@@ -431,8 +432,8 @@ fn share(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
 }
 
-fn method(name: &str) -> Result<Method, String> {
-    Method::from_name(name).ok_or_else(|| "fb, pm, mi or hy expected".to_owned())
+fn method(name: &str) -> Result<Method, UnknownMethod> {
+    name.parse()
 }
 
 fn positive(text: &str) -> Result<f64, String> {

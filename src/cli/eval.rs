@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use posescope::estimator;
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Comparison, Gate, Report, Tolerance, read_rows, write_report};
-use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
     Draw, Execution, Experiment, Pair, RUN_SCHEMA, RunFile, RunFolder, Scenes,
@@ -121,7 +121,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
         [] => defaults.methods.to_vec(),
         wanted => wanted.to_vec(),
     };
-    let methods = Method::ALL.into_iter().filter(|m| methods.contains(m));
+    let methods = estimator::methods().filter(|m| methods.contains(m));
     let fusions = match args.fusion.as_slice() {
         [] if references.count() == 1 && args.experiment != Some(Experiment::Multi) => Vec::new(),
         [] => defaults.fusions,

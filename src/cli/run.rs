@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use posescope::estimator;
 use posescope::localize::{
-    Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
+    Chooser, Localizer, QueryResult, Ranking, References, Request, Selection, Unwatched,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -136,8 +137,7 @@ impl Plan<'_> {
 
     /// In the order of the registry, each once.
     fn methods(&self) -> Vec<Method> {
-        Method::ALL
-            .into_iter()
+        estimator::methods()
             .filter(|method| self.args.job.method.contains(method))
             .collect()
     }
@@ -190,7 +190,7 @@ impl Plan<'_> {
     }
 
     fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<References, CliError> {
-        let chosen = chooser.choose(query, &|_| false)?;
+        let chosen = chooser.choose(query, &|_| false, &mut Unwatched)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(

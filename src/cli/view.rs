@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::app::{self, ReferencePick, Setup, WindowError};
+use posescope::estimator;
 use posescope::localize::{QueryResult, Selection};
 use posescope::method::Method;
 use posescope::params::Params;
@@ -191,7 +192,7 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
 
 /// In the order of the registry, each once.
 fn methods(asked: &[Method]) -> Vec<Method> {
-    let all = Method::ALL.into_iter();
+    let all = estimator::methods();
     all.filter(|method| asked.contains(method)).collect()
 }
 
@@ -271,7 +272,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         methods: file
             .methods
             .iter()
-            .filter_map(|name| Method::from_name(name))
+            .filter_map(|name| name.parse::<Method>().ok())
             .collect(),
         fusions: file.fusions(),
         params,

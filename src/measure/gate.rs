@@ -69,7 +69,7 @@ impl FromStr for Gate {
         let (left, right) = text.split_once(sign).ok_or_else(expected)?;
         let (metric, method) = left.trim().rsplit_once('@').ok_or_else(expected)?;
         let limit: f64 = right.trim().parse().map_err(|_| expected())?;
-        if !limit.is_finite() || crate::method::Method::from_name(method).is_none() {
+        if !limit.is_finite() || method.parse::<crate::method::Method>().is_err() {
             return Err(expected());
         }
         Ok(Self {

@@ -7,7 +7,8 @@ use super::run_file::{Item, Pair, RunFile};
 use super::run_folder::{FolderError, RunFolder};
 use crate::estimator::Failure;
 use crate::localize::{
-    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes, Watch,
+    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes,
+    Unwatched, Watch,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -194,7 +195,7 @@ impl Execution<'_> {
                 seed: self.run.seed,
                 index,
             };
-            chooser.choose(frame, &|frame| left_out.contains(&frame))
+            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut Unwatched)
         };
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;

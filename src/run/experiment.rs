@@ -40,18 +40,14 @@ pub struct Defaults {
     pub share: f64,
 }
 
-const WITHOUT_HYBRID: &[Method] = &[
-    Method::Feature,
-    Method::Photometric,
-    Method::MutualInformation,
-];
+const WITHOUT_HYBRID: &[Method] = &[Method::FB, Method::PM, Method::MI];
 
 /// What is asked in an experiment, or without one: every frame against one reference within 15 m.
 pub fn defaults(experiment: Option<Experiment>) -> Defaults {
     let robust: Vec<_> = fusion::find("r-wavg").into_iter().collect();
     match experiment {
         None => Defaults {
-            methods: &Method::ALL,
+            methods: &Method::PAPER,
             radii_m: &[15.0],
             references: Selection::Random(1),
             fusions: robust,
@@ -72,7 +68,7 @@ pub fn defaults(experiment: Option<Experiment>) -> Defaults {
             share: 0.1,
         },
         Some(Experiment::Large) => Defaults {
-            methods: &Method::ALL,
+            methods: &Method::PAPER,
             radii_m: &[15.0],
             references: Selection::Retrieved(5),
             fusions: robust,

@@ -203,7 +203,7 @@ impl RunFile {
     /// The methods.
     pub fn methods(&self) -> Vec<Method> {
         let methods = self.methods.iter();
-        methods.filter_map(|name| Method::from_name(name)).collect()
+        methods.filter_map(|name| name.parse().ok()).collect()
     }
 
     /// The fusions.
@@ -256,7 +256,7 @@ impl RunFile {
 
     /// Whether every name in it is known; says which is not.
     pub(super) fn check(&self) -> Result<(), String> {
-        let unknown_method = |name: &&String| Method::from_name(name).is_none();
+        let unknown_method = |name: &&String| name.parse::<Method>().is_err();
         let unknown_fusion = |name: &&String| fusion::find(name).is_none();
         let unknown = (self.methods.iter().find(unknown_method))
             .or_else(|| self.fusions.iter().find(unknown_fusion));

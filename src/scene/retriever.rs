@@ -8,13 +8,14 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::{Scene, SceneError};
 use crate::features::{SurfParams, surf};
 use crate::image::Photo;
-use crate::localize::Ranking;
+use crate::localize::{ChoiceError, Ranking};
 use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{
     BuildError, Criterion, Index, IndexError, Progress, Ranked, Request, Retrieval,
     RetrievalParams, Summary, build,
 };
+use crate::trace::Cancelled;
 use posescope_core::files::user_cache_folder;
 
 /// The extension of the files.
@@ -194,7 +195,9 @@ impl Ranking for Retriever {
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<Ranked>, SceneError> {
+        checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<Ranked>, ChoiceError> {
+        checkpoint()?;
         let candidates: HashSet<usize> = candidates.iter().copied().collect();
         let retrieval = self.retrieve(&query.photo, |frame| candidates.contains(&frame));
         let mut ranked = retrieval.ranked;

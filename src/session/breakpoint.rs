@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::estimator::{self, UnknownMethod};
 use crate::event::{Event, Stage, StageStarted};
 use crate::grid::Phase;
 use crate::method::Method;
@@ -208,7 +209,7 @@ impl Breakpoint {
             Stage::Accept,
             Stage::Color,
         ];
-        let names = Method::ALL.map(Stage::Estimator);
+        let names: Vec<_> = estimator::methods().map(Stage::Estimator).collect();
         let phases = Phase::ALL.map(Stage::Search);
         [Stage::Retrieve]
             .iter()
@@ -255,8 +256,9 @@ impl FromStr for Breakpoint {
         let scoped = comparison.map_or(text, |(name, ..)| name);
         let (method, name) = match scoped.split_once('.') {
             Some((method, name)) => {
-                let known = Method::from_name(method)
-                    .ok_or_else(|| refuse(format!("there is no method `{method}`")))?;
+                let known = method
+                    .parse()
+                    .map_err(|error: UnknownMethod| refuse(error.to_string()))?;
                 (Some(known), name)
             }
             None => (None, scoped),
@@ -472,12 +474,12 @@ mod tests {
             })
         };
         let run = [
-            started(Stage::Estimator(Method::Feature)),
+            started(Stage::Estimator(Method::FB)),
             started(Stage::Consensus),
             ended(Stage::Consensus),
-            ended(Stage::Estimator(Method::Feature)),
-            started(Stage::Estimator(Method::Hybrid)),
-            started(Stage::Estimator(Method::Feature)),
+            ended(Stage::Estimator(Method::FB)),
+            started(Stage::Estimator(Method::HY)),
+            started(Stage::Estimator(Method::FB)),
             started(Stage::Consensus),
         ];
         let at = |text| -> Vec<usize> {

@@ -93,6 +93,16 @@ pub enum JobError {
     },
 }
 
+impl JobError {
+    /// Whether the watcher asked the job to stop.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            Self::Localize(LocalizeError::Cancelled(_)) | Self::Choice(ChoiceError::Cancelled(_))
+        )
+    }
+}
+
 /// What the worker says to the session.
 pub(super) enum Message {
     Chosen(References),
@@ -112,7 +122,8 @@ pub(super) enum Message {
     Broke(String),
 }
 
-/// Starts the worker. Nobody joins it: it ends by itself, or at the next event after a cancel.
+/// Starts the worker. Nobody joins it: it ends by itself, or at the next event or checkpoint after a
+/// cancel.
 pub(super) fn spawn(
     job: Job,
     control: Arc<Control>,
@@ -131,7 +142,7 @@ pub(super) fn spawn(
             let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate, on_choice)));
             let last_words = match outcome {
                 Ok(Ok(_)) => Message::Finished,
-                Ok(Err(JobError::Localize(LocalizeError::Cancelled(_)))) => Message::Cancelled,
+                Ok(Err(error)) if error.is_cancelled() => Message::Cancelled,
                 Ok(Err(error)) => Message::Broke(error.to_string()),
                 Err(panic) => {
                     Message::Broke(format!("internal error: {}", words_of(panic.as_ref())))
@@ -166,7 +177,7 @@ impl Job {
         let references = scene(self.references.as_ref());
         let queries = scene(self.queries.as_ref());
         let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
-        let chosen = self.choose(&localizer)?;
+        let chosen = self.choose(&localizer, watch)?;
         on_choice(&chosen);
         let request = Request {
             radius_m: self.uncertainty_radius_m,
@@ -183,7 +194,11 @@ impl Job {
         Ok(results)
     }
 
-    fn choose(&self, localizer: &Localizer<'_>) -> Result<References, JobError> {
+    fn choose(
+        &self,
+        localizer: &Localizer<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<References, JobError> {
         if !self.chosen.frames.is_empty() {
             return Ok(self.chosen.clone());
         }
@@ -206,7 +221,7 @@ impl Job {
             seed: self.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),
         };
-        let chosen = chooser.choose(self.query, &|_| false)?;
+        let chosen = chooser.choose(self.query, &|_| false, watch)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear {
                 query: query(),

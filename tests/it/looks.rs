@@ -39,13 +39,9 @@ fn at_every_moment(
     see(window, "waiting", &[]);
     window.state_mut().send(Command::Run);
     wait(window, |app| *app.desk().state() == State::Finished);
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::Feature));
+    window.state_mut().send(Command::SelectMethod(Method::FB));
     see(window, "features", &[]);
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::MutualInformation));
+    window.state_mut().send(Command::SelectMethod(Method::MI));
     see(window, "search", &[]);
     window.state_mut().send(Command::SwitchTheme);
     see(window, "light", &[]);

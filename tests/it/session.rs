@@ -1,15 +1,16 @@
 //! Driving an estimator: pause, step, break, cancel.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
 use posescope::fusion;
-use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched};
+use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State};
+use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
@@ -22,7 +23,7 @@ fn job(query: usize) -> Job {
         chosen: vec![0].into(),
         selection: None,
         index: Arc::default(),
-        methods: Method::ALL.to_vec(),
+        methods: Method::PAPER.to_vec(),
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
@@ -89,7 +90,7 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
     assert_eq!(session.run().len(), 1);
     let first = &session.run().records()[0].event;
-    assert_eq!(starts(first), Some(Stage::Estimator(Method::Feature)));
+    assert_eq!(starts(first), Some(Stage::Estimator(Method::FB)));
 
     let event = order(&mut session, RunMode::StepInto);
     assert_eq!(starts(&event), Some(Stage::Detect));
@@ -102,7 +103,7 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
-    assert_eq!(ends(&event), Some(Stage::Estimator(Method::Feature)));
+    assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));
     assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
 }
 
@@ -202,6 +203,70 @@ fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
     }
 }
 
+/// Takes in what is told until something is the case.
+fn wait(session: &mut Session, is_so: impl Fn(&Session) -> bool) {
+    let begun = Instant::now();
+    while !is_so(session) {
+        assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
+        std::thread::sleep(Duration::from_millis(1));
+        session.drain();
+    }
+}
+
+#[test]
+fn a_session_pauses_and_stops_within_a_lattice() {
+    let mut endless = job(1);
+    endless.methods = vec![Method::PM];
+    for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
+        endless.params.assign(change).expect("a good value");
+    }
+    let mut session = start(endless, RunMode::Running, &[]);
+    let in_the_lattice = |session: &Session| session.run().len() > 500;
+    wait(&mut session, in_the_lattice);
+    session.set_mode(RunMode::Paused);
+    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    let told = session.run().len();
+    // A million hypotheses are to come, most of which were not even scored.
+    assert!(told < 500_000, "{told}");
+    session.set_mode(RunMode::Running);
+    wait(&mut session, |session| session.run().len() > told);
+    let begun = Instant::now();
+    session.cancel();
+    wait(&mut session, |session| !session.is_alive());
+    assert_eq!(session.state(), &State::Cancelled);
+    assert!(begun.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn references_that_are_ranked_can_be_stopped_too() {
+    let ranked = Job {
+        chosen: Default::default(),
+        selection: Some("maxf:2".parse().expect("a selection")),
+        ..job(1)
+    };
+    let mut stopped = UntilStopped(Arc::new(AtomicBool::new(true)));
+    let error = ranked.work(&mut stopped, |_| panic!("none was chosen"));
+    assert!(error.expect_err("it was stopped").is_cancelled());
+}
+
+/// Stops a run whose flag is up.
+struct UntilStopped(Arc<AtomicBool>);
+
+impl Sink for UntilStopped {
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Err(Cancelled)
+    }
+}
+
+impl Watch for UntilStopped {
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(Arc::clone(&self.0))
+    }
+}
+
 #[test]
 fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
     let mut session = start(job(UNREADABLE), RunMode::Running, &[]);
@@ -296,9 +361,9 @@ fn several_references_are_fused_as_without_a_session() {
     assert_eq!(alone.len(), 4 * 2);
     let run = session.run();
     let parts: Vec<Part> = run.spans().iter().map(|span| span.part).collect();
-    let first = [0, 1].map(|reference| Part::Reference(Method::Feature, reference));
+    let first = [0, 1].map(|reference| Part::Reference(Method::FB, reference));
     assert_eq!(parts[..2], first);
-    assert_eq!(parts[2..6], [Part::Fusion(Method::Feature); 4]);
+    assert_eq!(parts[2..6], [Part::Fusion(Method::FB); 4]);
     for span in run.spans() {
         let fused = run.latest_in::<ReferencesFused>(span, span.records.end);
         assert_eq!(fused.is_some(), matches!(span.part, Part::Fusion(_)));

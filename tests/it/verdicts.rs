@@ -59,7 +59,7 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
         offered: vec![frame("5")],
         query: frame("5"),
         chosen: vec![frame("4")].into(),
-        methods: vec![Method::Feature],
+        methods: vec![Method::FB],
         scene_argument: folder,
         queries: scene.clone(),
         references: scene.clone(),

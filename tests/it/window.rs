@@ -31,7 +31,7 @@ pub fn setup() -> Setup {
         chosen: vec![0].into(),
         pick: ReferencePick::ByHand,
         index: Arc::default(),
-        methods: Method::ALL.to_vec(),
+        methods: Method::PAPER.to_vec(),
         fusions: Vec::new(),
         params: Params::default(),
         uncertainty_radius_m: 3.0,
@@ -134,7 +134,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
             0,
             1,
             &[request],
-            &Method::ALL,
+            &Method::PAPER,
             &mut Unwatched,
             |result, _| {
                 results.push(result);
@@ -186,7 +186,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     press(&mut window, Modifiers::NONE, Key::Num3);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.part.method(), Some(Method::MutualInformation));
+    assert_eq!(span.part.method(), Some(Method::MI));
 }
 
 #[test]
@@ -229,9 +229,7 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
 #[test]
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::MutualInformation));
+    window.state_mut().send(Command::SelectMethod(Method::MI));
     window.step();
     window.step();
     window.state_mut().send(Command::SetParam {
@@ -242,7 +240,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     assert_eq!(settle(&mut window), State::Finished);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.part.method(), Some(Method::MutualInformation));
+    assert_eq!(span.part.method(), Some(Method::MI));
     assert_eq!(desk.cursor + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
         let bars = desk.run().stages().iter();
@@ -300,6 +298,53 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
     settle(&mut window);
     press(&mut window, Modifiers::NONE, Key::K);
     assert_eq!(window.state().desk().setup.query, 2);
+}
+
+#[test]
+fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
+    let scene: Arc<dyn Scene> = Arc::new(Walls::new());
+    let mut setup = Setup {
+        references: Arc::clone(&scene),
+        queries: Arc::clone(&scene),
+        methods: vec![Method::PM],
+        ..setup()
+    };
+    // A million hypotheses.
+    for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
+        setup.params.assign(change).expect("a good value");
+    }
+    let mut window = window(setup);
+    settle(&mut window);
+    wait(&mut window, |app| !app.desk().queries.is_painting());
+    std::thread::sleep(Duration::from_millis(100));
+    // Every worker has its handles on the scene.
+    let alone = Arc::strong_count(&scene);
+    let is_alone = |_: &App| Arc::strong_count(&scene) <= alone;
+    let mut stop_by = |command: Command| {
+        let begun = Instant::now();
+        window.state_mut().send(command);
+        window.step();
+        assert_eq!(window.state().desk().queries.progress(), None);
+        wait(&mut window, is_alone);
+        assert!(begun.elapsed() < Duration::from_secs(20));
+        let running = Instant::now();
+        while running.elapsed() < Duration::from_millis(200) {
+            window.step();
+        }
+        window.state_mut().send(Command::RunAllQueries);
+        window.step();
+        assert_eq!(window.state().desk().queries.progress(), Some((0, 3)));
+        wait(&mut window, |app| !is_alone(app));
+    };
+    // The first time there is nothing to stop but the session, which waits at its first event.
+    stop_by(Command::SetSeed(8));
+    stop_by(Command::RunAllQueries);
+    stop_by(Command::SetParam {
+        key: "grid.yaw_step".to_owned(),
+        value: "2".to_owned(),
+    });
+    stop_by(Command::SetReferences(vec![2]));
+    assert!(is_said(&window, "its settings were changed"));
 }
 
 #[test]

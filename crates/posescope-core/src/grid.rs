@@ -122,6 +122,16 @@ impl Phase {
         matches!(self, Self::YawCoarse | Self::YawFine)
     }
 
+    /// What makes its lattice smaller.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::PositionCoarse => "raise grid.coarse_step or lower the radius",
+            Self::PositionFine => "raise grid.fine_step or lower grid.fine_range",
+            Self::YawCoarse => "raise grid.yaw_step or lower grid.yaw_range",
+            Self::YawFine => "raise grid.yaw_fine_step or lower grid.yaw_fine_range",
+        }
+    }
+
     /// The name that people read.
     pub fn name(self) -> &'static str {
         match self {
@@ -131,6 +141,29 @@ impl Phase {
             Self::YawFine => "yaw, fine",
         }
     }
+}
+
+/// Cells of a lattice at most: 1,024 × 1,024, which is a radius of 511 m in steps of 1 m, or of 50 m
+/// in steps of 0.1 m.
+///
+/// Scoring as many hypotheses takes ten minutes on one core, their scores 24 MB, and what a window
+/// remembers of them 200 MB. A radius of 500 m in steps of 0.05 m would be 400 million: a week, and
+/// tens of gigabytes.
+pub const MOST_CELLS: usize = 1 << 20;
+
+/// A phase of the search has more than [`MOST_CELLS`].
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the search grid is too large: {} has {cells:.0} cells, at most {MOST_CELLS} are searched; {}",
+    phase.name(),
+    phase.remedy()
+)]
+pub struct LatticeTooLarge {
+    /// The phase.
+    pub phase: Phase,
+    /// The cells that its lattice would have, those left out included; they may be more than there
+    /// are numbers for.
+    pub cells: f64,
 }
 
 /// The hypotheses of one phase: a regular lattice of offsets around a centre.
@@ -152,7 +185,15 @@ pub struct Lattice {
 
 impl Lattice {
     /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].
-    pub fn new(phase: Phase, centre: Offset, radius_m: f64, params: &GridParams) -> Self {
+    ///
+    /// # Errors
+    /// [`LatticeTooLarge`]: more than [`MOST_CELLS`].
+    pub fn new(
+        phase: Phase,
+        centre: Offset,
+        radius_m: f64,
+        params: &GridParams,
+    ) -> Result<Self, LatticeTooLarge> {
         let (half_range, step) = match phase {
             Phase::PositionCoarse => (radius_m, params.coarse_step_m),
             Phase::PositionFine => (params.fine_range_m, params.fine_step_m),
@@ -166,9 +207,14 @@ impl Lattice {
             ),
         };
         // The tolerance keeps 1.0 / 0.2 from becoming 4 steps.
-        let steps = (half_range / step + 1e-9).floor().max(0.0) as usize;
-        let side = 2 * steps + 1;
-        Self {
+        let steps = (half_range / step + 1e-9).floor().max(0.0);
+        let side = 2.0 * steps + 1.0;
+        let cells = if phase.is_yaw() { side } else { side * side };
+        if cells > MOST_CELLS as f64 {
+            return Err(LatticeTooLarge { phase, cells });
+        }
+        let side = side as usize;
+        Ok(Self {
             phase,
             columns: side,
             rows: if phase.is_yaw() { 1 } else { side },
@@ -178,7 +224,7 @@ impl Lattice {
                 Phase::PositionCoarse => radius_m,
                 _ => f64::INFINITY,
             },
-        }
+        })
     }
 
     /// Number of cells, those left out included.
@@ -301,6 +347,40 @@ mod tests {
     use nalgebra::Point3;
     use proptest::prelude::*;
 
+    fn lattice(phase: Phase, centre: Offset, radius_m: f64) -> Lattice {
+        Lattice::new(phase, centre, radius_m, &GridParams::default()).expect("small")
+    }
+
+    #[test]
+    fn a_lattice_beyond_the_limit_is_refused_and_one_at_the_limit_is_not() {
+        let coarse = |radius_m, coarse_step_m| {
+            let params = GridParams {
+                coarse_step_m,
+                ..GridParams::default()
+            };
+            Lattice::new(Phase::PositionCoarse, Offset::default(), radius_m, &params)
+                .map(|lattice| lattice.cells())
+        };
+        assert_eq!(coarse(511.0, 1.0), Ok(1023 * 1023));
+        let refused = coarse(500.0, 0.05).expect_err("400 million");
+        assert_eq!(refused.cells, 20_001.0 * 20_001.0);
+        assert_eq!(
+            refused.to_string(),
+            "the search grid is too large: position, coarse has 400040001 cells, at most 1048576 \
+             are searched; raise grid.coarse_step or lower the radius"
+        );
+        for radius_m in [1e300, f64::INFINITY] {
+            assert!(coarse(radius_m, 0.05).is_err());
+        }
+        let params = GridParams {
+            fine_range_m: 10.0,
+            fine_step_m: 0.01,
+            ..GridParams::default()
+        };
+        let refused = Lattice::new(Phase::PositionFine, Offset::default(), 1.0, &params);
+        assert_eq!(refused.expect_err("4 million").cells, 2001.0 * 2001.0);
+    }
+
     #[test]
     fn the_fine_lattice_reaches_both_ends_and_contains_its_centre() {
         let centre = Offset {
@@ -308,7 +388,7 @@ mod tests {
             forward_m: -2.0,
             yaw_rad: 0.0,
         };
-        let lattice = Lattice::new(Phase::PositionFine, centre, 10.0, &GridParams::default());
+        let lattice = lattice(Phase::PositionFine, centre, 10.0);
         assert_eq!((lattice.columns, lattice.rows), (11, 11));
         assert_eq!(lattice.offset(60), Some(centre));
         let first = lattice.offset(0).expect("inside");
@@ -317,16 +397,14 @@ mod tests {
 
     #[test]
     fn coarse_positions_fill_the_disc_and_no_more() {
-        let params = GridParams::default();
-        let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 2.0, &params);
+        let lattice = lattice(Phase::PositionCoarse, Offset::default(), 2.0);
         assert_eq!(lattice.cells(), 25);
         assert_eq!(lattice.hypotheses().count(), 13);
     }
 
     #[test]
     fn yaw_angles_are_centred_and_symmetric() {
-        let params = GridParams::default();
-        let lattice = Lattice::new(Phase::YawCoarse, Offset::default(), 5.0, &params);
+        let lattice = lattice(Phase::YawCoarse, Offset::default(), 5.0);
         let yaws: Vec<_> = lattice.hypotheses().map(|(_, o)| o.yaw_rad).collect();
         assert_eq!(yaws.len(), 21);
         assert!((yaws[0] + 10_f64.to_radians()).abs() < 1e-12);
@@ -350,12 +428,7 @@ mod tests {
     }
 
     fn scored(costs: &[Option<f64>], covered: u32, columns: usize) -> ScoredLattice {
-        let mut lattice = Lattice::new(
-            Phase::YawCoarse,
-            Offset::default(),
-            1.0,
-            &GridParams::default(),
-        );
+        let mut lattice = lattice(Phase::YawCoarse, Offset::default(), 1.0);
         lattice.columns = columns;
         lattice.rows = costs.len() / columns;
         ScoredLattice {

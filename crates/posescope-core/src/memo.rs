@@ -6,6 +6,7 @@
 //! so there is no list of what a change makes invalid that could be out of date.
 
 use std::any::Any;
+use std::convert::Infallible;
 use std::fmt;
 use std::sync::Arc;
 
@@ -44,11 +45,24 @@ impl Memo {
         key: &impl fmt::Debug,
         make: impl FnOnce() -> T,
     ) -> Recalled<T> {
+        let Ok(recalled) = self.try_recall(key, || Ok::<_, Infallible>(make()));
+        recalled
+    }
+
+    /// As [`Self::recall`], for a value whose making can be stopped: then nothing is remembered.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn try_recall<T: Any + Send + Sync, E>(
+        &self,
+        key: &impl fmt::Debug,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Recalled<T>, E> {
         let Some(recent) = &self.0 else {
-            return Recalled {
-                value: Arc::new(make()),
+            return Ok(Recalled {
+                value: Arc::new(make()?),
                 reused: false,
-            };
+            });
         };
         // A key may spell out a thousand correspondences; its hash is kept.
         let key = format!("{} {key:?}", std::any::type_name::<T>());
@@ -56,17 +70,17 @@ impl Memo {
         if let Some(value) = recent.get(&key)
             && let Ok(value) = value.downcast()
         {
-            return Recalled {
+            return Ok(Recalled {
                 value,
                 reused: true,
-            };
+            });
         }
-        let value = Arc::new(make());
+        let value = Arc::new(make()?);
         recent.insert(&key, Arc::clone(&value) as Arc<dyn Any + Send + Sync>);
-        Recalled {
+        Ok(Recalled {
             value,
             reused: false,
-        }
+        })
     }
 }
 
@@ -102,6 +116,19 @@ mod tests {
         assert_eq!(*again.value, 4);
         assert!(!memo.recall(&("half", 8), || 4.0_f64).reused);
         assert!(!memo.recall(&("half", 9), || 4_u32).reused);
+    }
+
+    #[test]
+    fn what_was_stopped_is_not_remembered() {
+        let memo = Memo::of(4);
+        assert_eq!(
+            memo.try_recall(&"a", || Err::<u32, _>("stopped")).err(),
+            Some("stopped")
+        );
+        let again = memo
+            .try_recall(&"a", || Ok::<u32, &str>(7))
+            .expect("it is made");
+        assert!(!again.reused && *again.value == 7);
     }
 
     #[test]

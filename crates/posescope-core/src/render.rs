@@ -5,8 +5,8 @@ mod color;
 mod score;
 mod splat;
 
-pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud};
-pub use score::{Comparison, Score, Scorer};
+pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
+pub use score::{Comparison, MOST_AT_A_TIME, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
 use crate::describe::parameters;

@@ -6,9 +6,9 @@ use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::desk::Desk;
 use crate::app::{Command, Scope, theme};
+use crate::estimator;
 use crate::event::Side;
 use crate::localize::{QueryResult, Verdict};
-use crate::method::Method;
 
 /// The list of queries.
 #[derive(Default)]
@@ -76,7 +76,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
 pub(super) fn dots(ui: &mut Ui, desk: &Desk, results: &[QueryResult]) {
     let failure_radius_m = desk.setup.failure_radius_m;
     ui.spacing_mut().item_spacing.x = 2.0;
-    for method in Method::ALL {
+    for method in estimator::methods() {
         for result in results.iter().filter(|r| r.method == method.name()) {
             let (mark, color) = match result.verdict(failure_radius_m) {
                 Verdict::NoPose => ("×", theme::ESTIMATE),

@@ -7,28 +7,43 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-use super::{CostSummary, Estimator, Failure, Halt, Outcome, settle};
-use crate::cost::Cost;
+use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
+use crate::cost::{self, Cost};
 use crate::event::{
     CloudColored, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
 };
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
-use crate::image::gaussian_smoothed;
 use crate::memo::Recalled;
 use crate::method::Method;
+use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
-use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud};
+use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
 pub struct Direct {
-    pub(super) method: Method,
-    pub(super) cost: Box<dyn Cost>,
-    pub(super) render: RenderParams,
-    pub(super) grid: GridParams,
-    /// All parameters of the cost, as a key of what is remembered.
-    pub(super) cost_key: String,
+    method: Method,
+    cost: Box<dyn Cost>,
+    render: RenderParams,
+    grid: GridParams,
+    /// The cost with all its parameters, as a key of what is remembered.
+    cost_key: String,
+}
+
+impl Direct {
+    /// The estimator that searches the pose of least registered cost.
+    pub fn new(entry: &cost::Entry, params: &Params) -> Self {
+        let default = (entry.params)();
+        let cost = params.costs.of(entry).unwrap_or(default.as_ref());
+        Self {
+            method: Method::named(entry.name),
+            cost: cost.cost(),
+            render: params.render.clone(),
+            grid: params.grid.clone(),
+            cost_key: format!("{} {cost:?}", entry.name),
+        }
+    }
 }
 
 impl Estimator for Direct {
@@ -36,7 +51,7 @@ impl Estimator for Direct {
         let found = trace.stage(Stage::Estimator(self.method), |trace| {
             self.search(problem, trace)
         });
-        Ok(match settle(found)? {
+        Ok(match separate_failure(found)? {
             Ok((pose, cost)) => Outcome {
                 pose: Ok(pose),
                 counts: None,
@@ -63,6 +78,11 @@ impl Direct {
         problem: &Problem,
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
+        let radius = problem.uncertainty_radius_m;
+        // How large a lattice is depends on no centre, so none is refused after the others were scored.
+        for phase in Phase::ALL {
+            Lattice::new(phase, Offset::default(), radius, &self.grid).map_err(Failure::from)?;
+        }
         let cloud = trace.stage(Stage::Color, |trace| {
             let Recalled {
                 value: cloud,
@@ -78,7 +98,9 @@ impl Direct {
             }
             Ok(cloud)
         })?;
+        trace.checkpoint()?;
         let scorer = self.scorer(problem, &cloud);
+        trace.checkpoint()?;
 
         // The reference pose is the starting value, and its coverage the measure of all others.
         let start = Offset::default();
@@ -100,8 +122,8 @@ impl Direct {
         let mut coarse_positions = None;
         for _ in 0..self.grid.rounds {
             for phase in Phase::ALL {
-                let radius = problem.uncertainty_radius_m;
-                let lattice = Lattice::new(phase, search.best, radius, &self.grid);
+                let lattice =
+                    Lattice::new(phase, search.best, radius, &self.grid).map_err(Failure::from)?;
                 let surface =
                     trace.stage(Stage::Search(phase), |trace| search.phase(lattice, trace))?;
                 if phase == Phase::PositionCoarse {
@@ -125,6 +147,7 @@ impl Direct {
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
             };
             trace.emit(|| search.render(Moment::End, best))?;
+            trace.checkpoint()?;
             let area = problem.query.intrinsics.area();
             let summary = CostSummary {
                 initial: initial.cost,
@@ -152,25 +175,25 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        reference.memo.recall(&self.render, || {
-            color_cloud(
+        let key = (&self.render, self.cost.reference_channel_name());
+        reference.memo.recall(&key, || {
+            color_cloud_by(
                 &reference.cloud,
-                &reference.photo.gray,
                 &reference.intrinsics,
                 &self.render,
+                self.cost.reference_channel(&reference.photo.gray),
             )
         })
     }
 
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let sigma = self.cost.query_smoothing_px();
-        let smoothed = query
-            .memo
-            .recall(&sigma, || gaussian_smoothed(&query.photo.gray, sigma));
+        let channel = query.memo.recall(&self.cost.query_channel_name(), || {
+            self.cost.query_channel(&query.photo.gray)
+        });
         Scorer::new(
             &cloud.points,
-            smoothed.value,
+            channel.value,
             &query.intrinsics,
             self.render.splat_px,
             self.cost.as_ref(),
@@ -179,6 +202,7 @@ impl Direct {
 }
 
 /// Where the scores of a lattice are remembered: with the query, under all that they depend on.
+#[derive(Clone, Copy)]
 struct Memory<'a> {
     direct: &'a Direct,
     problem: &'a Problem,
@@ -192,10 +216,10 @@ struct LatticeScores {
 
 impl Memory<'_> {
     fn scores(
-        &self,
+        self,
         lattice: &Lattice,
-        score: impl FnOnce() -> Vec<Score>,
-    ) -> Recalled<LatticeScores> {
+        score: impl FnOnce() -> Result<Vec<Score>, Cancelled>,
+    ) -> Result<Recalled<LatticeScores>, Cancelled> {
         let Self { direct, problem } = self;
         let reference = &problem.reference;
         let key = (
@@ -204,9 +228,11 @@ impl Memory<'_> {
             &direct.render,
             lattice,
         );
-        problem.query.memo.recall(&key, || LatticeScores {
-            scores: score(),
-            _reference: Arc::clone(reference),
+        problem.query.memo.try_recall(&key, || {
+            Ok(LatticeScores {
+                scores: score()?,
+                _reference: Arc::clone(reference),
+            })
         })
     }
 }
@@ -223,7 +249,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Scores a lattice, tells the scores in scan order, and moves to its minimum.
+    /// Scores a lattice, some hypotheses at a time, tells the scores in scan order, and moves to its
+    /// minimum.
     ///
     /// A lattice where nothing has a cost leaves the search where it is.
     fn phase(
@@ -231,38 +258,34 @@ impl Search<'_> {
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let hypotheses: Vec<(usize, Offset)> = lattice.hypotheses().collect();
-        let poses: Vec<Pose> = hypotheses
-            .iter()
-            .map(|(_, offset)| offset.reference_from_camera())
-            .collect();
         let mut scores = vec![None; lattice.cells()];
-        let mut least: Option<f64> = None;
-        let phase = lattice.phase;
-        let Recalled {
-            value: found,
-            reused,
-        } = self.memory.scores(&lattice, || self.scorer.score(&poses));
-        trace.note_reuse(reused);
-        for (&(cell, offset), &score) in hypotheses.iter().zip(&found.scores) {
-            scores[cell] = Some(score);
-            let cost = score.eligible_cost(self.least_covered);
-            let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
-            if is_best {
-                least = cost;
+        let mut least = None;
+        let (memory, scorer) = (self.memory, self.scorer);
+        let found = memory.scores(&lattice, || {
+            let mut found = Vec::new();
+            let mut hypotheses = lattice.hypotheses();
+            loop {
+                trace.checkpoint()?;
+                let some: Vec<_> = hypotheses.by_ref().take(scorer.at_a_time()).collect();
+                if some.is_empty() {
+                    return Ok(found);
+                }
+                let poses: Vec<Pose> = some
+                    .iter()
+                    .map(|(_, offset)| offset.reference_from_camera())
+                    .collect();
+                for ((cell, offset), score) in some.into_iter().zip(scorer.score(&poses)) {
+                    found.push(score);
+                    scores[cell] = Some(score);
+                    self.tell(lattice.phase, offset, score, &mut least, trace)?;
+                }
             }
-            let evaluation = self.evaluations;
-            self.evaluations += 1;
-            trace.emit(|| PoseScored {
-                phase,
-                evaluation,
-                offset,
-                score,
-                coverage: f64::from(score.covered) / f64::from(self.covered_at_reference.max(1)),
-                is_best,
-            })?;
-            if is_best {
-                trace.emit(|| self.render(Moment::NewBest, offset))?;
+        })?;
+        trace.note_reuse(found.reused);
+        if found.reused {
+            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.scores) {
+                scores[cell] = Some(score);
+                self.tell(lattice.phase, offset, score, &mut least, trace)?;
             }
         }
         let surface = Arc::new(ScoredLattice {
@@ -282,6 +305,36 @@ impl Search<'_> {
             best: minimum.and_then(|cell| surface.lattice.offset(cell)),
         })?;
         Ok(surface)
+    }
+
+    /// Tells the score of a hypothesis, and the view where it is the `least` of its lattice so far.
+    fn tell(
+        &mut self,
+        phase: Phase,
+        offset: Offset,
+        score: Score,
+        least: &mut Option<f64>,
+        trace: &mut Trace<'_>,
+    ) -> Result<(), Cancelled> {
+        let cost = score.eligible_cost(self.least_covered);
+        let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
+        if is_best {
+            *least = cost;
+        }
+        let evaluation = self.evaluations;
+        self.evaluations += 1;
+        trace.emit(|| PoseScored {
+            phase,
+            evaluation,
+            offset,
+            score,
+            coverage: f64::from(score.covered) / f64::from(self.covered_at_reference.max(1)),
+            is_best,
+        })?;
+        if is_best {
+            trace.emit(|| self.render(Moment::NewBest, offset))?;
+        }
+        Ok(())
     }
 
     fn render(&self, moment: Moment, offset: Offset) -> ViewRendered {

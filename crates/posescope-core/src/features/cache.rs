@@ -1,11 +1,12 @@
 //! Features that were found before.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use image::GrayImage;
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::{Features, SurfParams, surf};
+use super::{Features, SurfParams, surf_interruptible};
 use crate::recent::Recent;
 
 /// The features of the images asked for last.
@@ -23,23 +24,38 @@ impl FeatureCache {
 
     /// [`surf`] of the image, remembered by its pixels and the parameters.
     pub fn surf(&self, image: &GrayImage, params: &SurfParams) -> Arc<Features> {
+        let Ok(features) = self.surf_interruptible(image, params, || Ok::<_, Infallible>(()));
+        features
+    }
+
+    /// As [`Self::surf`], of which `checkpoint` can stop the search as in [`surf_interruptible`].
+    ///
+    /// # Errors
+    /// Those of `checkpoint`.
+    pub fn surf_interruptible<E>(
+        &self,
+        image: &GrayImage,
+        params: &SurfParams,
+        checkpoint: impl FnMut() -> Result<(), E>,
+    ) -> Result<Arc<Features>, E> {
         let key = format!(
             "{:032x}-{:?}-{params:?}",
             xxh3_128(image.as_raw()),
             image.dimensions()
         );
         if let Some(features) = self.0.get(&key) {
-            return features;
+            return Ok(features);
         }
-        let features = Arc::new(surf(image, params));
+        let features = Arc::new(surf_interruptible(image, params, checkpoint)?);
         self.0.insert(&key, Arc::clone(&features));
-        features
+        Ok(features)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::features::surf;
     use image::Luma;
 
     #[test]

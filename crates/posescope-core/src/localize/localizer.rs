@@ -6,6 +6,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use super::watch::checkpoint;
 use super::{
     QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, tell_ranking,
 };
@@ -73,7 +74,7 @@ struct Work<'a> {
     problems: Vec<Problem>,
     /// Feature matches by problem, once they are known.
     matches: Vec<Option<usize>>,
-    /// By method, in the order of [`Method::ALL`], and problem.
+    /// By method, in the order of [`estimator::methods`], and problem.
     candidates: Vec<Vec<Option<Candidate>>>,
 }
 
@@ -138,6 +139,7 @@ impl<'a> Localizer<'a> {
                     Some(problem) => problem,
                     None => {
                         places.push(place);
+                        checkpoint(watch)?;
                         problems.push(Problem {
                             query: Arc::clone(&loaded),
                             reference: self.references.reference(reference)?,
@@ -154,9 +156,9 @@ impl<'a> Localizer<'a> {
             query: &loaded,
             truth: self.queries.pose(query),
             matches: vec![None; problems.len()],
-            candidates: Method::ALL
+            candidates: estimator::methods()
                 .map(|_| problems.iter().map(|_| None).collect())
-                .into(),
+                .collect(),
             problems,
         };
         watch.begin_query(index, &work.problems, work.truth.as_ref());
@@ -191,7 +193,7 @@ impl<'a> Localizer<'a> {
                     }
                 }
                 if !request.fusions.is_empty() {
-                    self.count_matches(&mut work, members);
+                    self.count_matches(&mut work, members, watch)?;
                 }
                 for fusion in &request.fusions {
                     let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
@@ -273,7 +275,7 @@ impl<'a> Localizer<'a> {
             _ => self.estimate(work, problem, method, watch)?,
         };
         watch.end_method(&candidate.result, &candidate.times);
-        let row = Method::ALL.iter().position(|known| *known == method);
+        let row = estimator::methods().position(|known| known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
         }
@@ -290,7 +292,7 @@ impl<'a> Localizer<'a> {
         let mut timings = StageTimings::default();
         let attention = watch.attention();
         let estimated = catch_unwind(AssertUnwindSafe(|| {
-            let mut estimator = (estimator::entry(method).new)(self.params);
+            let mut estimator = estimator::entry(method).make(self.params);
             estimator.remember(&self.features);
             let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
             let mut fanout = Fanout::new(sinks);
@@ -333,12 +335,18 @@ impl<'a> Localizer<'a> {
     }
 
     /// FB counts them anyway; for the direct methods the same features are matched.
-    fn count_matches(&self, work: &mut Work<'_>, members: &[usize]) {
+    fn count_matches(
+        &self,
+        work: &mut Work<'_>,
+        members: &[usize],
+        watch: &mut dyn Watch,
+    ) -> Result<(), Cancelled> {
         for &problem in members {
             if work.matches[problem].is_some() {
                 continue;
             }
-            let counted = Method::ALL.iter().find_map(|&method| {
+            checkpoint(watch)?;
+            let counted = estimator::methods().find_map(|method| {
                 let candidate = work.candidate(problem, method)?;
                 candidate.outcome.counts
             });
@@ -355,6 +363,7 @@ impl<'a> Localizer<'a> {
                 }
             });
         }
+        Ok(())
     }
 
     fn fuse(
@@ -419,20 +428,18 @@ impl<'a> Localizer<'a> {
 
 impl Work<'_> {
     fn candidate(&self, problem: usize, method: Method) -> Option<&Candidate> {
-        let row = Method::ALL.iter().position(|known| *known == method)?;
+        let row = estimator::methods().position(|known| known == method)?;
         self.candidates.get(row)?.get(problem)?.as_ref()
     }
 
-    /// FB's and MI's candidates, where a hybrid can be made of them.
+    /// The candidates of a hybrid's methods, where it can be made of them.
     fn hybrid_parts(&self, problem: usize, method: Method) -> Option<(&Candidate, &Candidate)> {
-        if method != Method::Hybrid {
-            return None;
-        }
-        let feature = self.candidate(problem, Method::Feature)?;
-        let direct = self.candidate(problem, Method::MutualInformation)?;
+        let parts = estimator::entry(method).hybrid()?;
+        let first = self.candidate(problem, parts.first)?;
+        let second = self.candidate(problem, parts.second)?;
         let panicked =
             |candidate: &Candidate| matches!(candidate.outcome.pose, Err(Failure::Internal { .. }));
-        (!panicked(feature) && !panicked(direct)).then_some((feature, direct))
+        (!panicked(first) && !panicked(second)).then_some((first, second))
     }
 }
 

@@ -8,7 +8,8 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-use super::Localizer;
+use super::watch::checkpoint;
+use super::{Localizer, Watch};
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
 use crate::features::FeatureCache;
@@ -95,16 +96,17 @@ pub trait Ranking: Send + Sync {
     fn criterion(&self) -> Criterion;
 
     /// The best `count` of the candidates, the best first, all of them as positions in the
-    /// references' scene.
+    /// references' scene. `checkpoint` is called between two frames that are looked at.
     ///
     /// # Errors
-    /// When a frame or the index cannot be read.
+    /// When a frame or the index cannot be read, and those of `checkpoint`.
     fn rank(
         &self,
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<Ranked>, SceneError>;
+        checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<Ranked>, ChoiceError>;
 }
 
 /// The references of a query.
@@ -194,6 +196,9 @@ pub enum ChoiceError {
     /// A frame cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The watcher asked the run to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Chooses references for queries.
@@ -214,7 +219,7 @@ pub struct Chooser<'a> {
 
 impl Chooser<'_> {
     /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
-    /// that it must not be one; the query itself never is.
+    /// that it must not be one; the query itself never is. `watch` hears nothing, but can stop it.
     ///
     /// # Errors
     /// [`ChoiceError`].
@@ -222,6 +227,7 @@ impl Chooser<'_> {
         &self,
         query: usize,
         left_out: &dyn Fn(usize) -> bool,
+        watch: &mut dyn Watch,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
@@ -254,10 +260,11 @@ impl Chooser<'_> {
                     params: self.params,
                     features: self.localizer.features(),
                 };
-                self.ranked(query, &within, &by_matches)
+                self.ranked(query, &within, &by_matches, watch)
             }
             Selection::Retrieved(_) => {
-                self.ranked(query, &within, self.index.ok_or(ChoiceError::NoIndex)?)
+                let index = self.index.ok_or(ChoiceError::NoIndex)?;
+                self.ranked(query, &within, index, watch)
             }
         }
     }
@@ -267,12 +274,15 @@ impl Chooser<'_> {
         query: usize,
         candidates: &[usize],
         by: &dyn Ranking,
+        watch: &mut dyn Watch,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let count = self.selection.count();
         let depth = ReferenceRanking::depth(count);
         let frames: Vec<RankedReference> = by
-            .rank(&*queries.query(query)?, candidates, depth)?
+            .rank(&*queries.query(query)?, candidates, depth, &mut || {
+                checkpoint(watch)
+            })?
             .into_iter()
             .map(|ranked| RankedReference {
                 name: references.frames()[ranked.frame].clone(),
@@ -313,10 +323,12 @@ impl Ranking for ByMatches<'_> {
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<Ranked>, SceneError> {
+        checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<Ranked>, ChoiceError> {
         let of_query = self.features.surf(&query.photo.gray, &self.params.surf);
         let mut ranked = Vec::new();
         for &candidate in candidates {
+            checkpoint()?;
             let photo = self.scene.photo(candidate)?;
             let features = self.features.surf(&photo.gray, &self.params.surf);
             ranked.push((

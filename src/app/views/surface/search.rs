@@ -68,11 +68,13 @@ impl<'a> Search<'a> {
                     // What is told of a lattice before its end are its hypotheses, one by one; where
                     // they are follows from the parameters.
                     let radius_m = problem.uncertainty_radius_m;
-                    filling
-                        .get_or_insert_with(|| {
-                            Filling::new(Lattice::new(scored.phase, centre, radius_m, params))
-                        })
-                        .take(scored);
+                    if filling.is_none() {
+                        let lattice = Lattice::new(scored.phase, centre, radius_m, params);
+                        filling = lattice.ok().map(Filling::new);
+                    }
+                    if let Some(filling) = &mut filling {
+                        filling.take(scored);
+                    }
                     search.hypothesis = Some(scored);
                 }
                 Event::PhaseSearched(searched) => {
@@ -157,12 +159,10 @@ pub(super) struct Minimum {
     pub(super) cost: f64,
 }
 
-/// The part of the run to read a direct method's search from, and the cursor in it. The hybrid runs
-/// MI inside itself, which is then the one at the cursor.
+/// The part of the run to read a direct method's search from, and the cursor in it. A hybrid runs
+/// others inside itself, one of which is then the one at the cursor.
 fn part<'a>(scope: &Scope<'a>, method: Method) -> Option<(&'a Span, usize)> {
-    let is_inside = scope.method() == Some(Method::Hybrid)
-        && method == Method::MutualInformation
-        && scope.latest::<PoseScored>().is_some();
+    let is_inside = scope.is_inside_hybrid(method) && scope.latest::<PoseScored>().is_some();
     match is_inside {
         true => Some((scope.span()?, scope.cursor)),
         false => scope.of(method),

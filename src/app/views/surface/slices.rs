@@ -180,7 +180,7 @@ impl<'a> Curve<'a> {
 /// Draws the slices. `shown` is the method of the maps, whose minimum is marked; the floor is that
 /// of the slider.
 pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64, width: f32) {
-    let methods = [Method::Photometric, Method::MutualInformation];
+    let methods = scope.direct_methods();
     let curves: Vec<Curve<'_>> = methods
         .into_iter()
         .filter_map(|method| Curve::of(scope, method, floor))
@@ -322,10 +322,11 @@ mod tests {
     #[test]
     fn a_slice_takes_the_row_or_the_column_of_its_cell() {
         let params = GridParams::default();
-        let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params);
+        let lattice =
+            Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params).expect("small");
         assert_eq!(Along::Right.cells(&lattice, 5), [3, 4, 5]);
         assert_eq!(Along::Forward.cells(&lattice, 5), [2, 5, 8]);
-        let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params);
+        let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params).expect("small");
         assert_eq!(Along::Yaw.cells(&yaw, 5).len(), yaw.columns);
     }
 
