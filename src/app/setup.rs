@@ -63,6 +63,8 @@ pub struct Setup {
     /// How far from the query's known position references are chosen \[m\]; without it, within the
     /// radius.
     pub prior_m: Option<f64>,
+    /// The translation error from which on a pose counts as a failure \[m\].
+    pub failure_radius_m: f64,
     /// Seed of every random choice.
     pub seed: u64,
     /// Breakpoints to begin with.

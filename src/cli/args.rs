@@ -14,12 +14,6 @@ use posescope::run::{Experiment, Shard};
 use posescope::scene::street::{Size, Street};
 use posescope::session::Breakpoint;
 
-/// The query of the bare command: a place on the street where parked cars hide part of what the
-/// reference saw.
-pub const DEMO_QUERY: &str = "000070";
-/// Its reference.
-pub const DEMO_REFERENCE: &str = "000062";
-
 /// See why a camera pose estimate fails.
 ///
 /// Without a command: runs all four estimators on the built-in street, prints the table of results,
@@ -116,7 +110,7 @@ impl ViewArgs {
     /// The window of the bare command.
     pub fn demo() -> Self {
         Self {
-            scene: "street".to_owned(),
+            scene: super::demo_settings::settings().scene.clone(),
             query: None,
             job: JobArgs::default(),
         }

@@ -27,5 +27,7 @@ mod space;
 mod surf_warp;
 mod synth;
 mod two_walls;
+mod verdicts;
+mod view;
 mod walls_scene;
 mod window;
