@@ -11,7 +11,6 @@ use divan::Bencher;
 use eframe::egui_wgpu::{
     RenderState, RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup,
 };
-use eframe::wgpu;
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use nalgebra::Point3;
@@ -46,8 +45,8 @@ impl Scene for DenseStreet {
     fn frames(&self) -> &[String] {
         self.0.frames()
     }
-    fn intrinsics(&self) -> Intrinsics {
-        self.0.intrinsics()
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.0.intrinsics(frame)
     }
     fn pose(&self, frame: usize) -> Option<Pose> {
         self.0.pose(frame)
@@ -228,6 +227,7 @@ fn open() -> Option<Window> {
         params: Params::default(),
         uncertainty_radius_m: 15.0,
         prior_m: None,
+        failure_radius_m: 10.0,
         seed: 0,
         breakpoints: Vec::new(),
         mode: RunMode::Running,

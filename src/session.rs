@@ -4,11 +4,12 @@
 //! The estimators know nothing of this. A gate, which is one more [`Sink`](crate::trace::Sink),
 //! holds the thread back between two events.
 
-mod at_hand;
 mod breakpoint;
 mod gate;
 mod index_file;
 mod job;
+mod loaded;
+mod message;
 mod run;
 
 use std::sync::Arc;
@@ -19,11 +20,12 @@ use crate::localize::References;
 pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use gate::RunMode;
 pub use index_file::IndexFile;
-pub use job::{Job, JobError, Loaded};
+pub use job::{Job, JobError};
+pub use loaded::Loaded;
 pub use run::{Part, Run, Span, StageBar};
 
 use gate::Control;
-use job::Message;
+use message::Message;
 
 /// What a session is doing.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use super::setup::ReferencePick;
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
-use crate::localize::{QueryResult, References, Status};
+use crate::localize::References;
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, State};
 use crate::sink::rerun::Targets;
@@ -286,13 +286,17 @@ impl Desk {
         }
     }
 
+    /// Whether a method is known to fail on a query.
+    pub(super) fn has_failed(&self, query: usize) -> bool {
+        let results = self.results.get(&query).map_or(&[][..], Vec::as_slice);
+        let failure_radius_m = self.setup.failure_radius_m;
+        let mut results = results.iter();
+        results.any(|result| !result.is_success(failure_radius_m))
+    }
+
     fn next_failure(&mut self, back: bool) {
-        let fails = |desk: &Self, query: usize| {
-            let results = desk.results.get(&query);
-            results.is_some_and(|results| results.iter().any(has_failed))
-        };
-        if self.results.keys().any(|query| fails(self, *query)) {
-            self.next_query(back, fails);
+        if self.results.keys().any(|query| self.has_failed(*query)) {
+            self.next_query(back, Self::has_failed);
         } else {
             self.note("No query is known to fail; run all of them first", false);
         }
@@ -363,14 +367,4 @@ impl Desk {
             Place::Last => self.camera_before,
         }
     }
-}
-
-/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
-pub(super) fn has_failed(result: &QueryResult) -> bool {
-    /// The failure radius of the paper for KITTI \[m\].
-    const FAILURE_RADIUS_M: f64 = 10.0;
-    result.status == Status::Failed
-        || result
-            .error
-            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
 }

@@ -14,7 +14,7 @@ use super::textures::color_image;
 use crate::event::{KindSet, Side};
 use crate::localize::{QueryResult, Watch};
 use crate::picture;
-use crate::scene::Scene;
+use crate::scene::{FrameStore, Scene};
 use crate::session::JobError;
 use crate::trace::{Cancelled, Record, Sink};
 
@@ -130,9 +130,10 @@ impl Queries {
         let started = thread::Builder::new()
             .name("queries".to_owned())
             .spawn(move || {
+                let frames = Arc::default();
                 for &query in &setup.offered {
                     let localized =
-                        catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &flag)));
+                        catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &flag)));
                     let outcome = match localized {
                         Ok(Ok(results)) => Ok(results),
                         Ok(Err(error)) if error.is_cancelled() => break,
@@ -238,10 +239,11 @@ fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
 fn localize(
     setup: &Setup,
     query: usize,
+    frames: &Arc<FrameStore>,
     stop: &Arc<AtomicBool>,
 ) -> Result<Vec<QueryResult>, JobError> {
     let mut setup = setup.clone();
     setup.go_to(query);
     let mut watch = UntilStopped(Arc::clone(stop));
-    setup.job(None).work(&mut watch, |_| {})
+    setup.job(frames).work(&mut watch, |_| {})
 }

@@ -77,6 +77,7 @@ impl Desk {
                 .collect(),
             configuration: run.params.to_toml(),
             seed: setup.seed,
+            failure_radius_m: setup.failure_radius_m,
         };
         let mut recorder = Recorder::open(targets, &identity, &setup.methods)?;
         recorder.begin_query(0, &loaded.problems, loaded.truth.as_ref());

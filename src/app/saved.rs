@@ -9,6 +9,7 @@ use super::setup::{ReferencePick, Setup};
 use crate::fusion;
 use crate::method::Method;
 use crate::params::Params;
+use crate::run::default_failure_radius_m;
 use crate::scene::{self, Scene};
 use crate::session::IndexFile;
 use posescope_core::files;
@@ -32,6 +33,9 @@ pub(super) struct SavedSession {
     radius_m: f64,
     #[serde(default)]
     prior_m: Option<f64>,
+    /// The scene's own where a session says nothing of it.
+    #[serde(default)]
+    failure_radius_m: Option<f64>,
     seed: u64,
     breakpoints: Vec<String>,
     /// Every parameter, as in a configuration file.
@@ -63,6 +67,7 @@ impl SavedSession {
             fusions: setup.fusions.iter().map(|f| f.name.to_owned()).collect(),
             radius_m: setup.uncertainty_radius_m,
             prior_m: setup.prior_m,
+            failure_radius_m: Some(setup.failure_radius_m),
             seed: setup.seed,
             breakpoints: setup.breakpoints.clone(),
             params: setup.params.to_toml(),
@@ -116,6 +121,9 @@ impl SavedSession {
             .map_err(|error| error.to_string())?;
         let is_same_scene =
             self.scene == present.scene_argument && self.queries == present.queries_argument;
+        let failure_radius_m = self
+            .failure_radius_m
+            .unwrap_or_else(|| default_failure_radius_m(references.name()));
         Ok(Setup {
             scene_argument: self.scene.clone(),
             queries_argument: self.queries.clone(),
@@ -148,6 +156,7 @@ impl SavedSession {
             params,
             uncertainty_radius_m: self.radius_m,
             prior_m: self.prior_m,
+            failure_radius_m,
             seed: self.seed,
             breakpoints: self.breakpoints.clone(),
             ..present.clone()

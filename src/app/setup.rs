@@ -10,8 +10,8 @@ use crate::fusion;
 use crate::localize::{QueryResult, References, Selection, frames_within};
 use crate::method::Method;
 use crate::params::Params;
-use crate::scene::Scene;
-use crate::session::{IndexFile, Job, Loaded, RunMode};
+use crate::scene::{FrameStore, Scene};
+use crate::session::{IndexFile, Job, RunMode};
 
 /// How the references of a query are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +63,8 @@ pub struct Setup {
     /// How far from the query's known position references are chosen \[m\]; without it, within the
     /// radius.
     pub prior_m: Option<f64>,
+    /// The translation error from which on a pose counts as a failure \[m\].
+    pub failure_radius_m: f64,
     /// Seed of every random choice.
     pub seed: u64,
     /// Breakpoints to begin with.
@@ -76,7 +78,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub(super) fn job(&self, at_hand: Option<Arc<Loaded>>) -> Job {
+    pub(super) fn job(&self, frames: &Arc<FrameStore>) -> Job {
         Job {
             references: Arc::clone(&self.references),
             queries: Arc::clone(&self.queries),
@@ -93,7 +95,7 @@ impl Setup {
             uncertainty_radius_m: self.uncertainty_radius_m,
             prior_m: self.prior_m,
             seed: self.seed,
-            at_hand,
+            frames: Arc::clone(frames),
         }
     }
 

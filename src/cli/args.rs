@@ -105,6 +105,18 @@ pub struct ViewArgs {
     pub job: JobArgs,
 }
 
+#[cfg(feature = "app")]
+impl ViewArgs {
+    /// The window of the bare command.
+    pub fn demo() -> Self {
+        Self {
+            scene: super::demo_settings::settings().scene.clone(),
+            query: None,
+            job: JobArgs::default(),
+        }
+    }
+}
+
 /// How a query is localised, whether somebody looks on or not.
 #[derive(Debug, Args)]
 pub struct JobArgs {

@@ -1,36 +1,35 @@
 //! The bare command: all four estimators on the built-in street.
 
-use std::path::PathBuf;
-
 use super::args::{JobArgs, RecordingArgs, RunArgs};
+use super::demo_settings::{Settings, settings};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
 #[cfg(feature = "app")]
 use posescope::session::RunMode;
 
-/// A place on the street where parked cars hide part of what the reference saw.
-pub const QUERY: &str = "000070";
-pub const REFERENCE: &str = "000062";
-const RECORDING: &str = "recordings/demo.rrd";
-
 /// Runs the demonstration and saves its recording.
 pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
-    let recording = PathBuf::from(RECORDING);
+    let Settings {
+        scene,
+        query,
+        reference,
+        recording,
+    } = settings();
     if let Some(folder) = recording.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
     run::run(
         &RunArgs {
-            scene: "street".to_owned(),
-            query: vec![QUERY.to_owned()],
+            scene: scene.clone(),
+            query: vec![query.clone()],
             all: false,
             job: JobArgs {
-                reference: vec![REFERENCE.to_owned()],
+                reference: vec![reference.clone()],
                 ..JobArgs::default()
             },
             recording: RecordingArgs {
-                save: Some(recording),
+                save: Some(recording.clone()),
                 ..RecordingArgs::default()
             },
             json: None,

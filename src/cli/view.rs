@@ -9,28 +9,18 @@ use posescope::estimator;
 use posescope::localize::{QueryResult, Selection};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::run::{read_results, read_run};
+use posescope::run::{default_failure_radius_m, read_results, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode};
 
 use super::args::{ConfigArgs, JobArgs, RecordingArgs, RunArgs, ViewArgs};
+use super::demo_settings::settings as demo_settings;
 use super::failure::CliError;
 use super::terminal::Terminal;
-use super::{demo, params, run};
+use super::{params, run};
 
 /// Where the window saves things unless somebody says otherwise.
 const FOLDER: &str = "recordings";
-
-impl ViewArgs {
-    /// The window of the bare command.
-    pub fn demo() -> Self {
-        Self {
-            scene: "street".to_owned(),
-            query: None,
-            job: JobArgs::default(),
-        }
-    }
-}
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
@@ -126,6 +116,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<_, _>>()?;
+    let failure_radius_m = default_failure_radius_m(references.name());
     let mut setup = Setup {
         scene_argument: args.scene.clone(),
         offered: (0..queries.frames().len()).collect(),
@@ -144,6 +135,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         params: params::resolve(&args.job.config)?,
         uncertainty_radius_m: args.job.radius,
         prior_m: args.job.prior,
+        failure_radius_m,
         seed: args.job.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,
@@ -159,14 +151,14 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
     let has_reference = |setup: &Setup, query| {
         setup.pick == ReferencePick::ByHand || !setup.candidates(query).is_empty()
     };
-    let is_demo = args.scene == "street"
+    let is_demo = args.scene == demo_settings().scene
         && args.job.queries.is_none()
         && args.query.is_none()
         && setup.pick == ReferencePick::By(Selection::Random(1));
     setup.query = match &args.query {
         _ if is_demo => {
-            setup.chosen = vec![setup.references.find(demo::REFERENCE)?].into();
-            setup.queries.find(demo::QUERY)?
+            setup.chosen = vec![setup.references.find(&demo_settings().reference)?].into();
+            setup.queries.find(&demo_settings().query)?
         }
         Some(name) => setup.queries.find(name)?,
         None => {
@@ -232,10 +224,14 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             results.entry(frame).or_default().push(result);
         }
     }
-    let is_failure = |results: &&Vec<QueryResult>| results.iter().any(|r| r.pose.is_none());
+    let failure_radius_m = file.failure_radius_m;
+    let is_failure = |results: &[QueryResult]| {
+        let mut results = results.iter();
+        results.any(|result| !result.is_success(failure_radius_m))
+    };
     let first = results
         .iter()
-        .find(|(_, results)| is_failure(results))
+        .find(|(_, results)| is_failure(results.as_slice()))
         .or_else(|| results.iter().next());
     let query = match (&args.query, first) {
         (Some(name), _) => queries.find(name)?,
@@ -272,6 +268,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         params,
         prior_m: args.job.prior.or(file.prior_m),
         uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.job.radius),
+        failure_radius_m,
         seed: file.seed,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,

@@ -278,7 +278,7 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
     let mut cameras: Vec<Camera> = Vec::new();
     let mut images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points\n".to_owned();
     for (index, one) in localized.iter().enumerate() {
-        let camera = one.item.pair.camera;
+        let camera = one.item.camera;
         let known = cameras.iter().position(|known| *known == camera);
         let camera = known.unwrap_or_else(|| {
             cameras.push(camera);
@@ -348,7 +348,7 @@ fn csv(folder: &Path, run: &RunFile, choice: &Choice) -> Result<String, ExportEr
         if !choice.takes(&result) {
             continue;
         }
-        let success = crate::run::is_success(&result, run.failure_radius_m);
+        let success = result.is_success(run.failure_radius_m);
         let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
         let setting = result.setting;
         let mut cells = vec![

@@ -7,7 +7,7 @@ use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use super::run_file::{Pair, describe};
+use super::run_file::{Pair, cameras_of, times_of};
 use crate::fusion;
 use crate::localize::Selection;
 use crate::method::Method;
@@ -165,7 +165,7 @@ impl Draw<'_> {
             let names = frames.map(|&frame| queries.frames()[frame].clone());
             names.collect::<Vec<_>>()
         };
-        let (camera, times_s) = describe(queries, &asked);
+        let (camera, cameras) = cameras_of(queries, &asked);
         // Where every frame is a query, all the others are its references.
         let left_out = if self.share < 1.0 { &drawn[..] } else { &[] };
         Ok(Pair {
@@ -173,9 +173,10 @@ impl Draw<'_> {
             scene: references.name().to_owned(),
             query_scene: queries.name().to_owned(),
             camera,
+            cameras,
             drawn: names(left_out),
             queries: names(&asked),
-            times_s,
+            times_s: times_of(queries, &asked),
         })
     }
 

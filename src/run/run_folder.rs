@@ -12,6 +12,7 @@ use serde::de::DeserializeOwned;
 
 use super::run_file::{RUN_SCHEMA, RunFile};
 use crate::localize::{QueryResult, StageTimes};
+use crate::params::Params;
 use posescope_core::files::write_whole;
 
 const RUN: &str = "run.toml";
@@ -146,8 +147,7 @@ impl RunFolder {
                 is_run: false,
             });
         }
-        let there = fs::read_to_string(&file).map_err(FolderError::io(&file))?;
-        same_run(path, &there, &toml_of(run))?;
+        same_run(path, &toml_of(&read_run(path)?), &toml_of(run))?;
         sweep(path).map_err(FolderError::io(path))?;
         let mut folder = Self::open(path)?;
         let results: Prefix = folder.prefix(RESULTS)?;
@@ -365,7 +365,7 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
         line,
         message,
     };
-    let run: RunFile = toml::from_str(&text).map_err(|error| {
+    let mut run: RunFile = toml::from_str(&text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
         let line = text[..at.min(text.len())].matches('\n').count() + 1;
         damaged(line, error.message().to_owned())
@@ -375,7 +375,19 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
         return Err(damaged(1, message));
     }
     run.check().map_err(|message| damaged(1, message))?;
+    run.params = completed(run.params);
     Ok(run)
+}
+
+/// The parameters of a run whose description may lack those that its version did not know or did
+/// not write: they had their defaults.
+fn completed(params: toml::Table) -> toml::Table {
+    let mut all = Params::default();
+    match all.merge_toml(&params.to_string()) {
+        Ok(()) => all.to_toml().parse().unwrap_or(params),
+        // Whoever uses them says what is wrong with them.
+        Err(_) => params,
+    }
 }
 
 /// Reads the lines of `results.jsonl` one by one, as far as `T` wants to know them.

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Scene, SceneError};
-use crate::features::{SurfParams, surf};
-use crate::image::Photo;
+use crate::features::{SurfParams, remembered, surf};
 use crate::localize::{ChoiceError, Ranking};
 use crate::params::Params;
 use crate::problem::Query;
@@ -159,10 +158,10 @@ impl Retriever {
         })
     }
 
-    /// The frames that resemble a photo, of those that are allowed.
-    pub fn retrieve(&self, photo: &Photo, allowed: impl Fn(usize) -> bool) -> Retrieval {
-        let features = surf(&photo.gray, &self.surf);
-        self.index.query(&features, &self.params, allowed)
+    /// The frames that resemble the query, of those that are allowed.
+    pub fn retrieve(&self, query: &Query, allowed: impl Fn(usize) -> bool) -> Retrieval {
+        let features = remembered(&query.photo.gray, &query.memo, &self.surf);
+        self.index.query(&features.value, &self.params, allowed)
     }
 
     /// The index.
@@ -199,7 +198,7 @@ impl Ranking for Retriever {
     ) -> Result<Vec<Ranked>, ChoiceError> {
         checkpoint()?;
         let candidates: HashSet<usize> = candidates.iter().copied().collect();
-        let retrieval = self.retrieve(&query.photo, |frame| candidates.contains(&frame));
+        let retrieval = self.retrieve(query, |frame| candidates.contains(&frame));
         let mut ranked = retrieval.ranked;
         ranked.truncate(count);
         Ok(ranked)

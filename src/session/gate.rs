@@ -5,7 +5,8 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::breakpoint::Breakpoints;
-use super::job::{Loaded, Message};
+use super::loaded::Loaded;
+use super::message::Message;
 use super::run::Part;
 use crate::event::{Event, StageEnded};
 use crate::geometry::Pose;

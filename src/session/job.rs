@@ -5,21 +5,17 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread;
 
-use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
-use super::run::Part;
+use super::message::Message;
 use crate::fusion;
-use crate::geometry::Pose;
 use crate::localize::{
     ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
-    Selection, StageTimes, Watch, words_of,
+    Selection, Watch, words_of,
 };
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::Problem;
-use crate::scene::{NoIndex, Scene};
-use crate::trace::Record;
+use crate::scene::{FrameStore, NoIndex, Scene};
 
 /// One query, its references, and what to do with them.
 #[derive(Clone)]
@@ -40,7 +36,7 @@ pub struct Job {
     pub methods: Vec<Method>,
     /// What to make of several references.
     pub fusions: Vec<&'static fusion::Entry>,
-    /// Their parameters.
+    /// The parameters of all methods.
     pub params: Params,
     /// How far the query may be from a reference \[m\].
     pub uncertainty_radius_m: f64,
@@ -49,17 +45,8 @@ pub struct Job {
     pub prior_m: Option<f64>,
     /// Seed of every random choice.
     pub seed: u64,
-    /// Frames that an earlier job has read, with all that was worked out about them.
-    pub at_hand: Option<Arc<Loaded>>,
-}
-
-/// The photos and clouds of a job.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The query and each of its references.
-    pub problems: Vec<Problem>,
-    /// Where the query camera was, if that is known. The estimators do not see it.
-    pub truth: Option<Pose>,
+    /// Where frames are remembered, with all that is worked out about them, for the next job too.
+    pub frames: Arc<FrameStore>,
 }
 
 /// Why a job has no results.
@@ -74,13 +61,13 @@ pub enum JobError {
     /// There is no index to ask.
     #[error(transparent)]
     Index(#[from] NoIndex),
-    /// Nobody said which.
+    /// Nobody said which references to take.
     #[error("no reference is chosen for query {query}")]
     NoneNamed {
         /// The query frame's name.
         query: String,
     },
-    /// Nothing is near enough.
+    /// No frame is near enough to be a reference.
     #[error(
         "no frame with pose and scan within {radius_m} m of query {query}; raise the radius or \
          choose references by hand"
@@ -101,25 +88,6 @@ impl JobError {
             Self::Localize(LocalizeError::Cancelled(_)) | Self::Choice(ChoiceError::Cancelled(_))
         )
     }
-}
-
-/// What the worker says to the session.
-pub(super) enum Message {
-    Chosen(References),
-    Loaded(Arc<Loaded>),
-    Began(Part),
-    Told(Box<Record>),
-    Waits {
-        breakpoint: Option<String>,
-    },
-    Goes,
-    Ended {
-        result: Box<QueryResult>,
-        times: Option<StageTimes>,
-    },
-    Finished,
-    Cancelled,
-    Broke(String),
 }
 
 /// Starts the worker. Nobody joins it: it ends by itself, or at the next event or checkpoint after a
@@ -172,11 +140,11 @@ impl Job {
         watch: &mut dyn Watch,
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
-        let before = self.at_hand.as_deref();
-        let scene = |scene| AtHand { scene, before };
-        let references = scene(self.references.as_ref());
-        let queries = scene(self.queries.as_ref());
-        let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
+        let scenes = (
+            self.frames.of(&self.references),
+            self.frames.of(&self.queries),
+        );
+        let localizer = Localizer::at_hand(scenes, &self.params, self.seed);
         let chosen = self.choose(&localizer, watch)?;
         on_choice(&chosen);
         let request = Request {

@@ -17,7 +17,7 @@ use posescope::features::FeatureState;
 use posescope::geometry::Pose;
 use posescope::history::History;
 use posescope::image::{FloatImage, gaussian_smoothed};
-use posescope::memo::Memo;
+use posescope::memo::{Key, Memo};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
@@ -319,8 +319,8 @@ impl Cost for Counting {
     fn query_channel(&self, photo: &GrayImage) -> FloatImage {
         gaussian_smoothed(photo, 0.0)
     }
-    fn query_channel_name(&self) -> String {
-        "grey".to_owned()
+    fn query_channel_key(&self) -> Key {
+        Key::new("grey")
     }
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
         self.0.fetch_add(1, Ordering::Relaxed);
@@ -587,7 +587,7 @@ fn problem_of_strangers() -> Problem {
     problem(photo(1.0, 99), photo(0.0, 5), cloud_of_the_walls())
 }
 
-fn remembering() -> Problem {
+pub fn remembering() -> Problem {
     let mut problem = solvable();
     let mut query = (*problem.query).clone();
     query.memo = Memo::of(64);

@@ -33,6 +33,7 @@ fn identity() -> Identity {
         references: vec!["reference".to_owned()],
         configuration: Params::default().to_toml(),
         seed: 7,
+        failure_radius_m: 10.0,
     }
 }
 
@@ -387,7 +388,7 @@ fn ranking_of_twelve() -> ReferencesRanked {
         frames: (0..12).map(reference).collect(),
     };
     let photos = (0..ranking.pictured().len())
-        .map(|rank| (rank != 2).then(|| Arc::new(photo.clone())))
+        .map(|rank| (rank != 2).then(|| Arc::clone(photo)))
         .collect();
     ReferencesRanked {
         ranking: Arc::new(ranking),

@@ -37,6 +37,7 @@ pub fn setup() -> Setup {
         uncertainty_radius_m: 3.0,
         prior_m: None,
         seed: 7,
+        failure_radius_m: 10.0,
         breakpoints: Vec::new(),
         mode: RunMode::Paused,
         results: Default::default(),

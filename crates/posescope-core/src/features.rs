@@ -19,22 +19,22 @@
 //! on any number of them. [`surf_interruptible`] and [`nearest_neighbours_interruptible`] can be
 //! stopped on the way.
 
-mod cache;
 mod descriptor;
 mod detector;
 mod hessian;
 mod integral;
 mod matching;
 mod orientation;
+mod remembered;
 mod state;
 mod surf;
 
 use nalgebra::Point2;
 
-pub use cache::FeatureCache;
 pub use matching::{
     Match, MatchVerdict, Neighbours, classify, nearest_neighbours, nearest_neighbours_interruptible,
 };
+pub use remembered::{remembered, remembered_interruptible};
 pub use state::FeatureState;
 pub use surf::{SurfParams, surf, surf_interruptible};
 

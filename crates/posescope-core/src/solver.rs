@@ -11,11 +11,13 @@ mod loss;
 pub mod p3p;
 pub mod refine;
 
-pub use loss::Loss;
+pub use loss::{Loss, LossShape};
 pub use p3p::{MAX_SOLUTIONS, p3p};
 pub use refine::{Refinement, refine};
 
 use nalgebra::{Point2, Point3};
+
+use crate::memo::bits_of_fields;
 
 /// A pixel and the 3-D point that is believed to be seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,3 +27,5 @@ pub struct Correspondence {
     /// The point \[m\], in the frame that the pose maps to the camera.
     pub point: Point3<f64>,
 }
+
+bits_of_fields!(Correspondence { pixel, point });

@@ -13,8 +13,9 @@ use super::{
     Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram,
     Similarity,
 };
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
+use crate::memo::{Exact, Key, bits_of_fields};
 
 /// NID among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -29,17 +30,25 @@ pub(super) const ENTRY: Entry = Entry {
     params: || Box::new(OrientationParams::default()),
 };
 
-/// Parameters of the cost of orientations.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OrientationParams {
-    /// Standard deviation of the Gaussian that smooths both photos before they are differentiated
-    /// \[px\].
-    pub sigma_px: f64,
-    /// Bins per axis of the joint histogram. The first one holds what has no orientation.
-    pub bins: usize,
-    /// Least gradient that has an orientation \[grey values per px\].
-    pub least_gradient: f64,
+parameters! {
+    /// Parameters of the cost of orientations.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct OrientationParams {
+        /// Standard deviation of the Gaussian that smooths both photos before they are
+        /// differentiated.
+        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        /// Bins per axis of the joint histogram. The first one holds what has no orientation.
+        pub bins: usize = count("bins", "", 3..=64),
+        /// Least gradient that has an orientation.
+        pub least_gradient: f64 = number("least_gradient", "grey values per px", 0.0..=100.0),
+    }
 }
+
+bits_of_fields!(OrientationParams {
+    sigma_px,
+    bins,
+    least_gradient,
+});
 
 impl Default for OrientationParams {
     fn default() -> Self {
@@ -51,38 +60,6 @@ impl Default for OrientationParams {
     }
 }
 
-impl Describe for OrientationParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        visitor.number(
-            About {
-                name: "sigma",
-                unit: "px",
-                help: "Gaussian smoothing of both photos before they are differentiated",
-            },
-            &mut self.sigma_px,
-            0.0..=20.0,
-        );
-        visitor.count(
-            About {
-                name: "bins",
-                unit: "",
-                help: "bins per axis of the joint histogram; the first holds what has no orientation",
-            },
-            &mut self.bins,
-            3..=64,
-        );
-        visitor.number(
-            About {
-                name: "least_gradient",
-                unit: "grey values per px",
-                help: "least gradient that has an orientation",
-            },
-            &mut self.least_gradient,
-            0.0..=100.0,
-        );
-    }
-}
-
 impl CostParams for OrientationParams {
     fn cost(&self) -> Box<dyn Cost> {
         Box::new(Orientation::new(self))
@@ -90,6 +67,10 @@ impl CostParams for OrientationParams {
 
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
     }
 }
 
@@ -134,8 +115,8 @@ impl Cost for Orientation {
         self.channel(photo)
     }
 
-    fn query_channel_name(&self) -> String {
-        self.reference_channel_name()
+    fn query_channel_key(&self) -> Key {
+        self.reference_channel_key()
     }
 
     /// Between two orientations lies no third that the photo shows: that of the nearest pixel counts.
@@ -151,8 +132,8 @@ impl Cost for Orientation {
         })
     }
 
-    fn reference_channel_name(&self) -> String {
-        format!("orientation {:?}", self.params)
+    fn reference_channel_key(&self) -> Key {
+        self.params.key()
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

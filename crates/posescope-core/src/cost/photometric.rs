@@ -1,8 +1,9 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
 use super::{Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair};
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
+use crate::memo::{Exact, Key, bits_of_fields};
 
 /// PM's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -14,15 +15,19 @@ pub(super) const ENTRY: Entry = Entry {
     params: || Box::new(PhotometricParams::default()),
 };
 
-/// Parameters of the photometric cost.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhotometricParams {
-    /// Standard deviation of the Gaussian that smooths the query \[px\].
-    pub sigma_px: f64,
-    /// The power of E in the weighted mean: 1 averages the squared differences E; 2 is the paper's
-    /// literal formula, which squares E once more.
-    pub power: usize,
+parameters! {
+    /// Parameters of the photometric cost.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct PhotometricParams {
+        /// Standard deviation of the Gaussian that smooths the query.
+        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        /// The power of the squared difference E in the weighted mean: 1 averages it; 2 is the
+        /// paper's literal formula, which squares E once more.
+        pub power: usize = count("power", "", 1..=2),
+    }
 }
+
+bits_of_fields!(PhotometricParams { sigma_px, power });
 
 impl Default for PhotometricParams {
     fn default() -> Self {
@@ -33,29 +38,6 @@ impl Default for PhotometricParams {
     }
 }
 
-impl Describe for PhotometricParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        visitor.number(
-            About {
-                name: "sigma",
-                unit: "px",
-                help: "Gaussian smoothing of the query",
-            },
-            &mut self.sigma_px,
-            0.0..=20.0,
-        );
-        visitor.count(
-            About {
-                name: "power",
-                unit: "",
-                help: "power of the squared difference in the mean; 2 is the paper's literal formula",
-            },
-            &mut self.power,
-            1..=2,
-        );
-    }
-}
-
 impl CostParams for PhotometricParams {
     fn cost(&self) -> Box<dyn Cost> {
         Box::new(Photometric::new(self))
@@ -63,6 +45,10 @@ impl CostParams for PhotometricParams {
 
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
     }
 }
 
@@ -110,8 +96,8 @@ impl Cost for Photometric {
         gaussian_smoothed(photo, self.params.sigma_px)
     }
 
-    fn query_channel_name(&self) -> String {
-        format!("grey, sigma {}", self.params.sigma_px)
+    fn query_channel_key(&self) -> Key {
+        Key::new(("grey", Exact::of(&self.params.sigma_px)))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

@@ -2,6 +2,7 @@
 //! (paper, appendix B).
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -14,10 +15,10 @@ use crate::event::{
 };
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
-use crate::memo::Recalled;
+use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::{Problem, ReferenceTuple};
+use crate::problem::Problem;
 use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by};
 use crate::trace::{Cancelled, Trace};
 
@@ -27,8 +28,8 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     render: RenderParams,
     grid: GridParams,
-    /// The cost with all its parameters, as a key of what is remembered.
-    cost_key: String,
+    /// Which cost, with all its parameters.
+    cost_key: Key,
 }
 
 impl Direct {
@@ -41,7 +42,23 @@ impl Direct {
             cost: cost.cost(),
             render: params.render.clone(),
             grid: params.grid.clone(),
-            cost_key: format!("{} {cost:?}", entry.name),
+            cost_key: Key::new((entry.name, cost.key())),
+        }
+    }
+
+    /// The estimator of a cost that is in no registry: it renders and searches as the others do, by
+    /// `params.render` and `params.grid`, and tells what it does as the method of this name.
+    ///
+    /// What is remembered of its scores is never taken for that of another cost, not even of one with
+    /// the same name: every estimator that is made here has a key of its own.
+    pub fn searching(name: &'static str, cost: Box<dyn Cost>, params: &Params) -> Self {
+        static MADE: AtomicU64 = AtomicU64::new(0);
+        Self {
+            method: Method::named(name),
+            cost,
+            render: params.render.clone(),
+            grid: params.grid.clone(),
+            cost_key: Key::new(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
 }
@@ -57,11 +74,7 @@ impl Estimator for Direct {
                 counts: None,
                 cost: Some(cost),
             },
-            Err(failure) => Outcome {
-                pose: Err(failure),
-                counts: None,
-                cost: None,
-            },
+            Err(failure) => Outcome::failed(failure),
         })
     }
 
@@ -175,8 +188,11 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        let key = (&self.render, self.cost.reference_channel_name());
-        reference.memo.recall(&key, || {
+        let key = ColoringKey {
+            render: Exact::of(&self.render),
+            channel: self.cost.reference_channel_key(),
+        };
+        reference.memo.recall(key, || {
             color_cloud_by(
                 &reference.cloud,
                 &reference.intrinsics,
@@ -188,7 +204,7 @@ impl Direct {
 
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let channel = query.memo.recall(&self.cost.query_channel_name(), || {
+        let channel = query.memo.recall(self.cost.query_channel_key(), || {
             self.cost.query_channel(&query.photo.gray)
         });
         Scorer::new(
@@ -201,6 +217,13 @@ impl Direct {
     }
 }
 
+/// What a coloured cloud depends on beside the reference.
+#[derive(PartialEq, Eq, Hash)]
+struct ColoringKey {
+    render: Exact<RenderParams>,
+    channel: Key,
+}
+
 /// Where the scores of a lattice are remembered: with the query, under all that they depend on.
 #[derive(Clone, Copy)]
 struct Memory<'a> {
@@ -208,10 +231,22 @@ struct Memory<'a> {
     problem: &'a Problem,
 }
 
-/// Remembered scores. They keep their reference alive, so that its address stays its own.
-struct LatticeScores {
-    scores: Vec<Score>,
-    _reference: Arc<ReferenceTuple>,
+/// What scores depend on beside the query.
+#[derive(PartialEq, Eq, Hash)]
+struct ScoresKey {
+    reference: MemoId,
+    cost: Key,
+    render: Exact<RenderParams>,
+    lattice: Exact<Lattice>,
+}
+
+/// Remembered scores.
+struct LatticeScores(Vec<Score>);
+
+impl Remembered for LatticeScores {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
 }
 
 impl Memory<'_> {
@@ -221,19 +256,17 @@ impl Memory<'_> {
         score: impl FnOnce() -> Result<Vec<Score>, Cancelled>,
     ) -> Result<Recalled<LatticeScores>, Cancelled> {
         let Self { direct, problem } = self;
-        let reference = &problem.reference;
-        let key = (
-            Arc::as_ptr(reference),
-            &direct.cost_key,
-            &direct.render,
-            lattice,
-        );
-        problem.query.memo.try_recall(&key, || {
-            Ok(LatticeScores {
-                scores: score()?,
-                _reference: Arc::clone(reference),
-            })
-        })
+        let Some(id) = problem.reference.memo.id() else {
+            return Ok(Recalled::made(Arc::new(LatticeScores(score()?))));
+        };
+        let key = ScoresKey {
+            reference: id,
+            cost: direct.cost_key.clone(),
+            render: Exact::of(&direct.render),
+            lattice: Exact::of(lattice),
+        };
+        let memo = &problem.query.memo;
+        memo.try_recall(key, || Ok(LatticeScores(score()?)))
     }
 }
 
@@ -283,7 +316,7 @@ impl Search<'_> {
         })?;
         trace.note_reuse(found.reused);
         if found.reused {
-            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.scores) {
+            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.0) {
                 scores[cell] = Some(score);
                 self.tell(lattice.phase, offset, score, &mut least, trace)?;
             }

@@ -11,6 +11,7 @@ use nalgebra::Point2;
 use self::journey::Journey;
 pub use self::params::{DepthRule, FeatureParams};
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
+use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
 use crate::depth::{DepthReading, ProjectedCloudIndex};
 use crate::event::{
@@ -18,16 +19,17 @@ use crate::event::{
     MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    FeatureCache, Features, Match, MatchVerdict, SurfParams, classify,
-    nearest_neighbours_interruptible, surf_interruptible,
+    Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours_interruptible,
+    remembered_interruptible,
 };
 use crate::geometry::Pose;
-use crate::memo::Recalled;
+use crate::memo::{Exact, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::robust::{
-    AcceptanceRule, Consensus, MlesacError, Trial, effective_area_px, inliers_beyond_chance, mlesac,
+    AcceptanceRule, Consensus, MlesacError, MlesacParams, Trial, effective_area_px,
+    inliers_beyond_chance, mlesac,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
@@ -42,10 +44,33 @@ const REMEMBERED_TRIALS: usize = 20_000;
 /// Matches lifted between two checkpoints.
 const LIFTED_AT_A_TIME: usize = 256;
 
-/// Remembered matches. They keep their reference alive, so that its address stays its own.
-struct Decisions {
-    decisions: Arc<[Option<Match>]>,
-    _reference: Arc<ReferenceTuple>,
+/// What the matches of two photos depend on beside the query's photo.
+#[derive(PartialEq, Eq, Hash)]
+struct MatchesKey {
+    reference: MemoId,
+    surf: Exact<SurfParams>,
+    ratio: Exact<f64>,
+    unique: bool,
+}
+
+/// Remembered matches.
+struct Decisions(Arc<[Option<Match>]>);
+
+impl Remembered for Decisions {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+}
+
+/// All that a consensus depends on.
+#[derive(PartialEq, Eq, Hash)]
+struct ConsensusKey {
+    camera: Exact<Intrinsics>,
+    params: Exact<MlesacParams>,
+    seed: u64,
+    correspondences: Exact<[Correspondence]>,
+    /// Whether the trials are kept.
+    is_heard: bool,
 }
 
 /// What MLESAC found.
@@ -55,11 +80,20 @@ struct Solved {
     trials: Option<Vec<Trial>>,
 }
 
+impl Remembered for Solved {
+    fn heap_bytes(&self) -> usize {
+        let found = self.outcome.as_ref().map_or(0, |consensus| {
+            size_of_val(consensus.inliers.as_slice())
+                + size_of_val(consensus.residuals_px.as_slice())
+        });
+        self.trials.as_deref().map_or(0, size_of_val) + found
+    }
+}
+
 /// The feature-based estimator.
 pub struct FeatureBased {
     surf: SurfParams,
     params: FeatureParams,
-    remembered: Option<Arc<FeatureCache>>,
 }
 
 impl Estimator for FeatureBased {
@@ -74,10 +108,6 @@ impl Estimator for FeatureBased {
             cost: None,
         })
     }
-
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        self.remembered = Some(Arc::clone(features));
-    }
 }
 
 impl FeatureBased {
@@ -86,7 +116,6 @@ impl FeatureBased {
         Self {
             surf: params.surf,
             params: params.fb.clone(),
-            remembered: None,
         }
     }
 
@@ -137,7 +166,7 @@ impl FeatureBased {
         let matches = trace.stage(Stage::Match, |trace| {
             let decisions = self.best_matches(problem, query, reference, trace)?;
             trace.note_reuse(decisions.reused);
-            let decisions = &decisions.value.decisions;
+            let Decisions(decisions) = &*decisions.value;
             trace.emit(|| MatchesDecided {
                 decisions: Arc::clone(decisions),
             })?;
@@ -205,12 +234,7 @@ impl FeatureBased {
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
         let checkpoint = || trace.checkpoint();
-        let features = memo.try_recall(&self.surf, || match &self.remembered {
-            Some(cache) => cache
-                .surf_interruptible(&photo.gray, &self.surf, checkpoint)
-                .map(Arc::unwrap_or_clone),
-            None => surf_interruptible(&photo.gray, &self.surf, checkpoint),
-        })?;
+        let features = remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?;
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features.value),
@@ -225,15 +249,20 @@ impl FeatureBased {
         reference: &Features,
         trace: &mut Trace<'_>,
     ) -> Result<Recalled<Decisions>, Cancelled> {
-        let FeatureParams { ratio, unique, .. } = self.params;
-        let key = (Arc::as_ptr(&problem.reference), self.surf, ratio, unique);
-        problem.query.memo.try_recall(&key, || {
+        let mut find = || {
             let checkpoint = || trace.checkpoint();
-            Ok(Decisions {
-                decisions: best_matches(query, reference, &self.params, checkpoint)?,
-                _reference: Arc::clone(&problem.reference),
-            })
-        })
+            best_matches(query, reference, &self.params, checkpoint).map(Decisions)
+        };
+        let Some(id) = problem.reference.memo.id() else {
+            return Ok(Recalled::made(Arc::new(find()?)));
+        };
+        let key = MatchesKey {
+            reference: id,
+            surf: Exact::of(&self.surf),
+            ratio: Exact::of(&self.params.ratio),
+            unique: self.params.unique,
+        };
+        problem.query.memo.try_recall(key, find)
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -244,7 +273,7 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = tuple.memo.recall(&"projected", || {
+        let cloud = tuple.memo.recall((), || {
             ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
         });
         let cloud = cloud.value;
@@ -291,8 +320,14 @@ impl FeatureBased {
         let seed = problem.random_seed("mlesac");
         // Whoever does not listen has no use for the trials.
         let is_heard = trace.wants::<HypothesisTried>();
-        let key = (intrinsics, params, seed, correspondences, is_heard);
-        let solved = problem.query.memo.try_recall(&key, || {
+        let key = ConsensusKey {
+            camera: Exact::of(intrinsics),
+            params: Exact::of(params),
+            seed,
+            correspondences: Exact::of(correspondences),
+            is_heard,
+        };
+        let solved = problem.query.memo.try_recall(key, || {
             let trials = is_heard.then(Vec::new);
             self.solve(problem, correspondences, trials, trace)
         })?;

@@ -12,7 +12,7 @@ use super::watch::checkpoint;
 use super::{Localizer, Watch};
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
-use crate::features::FeatureCache;
+use crate::features::remembered;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Query;
@@ -137,10 +137,10 @@ pub fn tell_ranking(
     trace: &mut Trace<'_>,
 ) -> Result<(), Cancelled> {
     let photo = |reference: &RankedReference| {
-        let read = references.photo(reference.ranked.frame);
+        let read = references.query(reference.ranked.frame);
         read.inspect_err(|error| log::warn!("{error}"))
             .ok()
-            .map(Arc::new)
+            .map(|frame| Arc::clone(&frame.photo))
     };
     trace.stage(Stage::Retrieve, |trace| {
         trace.emit(|| ReferencesRanked {
@@ -203,7 +203,7 @@ pub enum ChoiceError {
 
 /// Chooses references for queries.
 pub struct Chooser<'a> {
-    /// Whose features are compared, and where they are kept.
+    /// Whose frames are ranked, and what is known about them.
     pub localizer: &'a Localizer<'a>,
     /// Parameters of features and matching.
     pub params: &'a Params,
@@ -258,7 +258,6 @@ impl Chooser<'_> {
                 let by_matches = ByMatches {
                     scene: references,
                     params: self.params,
-                    features: self.localizer.features(),
                 };
                 self.ranked(query, &within, &by_matches, watch)
             }
@@ -305,12 +304,10 @@ impl Chooser<'_> {
 
 /// Ranks by exhaustive matching of features.
 pub struct ByMatches<'a> {
-    /// The references' scene.
+    /// The references' scene. Features are kept with its frames where these are remembered.
     pub scene: &'a dyn Scene,
     /// Parameters of features and matching.
     pub params: &'a Params,
-    /// Where features are kept.
-    pub features: &'a FeatureCache,
 }
 
 impl Ranking for ByMatches<'_> {
@@ -325,12 +322,14 @@ impl Ranking for ByMatches<'_> {
         count: usize,
         checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
     ) -> Result<Vec<Ranked>, ChoiceError> {
-        let of_query = self.features.surf(&query.photo.gray, &self.params.surf);
+        let surf = &self.params.surf;
+        let of_query = remembered(&query.photo.gray, &query.memo, surf).value;
         let mut ranked = Vec::new();
         for &candidate in candidates {
             checkpoint()?;
-            let photo = self.scene.photo(candidate)?;
-            let features = self.features.surf(&photo.gray, &self.params.surf);
+            // Neither its pose nor its cloud is needed.
+            let frame = self.scene.query(candidate)?;
+            let features = remembered(&frame.photo.gray, &frame.memo, surf).value;
             ranked.push((
                 count_matches(&of_query, &features, &self.params.fb),
                 candidate,

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::describe::choice;
+use crate::memo::Bits;
+
 /// A loss `ρ(r²)` on the squared length of a residual, about `r²` for small residuals.
 ///
 /// Minimising `Σ ρ(rᵢ²)` is, step by step, weighted least squares with the weights
@@ -16,6 +19,37 @@ pub enum Loss {
     Huber(f64),
     /// `s² ln(1 + r²/s²)`: the pull of a residual fades beyond the scale.
     Cauchy(f64),
+}
+
+/// The shape of a [`Loss`], without its scale.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossShape {
+    /// [`Loss::Squared`].
+    Squared,
+    /// [`Loss::Huber`].
+    Huber,
+    /// [`Loss::Cauchy`].
+    Cauchy,
+}
+
+impl Bits for LossShape {
+    fn write(&self, words: &mut Vec<u64>) {
+        words.push(*self as u64);
+    }
+}
+
+choice!(LossShape: Squared = "squared", Huber = "huber", Cauchy = "cauchy");
+
+impl LossShape {
+    /// The loss of this shape with a scale; least squares have none.
+    pub fn at(self, scale: f64) -> Loss {
+        match self {
+            Self::Squared => Loss::Squared,
+            Self::Huber => Loss::Huber(scale),
+            Self::Cauchy => Loss::Cauchy(scale),
+        }
+    }
 }
 
 impl Loss {
