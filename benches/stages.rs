@@ -197,7 +197,7 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
 
 #[divan::bench(args = Method::ALL.map(Method::name), sample_count = 10)]
 fn whole_estimator(bencher: Bencher, name: &str) {
-    let method = Method::from_name(name).expect("is listed");
+    let method = name.parse().expect("is listed");
     let estimator = (estimator::entry(method).new)(&Params::default());
     bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
 }

@@ -10,6 +10,7 @@ mod gate;
 mod index_file;
 mod job;
 mod run;
+mod task;
 
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver};
@@ -21,6 +22,9 @@ pub use gate::RunMode;
 pub use index_file::IndexFile;
 pub use job::{Job, JobError, Loaded};
 pub use run::{Part, Run, Span, StageBar};
+pub use task::Task;
+#[cfg(feature = "app")]
+pub(crate) use task::read_params;
 
 use gate::Control;
 use job::Message;
@@ -68,7 +72,7 @@ impl Session {
         let control = Arc::new(Control::new(mode, breakpoints));
         // Unbounded: a full queue that nobody drains would keep a cancelled worker waiting.
         let (outbox, inbox) = mpsc::channel();
-        let run = Run::new(job.params.clone());
+        let run = Run::new(job.task.params.clone());
         job::spawn(job, Arc::clone(&control), outbox, Arc::new(wake));
         Self {
             control,

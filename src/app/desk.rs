@@ -163,7 +163,7 @@ impl Meaning {
 
 impl Desk {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
-        let params = Arc::new(setup.params.clone());
+        let params = Arc::new(setup.task.params.clone());
         let session = start(&setup, setup.mode, None, &ctx);
         Self {
             params,
@@ -339,7 +339,7 @@ impl Desk {
         self.results = setup.results.clone();
         self.queries = Queries::new(self.ctx.clone());
         self.setup = setup;
-        self.params = Arc::new(self.setup.params.clone());
+        self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
         self.comparing = Comparing::default();
         // Frames of another scene may have the same names.
@@ -353,7 +353,7 @@ impl Desk {
     pub(super) fn begin_again(&mut self) {
         let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
         let follows = self.follows && self.session.is_alive();
-        self.params = Arc::new(self.setup.params.clone());
+        self.params = Arc::new(self.setup.task.params.clone());
         self.begin(RunMode::Running);
         self.follows = follows;
         self.anchor = anchor;
@@ -367,14 +367,10 @@ fn start(
     ctx: &egui::Context,
 ) -> Session {
     let ctx = ctx.clone();
-    let breakpoints = setup
-        .breakpoints
-        .iter()
-        .filter_map(|text| text.parse().ok());
     Session::start(
         setup.job(at_hand),
         mode,
-        Breakpoints::new(breakpoints),
+        Breakpoints::new(setup.task.breakpoints.iter().cloned()),
         move || ctx.request_repaint(),
     )
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::args::{JobArgs, RecordingArgs, RunArgs};
+use super::args::{RecordingArgs, RunArgs, TaskArgs};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
@@ -25,9 +25,9 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
             scene: "street".to_owned(),
             query: vec![QUERY.to_owned()],
             all: false,
-            job: JobArgs {
+            task: TaskArgs {
                 reference: vec![REFERENCE.to_owned()],
-                ..JobArgs::default()
+                ..TaskArgs::default()
             },
             recording: RecordingArgs {
                 save: Some(recording),

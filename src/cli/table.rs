@@ -45,7 +45,7 @@ pub fn results(results: &[(QueryResult, Duration)]) -> Table {
             start,
             match &result.fusion {
                 Some(fusion) => format!("{} {fusion}", result.method),
-                None => result.method.clone(),
+                None => result.method.to_string(),
             },
             error,
             rotation,

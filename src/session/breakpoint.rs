@@ -301,6 +301,8 @@ impl FromStr for Breakpoint {
     }
 }
 
+posescope_core::serde_as_text!(Breakpoint);
+
 /// Breakpoints, and what they remember of the run.
 #[derive(Clone, Debug, Default)]
 pub struct Breakpoints {

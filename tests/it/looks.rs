@@ -56,7 +56,7 @@ fn every_view_looks_as_it_did() {
         .window
         .state_mut()
         .send(Command::SetReferences(vec![0, 2]));
-    let all = posescope::fusion::ALL.iter().collect();
+    let all = posescope::fusion::Fusion::all().collect();
     painted.window.state_mut().send(Command::SetFusions(all));
     painted.window.run_steps(2);
     wait(&mut painted.window, |app| {

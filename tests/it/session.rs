@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
-use posescope::fusion;
+use posescope::fusion::Fusion;
 use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched};
 use posescope::method::Method;
-use posescope::params::Params;
-use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State};
+use posescope::run::Protocol;
+use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State, Task};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
@@ -19,14 +19,16 @@ fn job(query: usize) -> Job {
         queries: scene,
         query,
         chosen: vec![0].into(),
-        selection: None,
+        task: Task {
+            by_hand: true,
+            radius_m: 3.0,
+            protocol: Protocol {
+                seed: 7,
+                ..Protocol::default()
+            },
+            ..Task::of("walls")
+        },
         index: Arc::default(),
-        methods: Method::ALL.to_vec(),
-        fusions: Vec::new(),
-        params: Params::default(),
-        uncertainty_radius_m: 3.0,
-        prior_m: None,
-        seed: 7,
         at_hand: None,
     }
 }
@@ -218,7 +220,11 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
     settle(&mut first);
     let mut again = job(1);
     again.at_hand = first.run().loaded.clone();
-    again.params.assign("fb.ratio=0.7").expect("a good value");
+    again
+        .task
+        .params
+        .assign("fb.ratio=0.7")
+        .expect("a good value");
     let mut second = start(again, RunMode::Running, &[]);
     settle(&mut second);
     let reused: Vec<_> = second
@@ -243,18 +249,19 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
 
 #[test]
 fn several_references_are_fused_as_without_a_session() {
-    let several = Job {
+    let mut several = Job {
         chosen: vec![0, 2].into(),
-        fusions: fusion::ALL.iter().collect(),
         ..job(1)
     };
+    several.task.protocol.fusions = Fusion::all().collect();
+    let task = several.task.clone();
     let mut expected = Vec::new();
     let scene = Walls::new();
-    let localizer = Localizer::new(&scene, &scene, &several.params, several.seed);
+    let localizer = Localizer::new(&scene, &scene, &task.params, task.protocol.seed);
     let request = Request {
-        radius_m: several.uncertainty_radius_m,
+        radius_m: task.radius_m,
         references: several.chosen.clone(),
-        fusions: several.fusions.clone(),
+        fusions: task.protocol.fusions.clone(),
         setting: None,
     };
     let keep = |result, _| {
@@ -262,7 +269,14 @@ fn several_references_are_fused_as_without_a_session() {
         Ok::<(), LocalizeError>(())
     };
     localizer
-        .localize(0, 1, &[request], &several.methods, &mut Unwatched, keep)
+        .localize(
+            0,
+            1,
+            &[request],
+            &task.protocol.methods,
+            &mut Unwatched,
+            keep,
+        )
         .expect("good data");
 
     let mut session = start(several, RunMode::Running, &["fusion"]);

@@ -37,4 +37,5 @@ pub mod retrieval;
 pub mod robust;
 pub mod scene;
 pub mod solver;
+pub mod text;
 pub mod trace;

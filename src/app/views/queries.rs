@@ -82,7 +82,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
 pub(super) fn dots(ui: &mut Ui, results: &[QueryResult], shows_truth: bool) {
     ui.spacing_mut().item_spacing.x = 2.0;
     for method in Method::ALL {
-        for result in results.iter().filter(|r| r.method == method.name()) {
+        for result in results.iter().filter(|r| r.method == method) {
             let (mark, color, words) = match (&result.reason, &result.error) {
                 (Some(reason), _) => ("×", theme::ESTIMATE, reason.text.clone()),
                 (None, Some(error)) if has_failed(result) => (

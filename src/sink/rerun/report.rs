@@ -55,7 +55,7 @@ fn verdicts(results: &[QueryResult]) -> String {
         row(
             &mut text,
             &[
-                &result.method,
+                result.method.name(),
                 &result.references.join(", "),
                 &verdict,
                 &metres,
@@ -95,7 +95,7 @@ fn features(results: &[QueryResult]) -> String {
             counts.inliers,
         ]
         .map(|count| count.to_string());
-        let mut cells: Vec<&str> = vec![&result.method];
+        let mut cells: Vec<&str> = vec![result.method.name()];
         cells.extend(numbers.iter().map(String::as_str));
         row(&mut text, &cells);
     }
@@ -114,7 +114,7 @@ fn costs(results: &[QueryResult]) -> String {
         row(
             &mut text,
             &[
-                &result.method,
+                result.method.name(),
                 &number(Some(cost.best)),
                 &number(cost.truth),
                 &number(cost.initial),

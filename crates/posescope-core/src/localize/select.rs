@@ -17,6 +17,7 @@ use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use crate::scene::{Scene, SceneError};
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
 /// How references are chosen.
@@ -69,11 +70,14 @@ impl fmt::Display for Selection {
 }
 
 impl FromStr for Selection {
-    type Err = String;
+    type Err = UnknownWord;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected =
-            || "random:K, nearest:K, maxf:K or retrieve:K expected, with K from 1".to_owned();
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let expected = || UnknownWord {
+            found: text.to_owned(),
+            kind: "choice of references",
+            expected: "random:K, nearest:K, maxf:K or retrieve:K with K from 1".to_owned(),
+        };
         let (how, count) = text.split_once(':').ok_or_else(expected)?;
         let count: usize = count.parse().map_err(|_| expected())?;
         if count == 0 {
@@ -88,6 +92,8 @@ impl FromStr for Selection {
         }
     }
 }
+
+crate::serde_as_text!(Selection);
 
 /// Something that ranks reference frames for a query by what they look like: an index to ask.
 pub trait Ranking: Send + Sync {
@@ -114,6 +120,9 @@ pub struct References {
     pub frames: Vec<usize>,
     /// How they were found, where something ranked them.
     pub ranking: Option<Arc<ReferenceRanking>>,
+    /// How far from the query's known position they were sought \[m\]; `None` where they were named,
+    /// or the position is not known.
+    pub within_m: Option<f64>,
 }
 
 impl From<Vec<usize>> for References {
@@ -121,6 +130,7 @@ impl From<Vec<usize>> for References {
         Self {
             frames,
             ranking: None,
+            within_m: None,
         }
     }
 }
@@ -242,11 +252,11 @@ impl Chooser<'_> {
             }
         };
         let count = self.selection.count();
-        match self.selection {
-            Selection::Random(_) => Ok(draw(within, count, name, self.seed).into()),
+        let chosen = match self.selection {
+            Selection::Random(_) => draw(within, count, name, self.seed).into(),
             Selection::Nearest(_) => {
                 within.truncate(count);
-                Ok(within.into())
+                within.into()
             }
             Selection::Matched(_) => {
                 let by_matches = ByMatches {
@@ -254,12 +264,16 @@ impl Chooser<'_> {
                     params: self.params,
                     features: self.localizer.features(),
                 };
-                self.ranked(query, &within, &by_matches)
+                self.ranked(query, &within, &by_matches)?
             }
             Selection::Retrieved(_) => {
-                self.ranked(query, &within, self.index.ok_or(ChoiceError::NoIndex)?)
+                self.ranked(query, &within, self.index.ok_or(ChoiceError::NoIndex)?)?
             }
-        }
+        };
+        Ok(References {
+            within_m: place.map(|_| self.radius_m),
+            ..chosen
+        })
     }
 
     fn ranked(
@@ -289,6 +303,7 @@ impl Chooser<'_> {
                 chosen: count.min(frames.len()),
                 frames,
             })),
+            within_m: None,
         })
     }
 }
