@@ -14,11 +14,10 @@ use posescope::estimator;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
 use posescope::grid::Offset;
-use posescope::image::gaussian_smoothed;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::render::{ColoredCloud, Scorer, color_cloud};
+use posescope::render::{ColoredCloud, Scorer, color_cloud_by};
 use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
@@ -162,20 +161,17 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
     let mut params = Params::default();
     params.render.splat_px = SPLAT_PX;
     let entry = cost::ALL.iter().find(|entry| entry.name == name);
-    let cost: Box<dyn Cost> = (entry.expect("is listed").new)(&params);
+    let cost: Box<dyn Cost> = (entry.expect("is listed").params)().cost();
     let (query, reference) = (&PAIR.query, &PAIR.reference);
-    let cloud: ColoredCloud = color_cloud(
+    let cloud: ColoredCloud = color_cloud_by(
         &reference.cloud,
-        &reference.photo.gray,
         &reference.intrinsics,
         &params.render,
+        cost.reference_channel(&reference.photo.gray),
     );
     let scorer = Scorer::new(
         &cloud.points,
-        Arc::new(gaussian_smoothed(
-            &query.photo.gray,
-            cost.query_smoothing_px(),
-        )),
+        Arc::new(cost.query_channel(&query.photo.gray)),
         &query.intrinsics,
         SPLAT_PX,
         cost.as_ref(),
@@ -195,10 +191,10 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
         .bench(|| scorer.score(black_box(&poses)));
 }
 
-#[divan::bench(args = Method::ALL.map(Method::name), sample_count = 10)]
+#[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 10)]
 fn whole_estimator(bencher: Bencher, name: &str) {
-    let method = name.parse().expect("is listed");
-    let estimator = (estimator::entry(method).new)(&Params::default());
+    let method: Method = name.parse().expect("is listed");
+    let estimator = estimator::entry(method).make(&Params::default());
     bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
 }
 

@@ -235,8 +235,8 @@ fn pairs(
             uncertainty_radius_m: 2.0 * distance_m,
             seed: 0,
         };
-        let [indirect, direct] = [Method::Feature, Method::MutualInformation]
-            .map(|method| (estimator::entry(method).new)(&Params::default()));
+        let [indirect, direct] = [Method::FB, Method::MI]
+            .map(|method| estimator::entry(method).make(&Params::default()));
         let outcome = indirect.estimate(&problem, &mut Trace::off())?;
         errors.push(outcome.pose.map_or(f64::INFINITY, |pose| {
             PoseError::between(&truth, &pose).translation_m

@@ -197,7 +197,8 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
                 seed: options.seed,
             };
             let run = |method| {
-                (estimator::entry(method).new)(&params)
+                estimator::entry(method)
+                    .make(&params)
                     .estimate(&problem, &mut Trace::off())
                     .expect("nobody cancels")
             };
@@ -206,8 +207,8 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
                     (pose.translation.vector - truth.translation.vector).norm()
                 })
             };
-            let direct = run(Method::MutualInformation);
-            let [indirect, photometric] = [Method::Feature, Method::Photometric].map(run);
+            let direct = run(Method::MI);
+            let [indirect, photometric] = [Method::FB, Method::PM].map(run);
             // HY is FB's pose, or MI's where FB has none; equal problems have equal answers, so
             // that it need not be run again.
             let hybrid = if indirect.pose.is_ok() {
@@ -215,7 +216,8 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
             } else {
                 &direct
             };
-            let at_truth = (estimator::entry(Method::MutualInformation).new)(&params)
+            let at_truth = estimator::entry(Method::MI)
+                .make(&params)
                 .score_at(&problem, &truth)
                 .and_then(|score| score.cost);
             let information = at_truth
@@ -230,10 +232,10 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
                 reference: *reference_condition,
                 query: *query_condition,
                 errors: [
-                    (Method::Feature, error(&indirect)),
-                    (Method::Photometric, error(&photometric)),
-                    (Method::MutualInformation, error(&direct)),
-                    (Method::Hybrid, error(hybrid)),
+                    (Method::FB, error(&indirect)),
+                    (Method::PM, error(&photometric)),
+                    (Method::MI, error(&direct)),
+                    (Method::HY, error(hybrid)),
                 ],
                 information,
             });
@@ -279,7 +281,7 @@ fn median(errors: &[f64]) -> f64 {
 
 fn report(options: &Options, errors: &Errors) {
     let columns: Vec<&str> = options.conditions.iter().map(|c| c.name()).collect();
-    for method in Method::ALL {
+    for method in Method::PAPER {
         println!("\n## {}\n", method.name());
         println!(
             "Rows: reference; columns: query. Share of poses within 10 m / 2 m / 1 m, and the \
@@ -373,12 +375,7 @@ fn findings(options: &Options, errors: &Errors) {
             cells.len()
         );
     };
-    let (fb, pm, mi, hy) = (
-        Method::Feature,
-        Method::Photometric,
-        Method::MutualInformation,
-        Method::Hybrid,
-    );
+    let (fb, pm, mi, hy) = (Method::FB, Method::PM, Method::MI, Method::HY);
     let same = |(r, q): (Condition, Condition)| r == q;
     check("same condition: FB succeeds at 95 % or more", &same, &|p| {
         at(fb, p, SUCCESS_M) >= 95.0

@@ -327,7 +327,7 @@ pub fn shortcuts() -> Vec<Shortcut> {
         keys(NONE, Key::F1, Command::Help, "This list"),
     ];
     let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4];
-    let methods = Method::ALL
+    let methods = Method::PAPER
         .into_iter()
         .zip(numbers)
         .zip(["Show FB", "Show PM", "Show MI", "Show HY"]);

@@ -287,7 +287,8 @@ impl Desk {
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
         {
-            self.prober.ask(&problem, &self.params, pose);
+            let methods = self.setup.direct_methods();
+            self.prober.ask(&problem, &methods, &self.params, pose);
         }
     }
 

@@ -26,6 +26,7 @@ pub struct Probe {
 
 struct Request {
     problem: Problem,
+    methods: Vec<Method>,
     params: Arc<Params>,
     pose: Pose,
 }
@@ -64,13 +65,20 @@ impl Prober {
         }
     }
 
-    /// Asks about a pose, unless it was asked for last.
-    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, pose: Pose) {
+    /// Asks what these methods' costs say of a pose, unless it was asked for last.
+    pub(super) fn ask(
+        &mut self,
+        problem: &Problem,
+        methods: &[Method],
+        params: &Arc<Params>,
+        pose: Pose,
+    ) {
         if self.asked == Some(pose) {
             return;
         }
         let request = Request {
             problem: problem.clone(),
+            methods: methods.to_vec(),
             params: Arc::clone(params),
             pose,
         };
@@ -107,14 +115,13 @@ impl Prober {
 impl Request {
     fn answer(&self) -> Probe {
         let begun = Instant::now();
-        let comparisons = estimator::ALL
+        let comparisons = self
+            .methods
             .iter()
-            // The hybrid's cost is that of MI.
-            .filter(|entry| entry.method != Method::Hybrid)
-            .filter_map(|entry| {
-                let estimator = (entry.new)(&self.params);
+            .filter_map(|&method| {
+                let estimator = estimator::entry(method).make(&self.params);
                 let comparison = estimator.compare_at(&self.problem, &self.pose)?;
-                Some((entry.method, Arc::new(comparison)))
+                Some((method, Arc::new(comparison)))
             })
             .collect();
         Probe {

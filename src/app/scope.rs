@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::command::{Command, Queue};
 use super::desk::Desk;
+use crate::estimator;
 use crate::event::{DebugEvent, MinimumAssessed, Moment, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -123,12 +124,39 @@ impl<'a> Scope<'a> {
         self.run.latest_in(span, cursor)
     }
 
-    /// The direct method whose pictures are shown: that at the cursor, MI for the others.
+    /// The methods whose cost can be looked at: those of this run that search one, those of the paper
+    /// where there are none.
+    pub fn direct_methods(&self) -> Vec<Method> {
+        self.desk.setup.direct_methods()
+    }
+
+    /// The direct method whose pictures are shown: that at the cursor, for the others that inside a
+    /// hybrid, MI if the run has it.
     pub fn direct_method(&self) -> Method {
-        match self.method() {
-            Some(Method::Photometric) => Method::Photometric,
-            _ => Method::MutualInformation,
-        }
+        let direct = self.direct_methods();
+        let here = self.method();
+        let inside = here.and_then(|here| estimator::entry(here).hybrid());
+        [here, inside.map(|parts| parts.second), Some(Method::MI)]
+            .into_iter()
+            .flatten()
+            .chain(direct.first().copied())
+            .find(|method| direct.contains(method))
+            .unwrap_or(Method::MI)
+    }
+
+    /// The method in whose part of the run the search of [`Self::direct_method`] is told: a hybrid, if
+    /// the cursor is in one.
+    pub fn searching_method(&self) -> Method {
+        self.method()
+            .filter(|&here| estimator::entry(here).hybrid().is_some())
+            .unwrap_or_else(|| self.direct_method())
+    }
+
+    /// Whether the cursor is in a hybrid that runs this method inside itself.
+    pub fn is_inside_hybrid(&self, method: Method) -> bool {
+        let here = self.method().map(estimator::entry);
+        here.and_then(|entry| entry.hybrid())
+            .is_some_and(|parts| parts.first == method || parts.second == method)
     }
 
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
@@ -146,10 +174,11 @@ impl<'a> Scope<'a> {
                 at,
             });
         }
-        // The hybrid's views are those of MI inside it. Where it kept FB's pose, and for PM, it has none.
-        let within_hybrid = match (self.method(), method) {
-            (Some(Method::Hybrid), Method::MutualInformation) => self.latest(),
-            _ => None,
+        // A hybrid's views are those of the direct method inside it. Where it kept the other's pose it
+        // has none.
+        let within_hybrid = match self.is_inside_hybrid(method) {
+            true => self.latest(),
+            false => None,
         };
         let event: &ViewRendered = within_hybrid.or_else(|| self.latest_of(method))?;
         let problem = self.problem()?;

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
+use crate::estimator;
 use crate::localize::{QueryResult, References, Selection, frames_within};
+use crate::method::Method;
 use crate::scene::Scene;
 use crate::session::{IndexFile, Job, Loaded, RunMode, Task};
 use crate::text::UnknownWord;
@@ -77,6 +79,16 @@ impl Setup {
             task: self.task.clone(),
             index: Arc::clone(&self.index),
             at_hand,
+        }
+    }
+
+    /// The methods whose cost can be looked at: those asked for that search one, those of the paper
+    /// where there are none.
+    pub fn direct_methods(&self) -> Vec<Method> {
+        let direct = estimator::direct_methods(&self.task.protocol.methods);
+        match direct.as_slice() {
+            [] => vec![Method::PM, Method::MI],
+            _ => direct,
         }
     }
 

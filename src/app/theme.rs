@@ -2,6 +2,7 @@
 
 use egui::Color32;
 
+use crate::estimator;
 use crate::features::FeatureState;
 use crate::method::Method;
 use crate::palette::{self, Rgb};
@@ -27,12 +28,22 @@ pub fn state(index: usize) -> Color32 {
 
 /// The colour of a method's lane and curves.
 pub fn method(method: Method) -> Color32 {
-    match method {
-        Method::Feature => Color32::from_rgb(0x56, 0xB4, 0xE9),
-        Method::Photometric => Color32::from_rgb(0xE6, 0x9F, 0x00),
-        Method::MutualInformation => Color32::from_rgb(0xCC, 0x79, 0xA7),
-        Method::Hybrid => Color32::from_rgb(0x80, 0x80, 0x80),
-    }
+    /// In the order of the registry; those behind the paper's take turns.
+    const COLORS: [Rgb; 6] = [
+        [0x56, 0xB4, 0xE9],
+        [0xE6, 0x9F, 0x00],
+        [0xCC, 0x79, 0xA7],
+        [0x80, 0x80, 0x80],
+        [0xF0, 0xE4, 0x42],
+        [0x8D, 0xD3, 0xC7],
+    ];
+    let place = estimator::methods().position(|known| known == method);
+    let place = place.unwrap_or_default();
+    let paper = Method::PAPER.len();
+    rgb(match COLORS.get(place) {
+        Some(&color) => color,
+        None => COLORS[paper + (place - paper) % (COLORS.len() - paper)],
+    })
 }
 
 /// Viridis, for costs: 0 the worst, 1 the best.

@@ -161,14 +161,18 @@ fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         .run()
         .span_at(desk.cursor)
         .and_then(|span| span.part.method());
-    for (number, method) in (1..).zip(Method::ALL) {
+    let asked = desk.setup.task.protocol.methods.iter().copied();
+    let others = asked.filter(|method| !Method::PAPER.contains(method));
+    for method in Method::PAPER.into_iter().chain(others) {
         let is_here = here == Some(method);
-        let text = method.name().to_uppercase();
-        let response = ui.selectable_label(is_here, text);
-        if response
-            .on_hover_text(format!("Show what it did ({number})"))
-            .clicked()
-        {
+        let response = ui.selectable_label(is_here, method.label());
+        // The paper's have keys.
+        let key = Method::PAPER.iter().position(|known| *known == method);
+        let help = match key {
+            Some(place) => format!("Show what it did ({})", place + 1),
+            None => "Show what it did".to_owned(),
+        };
+        if response.on_hover_text(help).clicked() {
             commands.send(Command::SelectMethod(method));
         }
     }

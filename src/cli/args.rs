@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::estimator;
 use posescope::fusion::Fusion;
 use posescope::localize::Selection;
 use posescope::measure::{Format, Gate, Tolerance};
@@ -176,7 +177,7 @@ pub struct ProtocolArgs {
     /// [m] [default: the radius]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub prior: Option<f64>,
-    /// The methods to run [default: all]
+    /// The methods to run [default: fb,pm,mi,hy]
     #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',')]
     pub method: Vec<Method>,
     /// Fuse the poses of several references into one, by each of these [default: none, and each
@@ -203,8 +204,7 @@ impl ProtocolArgs {
         Protocol {
             references: self.references.unwrap_or(defaults.references),
             prior_m: self.prior.or(defaults.prior_m),
-            methods: Method::ALL
-                .into_iter()
+            methods: estimator::methods()
                 .filter(|method| methods.contains(method))
                 .collect(),
             fusions: match self.fusion.as_slice() {
@@ -498,7 +498,7 @@ mod tests {
     #[test]
     fn methods_run_once_each_in_the_order_of_the_registry() {
         let (task, _) = task(&["run", "street", "--all", "--method", "mi,fb,mi"]);
-        let expected = [Method::Feature, Method::MutualInformation];
+        let expected = [Method::FB, Method::MI];
         assert_eq!(task.protocol.methods, expected);
     }
 }

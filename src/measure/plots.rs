@@ -14,10 +14,10 @@ pub type Plot = (String, Result<String, String>);
 
 /// Okabe and Ito's colours, which colour-blind readers tell apart; by method.
 const COLORS: [(Method, RGBColor); 4] = [
-    (Method::Feature, RGBColor(0x00, 0x72, 0xB2)),
-    (Method::Photometric, RGBColor(0xE6, 0x9F, 0x00)),
-    (Method::MutualInformation, RGBColor(0x00, 0x9E, 0x73)),
-    (Method::Hybrid, RGBColor(0xD5, 0x5E, 0x00)),
+    (Method::FB, RGBColor(0x00, 0x72, 0xB2)),
+    (Method::PM, RGBColor(0xE6, 0x9F, 0x00)),
+    (Method::MI, RGBColor(0x00, 0x9E, 0x73)),
+    (Method::HY, RGBColor(0xD5, 0x5E, 0x00)),
 ];
 
 /// One line of a plot.
@@ -199,7 +199,7 @@ mod tests {
         ];
         let measures = measure(&rows, 10.0);
         let measures: Vec<&Measures> = measures.iter().collect();
-        let methods = [Method::Feature, Method::MutualInformation];
+        let methods = [Method::FB, Method::MI];
         let lines = recall_lines(&methods, &measures);
         let fb = [
             (0.0, 0.0),

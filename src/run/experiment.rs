@@ -69,11 +69,7 @@ pub struct Defaults {
     pub share: f64,
 }
 
-const WITHOUT_HYBRID: &[Method] = &[
-    Method::Feature,
-    Method::Photometric,
-    Method::MutualInformation,
-];
+const WITHOUT_HYBRID: &[Method] = &[Method::FB, Method::PM, Method::MI];
 
 /// What is asked in an experiment, or without one: every frame against one reference.
 pub fn defaults(experiment: Option<Experiment>) -> Defaults {

@@ -24,13 +24,13 @@ pub struct Protocol {
     pub seed: u64,
 }
 
-/// One random reference, all methods.
+/// One random reference, the methods of the paper.
 impl Default for Protocol {
     fn default() -> Self {
         Self {
             references: Selection::Random(1),
             prior_m: None,
-            methods: Method::ALL.to_vec(),
+            methods: Method::PAPER.to_vec(),
             fusions: Vec::new(),
             seed: 0,
         }

@@ -3,9 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::estimator;
 use crate::event::{Event, Stage, StageStarted};
 use crate::grid::Phase;
 use crate::method::Method;
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Record, Sink};
 
 /// A number that events carry, under the name that breakpoints know it by.
@@ -208,7 +210,7 @@ impl Breakpoint {
             Stage::Accept,
             Stage::Color,
         ];
-        let names = Method::ALL.map(Stage::Estimator);
+        let names: Vec<_> = estimator::methods().map(Stage::Estimator).collect();
         let phases = Phase::ALL.map(Stage::Search);
         [Stage::Retrieve]
             .iter()
@@ -255,8 +257,9 @@ impl FromStr for Breakpoint {
         let scoped = comparison.map_or(text, |(name, ..)| name);
         let (method, name) = match scoped.split_once('.') {
             Some((method, name)) => {
-                let known = Method::from_name(method)
-                    .ok_or_else(|| refuse(format!("there is no method `{method}`")))?;
+                let known = method
+                    .parse()
+                    .map_err(|error: UnknownWord| refuse(error.to_string()))?;
                 (Some(known), name)
             }
             None => (None, scoped),
@@ -474,12 +477,12 @@ mod tests {
             })
         };
         let run = [
-            started(Stage::Estimator(Method::Feature)),
+            started(Stage::Estimator(Method::FB)),
             started(Stage::Consensus),
             ended(Stage::Consensus),
-            ended(Stage::Estimator(Method::Feature)),
-            started(Stage::Estimator(Method::Hybrid)),
-            started(Stage::Estimator(Method::Feature)),
+            ended(Stage::Estimator(Method::FB)),
+            started(Stage::Estimator(Method::HY)),
+            started(Stage::Estimator(Method::FB)),
             started(Stage::Consensus),
         ];
         let at = |text| -> Vec<usize> {
@@ -539,7 +542,7 @@ mod tests {
                 .to_string()
         };
         assert!(message("fb.ransack").contains("ransac"));
-        assert!(message("xy.ransac").contains("no method `xy`"));
+        assert!(message("xy.ransac").contains("`xy` is no method"));
         assert!(message("inlers < 10").contains("inliers"));
         assert!(message("inliers < ten").contains("no number"));
         assert!(message("").contains("fb.ransac"));

@@ -97,7 +97,7 @@ impl Task {
         if let Some(prior_m) = protocol.prior_m {
             option("prior", &prior_m);
         }
-        if protocol.methods != Method::ALL {
+        if protocol.methods != Method::PAPER {
             option("method", &joined(&protocol.methods));
         }
         if !protocol.fusions.is_empty() {
@@ -152,7 +152,7 @@ mod tests {
             protocol: Protocol {
                 references: "retrieve:3".parse().expect("a choice"),
                 prior_m: Some(80.0),
-                methods: vec![Method::Feature, Method::MutualInformation],
+                methods: vec![Method::FB, Method::MI],
                 fusions: ["avg", "r-wavg"]
                     .map(|name| name.parse().expect("a fusion"))
                     .to_vec(),

@@ -49,9 +49,9 @@ fn hopeless() -> Vec<(&'static str, Problem)> {
 }
 
 fn estimators() -> impl Iterator<Item = (&'static str, Box<dyn estimator::Estimator>)> {
-    estimator::ALL
+    estimator::all()
         .iter()
-        .map(|entry| (entry.method.name(), (entry.new)(&Params::default())))
+        .map(|entry| (entry.method.name(), entry.make(&Params::default())))
 }
 
 fn silent(estimator: &dyn estimator::Estimator, problem: &Problem) -> Outcome {
@@ -193,9 +193,10 @@ fn the_outcome_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
     let problem = solvable();
-    for entry in estimator::ALL {
+    for entry in estimator::all() {
         let mut history = History::default();
-        let outcome = (entry.new)(&Params::default())
+        let outcome = entry
+            .make(&Params::default())
             .estimate(&problem, &mut Trace::to(&mut history))
             .expect("nobody cancels");
         let Some(cost) = outcome.cost else { continue };
@@ -213,9 +214,10 @@ fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
 
 /// Checks that every query feature is in one state and that the counts add up.
 fn check_states(problem: &Problem) {
-    let entry = &estimator::ALL[0];
+    let entry = estimator::entry(Method::FB);
     let mut history = History::default();
-    let outcome = (entry.new)(&Params::default())
+    let outcome = entry
+        .make(&Params::default())
         .estimate(problem, &mut Trace::to(&mut history))
         .expect("nobody cancels");
     let counts = outcome.counts.expect("features were used");
@@ -312,37 +314,34 @@ fn what_does_not_depend_on_a_changed_parameter_is_reused() {
     let reused_after = |method: Method, change: &str| -> Vec<&'static str> {
         let problem = remembering();
         let entry = estimator::entry(method);
-        let first = stages_of((entry.new)(&Params::default()).as_ref(), &problem);
+        let first = stages_of(entry.make(&Params::default()).as_ref(), &problem);
         assert!(first.iter().all(|(_, reused)| !reused), "{first:?}");
         let mut params = Params::default();
         params.assign(change).expect("a good assignment");
-        stages_of((entry.new)(&params).as_ref(), &problem)
+        stages_of(entry.make(&params).as_ref(), &problem)
             .into_iter()
             .filter_map(|(stage, reused)| reused.then_some(stage.name()))
             .collect()
     };
     let positions = ["color", "position_coarse", "position_fine"];
     assert_eq!(
-        reused_after(Method::Feature, "fb.accept=paper"),
+        reused_after(Method::FB, "fb.accept=paper"),
         ["detect", "match", "ransac"]
     );
     assert_eq!(
-        reused_after(Method::Feature, "fb.depth_radius=0.5"),
+        reused_after(Method::FB, "fb.depth_radius=0.5"),
         ["detect", "match"]
     );
-    assert_eq!(reused_after(Method::Feature, "fb.ratio=0.7"), ["detect"]);
-    assert!(reused_after(Method::Feature, "surf.threshold=900").is_empty());
+    assert_eq!(reused_after(Method::FB, "fb.ratio=0.7"), ["detect"]);
+    assert!(reused_after(Method::FB, "surf.threshold=900").is_empty());
     assert_eq!(
         // Around the same coarse yaw the fine angles are the same too.
-        reused_after(Method::MutualInformation, "grid.yaw_step=2"),
+        reused_after(Method::MI, "grid.yaw_step=2"),
         [&positions[..], &["yaw_fine"]].concat()
     );
+    assert_eq!(reused_after(Method::MI, "mi.bins=8"), ["color"]);
     assert_eq!(
-        reused_after(Method::MutualInformation, "mi.bins=8"),
-        ["color"]
-    );
-    assert_eq!(
-        reused_after(Method::Photometric, "mi.bins=8"),
+        reused_after(Method::PM, "mi.bins=8"),
         [&positions[..], &["yaw_coarse", "yaw_fine"]].concat()
     );
 }

@@ -20,7 +20,8 @@ fn with(assignments: &[&str]) -> Params {
 }
 
 fn outcome(method: Method, problem: &Problem, params: &Params) -> Outcome {
-    (estimator::entry(method).new)(params)
+    estimator::entry(method)
+        .make(params)
         .estimate(problem, &mut Trace::off())
         .expect("nobody cancels")
 }
@@ -32,7 +33,7 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
         uncertainty_radius_m: 0.5,
         ..solvable()
     };
-    let refused = outcome(Method::Feature, &near, &Params::default()).pose;
+    let refused = outcome(Method::FB, &near, &Params::default()).pose;
     let failure = refused.expect_err("it is twice as far as it may be");
     assert!(
         matches!(failure, Failure::OutsideRadius { .. }),
@@ -40,7 +41,7 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
     );
     assert_eq!(failure.code(), "R5");
     for accepting in ["fb.accept=paper", "fb.radius_slack=2"] {
-        let pose = outcome(Method::Feature, &near, &with(&[accepting])).pose;
+        let pose = outcome(Method::FB, &near, &with(&[accepting])).pose;
         assert!(pose.is_ok(), "{accepting}");
     }
 }
@@ -57,7 +58,7 @@ fn the_guarded_depth_rule_drops_keypoints_at_depth_edges_and_only_those() {
     points.extend(behind);
     let edged = problem(photo(1.0, 5), photo(0.0, 5), Cloud { points });
     let with_depth = |problem: &Problem, rule: &str| {
-        let outcome = outcome(Method::Feature, problem, &with(&[rule]));
+        let outcome = outcome(Method::FB, problem, &with(&[rule]));
         outcome.counts.expect("features were used").with_depth
     };
     let nearest = with_depth(&edged, "fb.depth=nearest");
@@ -77,7 +78,7 @@ fn without_the_uniqueness_test_every_match_that_passes_the_ratio_goes_on() {
     let problem = problem(photo(1.0, 5), photo(0.0, 6), cloud_of_the_walls());
     let counts = |assignment: &str| {
         let params = with(&["fb.ratio=1", assignment]);
-        let outcome = outcome(Method::Feature, &problem, &params);
+        let outcome = outcome(Method::FB, &problem, &params);
         outcome.counts.expect("features were used")
     };
     let (strict, lax) = (counts("fb.unique=true"), counts("fb.unique=false"));
@@ -95,7 +96,7 @@ fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
     };
     // If the reference pose were the true one, its cost would be the initial cost.
     let reference = problem.reference.world_from_camera;
-    for method in [Method::Photometric, Method::MutualInformation] {
+    for method in [Method::PM, Method::MI] {
         let cost = result(method, Some(&reference))
             .cost
             .expect("a direct method");
@@ -105,5 +106,5 @@ fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
         assert_eq!(unknown.cost.expect("a direct method").truth, None);
         assert_eq!((unknown.error, unknown.initial_error), (None, None));
     }
-    assert_eq!(result(Method::Feature, Some(&reference)).cost, None);
+    assert_eq!(result(Method::FB, Some(&reference)).cost, None);
 }

@@ -370,7 +370,7 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
         .expect("one per line");
     let of_mi: Vec<_> = results
         .iter()
-        .filter(|result| result.method == Method::MutualInformation)
+        .filter(|result| result.method == Method::MI)
         .collect();
     let position = of_mi[1].pose.as_ref().expect("a pose").position_m;
     let tum = text("tum");
@@ -496,7 +496,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         format: None,
         experiment: None,
         protocol: Protocol {
-            methods: vec![Method::Feature, Method::MutualInformation],
+            methods: vec![Method::FB, Method::MI],
             references: Selection::Nearest(1),
             ..Protocol::default()
         },

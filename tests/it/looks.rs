@@ -43,12 +43,12 @@ fn every_view_looks_as_it_did() {
     painted
         .window
         .state_mut()
-        .send(Command::SelectMethod(Method::Feature));
+        .send(Command::SelectMethod(Method::FB));
     shoot(&mut painted, "features", &[]);
     painted
         .window
         .state_mut()
-        .send(Command::SelectMethod(Method::MutualInformation));
+        .send(Command::SelectMethod(Method::MI));
     shoot(&mut painted, "search", &[]);
     painted.window.state_mut().send(Command::SwitchTheme);
     shoot(&mut painted, "light", &[]);

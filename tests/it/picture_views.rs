@@ -97,7 +97,7 @@ fn before_detection_there_are_just_the_photos() {
 
 #[test]
 fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
-    let mut window = finished(Method::Feature, "images");
+    let mut window = finished(Method::FB, "images");
     let states = latest::<FeaturesClassified>(&window).states;
     let count = |name: &str| states.iter().filter(|state| state.name() == name).count();
     for name in FeatureState::NAMES {
@@ -129,7 +129,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
 
 #[test]
 fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
-    let mut window = finished(Method::Feature, "images");
+    let mut window = finished(Method::FB, "images");
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
     assert_eq!(window.state().desk().selected_feature, Some(feature));
@@ -162,7 +162,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
 
 #[test]
 fn the_epipolar_line_of_a_true_match_passes_through_its_query_keypoint() {
-    let mut window = finished(Method::Feature, "images");
+    let mut window = finished(Method::FB, "images");
     let (feature, _) = lonely_inlier(&window);
     order(&mut window, Command::SelectFeature(Some(feature)));
     window.get_by_label_contains("true match: ");
@@ -181,7 +181,7 @@ fn the_epipolar_line_of_a_true_match_passes_through_its_query_keypoint() {
 
 #[test]
 fn only_differences_leaves_the_features_that_ended_in_another_state() {
-    let mut window = finished(Method::Feature, "images");
+    let mut window = finished(Method::FB, "images");
     order(&mut window, Command::OnlyDifferences);
     window.get_by_label("Differences need another run: keep one as A (P)");
     order(&mut window, Command::Pin);
@@ -189,7 +189,7 @@ fn only_differences_leaves_the_features_that_ended_in_another_state() {
     let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
     order(&mut window, Command::SetParam { key, value });
     assert_eq!(settle(&mut window), State::Finished);
-    order(&mut window, Command::SelectMethod(Method::Feature));
+    order(&mut window, Command::SelectMethod(Method::FB));
     let after = latest::<FeaturesClassified>(&window).states;
     let pairs = before.iter().zip(after.iter());
     let differ = pairs.filter(|(a, b)| a.name() != b.name()).count();
@@ -200,7 +200,7 @@ fn only_differences_leaves_the_features_that_ended_in_another_state() {
 
 #[test]
 fn linked_photos_zoom_together_and_a_double_click_shows_them_whole() {
-    let mut window = finished(Method::Feature, "images");
+    let mut window = finished(Method::FB, "images");
     let area = window.get_by_label("query photo 000001").rect();
     let whole = |window: &Harness<'_, App>| {
         let button = window.get_by_label("Whole photos");
@@ -228,8 +228,8 @@ fn linked_photos_zoom_together_and_a_double_click_shows_them_whole() {
 
 #[test]
 fn the_synthetic_view_shows_the_recorded_cost_and_place() {
-    let mut window = finished(Method::MutualInformation, "synthetic");
-    for method in [Method::MutualInformation, Method::Photometric] {
+    let mut window = finished(Method::MI, "synthetic");
+    for method in [Method::MI, Method::PM] {
         order(&mut window, Command::SelectMethod(method));
         let event = latest::<ViewRendered>(&window);
         let cost = event.comparison.score.cost.expect("a cost");
@@ -258,7 +258,7 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
 
 #[test]
 fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
-    let mut window = finished(Method::MutualInformation, "synthetic");
+    let mut window = finished(Method::MI, "synthetic");
     let truth = window
         .state()
         .desk()
@@ -287,7 +287,7 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
 
 #[test]
 fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_query() {
-    let mut window = finished(Method::MutualInformation, "synthetic");
+    let mut window = finished(Method::MI, "synthetic");
     let common = [
         "query",
         "view",
@@ -321,7 +321,7 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 
 #[test]
 fn both_views_draw_at_every_moment_of_a_run() {
-    let mut window = finished(Method::Feature, "images");
+    let mut window = finished(Method::FB, "images");
     order(&mut window, Command::SelectFeature(Some(0)));
     let len = window.state().desk().run().len();
     // Every moment of FB's story, and some of the long searches.

@@ -31,7 +31,8 @@ fn pair(query: &str, reference: &str) -> Option<(Problem, Pose)> {
 }
 
 fn error_of(method: Method, problem: &Problem, truth: &Pose) -> PoseError {
-    let outcome = (estimator::entry(method).new)(&Params::default())
+    let outcome = estimator::entry(method)
+        .make(&Params::default())
         .estimate(problem, &mut Trace::off())
         .expect("nobody cancels");
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));
@@ -41,7 +42,8 @@ fn error_of(method: Method, problem: &Problem, truth: &Pose) -> PoseError {
 /// The correspondences that FB hands to MLESAC; they do not depend on the seed.
 fn correspondences(problem: &Problem) -> Vec<Correspondence> {
     let mut history = History::default();
-    (estimator::entry(Method::Feature).new)(&Params::default())
+    estimator::entry(Method::FB)
+        .make(&Params::default())
         .estimate(problem, &mut Trace::to(&mut history))
         .expect("nobody cancels");
     let query = history
@@ -102,7 +104,7 @@ fn the_direct_methods_end_about_a_metre_off_because_height_is_frozen() {
     let Some((problem, truth)) = pair("3823", "3814") else {
         return;
     };
-    for method in [Method::MutualInformation, Method::Photometric] {
+    for method in [Method::MI, Method::PM] {
         let error = error_of(method, &problem, &truth);
         println!("{}: {error:?}", method.name());
         assert!(error.translation_m <= 1.3, "{}", method.name());
@@ -115,8 +117,9 @@ fn the_hybrid_returns_the_feature_based_pose_where_that_is_accepted() {
     let Some((problem, _)) = pair("3823", "3814") else {
         return;
     };
-    let [indirect, hybrid] = [Method::Feature, Method::Hybrid].map(|method| {
-        (estimator::entry(method).new)(&Params::default())
+    let [indirect, hybrid] = [Method::FB, Method::HY].map(|method| {
+        estimator::entry(method)
+            .make(&Params::default())
             .estimate(&problem, &mut Trace::off())
             .expect("nobody cancels")
     });

@@ -43,7 +43,8 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
     recorder.begin_query(0, std::slice::from_ref(&problem), Some(&truth));
     for &method in methods {
         recorder.begin_method(0, method);
-        let outcome = (estimator::entry(method).new)(params)
+        let outcome = estimator::entry(method)
+            .make(params)
             .estimate(&problem, &mut Trace::to(recorder))
             .expect("a recorder never cancels");
         let result = evaluate(
@@ -145,7 +146,7 @@ fn every_promised_entity_is_on_its_timelines() {
     let chunks = chunks(&recorded(
         &folder,
         "run.rrd",
-        &Method::ALL,
+        &Method::PAPER,
         &Params::default(),
     ));
     let found = timelines(&chunks);
@@ -175,7 +176,7 @@ fn every_promised_entity_is_on_its_timelines() {
         promised.push((format!("query/keypoints/{state}"), STEP));
         promised.push((format!("fb/matches/0/{state}"), STEP));
     }
-    for method in Method::ALL.map(Method::name) {
+    for method in Method::PAPER.map(Method::name) {
         promised.push((format!("world/estimate/{method}/camera"), STEP));
         promised.push((format!("stage/{method}"), STEP));
     }
@@ -209,13 +210,13 @@ fn two_recordings_of_one_run_are_equal() {
     let first = chunks(&recorded(
         &folder,
         "first.rrd",
-        &Method::ALL,
+        &Method::PAPER,
         &Params::default(),
     ));
     let second = chunks(&recorded(
         &folder,
         "second.rrd",
-        &Method::ALL,
+        &Method::PAPER,
         &Params::default(),
     ));
     assert_equal(&first, &second);
@@ -237,20 +238,20 @@ fn the_hybrid_repeats_no_story_but_tells_all_of_it_when_alone() {
         };
         ["fb/matches/0", "mi/synthetic", "world/cloud"].map(count)
     };
-    let parts = rows("parts.rrd", &[Method::Feature, Method::MutualInformation]);
+    let parts = rows("parts.rrd", &[Method::FB, Method::MI]);
     assert!(parts.iter().all(|&count| count > 0), "{parts:?}");
-    let both = [Method::Feature, Method::MutualInformation, Method::Hybrid];
+    let both = [Method::FB, Method::MI, Method::HY];
     assert_eq!(rows("both.rrd", &both), parts);
-    assert_eq!(rows("alone.rrd", &[Method::Hybrid]), parts);
+    assert_eq!(rows("alone.rrd", &[Method::HY]), parts);
 }
 
 #[test]
 fn a_second_query_begins_with_a_clean_slate_and_later_steps() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("two.rrd");
-    let mut recorder = open(&path, &[Method::Feature]);
-    run(&mut recorder, &[Method::Feature], &Params::default());
-    run(&mut recorder, &[Method::Feature], &Params::default());
+    let mut recorder = open(&path, &[Method::FB]);
+    run(&mut recorder, &[Method::FB], &Params::default());
+    run(&mut recorder, &[Method::FB], &Params::default());
     recorder.close().expect("a whole recording");
     let trials = |chunk: &&Chunk| chunk.entity_path().to_string() == "/fb/ransac/inliers";
     let chunks = chunks(&path);
@@ -319,9 +320,9 @@ fn a_process_that_is_killed_leaves_what_it_told() {
 #[test]
 fn a_whole_recording_wants_every_kind_and_a_repeating_hybrid_hardly_any() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut recorder = open(&folder.path().join("run.rrd"), &Method::ALL);
+    let mut recorder = open(&folder.path().join("run.rrd"), &Method::PAPER);
     assert_eq!(recorder.wanted(), KindSet::ALL);
-    run(&mut recorder, &Method::ALL, &Params::default());
+    run(&mut recorder, &Method::PAPER, &Params::default());
     assert!(!recorder.wanted().contains(Kind::ViewRendered));
     assert!(recorder.wanted().contains(Kind::BranchTaken));
 }
@@ -333,7 +334,7 @@ fn a_full_disk_is_reported_with_the_name_of_the_file() {
         save: Some(PathBuf::from("/dev/full")),
         ..Targets::default()
     };
-    let Err(error) = Recorder::open(&targets, &identity(), &Method::ALL) else {
+    let Err(error) = Recorder::open(&targets, &identity(), &Method::PAPER) else {
         panic!("there is no room for even the header");
     };
     let line = error.to_string();
@@ -358,9 +359,9 @@ fn a_fusion_is_recorded_with_weights_and_candidates() {
     let found = timelines(&chunks(&path));
     for entity in [
         entities::FUSION_TABLE.to_owned(),
-        entities::fusion_weights(Method::Feature),
-        entities::fusion_weights(Method::MutualInformation),
-        entities::fusion_candidates(Method::MutualInformation),
+        entities::fusion_weights(Method::FB),
+        entities::fusion_weights(Method::MI),
+        entities::fusion_candidates(Method::MI),
     ] {
         let timelines = found.get(&entity).unwrap_or_else(|| panic!("{entity}"));
         assert!(timelines.contains(STEP), "{entity}: {timelines:?}");
@@ -404,7 +405,7 @@ fn tell_ranking(recorder: &mut Recorder, event: &ReferencesRanked) {
 fn a_ranking_is_recorded_with_a_picture_of_the_best_and_wiped_for_the_next_query() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ranked.rrd");
-    let mut recorder = open(&path, &[Method::Feature]);
+    let mut recorder = open(&path, &[Method::FB]);
     let problem = solvable();
     recorder.begin_query(0, std::slice::from_ref(&problem), None);
     tell_ranking(&mut recorder, &ranking_of_twelve());
@@ -431,12 +432,12 @@ fn a_ranking_has_a_place_in_the_layout_only_where_there_is_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let is_laid_out = |name: &str, ranking: Option<&ReferencesRanked>| {
         let path = folder.path().join(name);
-        let mut recorder = open(&path, &[Method::Feature]);
+        let mut recorder = open(&path, &[Method::FB]);
         recorder.begin_query(0, std::slice::from_ref(&solvable()), None);
         if let Some(ranking) = ranking {
             tell_ranking(&mut recorder, ranking);
         }
-        recorder.begin_method(0, Method::Feature);
+        recorder.begin_method(0, Method::FB);
         recorder.close().expect("a whole recording");
         let layout = layout(&path);
         assert!(layout.contains("fb/matches/0"), "there is a layout");

@@ -52,7 +52,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
         .click();
     window.run_steps(2);
     assert_eq!(settle(&mut window), State::Finished);
-    assert_eq!(results(&window).len(), 2 * Method::ALL.len());
+    assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     assert!(
         results(&window)
             .iter()
@@ -69,7 +69,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
         .into_iter()
         .filter(|result| result.fusion.is_some_and(|f| f.name == "wavg"))
         .collect();
-    assert_eq!(fused.len(), Method::ALL.len());
+    assert_eq!(fused.len(), Method::PAPER.len());
     // Only the fusion is new.
     let run = window.state().desk().run();
     for bar in run.stages() {
@@ -82,7 +82,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     window.state_mut().send(save);
     window.run_steps(2);
     let recorded = timelines(&chunks(&recording));
-    assert!(recorded.contains_key(&entities::fusion_weights(Method::Feature)));
+    assert!(recorded.contains_key(&entities::fusion_weights(Method::FB)));
     assert!(!recorded.contains_key(entities::RETRIEVAL_TABLE));
 
     let command = window.state().desk().setup.command_line();
@@ -98,9 +98,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     assert!(is_said(&window, "HY, 2 references"));
     let error = fused[3].error.expect("the truth is known");
     assert!(is_said(&window, &format!("{:.3} m", error.translation_m)));
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::Feature));
+    window.state_mut().send(Command::SelectMethod(Method::FB));
     window.run_steps(3);
     assert!(is_said(&window, "FB, 2 references"));
 
@@ -187,7 +185,7 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     assert_eq!(pick(&mut window, Selection::Retrieved(2)), State::Finished);
     let chosen = &window.state().desk().setup.chosen;
     assert_eq!(chosen.frames.len(), 2);
-    assert_eq!(results(&window).len(), 2 * Method::ALL.len());
+    assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     maximize(&mut window, "retrieval");
     assert!(is_said(
         &window,

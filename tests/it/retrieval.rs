@@ -238,7 +238,7 @@ fn localized(requests: &[Request], watch: &mut dyn Watch) -> Vec<QueryResult> {
     let (scene, params) = (Walls::new(), Params::default());
     let mut results = Vec::new();
     Localizer::new(&scene, &scene, &params, 7)
-        .localize(0, 1, requests, &[Method::Feature], watch, |result, _| {
+        .localize(0, 1, requests, &[Method::FB], watch, |result, _| {
             results.push(result);
             Ok::<(), LocalizeError>(())
         })

@@ -92,8 +92,8 @@ fn words(scored: &PoseScored) -> String {
 #[test]
 fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
     let mut window = finished();
-    move_to_end(&mut window, Method::MutualInformation);
-    let scored = told::<PoseScored>(&window, Method::MutualInformation);
+    move_to_end(&mut window, Method::MI);
+    let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
     for map in [
         "Cost map:",
@@ -128,7 +128,7 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
 #[test]
 fn leaving_a_map_is_said_once() {
     let mut window = finished();
-    move_to_end(&mut window, Method::MutualInformation);
+    move_to_end(&mut window, Method::MI);
     hover(&mut window, "Cost map:", 0.5, 0.5).expect("a cell");
     let hovered = window.state().desk().hovered;
     assert!(hovered.is_some());
@@ -143,7 +143,7 @@ fn leaving_a_map_is_said_once() {
 #[test]
 fn a_click_takes_the_camera_to_the_cell() {
     let mut window = finished();
-    move_to_end(&mut window, Method::Photometric);
+    move_to_end(&mut window, Method::PM);
     hover(&mut window, "Cost map:", 0.25, 0.5).expect("a cell");
     let hovered = window.state().desk().hovered;
     let rect = window.get_by_label_contains("Cost map:").rect();
@@ -161,7 +161,7 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
     let mut window = finished();
     window.state_mut().send(Command::Maximize(Some("surface")));
     window.run_steps(3);
-    let scored = told::<PoseScored>(&window, Method::MutualInformation);
+    let scored = told::<PoseScored>(&window, Method::MI);
     for &(at, ref event) in scored
         .iter()
         .filter(|(_, event)| !event.phase.is_yaw())
@@ -200,11 +200,11 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
     let mut window = finished();
     window.state_mut().send(Command::Maximize(Some("surface")));
     window.run_steps(2);
-    move_to_end(&mut window, Method::MutualInformation);
-    let surfaces = told::<PhaseSearched>(&window, Method::MutualInformation);
+    move_to_end(&mut window, Method::MI);
+    let surfaces = told::<PhaseSearched>(&window, Method::MI);
     let surface = &surfaces[0].1.surface;
     assert_eq!(surface.lattice.phase, Phase::PositionCoarse);
-    let views = told::<ViewRendered>(&window, Method::MutualInformation);
+    let views = told::<ViewRendered>(&window, Method::MI);
     assert_eq!(views[0].1.moment, Moment::Start);
     let covered = views[0].1.comparison.score.covered;
     let own = surface.minimum();
@@ -236,7 +236,7 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
     assert_eq!(settle(&mut window), State::Finished);
     let floor = window.state().desk().setup.task.params.grid.coverage_floor;
     assert!((floor - moving).abs() < 1e-9, "{floor}");
-    let surfaces = told::<PhaseSearched>(&window, Method::MutualInformation);
+    let surfaces = told::<PhaseSearched>(&window, Method::MI);
     assert_eq!(surfaces[0].1.surface.minimum(), Some(cell));
     assert!(texts(&window, "The minimum moves").is_empty());
 }
@@ -244,7 +244,7 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
 #[test]
 fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
     let mut window = finished();
-    for (at, view) in told::<ViewRendered>(&window, Method::MutualInformation) {
+    for (at, view) in told::<ViewRendered>(&window, Method::MI) {
         move_to(&mut window, at);
         let cost = view.comparison.score.cost.expect("textured walls");
         let shown = text(&window, "NMI = ");
@@ -252,7 +252,7 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
             shown.ends_with(&format!(" = {:.4}", 1.0 - cost)),
             "{shown}, not 1 - {cost}"
         );
-        let Some(Explanation::MutualInformation(histogram)) = &view.comparison.explanation else {
+        let Some(Explanation::JointHistogram(histogram)) = &view.comparison.explanation else {
             panic!("MI explains itself by a histogram");
         };
         let bits = histogram.query_entropy / 2_f64.ln();
@@ -267,10 +267,10 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
 #[test]
 fn a_bin_under_the_pointer_tells_its_pairs() {
     let mut window = finished();
-    let views = told::<ViewRendered>(&window, Method::MutualInformation);
+    let views = told::<ViewRendered>(&window, Method::MI);
     let (at, view) = views.last().expect("the result");
     move_to(&mut window, *at);
-    let Some(Explanation::MutualInformation(histogram)) = &view.comparison.explanation else {
+    let Some(Explanation::JointHistogram(histogram)) = &view.comparison.explanation else {
         panic!("MI explains itself by a histogram");
     };
     let rect = window.get_by_label_contains("Joint histogram of").rect();
@@ -293,10 +293,10 @@ fn a_bin_under_the_pointer_tells_its_pairs() {
 #[test]
 fn the_residuals_of_pm_say_what_was_ignored() {
     let mut window = finished();
-    move_to_end(&mut window, Method::Photometric);
-    let views = told::<ViewRendered>(&window, Method::Photometric);
+    move_to_end(&mut window, Method::PM);
+    let views = told::<ViewRendered>(&window, Method::PM);
     let view = &views.last().expect("the result").1;
-    let Some(Explanation::Photometric(weights)) = &view.comparison.explanation else {
+    let Some(Explanation::Weights(weights)) = &view.comparison.explanation else {
         panic!("PM explains itself by weights");
     };
     let counted = weights.counted.iter().filter(|counted| **counted).count();
@@ -313,7 +313,7 @@ fn the_residuals_of_pm_say_what_was_ignored() {
 fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     let mut window = finished();
     window.state_mut().send(Command::ShowView("ransac"));
-    let trials = told::<HypothesisTried>(&window, Method::Feature);
+    let trials = told::<HypothesisTried>(&window, Method::FB);
     for (made, (at, tried)) in trials.iter().enumerate().step_by(trials.len() / 5 + 1) {
         move_to(&mut window, *at);
         let head = text(&window, &format!("{} trials made", made + 1));
@@ -343,7 +343,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
 fn the_acceptance_test_is_told_in_words() {
     let mut window = finished();
     window.state_mut().send(Command::ShowView("ransac"));
-    let (at, judged) = told::<ConsensusJudged>(&window, Method::Feature)[0].clone();
+    let (at, judged) = told::<ConsensusJudged>(&window, Method::FB)[0].clone();
     assert!(judged.accepted);
     move_to(&mut window, at);
     text(&window, "Accepted");

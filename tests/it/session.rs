@@ -90,7 +90,7 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
     assert_eq!(session.run().len(), 1);
     let first = &session.run().records()[0].event;
-    assert_eq!(starts(first), Some(Stage::Estimator(Method::Feature)));
+    assert_eq!(starts(first), Some(Stage::Estimator(Method::FB)));
 
     let event = order(&mut session, RunMode::StepInto);
     assert_eq!(starts(&event), Some(Stage::Detect));
@@ -103,7 +103,7 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
-    assert_eq!(ends(&event), Some(Stage::Estimator(Method::Feature)));
+    assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));
     assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
 }
 
@@ -294,9 +294,9 @@ fn several_references_are_fused_as_without_a_session() {
     assert_eq!(alone.len(), 4 * 2);
     let run = session.run();
     let parts: Vec<Part> = run.spans().iter().map(|span| span.part).collect();
-    let first = [0, 1].map(|reference| Part::Reference(Method::Feature, reference));
+    let first = [0, 1].map(|reference| Part::Reference(Method::FB, reference));
     assert_eq!(parts[..2], first);
-    assert_eq!(parts[2..6], [Part::Fusion(Method::Feature); 4]);
+    assert_eq!(parts[2..6], [Part::Fusion(Method::FB); 4]);
     for span in run.spans() {
         let fused = run.latest_in::<ReferencesFused>(span, span.records.end);
         assert_eq!(fused.is_some(), matches!(span.part, Part::Fusion(_)));

@@ -237,7 +237,7 @@ fn number_after(text: &str, words: &str) -> f64 {
 fn the_cost_under_the_pointer_is_the_recorded_one() {
     let mut window = finished();
     // The hybrid took the pose of FB and searched nothing.
-    let method = posescope::method::Method::MutualInformation;
+    let method = posescope::method::Method::MI;
     window.state_mut().send(Command::SelectMethod(method));
     window.run_steps(2);
     click(&mut window, "Top");

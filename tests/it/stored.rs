@@ -117,7 +117,7 @@ fn what_is_wrong_in_a_run_file_is_told_with_its_line() {
             "\"mi\"]",
             "\"mo\"]",
             "methods",
-            "`mo` is no method; fb, pm, mi or hy expected",
+            "`mo` is no method; fb, pm, mi, hy",
         ),
         (
             "methods = [\"fb\", \"mi\"]",
@@ -179,7 +179,7 @@ fn what_is_wrong_in_a_result_is_told_with_its_line() {
         (
             "\"method\":\"mi\"",
             "\"method\":\"mo\"",
-            "`mo` is no method; fb, pm, mi or hy expected",
+            "`mo` is no method; fb, pm, mi, hy",
         ),
         (
             "\"fusion\":\"r-wavg\"",

@@ -133,7 +133,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
             0,
             1,
             &[request],
-            &Method::ALL,
+            &Method::PAPER,
             &mut Unwatched,
             |result, _| {
                 results.push(result);
@@ -185,7 +185,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     press(&mut window, Modifiers::NONE, Key::Num3);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.part.method(), Some(Method::MutualInformation));
+    assert_eq!(span.part.method(), Some(Method::MI));
 }
 
 #[test]
@@ -230,9 +230,7 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
 #[test]
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
-    window
-        .state_mut()
-        .send(Command::SelectMethod(Method::MutualInformation));
+    window.state_mut().send(Command::SelectMethod(Method::MI));
     window.step();
     window.step();
     window.state_mut().send(Command::SetParam {
@@ -243,7 +241,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     assert_eq!(settle(&mut window), State::Finished);
     let desk = window.state().desk();
     let span = desk.run().span_at(desk.cursor).expect("in a span");
-    assert_eq!(span.part.method(), Some(Method::MutualInformation));
+    assert_eq!(span.part.method(), Some(Method::MI));
     assert_eq!(desk.cursor + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
         let bars = desk.run().stages().iter();
@@ -395,7 +393,7 @@ fn a_session_of_an_earlier_program_is_restored() {
     assert_eq!(setup.pick().to_string(), "maxf:2");
     assert_eq!(setup.chosen.frames, [0, 2]);
     assert_eq!(task.protocol.prior_m, Some(5.0));
-    let methods = [Method::Feature, Method::MutualInformation];
+    let methods = [Method::FB, Method::MI];
     assert_eq!(task.protocol.methods, methods);
     let fusions: Vec<&str> = task.protocol.fusions.iter().map(|f| f.name).collect();
     assert_eq!(fusions, ["avg", "r-wavg"]);

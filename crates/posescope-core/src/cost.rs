@@ -1,22 +1,32 @@
 //! Costs of the direct methods: how badly a synthetic view fits the query. Lower is better, always.
 //!
-//! A cost compares grey values pixel by pixel where the synthetic view exists. It knows no pose and
-//! no image. What is too little to judge has no cost, which is not the same as a high one.
+//! A cost says what it wants to see of a photo, a [channel](Cost::query_channel), and compares the
+//! query's with the synthetic view's pixel by pixel where the view exists. It knows no pose. What is
+//! too little to judge has no cost, which is not the same as a high one.
 //!
-//! A new cost is one file, its `mod` line and its entry in [`ALL`].
+//! A new cost is one file, its `mod` line and its entry in [`ALL`]. It is then a method of its own, of
+//! the same name, reachable from the command line, the window and the recordings: a direct estimator
+//! is a cost with a search.
 
+mod joint_histogram;
 mod mutual_information;
+mod orientation;
 mod photometric;
 
-pub use mutual_information::{JointHistogram, MutualInformation, MutualInformationParams};
+use std::fmt;
+
+pub use joint_histogram::JointHistogram;
+pub use mutual_information::{MutualInformation, MutualInformationParams};
+pub use orientation::{Orientation, OrientationParams};
 pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
 
-use crate::params::Params;
+use crate::describe::Describe;
+use crate::image::{FloatImage, GrayImage, cubic_interpolated};
 
 /// What the query and the synthetic view show at one covered pixel, each 0 … 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntensityPair {
-    /// The (smoothed) query I_Q.
+    /// The query I_Q, in the cost's channel.
     pub query: f32,
     /// The synthetic view I_S.
     pub synthetic: f32,
@@ -24,8 +34,27 @@ pub struct IntensityPair {
 
 /// A robust dissimilarity of two images over the pixels they share.
 pub trait Cost: Send + Sync {
-    /// Standard deviation of the Gaussian that smooths the query beforehand \[px\].
-    fn query_smoothing_px(&self) -> f64;
+    /// What the cost looks at in the query, each pixel 0 … 255.
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage;
+
+    /// Names what [`Self::query_channel`] makes, with all that it depends on.
+    fn query_channel_name(&self) -> String;
+
+    /// What the cloud is coloured with before views of it are rendered: the value 0 … 255 at a place
+    /// between the pixels of the reference photo \[px\]. Its grey values by cubic convolution, unless
+    /// the cost wants something else.
+    fn reference_channel<'a>(
+        &self,
+        photo: &'a GrayImage,
+    ) -> Box<dyn Fn(f32, f32) -> f32 + Sync + 'a> {
+        Box::new(|x, y| cubic_interpolated(photo, x, y))
+    }
+
+    /// Names what [`Self::reference_channel`] makes, with all that it depends on: costs of the same
+    /// name share one coloured cloud.
+    fn reference_channel_name(&self) -> String {
+        "grey".to_owned()
+    }
 
     /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64>;
@@ -38,34 +67,99 @@ pub trait Cost: Send + Sync {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Explanation {
     /// Which residuals counted.
-    Photometric(PhotometricWeights),
-    /// How the grey values of both images fall together.
-    MutualInformation(JointHistogram),
+    Weights(PhotometricWeights),
+    /// How the values of both images fall together.
+    JointHistogram(JointHistogram),
+}
+
+/// Which kind of [`Explanation`] a cost gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ExplanationKind {
+    /// [`Explanation::Weights`].
+    Weights,
+    /// [`Explanation::JointHistogram`].
+    JointHistogram,
+}
+
+/// The parameters of a cost: they describe themselves, and make the cost.
+pub trait CostParams: Describe + fmt::Debug + Send + Sync {
+    /// The cost with these parameters.
+    fn cost(&self) -> Box<dyn Cost>;
+
+    /// The same parameters.
+    fn boxed(&self) -> Box<dyn CostParams>;
+}
+
+/// What two images share, as a number 0 … 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Similarity {
+    /// Its abbreviation: `NMI`.
+    pub name: &'static str,
+    /// What it is, in entropies H and mutual information I of query Q and synthetic view S.
+    pub formula: &'static str,
 }
 
 /// A cost's place in the registry.
+#[derive(Debug)]
 pub struct Entry {
-    /// Short name.
+    /// The name of the method that searches the pose of least cost, and of the parameters' group.
     pub name: &'static str,
     /// One phrase.
     pub about: &'static str,
-    /// Makes the cost from the parameters.
-    pub new: fn(&Params) -> Box<dyn Cost>,
+    /// What a value of its channel is: `grey value`.
+    pub sees: &'static str,
+    /// How it explains itself.
+    pub explains: ExplanationKind,
+    /// What the cost is one minus of, where it is made of a joint histogram.
+    pub similarity: Option<Similarity>,
+    /// Its parameters with their defaults.
+    pub params: fn() -> Box<dyn CostParams>,
 }
 
 /// Every cost.
 pub const ALL: &[Entry] = &[
-    Entry {
-        name: "photometric",
-        about: "squared difference of grey values, the worse half ignored",
-        new: |params| Box::new(Photometric::new(&params.pm)),
-    },
-    Entry {
-        name: "mutual_information",
-        about: "1 − mutual information normalised by the larger entropy",
-        new: |params| Box::new(MutualInformation::new(&params.mi)),
-    },
+    photometric::ENTRY,
+    mutual_information::ENTRY,
+    orientation::ENTRY,
 ];
+
+/// The parameters of every cost, in the order of [`ALL`].
+#[derive(Debug)]
+pub struct CostSettings(Vec<Box<dyn CostParams>>);
+
+impl CostSettings {
+    /// Names of the groups, with their parameters.
+    pub fn groups(&mut self) -> impl Iterator<Item = (&'static str, &mut dyn Describe)> {
+        ALL.iter()
+            .zip(&mut self.0)
+            .map(|(entry, params)| (entry.name, params.as_mut() as &mut dyn Describe))
+    }
+
+    /// The parameters of a registered cost.
+    pub fn of(&self, entry: &Entry) -> Option<&dyn CostParams> {
+        let place = ALL.iter().position(|known| known.name == entry.name)?;
+        self.0.get(place).map(AsRef::as_ref)
+    }
+}
+
+impl Default for CostSettings {
+    fn default() -> Self {
+        Self(ALL.iter().map(|entry| (entry.params)()).collect())
+    }
+}
+
+impl Clone for CostSettings {
+    fn clone(&self) -> Self {
+        Self(self.0.iter().map(|params| params.boxed()).collect())
+    }
+}
+
+impl PartialEq for CostSettings {
+    fn eq(&self, other: &Self) -> bool {
+        let words = |settings: &Self| format!("{:?}", settings.0);
+        words(self) == words(other)
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -80,10 +174,22 @@ mod tests {
     }
 
     #[test]
-    fn no_pair_has_no_cost() {
-        let params = Params::default();
+    fn names_are_unique_and_settings_are_equal_to_their_copies() {
+        let mut names: Vec<_> = ALL.iter().map(|entry| entry.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), ALL.len());
+        let settings = CostSettings::default();
+        assert_eq!(settings.clone(), settings);
         for entry in ALL {
-            let cost = (entry.new)(&params);
+            assert!(settings.of(entry).is_some());
+        }
+    }
+
+    #[test]
+    fn no_pair_has_no_cost() {
+        for entry in ALL {
+            let cost = (entry.params)().cost();
             assert_eq!(cost.evaluate(&[]), None, "{}", entry.name);
             assert_eq!(cost.explain(&[]), None, "{}", entry.name);
         }
@@ -101,7 +207,7 @@ mod tests {
             .map(|i| (equal[i].0, equal[(i * 1237 + 11) % equal.len()].1))
             .collect();
         for entry in ALL {
-            let cost = (entry.new)(&Params::default());
+            let cost = (entry.params)().cost();
             let at_equal = cost.evaluate(&pairs(&equal)).expect("textured");
             let at_shuffled = cost.evaluate(&pairs(&shuffled)).expect("textured");
             assert!(at_equal.abs() < 1e-9, "{}: {at_equal}", entry.name);
@@ -115,7 +221,7 @@ mod tests {
             values in prop::collection::vec((0.0_f32..=255.0, 0.0_f32..=255.0), 0..200)
         ) {
             for entry in ALL {
-                let cost = (entry.new)(&Params::default());
+                let cost = (entry.params)().cost();
                 let pairs = pairs(&values);
                 let value = cost.evaluate(&pairs);
                 prop_assert_eq!(value.is_some(), cost.explain(&pairs).is_some());

@@ -1,29 +1,31 @@
-//! The four estimators. Each is a straight-line function from a [`Problem`] to an [`Outcome`] that
-//! tells what it does to a [`Trace`].
+//! The estimators. Each is a straight-line function from a [`Problem`] to an [`Outcome`] that tells
+//! what it does to a [`Trace`].
 //!
-//! A new estimator is one file, its `mod` line and its entry in [`ALL`].
+//! A direct estimator is a registered [cost](crate::cost::ALL) with a search, so a new cost is a new
+//! method. Any other estimator is one file, its `mod` line, its [`Entry`] in [`all`], and its kind in
+//! [`Parts`] where it is made of something new.
 
 mod direct;
 mod failure;
 mod feature;
 mod hybrid;
-mod mutual_information;
-mod photometric;
 
+pub use direct::Direct;
 pub use failure::Failure;
 pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches};
-pub use hybrid::{Hybrid, hybrid_outcome};
-pub use mutual_information::mutual_information;
-pub use photometric::photometric;
+pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 
-use std::sync::Arc;
+use std::str::FromStr;
+use std::sync::{Arc, LazyLock};
 
+use crate::cost;
 use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Score};
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
 /// How many features passed each step of FB. Every query keypoint is in exactly one state, so
@@ -100,47 +102,124 @@ pub trait Estimator: Send + Sync {
 }
 
 /// An estimator's place in the registry.
+#[derive(Debug)]
 pub struct Entry {
-    /// Which method of the paper.
+    /// The method that it is.
     pub method: Method,
     /// One phrase.
     pub about: &'static str,
-    /// Makes the estimator from the parameters.
-    pub new: fn(&Params) -> Box<dyn Estimator>,
+    /// What it is made of.
+    pub parts: Parts,
 }
 
-/// Every estimator, in the order in which they run.
-pub const ALL: &[Entry] = &[
-    Entry {
-        method: Method::Feature,
-        about: "indirect: SURF, ratio match, depth from the cloud, P3P and MLESAC",
-        new: |params| Box::new(FeatureBased::new(params)),
-    },
-    Entry {
-        method: Method::Photometric,
-        about: "direct: robust photometric error over a coarse-to-fine grid of synthetic views",
-        new: |params| Box::new(photometric(params)),
-    },
-    Entry {
-        method: Method::MutualInformation,
-        about: "direct: normalised mutual information over the same grid",
-        new: |params| Box::new(mutual_information(params)),
-    },
-    Entry {
-        method: Method::Hybrid,
-        about: "the feature-based pose, and mutual information where that has none",
-        new: |params| Box::new(Hybrid::new(params)),
-    },
-];
+/// What an estimator is made of. Whoever shows a run asks this, and not which method it is.
+#[derive(Debug)]
+pub enum Parts {
+    /// Features, matched and lifted to 3-D points.
+    Features,
+    /// A cost and a search for its minimum.
+    Cost(&'static cost::Entry),
+    /// The pose of one method, and of another where that has none.
+    Hybrid(HybridParts),
+}
+
+impl Entry {
+    /// The estimator with these parameters.
+    pub fn make(&self, params: &Params) -> Box<dyn Estimator> {
+        match self.parts {
+            Parts::Features => Box::new(FeatureBased::new(params)),
+            Parts::Cost(cost) => Box::new(Direct::new(cost, params)),
+            Parts::Hybrid(parts) => Box::new(Hybrid::new(self.method, parts, params)),
+        }
+    }
+
+    /// The cost that it searches by itself.
+    pub fn cost(&self) -> Option<&'static cost::Entry> {
+        match self.parts {
+            Parts::Cost(cost) => Some(cost),
+            Parts::Features | Parts::Hybrid(_) => None,
+        }
+    }
+
+    /// The methods that it runs inside, if it is made of others.
+    pub fn hybrid(&self) -> Option<HybridParts> {
+        match self.parts {
+            Parts::Hybrid(parts) => Some(parts),
+            Parts::Features | Parts::Cost(_) => None,
+        }
+    }
+}
+
+/// The paper's estimators that are no cost with a search.
+const FEATURE: Entry = Entry {
+    method: Method::FB,
+    about: "indirect: SURF, ratio match, depth from the cloud, P3P and MLESAC",
+    parts: Parts::Features,
+};
+const HYBRID: Entry = Entry {
+    method: Method::HY,
+    about: "the feature-based pose, and mutual information where that has none",
+    parts: Parts::Hybrid(HybridParts {
+        first: Method::FB,
+        second: Method::MI,
+    }),
+};
+
+/// Every estimator: those of the paper in its order, then the others. Each registered cost is one.
+pub fn all() -> &'static [Entry] {
+    static ALL: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+        let direct = cost::ALL.iter().map(|cost| Entry {
+            method: Method::named(cost.name),
+            about: cost.about,
+            parts: Parts::Cost(cost),
+        });
+        let mut all: Vec<_> = [FEATURE, HYBRID].into_iter().chain(direct).collect();
+        all.sort_by_key(|entry| entry.method);
+        all
+    });
+    &ALL
+}
+
+/// Every method, in the order of [`all`].
+pub fn methods() -> impl Iterator<Item = Method> {
+    all().iter().map(|entry| entry.method)
+}
+
+/// Those of some methods that search the pose of least cost, and those that a hybrid among them runs,
+/// in the order of [`all`].
+pub fn direct_methods(methods: &[Method]) -> Vec<Method> {
+    let runs = |method: Method| {
+        methods.iter().any(|&asked| {
+            let parts = entry(asked).hybrid();
+            asked == method
+                || parts.is_some_and(|parts| parts.first == method || parts.second == method)
+        })
+    };
+    let direct = all().iter().filter(|entry| entry.cost().is_some());
+    direct
+        .map(|entry| entry.method)
+        .filter(|&method| runs(method))
+        .collect()
+}
 
 /// The registry's entry of a method.
 ///
 /// # Panics
-/// Never: a test walks over all methods.
+/// For a name that no registry gave ([`Method::named`]).
 pub fn entry(method: Method) -> &'static Entry {
-    ALL.iter()
+    all()
+        .iter()
         .find(|entry| entry.method == method)
-        .unwrap_or_else(|| unreachable!("every method has an estimator"))
+        .unwrap_or_else(|| panic!("{method} is in no registry"))
+}
+
+impl FromStr for Method {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let found = methods().find(|method| method.name() == text);
+        found.ok_or_else(|| UnknownWord::among(text, "method", methods().map(Method::name)))
+    }
 }
 
 /// Why a straight-line estimator stops early.
@@ -176,7 +255,14 @@ mod tests {
 
     #[test]
     fn every_method_has_an_estimator() {
-        let methods: Vec<_> = ALL.iter().map(|entry| entry.method).collect();
-        assert_eq!(methods, Method::ALL);
+        let registered: Vec<_> = methods().collect();
+        assert_eq!(registered[..4], Method::PAPER);
+        assert_eq!(registered.len(), cost::ALL.len() + 2);
+        for method in registered {
+            assert_eq!(method.name().parse(), Ok(method));
+        }
+        let unknown = "sift".parse::<Method>().map_err(|error| error.to_string());
+        let words = "`sift` is no method; fb, pm, mi, hy or nid expected";
+        assert_eq!(unknown, Err(words.to_owned()));
     }
 }

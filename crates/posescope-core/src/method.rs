@@ -1,60 +1,70 @@
-//! The methods that are compared, by the names that the paper gives them.
+//! The methods that are compared, by their names.
 
+use std::cmp::Ordering;
 use std::fmt;
-use std::str::FromStr;
 
-use crate::text::UnknownWord;
-
-/// An estimator, as the paper abbreviates it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Method {
-    /// FB, the indirect feature-based method.
-    Feature,
-    /// PM, the direct photometric method.
-    Photometric,
-    /// MI, the direct mutual-information method.
-    MutualInformation,
-    /// HY, the hybrid of FB and MI.
-    Hybrid,
-}
+/// A method by its short name, which is the same on the command line, in results and in recordings.
+///
+/// Which methods there are says the registry of the estimators ([`crate::estimator::all`]): the four
+/// of the paper are known by name here, any other is a line in a registry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Method(&'static str);
 
 impl Method {
-    /// The order in which methods run and are listed.
-    pub const ALL: [Self; 4] = [
-        Self::Feature,
-        Self::Photometric,
-        Self::MutualInformation,
-        Self::Hybrid,
-    ];
+    /// FB, the indirect feature-based method.
+    pub const FB: Self = Self("fb");
+    /// PM, the direct photometric method.
+    pub const PM: Self = Self("pm");
+    /// MI, the direct mutual-information method.
+    pub const MI: Self = Self("mi");
+    /// HY, the hybrid of FB and MI.
+    pub const HY: Self = Self("hy");
 
-    /// The short name on the command line, in results and in recordings.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Feature => "fb",
-            Self::Photometric => "pm",
-            Self::MutualInformation => "mi",
-            Self::Hybrid => "hy",
-        }
+    /// The methods of the paper, in the order in which they run and are listed. Every command takes
+    /// these where it is not told which.
+    pub const PAPER: [Self; 4] = [Self::FB, Self::PM, Self::MI, Self::HY];
+
+    /// The method of a name that a registry gives.
+    pub const fn named(name: &'static str) -> Self {
+        Self(name)
     }
 
-    /// The method of a short name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|method| method.name() == name)
+    /// The short name.
+    pub const fn name(self) -> &'static str {
+        self.0
+    }
+
+    /// The name as people read it: `FB`.
+    pub fn label(self) -> String {
+        self.0.to_uppercase()
+    }
+
+    /// Position among those of the paper; all others come behind.
+    fn rank(self) -> usize {
+        let mut paper = Self::PAPER.iter();
+        paper
+            .position(|known| *known == self)
+            .unwrap_or(Self::PAPER.len())
     }
 }
 
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(self.0)
     }
 }
 
-impl FromStr for Method {
-    type Err = UnknownWord;
+/// Those of the paper in its order, then the others by name.
+impl Ord for Method {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let key = |method: &Self| (method.rank(), method.0);
+        key(self).cmp(&key(other))
+    }
+}
 
-    fn from_str(name: &str) -> Result<Self, UnknownWord> {
-        let names = Self::ALL.map(Self::name);
-        Self::from_name(name).ok_or_else(|| UnknownWord::among(name, "method", names))
+impl PartialOrd for Method {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
 }
 
@@ -63,16 +73,15 @@ crate::serde_as_text!(Method);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator;
 
     #[test]
     fn every_method_is_read_as_it_is_written() {
-        for method in Method::ALL {
+        for method in estimator::methods() {
             assert_eq!(method.to_string().parse(), Ok(method));
             let json = serde_json::to_string(&method).expect("a string");
             assert_eq!(json, format!("\"{}\"", method.name()));
             assert_eq!(serde_json::from_str::<Method>(&json).ok(), Some(method));
         }
-        let error = "xx".parse::<Method>().expect_err("unknown").to_string();
-        assert_eq!(error, "`xx` is no method; fb, pm, mi or hy expected");
     }
 }

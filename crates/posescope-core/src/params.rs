@@ -5,7 +5,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::cost::{MutualInformationParams, PhotometricParams};
+use crate::cost::CostSettings;
 use crate::describe::{
     About, Choice, Describe, Described, Domain, ParamError, ParamVisitor, Value,
 };
@@ -26,10 +26,8 @@ pub struct Params {
     pub render: RenderParams,
     /// `grid`: the coarse-to-fine search of the direct methods.
     pub grid: GridParams,
-    /// `pm`: the photometric cost.
-    pub pm: PhotometricParams,
-    /// `mi`: the mutual-information cost.
-    pub mi: MutualInformationParams,
+    /// `pm`, `mi` and so on: a group for each registered cost.
+    pub costs: CostSettings,
     /// `retrieval`: visual words, and the verification of what they find.
     pub retrieval: RetrievalParams,
 }
@@ -41,8 +39,9 @@ impl Params {
         visit("fb", &mut self.fb);
         visit("render", &mut self.render);
         visit("grid", &mut self.grid);
-        visit("pm", &mut self.pm);
-        visit("mi", &mut self.mi);
+        for (group, params) in self.costs.groups() {
+            visit(group, params);
+        }
         visit("retrieval", &mut self.retrieval);
     }
 

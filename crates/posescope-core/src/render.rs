@@ -5,7 +5,7 @@ mod color;
 mod score;
 mod splat;
 
-pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud};
+pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
 pub use score::{Comparison, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 

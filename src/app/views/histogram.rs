@@ -9,6 +9,8 @@ use egui::{RichText, ScrollArea, Ui};
 use super::View;
 use crate::app::{Scope, Shown};
 use crate::cost::Explanation;
+use crate::cost::ExplanationKind;
+use crate::estimator;
 use crate::grid::Offset;
 use crate::method::Method;
 
@@ -34,11 +36,11 @@ impl View for Histogram {
             };
             caption(ui, scope, &shown);
             match &shown.comparison.explanation {
-                Some(Explanation::MutualInformation(histogram)) => {
-                    joint::ui(ui, scope, &shown.comparison, histogram);
+                Some(Explanation::JointHistogram(histogram)) => {
+                    joint::ui(ui, scope, method, &shown.comparison, histogram);
                 }
-                Some(Explanation::Photometric(weights)) => {
-                    residuals::ui(ui, scope, &shown.comparison, weights);
+                Some(Explanation::Weights(weights)) => {
+                    residuals::ui(ui, scope, method, &shown.comparison, weights);
                 }
                 None => {
                     ui.weak("This view has no cost: too little of it is covered, or it is all of one grey");
@@ -57,11 +59,12 @@ impl Histogram {
         }
         let shown = self.method.unwrap_or_else(|| scope.direct_method());
         ui.horizontal_wrapped(|ui| {
-            let choices = [
-                (Method::Photometric, "PM residuals"),
-                (Method::MutualInformation, "MI joint histogram"),
-            ];
-            for (method, name) in choices {
+            for method in scope.direct_methods() {
+                let what = match explains(method) {
+                    Some(ExplanationKind::Weights) => "residuals",
+                    _ => "joint histogram",
+                };
+                let name = format!("{} {what}", method.label());
                 if ui.selectable_label(method == shown, name).clicked() {
                     self.method = Some(method);
                 }
@@ -69,6 +72,11 @@ impl Histogram {
         });
         self.method.unwrap_or(shown)
     }
+}
+
+/// How a method's cost explains itself, if it has one.
+pub(super) fn explains(method: Method) -> Option<ExplanationKind> {
+    estimator::entry(method).cost().map(|cost| cost.explains)
 }
 
 /// Why this view is shown, and where its camera is.

@@ -156,8 +156,8 @@ impl Images {
 fn summary(story: &Story<'_>) -> String {
     let (query, reference) = (story.query().len(), story.reference().len());
     let by = match story.method {
-        Some(Method::Hybrid) => "FB within HY",
-        _ => "FB",
+        Some(method) if method != Method::FB => format!("FB within {}", method.label()),
+        _ => "FB".to_owned(),
     };
     match (query, reference) {
         (0, 0) => "No features yet: FB finds them first".to_owned(),

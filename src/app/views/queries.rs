@@ -6,9 +6,9 @@ use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::obey::has_failed;
 use crate::app::{Command, Scope, theme};
+use crate::estimator;
 use crate::event::Side;
 use crate::localize::QueryResult;
-use crate::method::Method;
 
 /// The list of queries.
 #[derive(Default)]
@@ -81,7 +81,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
 /// One mark per method: what it is tells the shape too.
 pub(super) fn dots(ui: &mut Ui, results: &[QueryResult], shows_truth: bool) {
     ui.spacing_mut().item_spacing.x = 2.0;
-    for method in Method::ALL {
+    for method in estimator::methods() {
         for result in results.iter().filter(|r| r.method == method) {
             let (mark, color, words) = match (&result.reason, &result.error) {
                 (Some(reason), _) => ("×", theme::ESTIMATE, reason.text.clone()),

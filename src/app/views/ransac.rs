@@ -73,10 +73,10 @@ impl View for Ransac {
 /// of FB, unless the cursor is in the hybrid, which runs FB inside itself.
 fn source<'a>(scope: &Scope<'a>) -> Option<(&'a Span, usize)> {
     let is_inside =
-        scope.method() == Some(Method::Hybrid) && scope.latest::<HypothesisTried>().is_some();
+        scope.is_inside_hybrid(Method::FB) && scope.latest::<HypothesisTried>().is_some();
     let (span, cursor) = match is_inside {
         true => (scope.span()?, scope.cursor),
-        false => scope.of(Method::Feature)?,
+        false => scope.of(Method::FB)?,
     };
     Some((span, span.records.end.min(cursor + 1)))
 }
@@ -104,8 +104,8 @@ impl Ransac {
 
 fn head(ui: &mut Ui, scope: &Scope<'_>, span: &Span, trials: &Trials) {
     ui.horizontal_wrapped(|ui| {
-        if span.part.method() == Some(Method::Hybrid) {
-            ui.weak("inside HY");
+        if let Some(method) = span.part.method().filter(|method| *method != Method::FB) {
+            ui.weak(format!("inside {}", method.label()));
         }
         let needed = trials
             .needed()
@@ -129,7 +129,7 @@ fn head(ui: &mut Ui, scope: &Scope<'_>, span: &Span, trials: &Trials) {
 }
 
 fn hypothesis_color() -> Color32 {
-    theme::method(Method::Feature)
+    theme::method(Method::FB)
 }
 
 fn plots(ui: &mut Ui, scope: &Scope<'_>, trials: &Trials) {

@@ -97,7 +97,13 @@ impl View for Space {
         let content = self.content(scope, &site);
         let through = self.through.map(|through| through.who);
         let looks = ui.horizontal_wrapped(|ui| {
-            controls::looks(ui, &mut self.layers, &content.cameras, through)
+            controls::looks(
+                ui,
+                &scope.desk.setup.task.protocol.methods,
+                &mut self.layers,
+                &content.cameras,
+                through,
+            )
         });
         let jumps =
             ui.horizontal_wrapped(|ui| controls::jumps(ui, scope, self.next_flip.is_some()));
@@ -408,10 +414,7 @@ impl Space {
             });
         }
         if let Some((least, greatest)) = content.search.costs().filter(|_| self.layers.cost) {
-            let method = match scope.method() {
-                Some(method @ crate::method::Method::Hybrid) => method,
-                _ => scope.direct_method(),
-            };
+            let method = scope.searching_method();
             bars.push(Bar {
                 title: format!("cost of {}; grey: no say", method.name().to_uppercase()),
                 ends: [format!("{greatest:.4}"), format!("{least:.4}")],

@@ -42,7 +42,7 @@ impl View for Surface {
         let mut pointed_at = None;
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let search = Search::at(scope, method);
-            self.head(ui, method, search.as_ref());
+            self.head(ui, scope, method, search.as_ref());
             let Some(search) = search else {
                 ui.weak("Nothing is searched yet: the direct methods search, PM (2) and MI (3)");
                 return;
@@ -63,9 +63,9 @@ impl Surface {
         self.method.unwrap_or_else(|| scope.direct_method())
     }
 
-    fn head(&mut self, ui: &mut Ui, shown: Method, search: Option<&Search<'_>>) {
+    fn head(&mut self, ui: &mut Ui, scope: &Scope<'_>, shown: Method, search: Option<&Search<'_>>) {
         ui.horizontal_wrapped(|ui| {
-            for method in [Method::Photometric, Method::MutualInformation] {
+            for method in scope.direct_methods() {
                 let name = method.name().to_uppercase();
                 let button = ui.selectable_label(method == shown, name);
                 if button.on_hover_text("Show this method's search").clicked() {
@@ -73,8 +73,8 @@ impl Surface {
                 }
             }
             let Some(search) = search else { return };
-            if search.span.part.method() != Some(shown) {
-                ui.weak("inside HY");
+            if let Some(around) = search.span.part.method().filter(|around| *around != shown) {
+                ui.weak(format!("inside {}", around.label()));
             }
             match search.lattices.last() {
                 Some(searched) => ui.weak(progress(searched)),

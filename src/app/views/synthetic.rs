@@ -72,7 +72,7 @@ impl View for Synthetic {
 impl Synthetic {
     fn toolbar(&mut self, ui: &mut Ui, scope: &Scope<'_>, method: Method) {
         ui.horizontal_wrapped(|ui| {
-            for candidate in [Method::Photometric, Method::MutualInformation] {
+            for candidate in scope.direct_methods() {
                 let name = candidate.name().to_uppercase();
                 let response = ui.selectable_label(candidate == method, &name);
                 let help = format!("Show {name} whatever the cursor is in");

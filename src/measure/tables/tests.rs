@@ -19,7 +19,7 @@ fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
         format: None,
         experiment: Some(experiment),
         protocol: Protocol {
-            methods: vec![Method::Feature, Method::MutualInformation],
+            methods: vec![Method::FB, Method::MI],
             references: match experiment {
                 Experiment::Single => Selection::Random(1),
                 Experiment::Multi | Experiment::Large => Selection::Random(2),

@@ -7,6 +7,8 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGr
 use super::entities;
 use super::layout::{self, Node, View};
 use super::stream::Stream;
+use crate::cost::ExplanationKind;
+use crate::estimator;
 use crate::features::FeatureState;
 use crate::method::Method;
 use crate::palette;
@@ -36,27 +38,33 @@ pub(super) fn send(stream: &mut Stream, occasion: &Occasion<'_>) {
 /// Names and colours of what is plotted.
 pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
     let names = |names: &[&str]| SeriesLines::new().with_names(names.iter().copied());
-    if shows(methods, Method::Feature) {
+    if shows_features(methods) {
         let best = names(&["best inliers"]);
         stream.log_static(entities::RANSAC_BEST, &best);
     }
-    for method in [Method::Photometric, Method::MutualInformation] {
-        if shows(methods, method) {
-            let best = names(&["best cost"]).with_colors([super::color(palette::ESTIMATE)]);
-            stream.log_static(&entities::direct(method, "best"), &best);
-        }
+    let direct = estimator::direct_methods(methods);
+    for &method in &direct {
+        let best = names(&["best cost"]).with_colors([super::color(palette::ESTIMATE)]);
+        stream.log_static(&entities::direct(method, "best"), &best);
     }
-    if shows(methods, Method::MutualInformation) {
+    for method in direct.into_iter().filter(|&method| has_histogram(method)) {
         let entropies = names(&["H(query)", "H(synthetic)", "H(both)"]);
-        let path = entities::direct(Method::MutualInformation, "entropy");
-        stream.log_static(&path, &entropies);
+        stream.log_static(&entities::direct(method, "entropy"), &entropies);
     }
 }
 
-/// Whether anything of this method can be in the recording; the hybrid tells FB's and MI's stories.
-fn shows(methods: &[Method], method: Method) -> bool {
-    let by_hybrid = matches!(method, Method::Feature | Method::MutualInformation);
-    methods.contains(&method) || by_hybrid && methods.contains(&Method::Hybrid)
+/// Whether anything of FB can be in the recording; a hybrid tells the stories of its methods.
+fn shows_features(methods: &[Method]) -> bool {
+    methods.iter().any(|&method| {
+        let parts = estimator::entry(method).hybrid();
+        method == Method::FB || parts.is_some_and(|parts| parts.first == Method::FB)
+    })
+}
+
+/// Whether a method's cost is made of a joint histogram.
+fn has_histogram(method: Method) -> bool {
+    let cost = estimator::entry(method).cost();
+    cost.is_some_and(|cost| cost.explains == ExplanationKind::JointHistogram)
 }
 
 /// The world and the words on the left, a row per method on the right.
@@ -81,12 +89,11 @@ fn root(occasion: &Occasion<'_>) -> Node {
     }
     let left = Node::Column(vec![(3.0, overview(eyes).into()), (2.0, Node::Tabs(words))]);
     let mut rows = Vec::new();
-    if shows(methods, Method::Feature) {
+    if shows_features(methods) {
         rows.push((1.0, feature_row()));
     }
-    let direct: Vec<Node> = [Method::Photometric, Method::MutualInformation]
+    let direct: Vec<Node> = estimator::direct_methods(methods)
         .into_iter()
-        .filter(|&method| shows(methods, method))
         .map(|method| direct_row(method, eyes))
         .collect();
     // Three rows would leave too little height for the photos.
@@ -170,12 +177,12 @@ fn direct_row(method: Method, eyes: &Eyes<'_>) -> Node {
         .into()
     };
     let query: Node = View::new("2D", "Query", entities::QUERY_IMAGE).into();
-    let comparison = match method {
-        Method::Photometric => Node::Tabs(vec![
+    let comparison = match has_histogram(method) {
+        false => Node::Tabs(vec![
             image("residual", "residual"),
             image("weights", "weights"),
         ]),
-        _ => Node::Tabs(vec![
+        true => Node::Tabs(vec![
             image(
                 "joint histogram (right: synthetic, up: query)",
                 "joint_histogram",

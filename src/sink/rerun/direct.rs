@@ -63,11 +63,11 @@ impl DirectStory {
         } = event.comparison.as_ref();
         stream.log_image(&path("synthetic"), png(picture::synthetic(view)));
         match explanation {
-            Some(Explanation::Photometric(weights)) => {
+            Some(Explanation::Weights(weights)) => {
                 stream.log_image(&path("residual"), png(picture::residual(view, pairs)));
                 stream.log_image(&path("weights"), png(picture::weights(view, weights)));
             }
-            Some(Explanation::MutualInformation(histogram)) => {
+            Some(Explanation::JointHistogram(histogram)) => {
                 stream.log_image(
                     &path("joint_histogram"),
                     png(picture::joint_histogram(histogram)),

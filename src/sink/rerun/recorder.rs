@@ -12,6 +12,7 @@ use super::place::Place;
 use super::scene::{self, Camera, Origin};
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
+use crate::estimator;
 use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
 use crate::localize::{PoseReport, QueryResult, StageTimes, Status, Watch};
@@ -334,9 +335,9 @@ impl Query {
     /// Whether the hybrid that runs now can only repeat what was told before.
     fn is_repeated_hybrid(&self) -> bool {
         let was_told = |method| self.told.contains(&(self.reference, method));
-        self.method == Some(Method::Hybrid)
-            && was_told(Method::Feature)
-            && was_told(Method::MutualInformation)
+        let here = self.method.map(estimator::entry);
+        let parts = here.and_then(|entry| entry.hybrid());
+        parts.is_some_and(|parts| was_told(parts.first) && was_told(parts.second))
     }
 }
 

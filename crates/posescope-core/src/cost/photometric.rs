@@ -1,7 +1,18 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
-use super::{Cost, Explanation, IntensityPair};
+use super::{Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair};
 use crate::describe::{About, Describe, ParamVisitor};
+use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
+
+/// PM's cost among all costs.
+pub(super) const ENTRY: Entry = Entry {
+    name: "pm",
+    about: "squared difference of grey values, the worse half ignored",
+    sees: "grey value",
+    explains: ExplanationKind::Weights,
+    similarity: None,
+    params: || Box::new(PhotometricParams::default()),
+};
 
 /// Parameters of the photometric cost.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +56,16 @@ impl Describe for PhotometricParams {
     }
 }
 
+impl CostParams for PhotometricParams {
+    fn cost(&self) -> Box<dyn Cost> {
+        Box::new(Photometric::new(self))
+    }
+
+    fn boxed(&self) -> Box<dyn CostParams> {
+        Box::new(self.clone())
+    }
+}
+
 /// RSE(I_Q, I_S) = 1/λ Σ w E^power with E = (I_Q − I_S)², w = 1 where E ≤ median(E), λ = Σ w.
 #[derive(Clone, Debug)]
 pub struct Photometric {
@@ -54,6 +75,8 @@ pub struct Photometric {
 /// Which pixels the photometric cost counted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotometricWeights {
+    /// The power of E in the weighted mean.
+    pub power: usize,
     /// θ, the median of E \[grey values²\].
     pub threshold: f32,
     /// Per pair, whether E ≤ θ.
@@ -83,8 +106,12 @@ fn median(values: &mut [f32]) -> Option<f32> {
 }
 
 impl Cost for Photometric {
-    fn query_smoothing_px(&self) -> f64 {
-        self.params.sigma_px
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, self.params.sigma_px)
+    }
+
+    fn query_channel_name(&self) -> String {
+        format!("grey, sigma {}", self.params.sigma_px)
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
@@ -104,7 +131,8 @@ impl Cost for Photometric {
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
         let mut errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
         let threshold = median(&mut errors)?;
-        Some(Explanation::Photometric(PhotometricWeights {
+        Some(Explanation::Weights(PhotometricWeights {
+            power: self.params.power,
             threshold,
             counted: pairs
                 .iter()
@@ -134,7 +162,7 @@ mod tests {
         let cost = Photometric::new(&PhotometricParams::default());
         let expected = (1.0 + 4.0 + 9.0) / 3.0;
         assert_eq!(cost.evaluate(&pairs), Some(expected));
-        let Some(Explanation::Photometric(weights)) = cost.explain(&pairs) else {
+        let Some(Explanation::Weights(weights)) = cost.explain(&pairs) else {
             panic!("the photometric cost explains itself");
         };
         assert_eq!(weights.threshold, 9.0);

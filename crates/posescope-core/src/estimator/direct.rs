@@ -8,27 +8,42 @@ use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, settle};
-use crate::cost::Cost;
+use crate::cost::{self, Cost};
 use crate::event::{
     CloudColored, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
 };
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
-use crate::image::gaussian_smoothed;
 use crate::memo::Recalled;
 use crate::method::Method;
+use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
-use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud};
+use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
 pub struct Direct {
-    pub(super) method: Method,
-    pub(super) cost: Box<dyn Cost>,
-    pub(super) render: RenderParams,
-    pub(super) grid: GridParams,
-    /// All parameters of the cost, as a key of what is remembered.
-    pub(super) cost_key: String,
+    method: Method,
+    cost: Box<dyn Cost>,
+    render: RenderParams,
+    grid: GridParams,
+    /// The cost with all its parameters, as a key of what is remembered.
+    cost_key: String,
+}
+
+impl Direct {
+    /// The estimator that searches the pose of least registered cost.
+    pub fn new(entry: &cost::Entry, params: &Params) -> Self {
+        let default = (entry.params)();
+        let cost = params.costs.of(entry).unwrap_or(default.as_ref());
+        Self {
+            method: Method::named(entry.name),
+            cost: cost.cost(),
+            render: params.render.clone(),
+            grid: params.grid.clone(),
+            cost_key: format!("{} {cost:?}", entry.name),
+        }
+    }
 }
 
 impl Estimator for Direct {
@@ -152,25 +167,25 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        reference.memo.recall(&self.render, || {
-            color_cloud(
+        let key = (&self.render, self.cost.reference_channel_name());
+        reference.memo.recall(&key, || {
+            color_cloud_by(
                 &reference.cloud,
-                &reference.photo.gray,
                 &reference.intrinsics,
                 &self.render,
+                self.cost.reference_channel(&reference.photo.gray),
             )
         })
     }
 
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let sigma = self.cost.query_smoothing_px();
-        let smoothed = query
-            .memo
-            .recall(&sigma, || gaussian_smoothed(&query.photo.gray, sigma));
+        let channel = query.memo.recall(&self.cost.query_channel_name(), || {
+            self.cost.query_channel(&query.photo.gray)
+        });
         Scorer::new(
             &cloud.points,
-            smoothed.value,
+            channel.value,
             &query.intrinsics,
             self.render.splat_px,
             self.cost.as_ref(),

@@ -56,7 +56,7 @@ pub struct FeatureBased {
 impl Estimator for FeatureBased {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         let mut counts = FeatureCounts::default();
-        let pose = trace.stage(Stage::Estimator(Method::Feature), |trace| {
+        let pose = trace.stage(Stage::Estimator(Method::FB), |trace| {
             self.localize(problem, &mut counts, trace)
         });
         Ok(Outcome {

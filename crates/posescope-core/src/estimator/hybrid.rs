@@ -1,10 +1,11 @@
-//! HY, the hybrid (paper, section 2.5): FB is the more accurate where it finds enough matches, MI
-//! still gives a moderate pose where FB finds none.
+//! A hybrid: one method's pose, and another's where the first has none.
+//!
+//! HY, that of the paper (section 2.4), is FB and MI: FB is the more accurate where it finds enough
+//! matches, MI still gives a moderate pose where FB finds none.
 
 use std::sync::Arc;
 
-use super::direct::Direct;
-use super::{Estimator, FeatureBased, Outcome, mutual_information};
+use super::{Estimator, Outcome, entry};
 use crate::event::{BranchTaken, Stage};
 use crate::features::FeatureCache;
 use crate::geometry::Pose;
@@ -14,64 +15,78 @@ use crate::problem::Problem;
 use crate::render::Comparison;
 use crate::trace::{Cancelled, Trace};
 
-/// FB, and MI where FB has no pose.
+/// The two methods of a hybrid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HybridParts {
+    /// Runs first.
+    pub first: Method,
+    /// Runs where the first has no pose.
+    pub second: Method,
+}
+
+/// The pose of the first method, and of the second where that has none.
 pub struct Hybrid {
-    feature: FeatureBased,
-    mutual_information: Direct,
+    method: Method,
+    parts: HybridParts,
+    first: Box<dyn Estimator>,
+    second: Box<dyn Estimator>,
 }
 
 impl Hybrid {
     /// The hybrid of both with these parameters.
-    pub fn new(params: &Params) -> Self {
+    pub fn new(method: Method, parts: HybridParts, params: &Params) -> Self {
         Self {
-            feature: FeatureBased::new(params),
-            mutual_information: mutual_information(params),
+            method,
+            parts,
+            first: entry(parts.first).make(params),
+            second: entry(parts.second).make(params),
         }
     }
 }
 
-/// What the hybrid makes of the outcomes of FB and MI for one problem.
+/// What a hybrid makes of the outcomes of its methods for one problem.
 ///
 /// Equal problems have equal answers, so whoever has both need not run the hybrid.
-pub fn hybrid_outcome(feature: &Outcome, mutual_information: &Outcome) -> Outcome {
-    if feature.pose.is_ok() {
-        return feature.clone();
+pub fn hybrid_outcome(first: &Outcome, second: &Outcome) -> Outcome {
+    if first.pose.is_ok() {
+        return first.clone();
     }
     Outcome {
-        counts: feature.counts,
-        ..mutual_information.clone()
+        counts: first.counts,
+        ..second.clone()
     }
 }
 
 impl Estimator for Hybrid {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        trace.stage(Stage::Estimator(Method::Hybrid), |trace| {
-            let indirect = self.feature.estimate(problem, trace)?;
-            let failure = match &indirect.pose {
+        let HybridParts { first, second } = self.parts;
+        trace.stage(Stage::Estimator(self.method), |trace| {
+            let outcome = self.first.estimate(problem, trace)?;
+            let failure = match &outcome.pose {
                 Ok(_) => {
                     trace.emit(|| BranchTaken {
-                        method: Method::Feature,
+                        method: first,
                         why: "the feature-based pose was accepted".to_owned(),
                     })?;
-                    return Ok(indirect);
+                    return Ok(outcome);
                 }
                 Err(failure) => failure,
             };
             trace.emit(|| BranchTaken {
-                method: Method::MutualInformation,
+                method: second,
                 why: failure.to_string(),
             })?;
-            let direct = self.mutual_information.estimate(problem, trace)?;
-            Ok(hybrid_outcome(&indirect, &direct))
+            let fallback = self.second.estimate(problem, trace)?;
+            Ok(hybrid_outcome(&outcome, &fallback))
         })
     }
 
     fn remember(&mut self, features: &Arc<FeatureCache>) {
-        self.feature.remember(features);
+        self.first.remember(features);
+        self.second.remember(features);
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
-        self.mutual_information
-            .compare_at(problem, world_from_query)
+        self.second.compare_at(problem, world_from_query)
     }
 }

@@ -73,7 +73,7 @@ struct Work<'a> {
     problems: Vec<Problem>,
     /// Feature matches by problem, once they are known.
     matches: Vec<Option<usize>>,
-    /// By method, in the order of [`Method::ALL`], and problem.
+    /// By method, in the order of [`estimator::methods`], and problem.
     candidates: Vec<Vec<Option<Candidate>>>,
 }
 
@@ -154,9 +154,9 @@ impl<'a> Localizer<'a> {
             query: &loaded,
             truth: self.queries.pose(query),
             matches: vec![None; problems.len()],
-            candidates: Method::ALL
+            candidates: estimator::methods()
                 .map(|_| problems.iter().map(|_| None).collect())
-                .into(),
+                .collect(),
             problems,
         };
         watch.begin_query(index, &work.problems, work.truth.as_ref());
@@ -273,7 +273,7 @@ impl<'a> Localizer<'a> {
             _ => self.estimate(work, problem, method, watch)?,
         };
         watch.end_method(&candidate.result, &candidate.times);
-        let row = Method::ALL.iter().position(|known| *known == method);
+        let row = estimator::methods().position(|known| known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
         }
@@ -290,7 +290,7 @@ impl<'a> Localizer<'a> {
         let mut timings = StageTimings::default();
         let attention = watch.attention();
         let estimated = catch_unwind(AssertUnwindSafe(|| {
-            let mut estimator = (estimator::entry(method).new)(self.params);
+            let mut estimator = estimator::entry(method).make(self.params);
             estimator.remember(&self.features);
             let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
             let mut fanout = Fanout::new(sinks);
@@ -338,7 +338,7 @@ impl<'a> Localizer<'a> {
             if work.matches[problem].is_some() {
                 continue;
             }
-            let counted = Method::ALL.iter().find_map(|&method| {
+            let counted = estimator::methods().find_map(|method| {
                 let candidate = work.candidate(problem, method)?;
                 candidate.outcome.counts
             });
@@ -419,20 +419,18 @@ impl<'a> Localizer<'a> {
 
 impl Work<'_> {
     fn candidate(&self, problem: usize, method: Method) -> Option<&Candidate> {
-        let row = Method::ALL.iter().position(|known| *known == method)?;
+        let row = estimator::methods().position(|known| known == method)?;
         self.candidates.get(row)?.get(problem)?.as_ref()
     }
 
-    /// FB's and MI's candidates, where a hybrid can be made of them.
+    /// The candidates of a hybrid's methods, where it can be made of them.
     fn hybrid_parts(&self, problem: usize, method: Method) -> Option<(&Candidate, &Candidate)> {
-        if method != Method::Hybrid {
-            return None;
-        }
-        let feature = self.candidate(problem, Method::Feature)?;
-        let direct = self.candidate(problem, Method::MutualInformation)?;
+        let parts = estimator::entry(method).hybrid()?;
+        let first = self.candidate(problem, parts.first)?;
+        let second = self.candidate(problem, parts.second)?;
         let panicked =
             |candidate: &Candidate| matches!(candidate.outcome.pose, Err(Failure::Internal { .. }));
-        (!panicked(feature) && !panicked(direct)).then_some((feature, direct))
+        (!panicked(first) && !panicked(second)).then_some((first, second))
     }
 }
 

@@ -47,6 +47,17 @@ pub fn color_cloud(
     intrinsics: &Intrinsics,
     params: &RenderParams,
 ) -> ColoredCloud {
+    let value = |u, v| cubic_interpolated(photo, u, v);
+    color_cloud_by(cloud, intrinsics, params, value)
+}
+
+/// As [`color_cloud`], with any value 0 … 255 at the projection \[px\] in the place of the grey value.
+pub fn color_cloud_by(
+    cloud: &Cloud,
+    intrinsics: &Intrinsics,
+    params: &RenderParams,
+    value: impl Fn(f32, f32) -> f32,
+) -> ColoredCloud {
     let in_view: Vec<Projected> = cloud
         .points
         .iter()
@@ -60,7 +71,7 @@ pub fn color_cloud(
         .filter(|point| hidden_beyond.as_ref().is_none_or(|map| map.shows(point)))
         .map(|point| ColoredPoint {
             position: point.position,
-            intensity: cubic_interpolated(photo, point.u, point.v),
+            intensity: value(point.u, point.v),
         })
         .collect();
     let counts = ColoringCounts {

@@ -9,6 +9,8 @@ use super::comparison;
 use crate::app::views::readout::Readout;
 use crate::app::{Scope, theme};
 use crate::cost::JointHistogram;
+use crate::cost::Similarity;
+use crate::estimator;
 use crate::method::Method;
 use crate::picture;
 use crate::render::Comparison;
@@ -23,9 +25,12 @@ const MARGIN_LENGTH: f64 = 52.0;
 pub(super) fn ui(
     ui: &mut Ui,
     scope: &Scope<'_>,
+    method: Method,
     shown: &Arc<Comparison>,
     histogram: &JointHistogram,
 ) {
+    let cost = estimator::entry(method).cost();
+    let sees = cost.map_or("value", |cost| cost.sees);
     let margins = Margins::of(histogram);
     let texture = scope
         .desk
@@ -49,8 +54,8 @@ pub(super) fn ui(
         .allow_boxed_zoom(false)
         .x_grid_spacer(grey_marks)
         .y_grid_spacer(grey_marks)
-        .x_axis_label("grey value of the synthetic view")
-        .y_axis_label("grey value of the query")
+        .x_axis_label(format!("{sees} of the synthetic view"))
+        .y_axis_label(format!("{sees} of the query"))
         .include_x(-4.0)
         .include_y(-4.0)
         .include_x(MARGIN_FROM + MARGIN_LENGTH)
@@ -93,7 +98,7 @@ pub(super) fn ui(
         words,
         "Point at a bin; bright: many pairs (logarithmic)",
     );
-    numbers(ui, scope, shown, histogram);
+    numbers(ui, scope, method, shown, histogram);
 }
 
 fn ui_color(ctx: &egui::Context) -> Color32 {
@@ -227,7 +232,14 @@ fn greys(bin: usize, bins: usize) -> String {
 }
 
 /// The formula with its numbers.
-fn numbers(ui: &mut Ui, scope: &Scope<'_>, shown: &Comparison, histogram: &JointHistogram) {
+fn numbers(
+    ui: &mut Ui,
+    scope: &Scope<'_>,
+    method: Method,
+    shown: &Comparison,
+    histogram: &JointHistogram,
+) {
+    let cost = estimator::entry(method).cost();
     // The histogram's entropies are natural ones.
     let bits = |nats: f64| nats / std::f64::consts::LN_2;
     let query = bits(histogram.query_entropy);
@@ -240,27 +252,31 @@ fn numbers(ui: &mut Ui, scope: &Scope<'_>, shown: &Comparison, histogram: &Joint
     ui.label(format!(
         "I(Q,S) = H(Q) + H(S) - H(Q,S) = {query:.3} + {synthetic:.3} - {joint:.3} = {shared:.3} bit"
     ));
-    if let Some(nmi) = histogram.normalized_mutual_information() {
-        let larger = query.max(synthetic);
-        ui.label(format!(
-            "NMI = I(Q,S) / max(H(Q), H(S)) = {shared:.3} / {larger:.3} = {nmi:.4}"
-        ));
-    }
+    let similarity = cost.and_then(|cost| cost.similarity);
     if let Some(cost) = shown.score.cost {
+        let mut is = String::new();
+        if let Some(Similarity { name, formula }) = similarity {
+            let share = 1.0 - cost;
+            let norm = shared / share;
+            ui.label(format!(
+                "{name} = {formula} = {shared:.3} / {norm:.3} = {share:.4}"
+            ));
+            is = format!(" = 1 - {name}");
+        }
         ui.label(format!(
-            "cost = 1 - NMI = {cost:.4}, over {} pixels",
+            "cost{is} = {cost:.4}, over {} pixels",
             shown.score.covered
         ));
     }
     let quality: fn(f64) -> f64 = |cost| 1.0 - cost;
-    let method = Method::MutualInformation;
     ui.separator();
     ui.label(
-        egui::RichText::new("MI")
+        egui::RichText::new(method.label())
             .color(theme::method(method))
             .strong(),
     );
-    comparison(ui, scope, method, shown.score.cost, Some(("NMI", quality)));
+    let quality = similarity.map(|similarity| (similarity.name, quality));
+    comparison(ui, scope, method, shown.score.cost, quality);
 }
 
 #[cfg(test)]

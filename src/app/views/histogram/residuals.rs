@@ -15,11 +15,17 @@ const WIDTH: usize = 4;
 const BARS: usize = 512 / WIDTH;
 
 /// Draws the residuals of a comparison.
-pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Comparison, weights: &PhotometricWeights) {
+pub(super) fn ui(
+    ui: &mut Ui,
+    scope: &Scope<'_>,
+    method: Method,
+    shown: &Comparison,
+    weights: &PhotometricWeights,
+) {
     let counts = counts(&shown.pairs, weights);
     let median = f64::from(weights.threshold).sqrt();
     let ignored = ui.visuals().weak_text_color();
-    let counted = theme::method(Method::Photometric);
+    let counted = theme::method(method);
     let label = |position: &HoverPosition<'_>| match position {
         HoverPosition::NearDataPoint { plot_name, .. } => Some((*plot_name).to_owned()),
         HoverPosition::Elsewhere { .. } => None,
@@ -58,7 +64,7 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Comparison, weights: &P
         "The median difference is {median:.2} grey values (dashed); whatever differs more is ignored"
     ));
     if let Some(cost) = shown.score.cost {
-        let power = scope.run.params.pm.power;
+        let power = weights.power;
         let mean = match power {
             1 => "mean square of those that count",
             _ => "mean fourth power of those that count",
@@ -69,8 +75,7 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Comparison, weights: &P
         ));
     }
     ui.separator();
-    let method = Method::Photometric;
-    ui.label(egui::RichText::new("PM").color(counted).strong());
+    ui.label(egui::RichText::new(method.label()).color(counted).strong());
     comparison(ui, scope, method, shown.score.cost, None);
 }
 
@@ -122,6 +127,7 @@ mod tests {
             synthetic: (-difference).max(0.0),
         });
         let weights = PhotometricWeights {
+            power: 1,
             threshold: 16.0,
             counted: vec![false, true, true, true, true, false],
         };

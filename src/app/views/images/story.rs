@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::app::Scope;
 use crate::depth::LiftedMatch;
+use crate::estimator::{self, Parts};
 use crate::event::{Event, Side};
 use crate::features::FeatureState;
 use crate::features::{Features, Keypoint, Match, MatchVerdict};
@@ -40,11 +41,19 @@ impl<'a> Story<'a> {
     /// The story at the cursor; for the direct methods that of FB, or of the hybrid where FB was
     /// not asked to run.
     pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let part = match scope.method() {
-            Some(method @ (Method::Feature | Method::Hybrid)) => scope.of(method),
-            _ => scope
-                .of(Method::Feature)
-                .or_else(|| scope.of(Method::Hybrid)),
+        let with_features = |method: Method| {
+            let entry = estimator::entry(method);
+            let inside = entry
+                .hybrid()
+                .is_some_and(|parts| parts.first == Method::FB);
+            inside || matches!(entry.parts, Parts::Features)
+        };
+        let part = match scope.method().filter(|&here| with_features(here)) {
+            Some(here) => scope.of(here),
+            None => {
+                let mut asked = scope.desk.setup.task.protocol.methods.iter().copied();
+                asked.find_map(|method| with_features(method).then(|| scope.of(method))?)
+            }
         };
         part.map_or_else(Self::default, |(span, cursor)| {
             Self::until(scope.run, span, cursor)

@@ -8,6 +8,7 @@ use super::site::{Site, spot};
 use super::story::{FeatureStory, SearchStory};
 use crate::app::{Scope, theme};
 use crate::camera::Intrinsics;
+use crate::estimator::{self, Parts};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 
@@ -27,15 +28,14 @@ pub(super) enum Who {
 
 impl Who {
     /// All that one may want to look through, in the order of the buttons.
-    pub(super) const TO_LOOK_THROUGH: [Self; 7] = [
-        Self::Reference,
-        Self::Truth,
-        Self::Estimate(Method::Feature),
-        Self::Estimate(Method::Photometric),
-        Self::Estimate(Method::MutualInformation),
-        Self::Estimate(Method::Hybrid),
-        Self::Hand,
-    ];
+    pub(super) fn to_look_through(methods: &[Method]) -> Vec<Self> {
+        let estimates = methods.iter().map(|&method| Self::Estimate(method));
+        [Self::Reference, Self::Truth]
+            .into_iter()
+            .chain(estimates)
+            .chain([Self::Hand])
+            .collect()
+    }
 
     /// The name on a button.
     pub(super) fn name(self) -> String {
@@ -54,12 +54,10 @@ impl Who {
         match self {
             Self::Reference => "○",
             Self::Truth => "×",
-            Self::Estimate(method) | Self::BestSoFar(method) => match method {
-                Method::Feature => "●",
-                Method::Photometric => "▲",
-                Method::MutualInformation => "■",
-                Method::Hybrid => "◆",
-            },
+            Self::Estimate(method) | Self::BestSoFar(method) => {
+                const SHAPES: [&str; 6] = ["●", "▲", "■", "◆", "★", "▼"];
+                SHAPES[place(method) % SHAPES.len()]
+            }
             Self::Hand => "▶",
             Self::Pointer => "↓",
         }
@@ -79,7 +77,7 @@ impl Who {
         match self {
             Self::Reference | Self::Hand => 1.0,
             Self::Truth => 1.24,
-            Self::Estimate(method) => 1.0 + 0.08 * f64::from(method as u8),
+            Self::Estimate(method) => 1.0 + 0.08 * place(method) as f64,
             Self::BestSoFar(_) | Self::Pointer => 0.7,
         }
     }
@@ -96,6 +94,12 @@ impl Who {
     pub(super) fn is_query(self) -> bool {
         self != Self::Reference
     }
+}
+
+/// A method's place among all.
+fn place(method: Method) -> usize {
+    let found = estimator::methods().position(|known| known == method);
+    found.unwrap_or_default()
 }
 
 /// A camera somewhere in the scene.
@@ -194,7 +198,7 @@ pub(super) fn cameras(
     };
     let mut all = vec![camera(Who::Reference, problem.reference.world_from_camera)];
     all.extend(truth.map(|pose| camera(Who::Truth, *pose)));
-    for method in Method::ALL {
+    for &method in &scope.desk.setup.task.protocol.methods {
         if let Some(pose) = estimate(scope, method) {
             all.push(camera(Who::Estimate(method), pose));
         }
@@ -230,10 +234,10 @@ fn best_so_far(
     }
     let by_search = search.path.last().map(|best| best.reference_from_camera());
     let method = span.part.method()?;
-    let best = match method {
-        Method::Feature => features.reference_from_query,
-        Method::Photometric | Method::MutualInformation => by_search,
-        Method::Hybrid => by_search.or(features.reference_from_query),
+    let best = match estimator::entry(method).parts {
+        Parts::Features => features.reference_from_query,
+        Parts::Cost(_) => by_search,
+        Parts::Hybrid(_) => by_search.or(features.reference_from_query),
     };
     Some((method, best?))
 }

@@ -7,6 +7,7 @@ use super::cameras::{Camera, Who};
 use super::cloud::Coloring;
 use crate::app::camera::Place;
 use crate::app::{Command, Scope, shortcuts};
+use crate::method::Method;
 
 /// What is shown.
 #[derive(Clone, Debug)]
@@ -53,6 +54,7 @@ pub(super) enum Wish {
 /// Where one looks from.
 pub(super) fn looks(
     ui: &mut Ui,
+    methods: &[Method],
     layers: &mut Layers,
     cameras: &[Camera],
     through: Option<Who>,
@@ -68,7 +70,7 @@ pub(super) fn looks(
     button(ui, "Reset view", help, Wish::Reset);
     button(ui, "Top", "From straight above", Wish::Top);
     ui.weak("through");
-    for who in Who::TO_LOOK_THROUGH {
+    for who in Who::to_look_through(methods) {
         let camera = cameras.iter().find(|camera| camera.who == who);
         let text = format!("{} {}", who.shape(), who.name());
         let selected = through == Some(who);

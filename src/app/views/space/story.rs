@@ -36,14 +36,14 @@ pub(super) struct Ray {
 impl<'a> FeatureStory<'a> {
     /// From the estimator at the cursor, if it lifts matches; else from FB's part.
     pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let here = match scope.method() {
-            Some(Method::Hybrid) => Self::told(scope.run, scope.cursor),
-            _ => Self::default(),
+        let here = match scope.is_inside_hybrid(Method::FB) {
+            true => Self::told(scope.run, scope.cursor),
+            false => Self::default(),
         };
         if !here.lifted.is_empty() {
             return here;
         }
-        match scope.of(Method::Feature) {
+        match scope.of(Method::FB) {
             Some((_, cursor)) => Self::told(scope.run, cursor),
             None => here,
         }
@@ -97,10 +97,7 @@ pub(super) struct SearchStory<'a> {
 impl<'a> SearchStory<'a> {
     /// From the direct method whose pictures are shown.
     pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let method = match scope.method() {
-            Some(Method::Hybrid) => Method::Hybrid,
-            _ => scope.direct_method(),
-        };
+        let method = scope.searching_method();
         let Some((span, cursor)) = scope.of(method) else {
             return Self::default();
         };
@@ -135,13 +132,10 @@ impl<'a> SearchStory<'a> {
 pub(super) fn colored<'a>(scope: &Scope<'a>) -> Option<&'a Arc<ColoredCloud>> {
     let here = scope.latest::<CloudColored>();
     let other = || {
-        [
-            Method::Photometric,
-            Method::MutualInformation,
-            Method::Hybrid,
-        ]
-        .into_iter()
-        .find_map(|method| scope.latest_of::<CloudColored>(method))
+        let methods = scope.desk.setup.task.protocol.methods.iter();
+        methods
+            .copied()
+            .find_map(|method| scope.latest_of::<CloudColored>(method))
     };
     here.or_else(other).map(|event| &event.cloud)
 }

@@ -94,11 +94,7 @@ impl Mark {
             );
         }
         let cameras = [
-            (
-                Kind::Feature,
-                scope.estimate(Method::Feature),
-                "FB's estimate",
-            ),
+            (Kind::Feature, scope.estimate(Method::FB), "FB's estimate"),
             (Kind::Truth, scope.truth().copied(), "truth"),
             (Kind::Camera, scope.desk.camera, "camera in hand"),
         ];
@@ -173,7 +169,7 @@ impl Kind {
         match self {
             Self::Start => theme::REFERENCE,
             Self::Coarse | Self::Fine => theme::ESTIMATE,
-            Self::Feature => theme::method(Method::Feature),
+            Self::Feature => theme::method(Method::FB),
             Self::Truth => theme::TRUTH,
             Self::Camera => theme::CAMERA,
             Self::Ranked(_) | Self::Floored => Color32::BLACK,

@@ -157,12 +157,10 @@ pub(super) struct Minimum {
     pub(super) cost: f64,
 }
 
-/// The part of the run to read a direct method's search from, and the cursor in it. The hybrid runs
-/// MI inside itself, which is then the one at the cursor.
+/// The part of the run to read a direct method's search from, and the cursor in it. A hybrid runs
+/// others inside itself, one of which is then the one at the cursor.
 fn part<'a>(scope: &Scope<'a>, method: Method) -> Option<(&'a Span, usize)> {
-    let is_inside = scope.method() == Some(Method::Hybrid)
-        && method == Method::MutualInformation
-        && scope.latest::<PoseScored>().is_some();
+    let is_inside = scope.is_inside_hybrid(method) && scope.latest::<PoseScored>().is_some();
     match is_inside {
         true => Some((scope.span()?, scope.cursor)),
         false => scope.of(method),

@@ -180,7 +180,7 @@ impl<'a> Curve<'a> {
 /// Draws the slices. `shown` is the method of the maps, whose minimum is marked; the floor is that
 /// of the slider.
 pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64, width: f32) {
-    let methods = [Method::Photometric, Method::MutualInformation];
+    let methods = scope.direct_methods();
     let curves: Vec<Curve<'_>> = methods
         .into_iter()
         .filter_map(|method| Curve::of(scope, method, floor))

@@ -6,9 +6,11 @@ use egui::{Color32, Sense, TextureHandle, Ui, Vec2};
 use image::DynamicImage;
 
 use crate::app::textures::color_image;
+use crate::app::views::histogram::explains;
 use crate::app::views::legend;
 use crate::app::{Scope, Shown, theme};
 use crate::cost::Explanation;
+use crate::cost::ExplanationKind;
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::render::Comparison;
@@ -48,7 +50,7 @@ impl Mode {
             Self::Blend => "Blend",
             Self::Checkerboard => "Checkerboard",
             Self::Residual => "Residual",
-            Self::Weights if method == Method::Photometric => "Weights",
+            Self::Weights if explains(method) == Some(ExplanationKind::Weights) => "Weights",
             Self::Weights => "Shares",
             Self::Coverage => "Coverage",
         }
@@ -64,7 +66,7 @@ impl Mode {
             Self::Blend => "View over query",
             Self::Checkerboard => "Query and view in alternate squares",
             Self::Residual => "Query minus view: orange where the query is brighter",
-            Self::Weights if method == Method::Photometric => {
+            Self::Weights if explains(method) == Some(ExplanationKind::Weights) => {
                 "Which pixels the photometric cost counts, and which it ignores"
             }
             Self::Weights => "What each pixel's pair of grey values adds to mutual information",
@@ -122,14 +124,14 @@ impl Mode {
                 diverging_bar(ui, "query minus view, grey values", &ends);
                 ui.weak("query darker ← → query brighter");
             }
-            (Self::Weights, Some(Explanation::Photometric(weights))) => {
+            (Self::Weights, Some(Explanation::Weights(weights))) => {
                 let most = weights.threshold.sqrt();
                 swatch(ui, 1);
                 ui.label(format!("counted: off by at most {most:.1} grey values"));
                 swatch(ui, 0);
                 ui.label("ignored");
             }
-            (Self::Weights, Some(Explanation::MutualInformation(_))) => {
+            (Self::Weights, Some(Explanation::JointHistogram(_))) => {
                 let ends = [(0.0, "-2"), (0.5, "0"), (1.0, "2 nat")];
                 diverging_bar(ui, "contribution to mutual information, nat", &ends);
                 ui.weak("rarer ← → more frequent than by chance");
@@ -150,8 +152,8 @@ impl Mode {
 
 fn weights(made: &Comparison) -> DynamicImage {
     match &made.explanation {
-        Some(Explanation::Photometric(weights)) => picture::weights(&made.view, weights).into(),
-        Some(Explanation::MutualInformation(histogram)) => {
+        Some(Explanation::Weights(weights)) => picture::weights(&made.view, weights).into(),
+        Some(Explanation::JointHistogram(histogram)) => {
             picture::contributions(&made.view, &made.pairs, histogram).into()
         }
         None => picture::synthetic(&made.view).into(),
