@@ -23,8 +23,6 @@ pub use index_file::IndexFile;
 pub use job::{Job, JobError, Loaded};
 pub use run::{Part, Run, Span, StageBar};
 pub use task::Task;
-#[cfg(feature = "app")]
-pub(crate) use task::read_params;
 
 use gate::Control;
 use job::Message;

@@ -14,7 +14,7 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::{self, Scene};
-use crate::session::{Breakpoint, IndexFile, Task, read_params};
+use crate::session::{Breakpoint, IndexFile, Task};
 
 /// The version of the file's form.
 const SCHEMA: &str = "posescope.session/2";
@@ -50,7 +50,7 @@ struct SavedSession1 {
     prior_m: Option<f64>,
     seed: u64,
     breakpoints: Vec<Breakpoint>,
-    #[serde(deserialize_with = "read_params")]
+    #[serde(deserialize_with = "posescope_core::text::parsed")]
     params: Params,
     cursor: usize,
     layout: serde_json::Value,

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::path::PathBuf;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::breakpoint::Breakpoint;
 use crate::method::Method;
@@ -29,7 +29,10 @@ pub struct Task {
     /// How references are chosen and queries localised.
     pub protocol: Protocol,
     /// Parameters of the estimators.
-    #[serde(serialize_with = "write_params", deserialize_with = "read_params")]
+    #[serde(
+        serialize_with = "write_params",
+        deserialize_with = "posescope_core::text::parsed"
+    )]
     pub params: Params,
     /// Where the run is to stop.
     pub breakpoints: Vec<Breakpoint>,
@@ -38,14 +41,6 @@ pub struct Task {
 /// As a configuration file, with every parameter.
 fn write_params<S: Serializer>(params: &Params, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&params.to_toml())
-}
-
-/// What [`Task::params`] is read with.
-pub(crate) fn read_params<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Params, D::Error> {
-    let text = String::deserialize(deserializer)?;
-    let mut params = Params::default();
-    let merged = params.merge_toml(&text).map(|()| params);
-    merged.map_err(serde::de::Error::custom)
 }
 
 impl Task {

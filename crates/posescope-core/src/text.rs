@@ -1,5 +1,12 @@
 //! What is written as a word: on the command line, in files, in tables.
 
+use std::fmt;
+use std::marker::PhantomData;
+use std::str::FromStr;
+
+use serde::Deserializer;
+use serde::de::Visitor;
+
 /// A word that is none of those expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is no {kind}; {expected} expected")]
@@ -42,6 +49,34 @@ pub fn json_message(error: &serde_json::Error) -> String {
     }
 }
 
+/// Reads a string as what it says. An error has the place of the string.
+///
+/// # Errors
+/// No string, or what `FromStr` says of it.
+pub fn parsed<'de, T, D>(deserializer: D) -> Result<T, D::Error>
+where
+    T: FromStr,
+    T::Err: fmt::Display,
+    D: Deserializer<'de>,
+{
+    // Parsed within the visitor: what is refused only later has a later place.
+    struct Words<T>(PhantomData<T>);
+
+    impl<T: FromStr<Err: fmt::Display>> Visitor<'_> for Words<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a string")
+        }
+
+        fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<T, E> {
+            text.parse().map_err(E::custom)
+        }
+    }
+
+    deserializer.deserialize_str(Words(PhantomData))
+}
+
 /// Reads and writes a type that has `Display` and `FromStr` as a string. What `FromStr` says of a
 /// wrong one reaches the reader of the file.
 #[macro_export]
@@ -57,8 +92,7 @@ macro_rules! serde_as_text {
             fn deserialize<D: ::serde::Deserializer<'de>>(
                 deserializer: D,
             ) -> Result<Self, D::Error> {
-                let text = <String as ::serde::Deserialize>::deserialize(deserializer)?;
-                text.parse().map_err(::serde::de::Error::custom)
+                $crate::text::parsed(deserializer)
             }
         }
     };
