@@ -4,13 +4,17 @@
 //!
 //! With `POSESCOPE_THREADS=1` in the environment everything runs on one thread.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
+use std::thread;
+use std::time::Instant;
 
 use divan::{Bencher, black_box};
 use nalgebra::{Point2, Point3, Unit, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::cost::{self, Cost};
 use posescope::estimator;
+use posescope::event::KindSet;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
 use posescope::grid::Offset;
@@ -23,7 +27,7 @@ use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, IndexOptions, Retriever};
 use posescope::solver::{Correspondence, p3p};
-use posescope::trace::Trace;
+use posescope::trace::{Cancelled, Record, Sink, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -196,6 +200,52 @@ fn whole_estimator(bencher: Bencher, name: &str) {
     let method: Method = name.parse().expect("is listed");
     let estimator = estimator::entry(method).make(&Params::default());
     bencher.bench(|| estimator.estimate(black_box(&PAIR), &mut Trace::off()));
+}
+
+/// How long a run goes on after it was asked to stop. The moments at which it is asked are spread over
+/// the run, so that the slowest is what somebody at the window waits at worst.
+#[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 60, sample_size = 1)]
+fn stopped(bencher: Bencher, name: &str) {
+    const MOMENTS: u32 = 60;
+    let method: Method = name.parse().expect("is listed");
+    let run = move |flag: &AtomicBool| {
+        let estimator = estimator::entry(method).make(&Params::default());
+        estimator.estimate(&PAIR, &mut Trace::watched(&mut UntilStopped, flag))
+    };
+    let begun = Instant::now();
+    run(&AtomicBool::new(false)).expect("nobody stops it");
+    let whole = begun.elapsed();
+    let mut moment = 0;
+    bencher
+        .with_inputs(|| {
+            let flag = Arc::new(AtomicBool::new(false));
+            let worker = {
+                let flag = Arc::clone(&flag);
+                thread::spawn(move || run(&flag).is_err())
+            };
+            thread::sleep(whole * (moment % MOMENTS) / MOMENTS);
+            moment += 1;
+            (flag, worker)
+        })
+        .bench_local_values(|(flag, worker)| {
+            flag.store(true, Ordering::Release);
+            worker.join()
+        });
+}
+
+/// Wants to hear nothing, and stops the run when its flag is up.
+struct UntilStopped;
+
+impl Sink for UntilStopped {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Err(Cancelled)
+    }
 }
 
 /// Making a frame of the street, past the cache.

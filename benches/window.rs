@@ -44,8 +44,8 @@ impl Scene for DenseStreet {
     fn frames(&self) -> &[String] {
         self.0.frames()
     }
-    fn intrinsics(&self) -> Intrinsics {
-        self.0.intrinsics()
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.0.intrinsics(frame)
     }
     fn pose(&self, frame: usize) -> Option<Pose> {
         self.0.pose(frame)

@@ -165,10 +165,10 @@ fn spectrum_slope(photo: &GrayImage) -> f64 {
 /// Share of the pixels that have a projected scan point within 4 px.
 fn lidar_share(scene: &dyn Scene, frames: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
     const REACH: i64 = 4;
-    let intrinsics = scene.intrinsics();
-    let (width, height) = (i64::from(intrinsics.width), i64::from(intrinsics.height));
     let mut shares = Vec::new();
     for &frame in frames.iter().filter(|&&frame| scene.has_cloud(frame)) {
+        let intrinsics = scene.intrinsics(frame);
+        let (width, height) = (i64::from(intrinsics.width), i64::from(intrinsics.height));
         let mut covered = vec![false; (width * height) as usize];
         for point in &scene.cloud(frame)?.points {
             let Some(pixel) = intrinsics.project(&point.cast()) else {
@@ -226,8 +226,8 @@ fn pairs(
             query: query_frame,
             reference: Arc::new(ReferenceTuple {
                 name: scene.frames()[reference].clone(),
-                photo,
-                intrinsics: scene.intrinsics(),
+                photo: photo.into(),
+                intrinsics: scene.intrinsics(reference),
                 world_from_camera,
                 cloud: scene.cloud(reference)?,
                 memo: Memo::off(),

@@ -166,7 +166,7 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
         let frame = query_frame(drive.frame_count(), options, place);
         let query = Arc::new(Query {
             name: format!("{frame:06}"),
-            photo: Photo::from_color(drive.image(frame)),
+            photo: Arc::new(Photo::from_color(drive.image(frame))),
             intrinsics: drive.intrinsics(),
             memo: Memo::off(),
         });
@@ -256,7 +256,7 @@ fn tuple(drive: &Traversal, frame: usize) -> Arc<ReferenceTuple> {
     let points = drive.cloud(frame);
     Arc::new(ReferenceTuple {
         name: format!("{frame:06}"),
-        photo: Photo::from_color(drive.image(frame)),
+        photo: Arc::new(Photo::from_color(drive.image(frame))),
         intrinsics: drive.intrinsics(),
         world_from_camera: drive.world_from_camera(frame),
         cloud: Cloud {

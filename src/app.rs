@@ -19,6 +19,7 @@ mod save;
 mod saved;
 mod scope;
 mod setup;
+mod shown;
 mod textures;
 mod theme;
 mod timeline;
@@ -28,8 +29,9 @@ mod window;
 
 pub use command::{Command, Shortcut, shortcuts};
 pub use desk::{Comparing, Desk, Note};
-pub use scope::{Scope, Shown, ShownAt};
+pub use scope::Scope;
 pub use setup::{ReferencePick, Setup};
+pub use shown::{Shown, ShownAt};
 pub use window::{WindowError, has_display, open, window_options};
 
 use layout::Layout;

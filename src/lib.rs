@@ -18,6 +18,11 @@
 struct Readme;
 
 pub use posescope_core::{
+    Cloud, Cost, Direct, Estimator, Failure, History, InputError, IntensityPair, Intrinsics,
+    Method, Outcome, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, localize_by,
+    localize_traced,
+};
+pub use posescope_core::{
     camera, cloud, cost, depth, describe, estimator, event, features, fusion, geometry, grid,
     history, image, localize, memo, method, params, problem, render, retrieval, robust, solver,
     text, trace,

@@ -4,11 +4,12 @@
 //! The estimators know nothing of this. A gate, which is one more [`Sink`](crate::trace::Sink),
 //! holds the thread back between two events.
 
-mod at_hand;
 mod breakpoint;
 mod gate;
 mod index_file;
 mod job;
+mod loaded;
+mod message;
 mod run;
 mod task;
 
@@ -20,12 +21,13 @@ use crate::localize::References;
 pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use gate::RunMode;
 pub use index_file::IndexFile;
-pub use job::{Job, JobError, Loaded};
+pub use job::{Job, JobError};
+pub use loaded::Loaded;
 pub use run::{Part, Run, Span, StageBar};
 pub use task::Task;
 
 use gate::Control;
-use job::Message;
+use message::Message;
 
 /// What a session is doing.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,7 +144,8 @@ impl Session {
         self.control.set_breakpoints(breakpoints);
     }
 
-    /// Asks the run to stop. It says [`State::Cancelled`] when it has.
+    /// Asks the run to stop, and does not wait for it. It says [`State::Cancelled`] when it has: an
+    /// estimator looks up after 256 hypotheses, one trial or one pass over an image.
     pub fn cancel(&self) {
         self.control.cancel();
     }

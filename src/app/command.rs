@@ -4,6 +4,9 @@ use std::cell::RefCell;
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
+use super::camera::{Nudge, Place};
+use super::desk::Comparing;
+use super::setup::ReferencePick;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -29,30 +32,30 @@ pub enum Command {
     Forward(usize),
     /// Move the cursor back.
     Back(usize),
-    /// To the first record.
+    /// Move the cursor to the first record.
     First,
-    /// To the last record, and stay there as more come in.
+    /// Move the cursor to the last record, and keep it there as more come in.
     Last,
-    /// To this record.
+    /// Move the cursor to this record.
     MoveCursor(usize),
-    /// To the last record that an estimator has told.
+    /// Move the cursor to the last record that an estimator has told.
     SelectMethod(Method),
     /// Localise another query.
     SelectQuery(usize),
     /// Localise the next query, or the one before.
     NextQuery {
-        /// The one before.
+        /// Whether the one before is meant.
         back: bool,
     },
     /// Localise the next query with a failed method.
     NextFailure {
-        /// Look backwards.
+        /// Whether to look backwards.
         back: bool,
     },
     /// Localise all queries, without stepping, to know which fail.
     RunAllQueries,
     /// Choose the references in another way.
-    PickReferences(super::ReferencePick),
+    PickReferences(ReferencePick),
     /// Use other reference frames.
     SetReferences(Vec<usize>),
     /// Fuse what several references give, in these ways, and run again.
@@ -68,7 +71,7 @@ pub enum Command {
         /// The value as text.
         value: String,
     },
-    /// All parameters to their defaults.
+    /// Set all parameters to their defaults.
     ResetParams,
     /// Replace the breakpoints.
     SetBreakpoints(Vec<String>),
@@ -77,7 +80,7 @@ pub enum Command {
     /// Forget A.
     Unpin,
     /// Show another of the two runs.
-    Compare(super::Comparing),
+    Compare(Comparing),
     /// Show A instead of B, or the other way round.
     Flip,
     /// Blink between query and synthetic view.
@@ -95,9 +98,9 @@ pub enum Command {
     /// Take the camera in hand at a pose (`world_from_camera`), or let it go.
     TakeCamera(Option<Pose>),
     /// Take the camera to a place of the search.
-    JumpCamera(super::camera::Place),
+    JumpCamera(Place),
     /// Move the camera in hand, in its own frame \[m, rad\].
-    MoveCamera(super::camera::Nudge),
+    MoveCamera(Nudge),
     /// Save the run as a recording.
     SaveRecording(std::path::PathBuf),
     /// Send the run to a running Rerun viewer.
@@ -114,11 +117,11 @@ pub enum Command {
     RestoreSession(std::path::PathBuf),
     /// Bring a view to the front.
     ShowView(&'static str),
-    /// All the room for a view; for none, for that under the pointer, or back to all views.
+    /// Give all the room to a view; for none, for that under the pointer, or back to all views.
     Maximize(Option<&'static str>),
-    /// The first layout.
+    /// Go back to the first layout.
     ResetLayout,
-    /// Dark or light.
+    /// Change from dark to light or back.
     SwitchTheme,
     /// Show or hide the list of keys.
     Help,
@@ -131,7 +134,7 @@ pub enum Command {
 pub struct Queue(RefCell<Vec<Command>>);
 
 impl Queue {
-    /// Adds one.
+    /// Adds a command.
     pub fn send(&self, command: Command) {
         self.0.borrow_mut().push(command);
     }
@@ -145,15 +148,14 @@ impl Queue {
 pub struct Shortcut {
     /// The key with its modifiers.
     pub keys: KeyboardShortcut,
-    /// What it does.
+    /// The command that the key sends.
     pub command: Command,
-    /// The same in words.
+    /// What it does, in the words of the list of keys.
     pub help: &'static str,
 }
 
 /// Every key. Where two keys do the same, the second follows with the same words.
 pub fn shortcuts() -> Vec<Shortcut> {
-    use super::camera::{Nudge, Place};
     const NONE: Modifiers = Modifiers::NONE;
     const SHIFT: Modifiers = Modifiers::SHIFT;
     const ALT: Modifiers = Modifiers::ALT;

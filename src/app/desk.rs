@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::command;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
-use super::scope::{Scope, ShownAt};
 use super::setup::Setup;
+use super::shown::ShownAt;
 use super::textures::Textures;
 use crate::geometry::Pose;
+use crate::localize::{QueryResult, Status};
 use crate::params::Params;
-use crate::session::{Breakpoints, Loaded, Part, Run, RunMode, Session, State};
+use crate::scene::FrameStore;
+use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,7 +29,7 @@ pub enum Comparing {
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
-    /// One line.
+    /// What to tell, in one line.
     pub text: String,
     /// Whether something went wrong.
     pub is_error: bool,
@@ -36,7 +37,7 @@ pub struct Note {
 
 /// A run that was kept to be compared with.
 pub struct Kept {
-    /// The run.
+    /// The run as it was kept.
     pub run: Run,
     /// Where the cursor was.
     pub cursor: usize,
@@ -44,10 +45,12 @@ pub struct Kept {
 
 /// Everything that the views draw from.
 pub struct Desk {
-    /// What is run.
+    /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
     /// The parameters of the setup, shared with the prober.
     pub(super) params: Arc<Params>,
+    /// Frames of the setup's scenes, with what its runs have worked out about them.
+    frames: Arc<FrameStore>,
     pub(super) session: Session,
     pub(super) ctx: egui::Context,
     /// Position among the records of the present run.
@@ -84,15 +87,15 @@ pub struct Desk {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: BTreeMap<usize, Vec<crate::localize::QueryResult>>,
+    pub results: BTreeMap<usize, Vec<QueryResult>>,
 }
 
 /// A place in a run that can be found again in another one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Anchor {
-    /// By what it means.
+    /// The place by what it means to the estimator.
     Meaning(Meaning),
-    /// By its number.
+    /// The place by the number of its record.
     Record(usize),
 }
 
@@ -164,11 +167,13 @@ impl Meaning {
 impl Desk {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
         let params = Arc::new(setup.task.params.clone());
-        let session = start(&setup, setup.mode, None, &ctx);
+        let frames = Arc::default();
+        let session = start(&setup, setup.mode, &frames, &ctx);
         Self {
             params,
             prober: Prober::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
+            frames,
             session,
             ctx,
             cursor: 0,
@@ -201,26 +206,11 @@ impl Desk {
         self.session.state()
     }
 
-    /// The present run at the cursor.
-    pub(super) fn scope<'a>(&'a self, commands: &'a command::Queue) -> Scope<'a> {
-        Scope {
-            run: self.run(),
-            cursor: self.cursor,
-            desk: self,
-            commands,
-        }
-    }
-
-    /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept_scope<'a>(&'a self, commands: &'a command::Queue) -> Option<Scope<'a>> {
+    /// The place in the kept run that corresponds to the cursor.
+    pub(super) fn kept_cursor(&self) -> Option<usize> {
         let kept = self.kept.as_ref()?;
         let same = Meaning::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
-        Some(Scope {
-            run: &kept.run,
-            cursor: same.unwrap_or(kept.cursor),
-            desk: self,
-            commands,
-        })
+        Some(same.unwrap_or(kept.cursor))
     }
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
@@ -321,18 +311,25 @@ impl Desk {
 
     /// Another query, or other references: everything begins anew.
     pub(super) fn begin(&mut self, mode: RunMode) {
-        let at_hand = self.run().loaded.clone();
-        self.begin_with(mode, at_hand);
-    }
-
-    fn begin_with(&mut self, mode: RunMode, at_hand: Option<Arc<Loaded>>) {
-        self.session = start(&self.setup, mode, at_hand, &self.ctx);
+        // The run before would go on beside the new one.
+        self.session.cancel();
+        self.session = start(&self.setup, mode, &self.frames, &self.ctx);
         self.cursor = 0;
         self.follows = true;
         self.anchor = None;
         self.hovered = None;
         self.selected_feature = None;
         self.prober.forget();
+    }
+
+    /// What all queries were run with holds no longer.
+    pub(super) fn stop_queries(&mut self) {
+        if self.queries.stop_all() {
+            self.note(
+                "The run over all queries has stopped: its settings were changed",
+                false,
+            );
+        }
     }
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
@@ -343,8 +340,9 @@ impl Desk {
         self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
         self.comparing = Comparing::default();
-        // Frames of another scene may have the same names.
-        self.begin_with(RunMode::Running, None);
+        // The scenes are others, even where they have the same names.
+        self.frames = Arc::default();
+        self.begin(RunMode::Running);
         self.follows = false;
         self.anchor = Some(Anchor::Record(cursor));
     }
@@ -352,6 +350,7 @@ impl Desk {
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
     pub(super) fn begin_again(&mut self) {
+        self.stop_queries();
         let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
         let follows = self.follows && self.session.is_alive();
         self.params = Arc::new(self.setup.task.params.clone());
@@ -361,17 +360,22 @@ impl Desk {
     }
 }
 
-fn start(
-    setup: &Setup,
-    mode: RunMode,
-    at_hand: Option<Arc<Loaded>>,
-    ctx: &egui::Context,
-) -> Session {
+fn start(setup: &Setup, mode: RunMode, frames: &Arc<FrameStore>, ctx: &egui::Context) -> Session {
     let ctx = ctx.clone();
     Session::start(
-        setup.job(at_hand),
+        setup.job(frames),
         mode,
         Breakpoints::new(setup.task.breakpoints.iter().cloned()),
         move || ctx.request_repaint(),
     )
+}
+
+/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
+pub(super) fn has_failed(result: &QueryResult) -> bool {
+    /// The failure radius of the paper for KITTI \[m\].
+    const FAILURE_RADIUS_M: f64 = 10.0;
+    result.status == Status::Failed
+        || result
+            .error
+            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
 }

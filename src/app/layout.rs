@@ -194,8 +194,8 @@ impl Panes<'_> {
             return;
         };
         egui::Frame::NONE.inner_margin(6.0).show(ui, |ui| {
-            let present = self.desk.scope(self.commands);
-            let kept = self.desk.kept_scope(self.commands);
+            let present = Scope::present(self.desk, self.commands);
+            let kept = Scope::kept(self.desk, self.commands);
             match (self.desk.comparing, kept) {
                 (Comparing::Kept, Some(kept)) => draw(ui, "A", &mut panel.kept, &kept),
                 (Comparing::SideBySide, Some(kept)) => ui.columns(2, |columns| {

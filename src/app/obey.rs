@@ -5,13 +5,13 @@ use std::path::Path;
 use super::App;
 use super::camera::Place;
 use super::command::Command;
-use super::desk::{Comparing, Desk, Kept};
+use super::desk::{Comparing, Desk, Kept, has_failed};
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
-use crate::localize::{QueryResult, References, Status};
+use crate::localize::References;
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, State};
 use crate::sink::rerun::Targets;
@@ -299,6 +299,7 @@ impl Desk {
     }
 
     fn pick_references(&mut self, pick: ReferencePick) {
+        self.stop_queries();
         self.setup.task.by_hand = pick == ReferencePick::ByHand;
         if let ReferencePick::By(selection) = pick {
             self.setup.task.protocol.references = selection;
@@ -312,6 +313,7 @@ impl Desk {
             self.note("A query needs at least one reference", true);
             return;
         }
+        self.stop_queries();
         self.setup.task.by_hand = true;
         self.setup.chosen = frames.into();
         self.begin(RunMode::Running);
@@ -363,14 +365,4 @@ impl Desk {
             Place::Last => self.camera_before,
         }
     }
-}
-
-/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
-pub(super) fn has_failed(result: &QueryResult) -> bool {
-    /// The failure radius of the paper for KITTI \[m\].
-    const FAILURE_RADIUS_M: f64 = 10.0;
-    result.status == Status::Failed
-        || result
-            .error
-            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
 }

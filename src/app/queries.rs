@@ -11,10 +11,12 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 
 use super::setup::Setup;
 use super::textures::color_image;
-use crate::event::Side;
-use crate::localize::{QueryResult, Unwatched};
+use crate::event::{KindSet, Side};
+use crate::localize::{QueryResult, Watch};
 use crate::picture;
-use crate::scene::Scene;
+use crate::scene::{FrameStore, Scene};
+use crate::session::JobError;
+use crate::trace::{Cancelled, Record, Sink};
 
 /// Width of a thumbnail \[px\].
 const THUMBNAIL_WIDTH: u32 = 124;
@@ -37,12 +39,42 @@ enum Picture {
     Idle,
 }
 
-/// All queries at work, one after the other.
+/// All queries at work, one after the other. Nobody joins the worker: it ends soon after the batch is
+/// dropped.
 struct Batch {
     outcomes: Receiver<Outcome>,
-    cancelled: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
     done: usize,
     all: usize,
+}
+
+impl Drop for Batch {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+    }
+}
+
+/// Wants to hear nothing. Whoever raises the flag wants the run to stop.
+struct UntilStopped(Arc<AtomicBool>);
+
+impl Sink for UntilStopped {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Err(Cancelled)
+    }
+}
+
+impl Watch for UntilStopped {
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(Arc::clone(&self.0))
+    }
 }
 
 impl Queries {
@@ -81,28 +113,36 @@ impl Queries {
         self.batch.as_ref().map(|batch| (batch.done, batch.all))
     }
 
+    /// Stops running all queries. Whether that was going on.
+    pub(super) fn stop_all(&mut self) -> bool {
+        self.batch.take().is_some()
+    }
+
     /// Starts to run all queries, or stops doing so.
     pub(super) fn run_all(&mut self, setup: &Setup) {
-        if let Some(batch) = self.batch.take() {
-            batch.cancelled.store(true, Ordering::Relaxed);
+        if self.stop_all() {
             return;
         }
         let (outbox, outcomes) = mpsc::channel();
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let (setup, flag, ctx) = (setup.clone(), Arc::clone(&cancelled), self.ctx.clone());
+        let stop = Arc::new(AtomicBool::new(false));
+        let (setup, flag, ctx) = (setup.clone(), Arc::clone(&stop), self.ctx.clone());
         let all = setup.offered.len();
         let started = thread::Builder::new()
             .name("queries".to_owned())
             .spawn(move || {
+                let frames = Arc::default();
                 for &query in &setup.offered {
-                    if flag.load(Ordering::Relaxed) {
-                        break;
-                    }
-                    let outcome = catch_unwind(AssertUnwindSafe(|| localize(&setup, query)))
-                        .unwrap_or_else(|_| {
+                    let localized =
+                        catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &flag)));
+                    let outcome = match localized {
+                        Ok(Ok(results)) => Ok(results),
+                        Ok(Err(error)) if error.is_cancelled() => break,
+                        Ok(Err(error)) => Err(error.to_string()),
+                        Err(_) => {
                             let name = &setup.queries.frames()[query];
                             Err(format!("internal error at query {name}"))
-                        });
+                        }
+                    };
                     if outbox.send((query, outcome)).is_err() {
                         break;
                     }
@@ -112,7 +152,7 @@ impl Queries {
         if started.is_ok() {
             self.batch = Some(Batch {
                 outcomes,
-                cancelled,
+                stop,
                 done: 0,
                 all,
             });
@@ -182,9 +222,6 @@ impl Queries {
 
 impl Drop for Queries {
     fn drop(&mut self) {
-        if let Some(batch) = &self.batch {
-            batch.cancelled.store(true, Ordering::Relaxed);
-        }
         self.wanted
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -199,9 +236,14 @@ fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
     Some(color_image(&small))
 }
 
-fn localize(setup: &Setup, query: usize) -> Result<Vec<QueryResult>, String> {
+fn localize(
+    setup: &Setup,
+    query: usize,
+    frames: &Arc<FrameStore>,
+    stop: &Arc<AtomicBool>,
+) -> Result<Vec<QueryResult>, JobError> {
     let mut setup = setup.clone();
     setup.go_to(query);
-    let results = setup.job(None).work(&mut Unwatched, |_| {});
-    results.map_err(|error| error.to_string())
+    let mut watch = UntilStopped(Arc::clone(stop));
+    setup.job(frames).work(&mut watch, |_| {})
 }

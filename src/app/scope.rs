@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::command::{Command, Queue};
 use super::desk::Desk;
+use super::shown::{Shown, ShownAt};
 use crate::estimator;
-use crate::event::{DebugEvent, MinimumAssessed, Moment, ReferencesFused, ViewRendered};
+use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::render::Comparison;
 use crate::session::{Part, Run, Span};
 
 /// A run at a cursor, and the desk around it.
@@ -24,42 +24,27 @@ pub struct Scope<'a> {
     pub(super) commands: &'a Queue,
 }
 
-/// A synthetic view beside the query, and where it comes from.
-#[derive(Clone)]
-pub struct Shown {
-    /// View, cost, and what made the cost.
-    pub comparison: Arc<Comparison>,
-    /// Where the camera is (`world_from_camera`).
-    pub pose: Pose,
-    /// Why it is shown.
-    pub at: ShownAt,
-}
-
-/// Why a synthetic view is shown.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ShownAt {
-    /// The pointer is over this pose.
-    Pointer,
-    /// The camera in hand is there.
-    Camera,
-    /// The estimator rendered it.
-    Event(Moment),
-}
-
-impl ShownAt {
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pointer => "under the pointer",
-            Self::Camera => "camera in hand",
-            Self::Event(Moment::Start) => "at the reference",
-            Self::Event(Moment::NewBest) => "new best",
-            Self::Event(Moment::End) => "result",
+impl<'a> Scope<'a> {
+    /// The present run at the cursor.
+    pub(super) fn present(desk: &'a Desk, commands: &'a Queue) -> Self {
+        Self {
+            run: desk.run(),
+            cursor: desk.cursor,
+            desk,
+            commands,
         }
     }
-}
 
-impl<'a> Scope<'a> {
+    /// The kept run at the place that corresponds to the cursor.
+    pub(super) fn kept(desk: &'a Desk, commands: &'a Queue) -> Option<Self> {
+        Some(Self {
+            run: &desk.kept.as_ref()?.run,
+            cursor: desk.kept_cursor()?,
+            desk,
+            commands,
+        })
+    }
+
     /// Asks for something to be done after this frame.
     pub fn send(&self, command: Command) {
         self.commands.send(command);
@@ -219,10 +204,10 @@ impl<'a> Scope<'a> {
 /// What a cost can be compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CostBounds {
-    /// What no relation at all costs.
+    /// Cost of images that have nothing to do with each other.
     pub shuffled: Option<f64>,
-    /// The result of the search.
+    /// Cost at the result of the search.
     pub best: Option<f64>,
-    /// The true pose.
+    /// Cost at the true pose.
     pub truth: Option<f64>,
 }

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use crate::estimator;
 use crate::localize::{QueryResult, References, Selection, frames_within};
 use crate::method::Method;
-use crate::scene::Scene;
-use crate::session::{IndexFile, Job, Loaded, RunMode, Task};
+use crate::scene::{FrameStore, Scene};
+use crate::session::{IndexFile, Job, RunMode, Task};
 use crate::text::UnknownWord;
 
 /// How the references of a query are chosen.
@@ -70,7 +70,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub(super) fn job(&self, at_hand: Option<Arc<Loaded>>) -> Job {
+    pub(super) fn job(&self, frames: &Arc<FrameStore>) -> Job {
         Job {
             references: Arc::clone(&self.references),
             queries: Arc::clone(&self.queries),
@@ -78,7 +78,7 @@ impl Setup {
             chosen: self.chosen.clone(),
             task: self.task.clone(),
             index: Arc::clone(&self.index),
-            at_hand,
+            frames: Arc::clone(frames),
         }
     }
 

@@ -17,6 +17,12 @@ use posescope::session::{Breakpoint, Task};
 use super::failure::CliError;
 use super::params;
 
+/// The query of the bare command: a place on the street where parked cars hide part of what the
+/// reference saw.
+pub const DEMO_QUERY: &str = "000070";
+/// Its reference.
+pub const DEMO_REFERENCE: &str = "000062";
+
 /// See why a camera pose estimate fails.
 ///
 /// Without a command: runs all four estimators on the built-in street, prints the table of results,
@@ -106,6 +112,18 @@ pub struct ViewArgs {
     pub query: Option<String>,
     #[command(flatten)]
     pub task: TaskArgs,
+}
+
+#[cfg(feature = "app")]
+impl ViewArgs {
+    /// The window of the bare command.
+    pub fn demo() -> Self {
+        Self {
+            scene: "street".to_owned(),
+            query: None,
+            task: TaskArgs::default(),
+        }
+    }
 }
 
 /// What is asked of a query, whether somebody looks on or not.

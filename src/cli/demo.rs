@@ -2,16 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::args::{RecordingArgs, RunArgs, TaskArgs};
+use super::args::{DEMO_QUERY, DEMO_REFERENCE, RecordingArgs, RunArgs, TaskArgs};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
 #[cfg(feature = "app")]
 use posescope::session::RunMode;
 
-/// A place on the street where parked cars hide part of what the reference saw.
-pub const QUERY: &str = "000070";
-pub const REFERENCE: &str = "000062";
 const RECORDING: &str = "recordings/demo.rrd";
 
 /// Runs the demonstration and saves its recording.
@@ -23,10 +20,10 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
     run::run(
         &RunArgs {
             scene: "street".to_owned(),
-            query: vec![QUERY.to_owned()],
+            query: vec![DEMO_QUERY.to_owned()],
             all: false,
             task: TaskArgs {
-                reference: vec![REFERENCE.to_owned()],
+                reference: vec![DEMO_REFERENCE.to_owned()],
                 ..TaskArgs::default()
             },
             recording: RecordingArgs {

@@ -62,7 +62,7 @@ impl CliError {
 
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Self::ReaderGone | Self::Stopped(_) => DONE,
+            Self::ReaderGone | Self::Stopped(_) | Self::Choice(ChoiceError::Cancelled(_)) => DONE,
             Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
             Self::Usage(_)
             | Self::Param(_)

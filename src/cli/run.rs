@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use posescope::localize::{
-    Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
+    Chooser, Localizer, QueryResult, Ranking, References, Request, Selection, Unwatched,
 };
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
@@ -178,7 +178,7 @@ impl Plan<'_> {
     }
 
     fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<References, CliError> {
-        let chosen = chooser.choose(query, &|_| false)?;
+        let chosen = chooser.choose(query, &|_| false, &mut Unwatched)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(

@@ -74,7 +74,7 @@ fn write(
         .clone()
         .filter_map(|frame| street.time_s(frame))
         .collect();
-    writer.calibration(&street.intrinsics())?;
+    writer.calibration(&street.intrinsics(0))?;
     writer.poses(&poses, &times_s)?;
     let traversal = street.traversal();
     all.into_par_iter().step_by(every).try_for_each(|frame| {

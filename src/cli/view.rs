@@ -12,24 +12,13 @@ use posescope::run::{Protocol, read_results, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task};
 
-use super::args::{Arguments, Command, TaskArgs, ViewArgs};
+use super::args::{Arguments, Command, DEMO_QUERY, DEMO_REFERENCE, ViewArgs};
 use super::failure::CliError;
+use super::run;
 use super::terminal::Terminal;
-use super::{demo, run};
 
 /// Where the window saves things unless somebody says otherwise.
 const FOLDER: &str = "recordings";
-
-impl ViewArgs {
-    /// The window of the bare command.
-    pub fn demo() -> Self {
-        Self {
-            scene: "street".to_owned(),
-            query: None,
-            task: TaskArgs::default(),
-        }
-    }
-}
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
@@ -113,8 +102,8 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
         && setup.pick() == ReferencePick::By(Protocol::default().references);
     setup.query = match &args.query {
         _ if is_demo => {
-            setup.chosen = vec![setup.references.find(demo::REFERENCE)?].into();
-            setup.queries.find(demo::QUERY)?
+            setup.chosen = vec![setup.references.find(DEMO_REFERENCE)?].into();
+            setup.queries.find(DEMO_QUERY)?
         }
         Some(name) => setup.queries.find(name)?,
         None => {

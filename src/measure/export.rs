@@ -278,7 +278,7 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
     let mut cameras: Vec<Camera> = Vec::new();
     let mut images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points\n".to_owned();
     for (index, one) in localized.iter().enumerate() {
-        let camera = one.item.pair.camera;
+        let camera = one.item.camera;
         let known = cameras.iter().position(|known| *known == camera);
         let camera = known.unwrap_or_else(|| {
             cameras.push(camera);

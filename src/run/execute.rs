@@ -9,7 +9,7 @@ use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes, Status,
-    Watch,
+    Unwatched, Watch,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -196,7 +196,7 @@ impl Execution<'_> {
                 seed: protocol.seed,
                 index,
             };
-            chooser.choose(frame, &|frame| left_out.contains(&frame))
+            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut Unwatched)
         };
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;

@@ -9,7 +9,7 @@ use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
 use super::protocol::Protocol;
-use super::run_file::{Pair, describe};
+use super::run_file::{Pair, cameras_of, times_of};
 use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;
@@ -201,7 +201,7 @@ impl Draw<'_> {
             let names = frames.map(|&frame| queries.frames()[frame].clone());
             names.collect::<Vec<_>>()
         };
-        let (camera, times_s) = describe(queries, &asked);
+        let (camera, cameras) = cameras_of(queries, &asked);
         // Where every frame is a query, all the others are its references.
         let left_out = if self.share < 1.0 { &drawn[..] } else { &[] };
         Ok(Pair {
@@ -209,9 +209,10 @@ impl Draw<'_> {
             scene: references.name().to_owned(),
             query_scene: queries.name().to_owned(),
             camera,
+            cameras,
             drawn: names(left_out),
             queries: names(&asked),
-            times_s,
+            times_s: times_of(queries, &asked),
         })
     }
 

@@ -225,8 +225,11 @@ pub struct Pair {
     pub scene: String,
     /// The name of the queries' scene.
     pub query_scene: String,
-    /// The camera of the queries.
+    /// The camera of the queries; the first one's where they have several.
     pub camera: Camera,
+    /// The camera of each query, where they have several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<Camera>,
     /// Frames that were drawn as queries; where the scenes are the same, none is a reference.
     pub drawn: Vec<String>,
     /// The queries: all that were drawn, or those of them that were named.
@@ -282,6 +285,8 @@ pub struct Item<'a> {
     pub pair: &'a Pair,
     /// The query frame's name.
     pub query: &'a str,
+    /// The query's camera.
+    pub camera: Camera,
     /// When the query was taken \[s\].
     pub time_s: Option<f64>,
 }
@@ -291,16 +296,15 @@ impl RunFile {
     pub fn plan(&self) -> impl Iterator<Item = Item<'_>> {
         let queries = self.pairs.iter().flat_map(|pair| {
             let queries = pair.queries.iter().enumerate();
-            queries.map(move |(at, query)| (pair, query, pair.times_s.get(at).copied()))
+            queries.map(move |(at, query)| (pair, at, query))
         });
-        queries
-            .enumerate()
-            .map(|(index, (pair, query, time_s))| Item {
-                index,
-                pair,
-                query,
-                time_s,
-            })
+        queries.enumerate().map(|(index, (pair, at, query))| Item {
+            index,
+            pair,
+            query,
+            camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
+            time_s: pair.times_s.get(at).copied(),
+        })
     }
 
     /// The items of this shard.
@@ -374,10 +378,21 @@ impl RunFile {
     }
 }
 
-/// The camera and the time of the queries of a scene.
-pub(super) fn describe(scene: &dyn Scene, queries: &[usize]) -> (Camera, Vec<f64>) {
+/// When the queries of a scene were taken, if that is known of all.
+pub(super) fn times_of(scene: &dyn Scene, queries: &[usize]) -> Vec<f64> {
     let times: Option<Vec<f64>> = queries.iter().map(|&frame| scene.time_s(frame)).collect();
-    (scene.intrinsics().into(), times.unwrap_or_default())
+    times.unwrap_or_default()
+}
+
+/// The camera of the first of some frames, and that of each where they have several.
+pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (Camera, Vec<Camera>) {
+    let camera = |frame: usize| Camera::from(scene.intrinsics(frame));
+    let first = camera(frames.first().copied().unwrap_or(0));
+    let cameras: Vec<Camera> = frames.iter().map(|&frame| camera(frame)).collect();
+    match cameras.iter().all(|camera| *camera == first) {
+        true => (first, Vec::new()),
+        false => (first, cameras),
+    }
 }
 
 #[cfg(test)]

@@ -147,7 +147,7 @@ impl Scene for KittiOdometry {
         &self.frames
     }
 
-    fn intrinsics(&self) -> Intrinsics {
+    fn intrinsics(&self, _frame: usize) -> Intrinsics {
         self.intrinsics
     }
 
@@ -175,7 +175,7 @@ impl Scene for KittiOdometry {
             width: expected_width,
             height: expected_height,
             ..
-        } = self.intrinsics;
+        } = self.intrinsics(frame);
         if (width, height) != (expected_width, expected_height) {
             return Err(SceneError::Content {
                 path,

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Scene, SceneError};
-use crate::features::{SurfParams, surf};
-use crate::image::Photo;
-use crate::localize::Ranking;
+use crate::features::{SurfParams, remembered, surf};
+use crate::localize::{ChoiceError, Ranking};
 use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{
     BuildError, Criterion, Index, IndexError, Progress, Ranked, Request, Retrieval,
     RetrievalParams, Summary, build,
 };
+use crate::trace::Cancelled;
 use posescope_core::files::user_cache_folder;
 
 /// The extension of the files.
@@ -158,10 +158,10 @@ impl Retriever {
         })
     }
 
-    /// The frames that resemble a photo, of those that are allowed.
-    pub fn retrieve(&self, photo: &Photo, allowed: impl Fn(usize) -> bool) -> Retrieval {
-        let features = surf(&photo.gray, &self.surf);
-        self.index.query(&features, &self.params, allowed)
+    /// The frames that resemble the query, of those that are allowed.
+    pub fn retrieve(&self, query: &Query, allowed: impl Fn(usize) -> bool) -> Retrieval {
+        let features = remembered(&query.photo.gray, &query.memo, &self.surf);
+        self.index.query(&features.value, &self.params, allowed)
     }
 
     /// The index.
@@ -194,9 +194,11 @@ impl Ranking for Retriever {
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<Ranked>, SceneError> {
+        checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<Ranked>, ChoiceError> {
+        checkpoint()?;
         let candidates: HashSet<usize> = candidates.iter().copied().collect();
-        let retrieval = self.retrieve(&query.photo, |frame| candidates.contains(&frame));
+        let retrieval = self.retrieve(query, |frame| candidates.contains(&frame));
         let mut ranked = retrieval.ranked;
         ranked.truncate(count);
         Ok(ranked)

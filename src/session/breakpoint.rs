@@ -322,7 +322,7 @@ struct Watched {
 }
 
 impl Breakpoints {
-    /// These.
+    /// A list of breakpoints, none of which was reached yet.
     pub fn new(breakpoints: impl IntoIterator<Item = Breakpoint>) -> Self {
         Self {
             watched: breakpoints

@@ -5,7 +5,8 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::breakpoint::Breakpoints;
-use super::job::{Loaded, Message};
+use super::loaded::Loaded;
+use super::message::Message;
 use super::run::Part;
 use crate::event::{Event, StageEnded};
 use crate::geometry::Pose;
@@ -17,7 +18,7 @@ use crate::trace::{Cancelled, Record, Sink};
 /// How a run goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunMode {
-    /// Not at all: it waits behind the next event.
+    /// Not at all: it waits behind the next event, or within a loop that tells nothing.
     Paused,
     /// To the next event.
     StepInto,
@@ -78,10 +79,6 @@ impl Control {
         let mut wishes = self.wishes();
         wishes.cancelled = true;
         self.tell(wishes);
-    }
-
-    pub(super) fn is_cancelled(&self) -> bool {
-        self.wishes().cancelled
     }
 
     fn tell(&self, wishes: MutexGuard<'_, Wishes>) {
@@ -290,9 +287,22 @@ impl Sink for Gate {
         self.tell(Message::Goes)
     }
 
+    /// A run that was told to pause need not come to its next event first. One that told nothing yet
+    /// does, so that there is something to look at.
     fn attend(&mut self) -> Result<(), Cancelled> {
-        if self.control.is_cancelled() {
-            return Err(Cancelled);
+        let control = Arc::clone(&self.control);
+        let is_paused = {
+            let wishes = control.wishes();
+            if wishes.cancelled {
+                return Err(Cancelled);
+            }
+            self.listen(&wishes);
+            wishes.mode == RunMode::Paused
+        };
+        if is_paused && self.last.is_some() {
+            self.tell(Message::Waits { breakpoint: None })?;
+            self.wait()?;
+            self.tell(Message::Goes)?;
         }
         Ok(())
     }

@@ -5,19 +5,15 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread;
 
-use super::at_hand::AtHand;
 use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
-use super::run::Part;
+use super::message::Message;
 use super::task::Task;
-use crate::geometry::Pose;
 use crate::localize::{
     ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
-    Selection, StageTimes, Watch, words_of,
+    Selection, Watch, words_of,
 };
-use crate::problem::Problem;
-use crate::scene::{NoIndex, Scene};
-use crate::trace::Record;
+use crate::scene::{FrameStore, NoIndex, Scene};
 
 /// One query, its references, and what to do with them.
 #[derive(Clone)]
@@ -34,17 +30,8 @@ pub struct Job {
     pub task: Task,
     /// What a choice by looks asks.
     pub index: Arc<IndexFile>,
-    /// Frames that an earlier job has read, with all that was worked out about them.
-    pub at_hand: Option<Arc<Loaded>>,
-}
-
-/// The photos and clouds of a job.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The query and each of its references.
-    pub problems: Vec<Problem>,
-    /// Where the query camera was, if that is known. The estimators do not see it.
-    pub truth: Option<Pose>,
+    /// Where frames are remembered, with all that is worked out about them, for the next job too.
+    pub frames: Arc<FrameStore>,
 }
 
 /// Why a job has no results.
@@ -59,13 +46,13 @@ pub enum JobError {
     /// There is no index to ask.
     #[error(transparent)]
     Index(#[from] NoIndex),
-    /// Nobody said which.
+    /// Nobody said which references to take.
     #[error("no reference is chosen for query {query}")]
     NoneNamed {
         /// The query frame's name.
         query: String,
     },
-    /// Nothing is near enough.
+    /// No frame is near enough to be a reference.
     #[error(
         "no frame with pose and scan within {radius_m} m of query {query}; raise the radius \
          or the prior, or choose references by hand"
@@ -78,26 +65,18 @@ pub enum JobError {
     },
 }
 
-/// What the worker says to the session.
-pub(super) enum Message {
-    Chosen(References),
-    Loaded(Arc<Loaded>),
-    Began(Part),
-    Told(Box<Record>),
-    Waits {
-        breakpoint: Option<String>,
-    },
-    Goes,
-    Ended {
-        result: Box<QueryResult>,
-        times: Option<StageTimes>,
-    },
-    Finished,
-    Cancelled,
-    Broke(String),
+impl JobError {
+    /// Whether the watcher asked the job to stop.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            Self::Localize(LocalizeError::Cancelled(_)) | Self::Choice(ChoiceError::Cancelled(_))
+        )
+    }
 }
 
-/// Starts the worker. Nobody joins it: it ends by itself, or at the next event after a cancel.
+/// Starts the worker. Nobody joins it: it ends by itself, or at the next event or checkpoint after a
+/// cancel.
 pub(super) fn spawn(
     job: Job,
     control: Arc<Control>,
@@ -116,7 +95,7 @@ pub(super) fn spawn(
             let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate, on_choice)));
             let last_words = match outcome {
                 Ok(Ok(_)) => Message::Finished,
-                Ok(Err(JobError::Localize(LocalizeError::Cancelled(_)))) => Message::Cancelled,
+                Ok(Err(error)) if error.is_cancelled() => Message::Cancelled,
                 Ok(Err(error)) => Message::Broke(error.to_string()),
                 Err(panic) => {
                     Message::Broke(format!("internal error: {}", words_of(panic.as_ref())))
@@ -147,12 +126,12 @@ impl Job {
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
         let (task, protocol) = (&self.task, &self.task.protocol);
-        let before = self.at_hand.as_deref();
-        let scene = |scene| AtHand { scene, before };
-        let references = scene(self.references.as_ref());
-        let queries = scene(self.queries.as_ref());
-        let localizer = Localizer::new(&references, &queries, &task.params, protocol.seed);
-        let chosen = self.choose(&localizer)?;
+        let scenes = (
+            self.frames.of(&self.references),
+            self.frames.of(&self.queries),
+        );
+        let localizer = Localizer::at_hand(scenes, &task.params, protocol.seed);
+        let chosen = self.choose(&localizer, watch)?;
         on_choice(&chosen);
         let request = Request {
             radius_m: task.radius_m,
@@ -169,7 +148,11 @@ impl Job {
         Ok(results)
     }
 
-    fn choose(&self, localizer: &Localizer<'_>) -> Result<References, JobError> {
+    fn choose(
+        &self,
+        localizer: &Localizer<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<References, JobError> {
         if !self.chosen.frames.is_empty() {
             return Ok(self.chosen.clone());
         }
@@ -192,7 +175,7 @@ impl Job {
             seed: protocol.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),
         };
-        let chosen = chooser.choose(self.query, &|_| false)?;
+        let chosen = chooser.choose(self.query, &|_| false, watch)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear {
                 query: query(),

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::job::Loaded;
+use super::loaded::Loaded;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
 use crate::history::History;
 use crate::localize::{QueryResult, StageTimes};
@@ -60,9 +60,9 @@ impl Part {
 /// A part of a run, told without a break.
 #[derive(Clone, Debug)]
 pub struct Span {
-    /// What it is about.
+    /// The part of the run that it tells.
     pub part: Part,
-    /// Its records.
+    /// Positions of its records among those of the run.
     pub records: Range<usize>,
     /// Its result, once there is one.
     pub result: Option<QueryResult>,
@@ -73,7 +73,7 @@ pub struct Span {
 /// One stage as a bar on the timeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageBar {
-    /// Which.
+    /// The stage that the bar stands for.
     pub stage: Stage,
     /// 1 for a whole estimator, one more for each stage around it.
     pub depth: usize,

@@ -11,6 +11,7 @@ mod comparison;
 mod direct;
 mod encode;
 pub mod entities;
+mod error;
 mod feature;
 mod file;
 mod fusion;
@@ -26,8 +27,9 @@ mod targets;
 mod viewer;
 
 pub use comparison::{ComparisonError, record_comparison};
+pub use error::RecordError;
 pub use recorder::Recorder;
-pub use targets::{Identity, RecordError, Targets};
+pub use targets::{Identity, Targets};
 
 use crate::palette::Rgb;
 

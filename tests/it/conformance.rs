@@ -2,21 +2,26 @@
 //! there.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope::cloud::Cloud;
-use posescope::estimator::{self, Outcome};
+use posescope::cost::{Cost, Explanation, IntensityPair};
+use posescope::estimator::{self, Outcome, Parts};
 use posescope::event::{
-    DepthsLifted, Event, FeaturesClassified, FeaturesDetected, KindSet, MatchesDecided,
-    PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
+    DepthsLifted, Event, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind, KindSet,
+    MatchesDecided, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted,
 };
 use posescope::features::FeatureState;
+use posescope::geometry::Pose;
 use posescope::history::History;
-use posescope::memo::Memo;
+use posescope::image::{FloatImage, gaussian_smoothed};
+use posescope::memo::{Key, Memo};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
+use posescope::render::{Scorer, color_cloud};
 use posescope::trace::{Cancelled, Record, Sink, Trace};
 use proptest::prelude::*;
 
@@ -122,6 +127,297 @@ fn every_estimator_can_be_stopped_at_any_event() {
             );
         }
     }
+}
+
+/// What a run does that concerns its watcher.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Moment {
+    /// It looks at the attention flag.
+    LooksUp,
+    /// It tells something.
+    Tells(Kind),
+}
+
+/// Keeps the attention flag up, so that the run comes by whenever it looks; stops it at one of the
+/// times.
+struct Attended<'a> {
+    flag: &'a AtomicBool,
+    wanted: KindSet,
+    moments: Vec<Moment>,
+    looks: usize,
+    stop_at: Option<usize>,
+}
+
+impl<'a> Attended<'a> {
+    fn new(flag: &'a AtomicBool, wanted: KindSet, stop_at: Option<usize>) -> Self {
+        flag.store(true, Ordering::Release);
+        Self {
+            flag,
+            wanted,
+            moments: Vec::new(),
+            looks: 0,
+            stop_at,
+        }
+    }
+}
+
+impl Sink for Attended<'_> {
+    fn wanted(&self) -> KindSet {
+        self.wanted
+    }
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        self.moments.push(Moment::Tells(record.event.kind()));
+        Ok(())
+    }
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.moments.push(Moment::LooksUp);
+        self.flag.store(true, Ordering::Release);
+        self.looks += 1;
+        if self.stop_at == Some(self.looks) {
+            return Err(Cancelled);
+        }
+        Ok(())
+    }
+}
+
+/// Everything that concerns the watcher of a run that is not stopped.
+fn moments(
+    estimator: &dyn estimator::Estimator,
+    problem: &Problem,
+    wanted: KindSet,
+) -> Vec<Moment> {
+    let flag = AtomicBool::new(false);
+    let mut sink = Attended::new(&flag, wanted, None);
+    estimator
+        .estimate(problem, &mut Trace::watched(&mut sink, &flag))
+        .expect("nobody cancels");
+    sink.moments
+}
+
+/// As many hypotheses are scored at a time as on any number of threads.
+fn on_many_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(32).build();
+    pool.expect("a pool").install(work)
+}
+
+/// 1,681 coarse hypotheses, and more trials than are looked up between.
+fn long() -> (Problem, Params) {
+    let mut params = Params::default();
+    for change in [
+        "grid.coarse_step=0.14",
+        "fb.confidence=0.999999",
+        "fb.ratio=1",
+    ] {
+        params.assign(change).expect("a good value");
+    }
+    (solvable(), params)
+}
+
+#[test]
+fn between_two_looks_at_the_flag_lie_at_most_300_hypotheses_or_1000_trials() {
+    let (problem, params) = long();
+    for entry in estimator::all() {
+        let name = entry.method.name();
+        let estimator = entry.make(&params);
+        let moments = on_many_threads(|| moments(estimator.as_ref(), &problem, KindSet::ALL));
+        // Telling looks up too, but may tell what was worked out long before. What counts is how many
+        // hypotheses are told between two looks that nothing is told at.
+        let (mut since, mut scored, mut tried) = (0, 0, 0);
+        let mut before = None;
+        for pair in moments.windows(2) {
+            match pair[0] {
+                Moment::LooksUp if pair[1] == Moment::LooksUp => since = 0,
+                Moment::Tells(Kind::PoseScored) => (since, scored) = (since + 1, scored + 1),
+                Moment::Tells(Kind::HypothesisTried) => {
+                    // MLESAC tells its trials one by one, as it goes.
+                    assert_eq!(before, Some(Moment::LooksUp), "{name}");
+                    tried += 1;
+                }
+                Moment::LooksUp | Moment::Tells(_) => {}
+            }
+            assert!(since <= 300, "{name}");
+            before = Some(pair[0]);
+        }
+        match entry.parts {
+            Parts::Features | Parts::Hybrid(_) => assert!(tried > 90, "{name}: {tried}"),
+            Parts::Cost(_) => {
+                assert!(scored > 1000, "{name}: {scored}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_stage_that_takes_time_looks_up_more_than_its_events_do() {
+    let (problem, params) = long();
+    for entry in estimator::all() {
+        let name = entry.method.name();
+        let estimator = entry.make(&params);
+        let loud = moments(estimator.as_ref(), &problem, KindSet::ALL);
+        let quiet = moments(estimator.as_ref(), &problem, KindSet::NONE);
+        let looks = |moments: &[Moment]| {
+            let looks = |moment: &&Moment| **moment == Moment::LooksUp;
+            moments.iter().filter(looks).count()
+        };
+        // Whoever wants to hear nothing is heard as often.
+        assert_eq!(looks(&loud), looks(&quiet), "{name}");
+        let told = loud.len() - looks(&loud);
+        assert!(looks(&loud) + 20 > told, "{name}: {told}");
+    }
+    let fb = estimator::entry(Method::FB).make(&params);
+    let all = moments(
+        fb.as_ref(),
+        &problem,
+        KindSet::of(&[Kind::FeaturesDetected]),
+    );
+    let told = |kind: Kind| all.iter().position(|moment| *moment == Moment::Tells(kind));
+    let first = told(Kind::FeaturesDetected).expect("always told");
+    // The sums, four layers and two searches of an octave, the descriptors.
+    assert!(first >= 12, "one photo's passes: {first}");
+}
+
+#[test]
+fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
+    let (problem, params) = long();
+    for entry in estimator::all() {
+        let name = entry.method.name();
+        let estimator = entry.make(&params);
+        for wanted in [KindSet::ALL, KindSet::NONE] {
+            let looks = moments(estimator.as_ref(), &problem, wanted)
+                .iter()
+                .filter(|moment| **moment == Moment::LooksUp)
+                .count();
+            let stops = (1..=looks).filter(|i| *i < 40 || looks - i < 4 || i % 1999 == 0);
+            for stop in stops {
+                let flag = AtomicBool::new(false);
+                let mut sink = Attended::new(&flag, wanted, Some(stop));
+                let mut trace = Trace::watched(&mut sink, &flag);
+                let outcome = estimator.estimate(&problem, &mut trace);
+                assert_eq!(
+                    outcome.err(),
+                    Some(Cancelled),
+                    "{name} at {stop} of {looks}"
+                );
+                // Nothing follows but the ends of the stages that were open.
+                assert_eq!(sink.looks, stop, "{name}");
+                let last = sink.moments.iter().rposition(|m| *m == Moment::LooksUp);
+                let after = &sink.moments[last.expect("it was stopped") + 1..];
+                let is_end = |moment: &Moment| *moment == Moment::Tells(Kind::StageEnded);
+                assert!(
+                    after.len() <= 4 && after.iter().all(is_end),
+                    "{name}: {after:?}"
+                );
+            }
+        }
+    }
+}
+
+/// Counts what it judges.
+struct Counting(AtomicUsize);
+
+impl Cost for Counting {
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, 0.0)
+    }
+    fn query_channel_key(&self) -> Key {
+        Key::new("grey")
+    }
+    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        Some(pairs.len() as f64)
+    }
+    fn explain(&self, _pairs: &[IntensityPair]) -> Option<Explanation> {
+        None
+    }
+}
+
+#[test]
+fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
+    let problem = solvable();
+    let query = Arc::new(gaussian_smoothed(&problem.query.photo.gray, 0.0));
+    let reference = &problem.reference;
+    let cloud = color_cloud(
+        &reference.cloud,
+        &reference.photo.gray,
+        &reference.intrinsics,
+        &Params::default().render,
+    );
+    let cost = Counting(AtomicUsize::new(0));
+    let scorer = Scorer::new(&cloud.points, query, &CAMERA, 1, &cost);
+    assert!(on_many_threads(|| scorer.at_a_time()) <= 300);
+    let poses: Vec<_> = (0..70)
+        .map(|i| Pose::translation(0.0, 0.0, 0.02 * f64::from(i)))
+        .collect();
+    let at_once = scorer.score(&poses);
+    assert_eq!(cost.0.load(Ordering::Relaxed), poses.len());
+    let one_by_one: Vec<_> = poses
+        .iter()
+        .flat_map(|pose| scorer.score(std::slice::from_ref(pose)))
+        .collect();
+    assert_eq!(at_once, one_by_one);
+}
+
+#[test]
+fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
+    let mut problem = solvable();
+    problem.uncertainty_radius_m = 500.0;
+    let mut params = Params::default();
+    params
+        .assign("grid.coarse_step=0.05")
+        .expect("a good value");
+    for entry in estimator::all() {
+        let outcome = silent(entry.make(&params).as_ref(), &problem);
+        match entry.parts {
+            // FB searches no grid, and the hybrid takes its pose.
+            Parts::Features | Parts::Hybrid(_) => assert!(outcome.pose.is_ok()),
+            Parts::Cost(_) => {
+                let failure = outcome.pose.expect_err("400 million hypotheses");
+                assert_eq!(failure.code(), "D9");
+                let said = failure.to_string();
+                assert!(
+                    said.contains("400040001") && said.contains("grid.coarse_step"),
+                    "{said}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn trials_that_are_not_remembered_are_told_again_all_the_same() {
+    let (mut problem, mut params) = (remembering(), Params::default());
+    // No photo shows the other: no sample is ever good enough, and all trials are drawn.
+    let other = problem_of_strangers();
+    problem.query = Arc::new(posescope::problem::Query {
+        memo: Memo::of(64),
+        ..(*other.query).clone()
+    });
+    let changes = [
+        "fb.max_trials=30000",
+        "fb.confidence=0.999999",
+        "fb.ratio=1",
+        "fb.unique=false",
+        "fb.depth_radius=50",
+        "fb.inlier=0.2",
+    ];
+    for change in changes {
+        params.assign(change).expect("a good value");
+    }
+    let fb = estimator::entry(Method::FB).make(&params);
+    let quiet = silent(fb.as_ref(), &problem);
+    let told = || {
+        let mut history = History::default();
+        let outcome = fb.estimate(&problem, &mut Trace::to(&mut history));
+        assert_eq!(outcome.expect("nobody cancels"), quiet);
+        let trials: Vec<_> = history
+            .all::<HypothesisTried>()
+            .map(|(_, tried)| tried.trial)
+            .collect();
+        trials
+    };
+    let first = told();
+    assert!(first.len() > 20_000, "{}", first.len());
+    assert_eq!(told(), first);
 }
 
 #[test]
@@ -287,7 +583,11 @@ fn stages_of(estimator: &dyn estimator::Estimator, problem: &Problem) -> Vec<(St
         .collect()
 }
 
-fn remembering() -> Problem {
+fn problem_of_strangers() -> Problem {
+    problem(photo(1.0, 99), photo(0.0, 5), cloud_of_the_walls())
+}
+
+pub fn remembering() -> Problem {
     let mut problem = solvable();
     let mut query = (*problem.query).clone();
     query.memo = Memo::of(64);

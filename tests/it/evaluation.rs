@@ -443,8 +443,8 @@ impl Scene for Trapped {
     fn frames(&self) -> &[String] {
         self.scene.frames()
     }
-    fn intrinsics(&self) -> Intrinsics {
-        self.scene.intrinsics()
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.scene.intrinsics(frame)
     }
     fn pose(&self, frame: usize) -> Option<Pose> {
         self.scene.pose(frame)

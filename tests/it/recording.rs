@@ -387,7 +387,7 @@ fn ranking_of_twelve() -> ReferencesRanked {
         frames: (0..12).map(reference).collect(),
     };
     let photos = (0..ranking.pictured().len())
-        .map(|rank| (rank != 2).then(|| Arc::new(photo.clone())))
+        .map(|rank| (rank != 2).then(|| Arc::clone(photo)))
         .collect();
     ReferencesRanked {
         ranking: Arc::new(ranking),

@@ -1,14 +1,16 @@
 //! Driving an estimator: pause, step, break, cancel.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
 use posescope::fusion::Fusion;
-use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched};
+use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
 use posescope::method::Method;
 use posescope::run::Protocol;
 use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State, Task};
+use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
@@ -29,7 +31,7 @@ fn job(query: usize) -> Job {
             ..Task::of("walls")
         },
         index: Arc::default(),
-        at_hand: None,
+        frames: Arc::default(),
     }
 }
 
@@ -188,6 +190,71 @@ fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
     }
 }
 
+/// Takes in what is told until something is the case.
+fn wait(session: &mut Session, is_so: impl Fn(&Session) -> bool) {
+    let begun = Instant::now();
+    while !is_so(session) {
+        assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
+        std::thread::sleep(Duration::from_millis(1));
+        session.drain();
+    }
+}
+
+#[test]
+fn a_session_pauses_and_stops_within_a_lattice() {
+    let mut endless = job(1);
+    endless.task.protocol.methods = vec![Method::PM];
+    for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
+        endless.task.params.assign(change).expect("a good value");
+    }
+    let mut session = start(endless, RunMode::Running, &[]);
+    let in_the_lattice = |session: &Session| session.run().len() > 500;
+    wait(&mut session, in_the_lattice);
+    session.set_mode(RunMode::Paused);
+    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    let told = session.run().len();
+    // A million hypotheses are to come, most of which were not even scored.
+    assert!(told < 500_000, "{told}");
+    session.set_mode(RunMode::Running);
+    wait(&mut session, |session| session.run().len() > told);
+    let begun = Instant::now();
+    session.cancel();
+    wait(&mut session, |session| !session.is_alive());
+    assert_eq!(session.state(), &State::Cancelled);
+    assert!(begun.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn references_that_are_ranked_can_be_stopped_too() {
+    let mut ranked = Job {
+        chosen: Default::default(),
+        ..job(1)
+    };
+    ranked.task.by_hand = false;
+    ranked.task.protocol.references = "maxf:2".parse().expect("a selection");
+    let mut stopped = UntilStopped(Arc::new(AtomicBool::new(true)));
+    let error = ranked.work(&mut stopped, |_| panic!("none was chosen"));
+    assert!(error.expect_err("it was stopped").is_cancelled());
+}
+
+/// Stops a run whose flag is up.
+struct UntilStopped(Arc<AtomicBool>);
+
+impl Sink for UntilStopped {
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Err(Cancelled)
+    }
+}
+
+impl Watch for UntilStopped {
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(Arc::clone(&self.0))
+    }
+}
+
 #[test]
 fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
     let mut session = start(job(UNREADABLE), RunMode::Running, &[]);
@@ -216,15 +283,11 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
 
 #[test]
 fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
-    let mut first = start(job(1), RunMode::Running, &[]);
-    settle(&mut first);
     let mut again = job(1);
-    again.at_hand = first.run().loaded.clone();
-    again
-        .task
-        .params
-        .assign("fb.ratio=0.7")
-        .expect("a good value");
+    let mut first = start(again.clone(), RunMode::Running, &[]);
+    settle(&mut first);
+    let params = &mut again.task.params;
+    params.assign("fb.ratio=0.7").expect("a good value");
     let mut second = start(again, RunMode::Running, &[]);
     settle(&mut second);
     let reused: Vec<_> = second

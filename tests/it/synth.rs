@@ -35,7 +35,7 @@ fn open(folder: &Path) -> Box<dyn Scene> {
 /// The pair as it is made, past any cache.
 fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
     let drive = street.traversal();
-    let photo = |frame| Photo::from_color(drive.image(frame));
+    let photo = |frame| Arc::new(Photo::from_color(drive.image(frame)));
     let intrinsics = drive.intrinsics();
     let scan = drive.cloud(reference);
     Problem {
@@ -78,7 +78,7 @@ fn estimates_from_disk_are_those_from_memory() {
     let street = Street::new("overcast", Size::Half).expect("is built in");
     let of_all = street.traversal().frame_count();
     assert_eq!(disk.frames().len(), of_all.div_ceil(9));
-    assert_eq!(disk.intrinsics(), Size::Half.intrinsics());
+    assert_eq!(disk.intrinsics(0), Size::Half.intrinsics());
 
     let (query, reference) = (72, 63);
     let at = |number: usize| disk.find(&number.to_string()).expect("is there");

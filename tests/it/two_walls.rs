@@ -46,13 +46,13 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
     Problem {
         query: Arc::new(Query {
             name: "query".to_owned(),
-            photo: Photo::from_gray(query),
+            photo: Photo::from_gray(query).into(),
             intrinsics: CAMERA,
             memo: Memo::off(),
         }),
         reference: Arc::new(ReferenceTuple {
             name: "reference".to_owned(),
-            photo: Photo::from_gray(reference),
+            photo: Photo::from_gray(reference).into(),
             intrinsics: CAMERA,
             world_from_camera: Pose::translation(100.0, -2.0, 30.0),
             cloud,

@@ -33,7 +33,7 @@ impl Scene for Walls {
     fn frames(&self) -> &[String] {
         &self.names
     }
-    fn intrinsics(&self) -> Intrinsics {
+    fn intrinsics(&self, _frame: usize) -> Intrinsics {
         CAMERA
     }
     fn pose(&self, frame: usize) -> Option<Pose> {

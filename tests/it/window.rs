@@ -302,6 +302,53 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
 }
 
 #[test]
+fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
+    let scene: Arc<dyn Scene> = Arc::new(Walls::new());
+    let mut setup = Setup {
+        references: Arc::clone(&scene),
+        queries: Arc::clone(&scene),
+        ..setup()
+    };
+    setup.task.protocol.methods = vec![Method::PM];
+    // A million hypotheses.
+    for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
+        setup.task.params.assign(change).expect("a good value");
+    }
+    let mut window = window(setup);
+    settle(&mut window);
+    wait(&mut window, |app| !app.desk().queries.is_painting());
+    std::thread::sleep(Duration::from_millis(100));
+    // Every worker has its handles on the scene.
+    let alone = Arc::strong_count(&scene);
+    let is_alone = |_: &App| Arc::strong_count(&scene) <= alone;
+    let mut stop_by = |command: Command| {
+        let begun = Instant::now();
+        window.state_mut().send(command);
+        window.step();
+        assert_eq!(window.state().desk().queries.progress(), None);
+        wait(&mut window, is_alone);
+        assert!(begun.elapsed() < Duration::from_secs(20));
+        let running = Instant::now();
+        while running.elapsed() < Duration::from_millis(200) {
+            window.step();
+        }
+        window.state_mut().send(Command::RunAllQueries);
+        window.step();
+        assert_eq!(window.state().desk().queries.progress(), Some((0, 3)));
+        wait(&mut window, |app| !is_alone(app));
+    };
+    // The first time there is nothing to stop but the session, which waits at its first event.
+    stop_by(Command::SetSeed(8));
+    stop_by(Command::RunAllQueries);
+    stop_by(Command::SetParam {
+        key: "grid.yaw_step".to_owned(),
+        value: "2".to_owned(),
+    });
+    stop_by(Command::SetReferences(vec![2]));
+    assert!(is_said(&window, "its settings were changed"));
+}
+
+#[test]
 fn what_goes_wrong_is_said_and_the_window_lives_on() {
     let mut setup = setup();
     setup.offered.push(UNREADABLE);

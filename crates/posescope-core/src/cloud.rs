@@ -11,6 +11,15 @@ pub struct Cloud {
     pub points: Vec<Point3<f32>>,
 }
 
+/// From x right, y down, z forward of the camera that the cloud is registered with \[m\].
+impl FromIterator<[f32; 3]> for Cloud {
+    fn from_iter<I: IntoIterator<Item = [f32; 3]>>(points: I) -> Self {
+        Self {
+            points: points.into_iter().map(Point3::from).collect(),
+        }
+    }
+}
+
 impl Cloud {
     /// Number of points.
     pub fn len(&self) -> usize {

@@ -22,6 +22,7 @@ pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
 
 use crate::describe::Describe;
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
+use crate::memo::Key;
 
 /// What the query and the synthetic view show at one covered pixel, each 0 … 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,8 +38,8 @@ pub trait Cost: Send + Sync {
     /// What the cost looks at in the query, each pixel 0 … 255.
     fn query_channel(&self, photo: &GrayImage) -> FloatImage;
 
-    /// Names what [`Self::query_channel`] makes, with all that it depends on.
-    fn query_channel_name(&self) -> String;
+    /// What [`Self::query_channel`] makes: all that it depends on beside the photo.
+    fn query_channel_key(&self) -> Key;
 
     /// What the cloud is coloured with before views of it are rendered: the value 0 … 255 at a place
     /// between the pixels of the reference photo \[px\]. Its grey values by cubic convolution, unless
@@ -50,17 +51,21 @@ pub trait Cost: Send + Sync {
         Box::new(|x, y| cubic_interpolated(photo, x, y))
     }
 
-    /// Names what [`Self::reference_channel`] makes, with all that it depends on: costs of the same
-    /// name share one coloured cloud.
-    fn reference_channel_name(&self) -> String {
-        "grey".to_owned()
+    /// What [`Self::reference_channel`] makes: all that it depends on beside the photo. Costs of equal
+    /// keys share one coloured cloud.
+    fn reference_channel_key(&self) -> Key {
+        Key::new("grey")
     }
 
     /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64>;
 
-    /// Why the cost of these pairs is what it is; `None` where there is no cost.
-    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation>;
+    /// Why the cost of these pairs is what it is; `None` where there is no cost, and for a cost that
+    /// has nothing of the kind to show.
+    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
+        let _ = pairs;
+        None
+    }
 }
 
 /// What a cost was made of.
@@ -88,6 +93,9 @@ pub trait CostParams: Describe + fmt::Debug + Send + Sync {
 
     /// The same parameters.
     fn boxed(&self) -> Box<dyn CostParams>;
+
+    /// The parameters to the last bit, as a key of what depends on them.
+    fn key(&self) -> Key;
 }
 
 /// What two images share, as a number 0 … 1.
@@ -156,8 +164,11 @@ impl Clone for CostSettings {
 
 impl PartialEq for CostSettings {
     fn eq(&self, other: &Self) -> bool {
-        let words = |settings: &Self| format!("{:?}", settings.0);
-        words(self) == words(other)
+        let keys = |settings: &Self| -> Vec<Key> {
+            let params = settings.0.iter();
+            params.map(|params| params.key()).collect()
+        };
+        keys(self) == keys(other)
     }
 }
 

@@ -5,11 +5,19 @@ use nalgebra::{Point2, Point3};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
+use crate::memo::Remembered;
 
 /// The cloud projected into its own camera, searchable by pixel.
 pub struct ProjectedCloudIndex {
     tree: Option<ImmutableKdTree<f64, 2>>,
     depths: Vec<f64>,
+}
+
+impl Remembered for ProjectedCloudIndex {
+    /// The tree holds each pixel position and its number, in leaves that are not all full.
+    fn heap_bytes(&self) -> usize {
+        self.depths.len() * (size_of::<f64>() + 2 * size_of::<[f64; 2]>())
+    }
 }
 
 /// What the projected cloud says about one pixel.

@@ -16,10 +16,9 @@ pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches};
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 
 use std::str::FromStr;
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
 
 use crate::cost;
-use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
@@ -76,6 +75,17 @@ pub struct Outcome {
     pub cost: Option<CostSummary>,
 }
 
+impl Outcome {
+    /// No pose, and nothing to say but why.
+    pub fn failed(failure: Failure) -> Self {
+        Self {
+            pose: Err(failure),
+            counts: None,
+            cost: None,
+        }
+    }
+}
+
 /// A way to find the query's pose.
 pub trait Estimator: Send + Sync {
     /// Localises the query.
@@ -83,11 +93,6 @@ pub trait Estimator: Send + Sync {
     /// # Errors
     /// Only [`Cancelled`]: a query without a pose is an [`Outcome`] with a [`Failure`].
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled>;
-
-    /// Features of photos may come from this cache, and go there. It saves time and nothing else.
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        let _ = features;
-    }
 
     /// The cost that this estimator minimises, at any pose of the query; `None` if it has none.
     fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {
@@ -240,8 +245,8 @@ impl From<Cancelled> for Halt {
     }
 }
 
-/// Separates "no pose" from "asked to stop".
-fn settle<T>(result: Result<T, Halt>) -> Result<Result<T, Failure>, Cancelled> {
+/// Separates a failure, which is an answer, from being asked to stop.
+fn separate_failure<T>(result: Result<T, Halt>) -> Result<Result<T, Failure>, Cancelled> {
     match result {
         Ok(value) => Ok(Ok(value)),
         Err(Halt::Failed(failure)) => Ok(Err(failure)),

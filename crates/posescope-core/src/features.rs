@@ -16,24 +16,27 @@
 //! is distinct, mutual, or neither.
 //!
 //! All of it runs on all threads of the current [`rayon`] pool and gives the same result
-//! on any number of them.
+//! on any number of them. [`surf_interruptible`] and [`nearest_neighbours_interruptible`] can be
+//! stopped on the way.
 
-mod cache;
 mod descriptor;
 mod detector;
 mod hessian;
 mod integral;
 mod matching;
 mod orientation;
+mod remembered;
 mod state;
 mod surf;
 
 use nalgebra::Point2;
 
-pub use cache::FeatureCache;
-pub use matching::{Match, MatchVerdict, Neighbours, classify, nearest_neighbours};
+pub use matching::{
+    Match, MatchVerdict, Neighbours, classify, nearest_neighbours, nearest_neighbours_interruptible,
+};
+pub use remembered::{remembered, remembered_interruptible};
 pub use state::FeatureState;
-pub use surf::{SurfParams, surf};
+pub use surf::{SurfParams, surf, surf_interruptible};
 
 /// A blob: the place in an image that a descriptor describes.
 #[derive(Clone, Copy, Debug, PartialEq)]

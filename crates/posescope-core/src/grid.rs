@@ -8,6 +8,7 @@ use nalgebra::{Translation3, Vector3};
 
 use crate::describe::{About, Describe, ParamVisitor};
 use crate::geometry::{Pose, yaw};
+use crate::memo::{Bits, bits_of_fields};
 use crate::render::Score;
 
 /// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.
@@ -130,6 +131,12 @@ pub struct Offset {
     pub yaw_rad: f64,
 }
 
+bits_of_fields!(Offset {
+    right_m,
+    forward_m,
+    yaw_rad
+});
+
 impl Offset {
     /// The offset of a camera `reference_from_camera`. What no offset has is left out: height, pitch
     /// and roll.
@@ -165,6 +172,12 @@ pub enum Phase {
     YawFine,
 }
 
+impl Bits for Phase {
+    fn write(&self, words: &mut Vec<u64>) {
+        words.push(*self as u64);
+    }
+}
+
 impl Phase {
     /// The order of the search.
     pub const ALL: [Self; 4] = [
@@ -179,6 +192,16 @@ impl Phase {
         matches!(self, Self::YawCoarse | Self::YawFine)
     }
 
+    /// What makes its lattice smaller.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::PositionCoarse => "raise grid.coarse_step or lower the radius",
+            Self::PositionFine => "raise grid.fine_step or lower grid.fine_range",
+            Self::YawCoarse => "raise grid.yaw_step or lower grid.yaw_range",
+            Self::YawFine => "raise grid.yaw_fine_step or lower grid.yaw_fine_range",
+        }
+    }
+
     /// The name that people read.
     pub fn name(self) -> &'static str {
         match self {
@@ -188,6 +211,29 @@ impl Phase {
             Self::YawFine => "yaw, fine",
         }
     }
+}
+
+/// Cells of a lattice at most: 1,024 × 1,024, which is a radius of 511 m in steps of 1 m, or of 50 m
+/// in steps of 0.1 m.
+///
+/// Scoring as many hypotheses takes ten minutes on one core, their scores 24 MB, and what a window
+/// remembers of them 200 MB. A radius of 500 m in steps of 0.05 m would be 400 million: a week, and
+/// tens of gigabytes.
+pub const MOST_CELLS: usize = 1 << 20;
+
+/// A phase of the search has more than [`MOST_CELLS`].
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the search grid is too large: {} has {cells:.0} cells, at most {MOST_CELLS} are searched; {}",
+    phase.name(),
+    phase.remedy()
+)]
+pub struct LatticeTooLarge {
+    /// The phase.
+    pub phase: Phase,
+    /// The cells that its lattice would have, those left out included; they may be more than there
+    /// are numbers for.
+    pub cells: f64,
 }
 
 /// The hypotheses of one phase: a regular lattice of offsets around a centre.
@@ -207,9 +253,26 @@ pub struct Lattice {
     reach_m: f64,
 }
 
+bits_of_fields!(Lattice {
+    phase,
+    columns,
+    rows,
+    step,
+    centre,
+    reach_m,
+});
+
 impl Lattice {
     /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].
-    pub fn new(phase: Phase, centre: Offset, radius_m: f64, params: &GridParams) -> Self {
+    ///
+    /// # Errors
+    /// [`LatticeTooLarge`]: more than [`MOST_CELLS`].
+    pub fn new(
+        phase: Phase,
+        centre: Offset,
+        radius_m: f64,
+        params: &GridParams,
+    ) -> Result<Self, LatticeTooLarge> {
         let (half_range, step) = match phase {
             Phase::PositionCoarse => (radius_m, params.coarse_step_m),
             Phase::PositionFine => (params.fine_range_m, params.fine_step_m),
@@ -223,9 +286,14 @@ impl Lattice {
             ),
         };
         // The tolerance keeps 1.0 / 0.2 from becoming 4 steps.
-        let steps = (half_range / step + 1e-9).floor().max(0.0) as usize;
-        let side = 2 * steps + 1;
-        Self {
+        let steps = (half_range / step + 1e-9).floor().max(0.0);
+        let side = 2.0 * steps + 1.0;
+        let cells = if phase.is_yaw() { side } else { side * side };
+        if cells > MOST_CELLS as f64 {
+            return Err(LatticeTooLarge { phase, cells });
+        }
+        let side = side as usize;
+        Ok(Self {
             phase,
             columns: side,
             rows: if phase.is_yaw() { 1 } else { side },
@@ -235,7 +303,7 @@ impl Lattice {
                 Phase::PositionCoarse => radius_m,
                 _ => f64::INFINITY,
             },
-        }
+        })
     }
 
     /// Number of cells, those left out included.
@@ -358,6 +426,40 @@ mod tests {
     use nalgebra::Point3;
     use proptest::prelude::*;
 
+    fn lattice(phase: Phase, centre: Offset, radius_m: f64) -> Lattice {
+        Lattice::new(phase, centre, radius_m, &GridParams::default()).expect("small")
+    }
+
+    #[test]
+    fn a_lattice_beyond_the_limit_is_refused_and_one_at_the_limit_is_not() {
+        let coarse = |radius_m, coarse_step_m| {
+            let params = GridParams {
+                coarse_step_m,
+                ..GridParams::default()
+            };
+            Lattice::new(Phase::PositionCoarse, Offset::default(), radius_m, &params)
+                .map(|lattice| lattice.cells())
+        };
+        assert_eq!(coarse(511.0, 1.0), Ok(1023 * 1023));
+        let refused = coarse(500.0, 0.05).expect_err("400 million");
+        assert_eq!(refused.cells, 20_001.0 * 20_001.0);
+        assert_eq!(
+            refused.to_string(),
+            "the search grid is too large: position, coarse has 400040001 cells, at most 1048576 \
+             are searched; raise grid.coarse_step or lower the radius"
+        );
+        for radius_m in [1e300, f64::INFINITY] {
+            assert!(coarse(radius_m, 0.05).is_err());
+        }
+        let params = GridParams {
+            fine_range_m: 10.0,
+            fine_step_m: 0.01,
+            ..GridParams::default()
+        };
+        let refused = Lattice::new(Phase::PositionFine, Offset::default(), 1.0, &params);
+        assert_eq!(refused.expect_err("4 million").cells, 2001.0 * 2001.0);
+    }
+
     #[test]
     fn the_fine_lattice_reaches_both_ends_and_contains_its_centre() {
         let centre = Offset {
@@ -365,7 +467,7 @@ mod tests {
             forward_m: -2.0,
             yaw_rad: 0.0,
         };
-        let lattice = Lattice::new(Phase::PositionFine, centre, 10.0, &GridParams::default());
+        let lattice = lattice(Phase::PositionFine, centre, 10.0);
         assert_eq!((lattice.columns, lattice.rows), (11, 11));
         assert_eq!(lattice.offset(60), Some(centre));
         let first = lattice.offset(0).expect("inside");
@@ -374,16 +476,14 @@ mod tests {
 
     #[test]
     fn coarse_positions_fill_the_disc_and_no_more() {
-        let params = GridParams::default();
-        let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 2.0, &params);
+        let lattice = lattice(Phase::PositionCoarse, Offset::default(), 2.0);
         assert_eq!(lattice.cells(), 25);
         assert_eq!(lattice.hypotheses().count(), 13);
     }
 
     #[test]
     fn yaw_angles_are_centred_and_symmetric() {
-        let params = GridParams::default();
-        let lattice = Lattice::new(Phase::YawCoarse, Offset::default(), 5.0, &params);
+        let lattice = lattice(Phase::YawCoarse, Offset::default(), 5.0);
         let yaws: Vec<_> = lattice.hypotheses().map(|(_, o)| o.yaw_rad).collect();
         assert_eq!(yaws.len(), 21);
         assert!((yaws[0] + 10_f64.to_radians()).abs() < 1e-12);
@@ -407,12 +507,7 @@ mod tests {
     }
 
     fn scored(costs: &[Option<f64>], covered: u32, columns: usize) -> ScoredLattice {
-        let mut lattice = Lattice::new(
-            Phase::YawCoarse,
-            Offset::default(),
-            1.0,
-            &GridParams::default(),
-        );
+        let mut lattice = lattice(Phase::YawCoarse, Offset::default(), 1.0);
         lattice.columns = columns;
         lattice.rows = costs.len() / columns;
         ScoredLattice {

@@ -5,8 +5,17 @@ use std::path::Path;
 pub use image::{GrayImage, RgbImage};
 use image::{ImageBuffer, Luma};
 
+use crate::input::InputError;
+use crate::memo::Remembered;
+
 /// A grey image of real values in 0 … 255.
 pub type FloatImage = ImageBuffer<Luma<f32>, Vec<f32>>;
+
+impl Remembered for FloatImage {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.as_raw().as_slice())
+    }
+}
 
 /// A photograph: the grey values that the estimators work on, and its colours where it has any.
 #[derive(Clone, Debug)]
@@ -24,6 +33,23 @@ impl Photo {
             gray: image::imageops::grayscale(&color),
             color: Some(color),
         }
+    }
+
+    /// A photo of a grey camera from its values, row by row from the top left.
+    ///
+    /// # Errors
+    /// [`InputError::PixelCount`] when the values are not as many as the image has pixels.
+    pub fn from_gray_values(width: u32, height: u32, values: Vec<u8>) -> Result<Self, InputError> {
+        let given = values.len();
+        let is_whole = u64::from(width) * u64::from(height) == given as u64;
+        GrayImage::from_raw(width, height, values)
+            .filter(|_| is_whole)
+            .map(Self::from_gray)
+            .ok_or(InputError::PixelCount {
+                width,
+                height,
+                given,
+            })
     }
 
     /// A photo of a grey camera.
@@ -49,6 +75,12 @@ impl Photo {
     /// Width and height \[px\].
     pub fn dimensions(&self) -> (u32, u32) {
         self.gray.dimensions()
+    }
+
+    /// Memory that the pixels take \[bytes\].
+    pub fn bytes(&self) -> usize {
+        let color = self.color.as_ref().map_or(0, |color| color.as_raw().len());
+        self.gray.as_raw().len() + color
     }
 }
 
@@ -98,6 +130,17 @@ fn catmull_rom_weights(t: f32) -> [f32; 4] {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn grey_values_are_taken_row_by_row_and_must_be_as_many_as_pixels() {
+        let photo = Photo::from_gray_values(3, 2, vec![0, 1, 2, 3, 4, 5]).expect("six");
+        assert_eq!(photo.gray.get_pixel(1, 1).0, [4]);
+        for given in [5, 7] {
+            let refused = Photo::from_gray_values(3, 2, vec![0; given]).expect_err("not six");
+            let expected = format!("{given} grey values given, 3 x 2 px need 6");
+            assert_eq!(refused.to_string(), expected);
+        }
+    }
 
     #[test]
     fn smoothing_keeps_a_constant_and_spreads_a_dot_like_a_gaussian() {

@@ -4,10 +4,11 @@
 mod localizer;
 mod result;
 mod select;
+mod single;
 mod timing;
 mod watch;
 
-pub use localizer::{LocalizeError, Localizer, Request, words_of};
+pub use localizer::{LocalizeError, Localizer, Request};
 pub use result::{
     CostReport, Diagnosis, PoseReport, QueryResult, Reason, SCHEMA, Setting, Status, evaluate,
 };
@@ -15,5 +16,6 @@ pub use select::{
     ByMatches, ChoiceError, Chooser, Ranking, References, Selection, draw, frames_within,
     tell_ranking,
 };
+pub use single::{localize, localize_by, localize_traced, words_of};
 pub use timing::{StageTimes, StageTimings};
 pub use watch::{Unwatched, Watch};

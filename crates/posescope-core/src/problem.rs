@@ -6,6 +6,7 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
+use crate::input::InputError;
 use crate::memo::Memo;
 
 /// The photo whose pose is sought.
@@ -13,12 +14,33 @@ use crate::memo::Memo;
 pub struct Query {
     /// The frame's name in its scene.
     pub name: String,
-    /// The photo.
-    pub photo: Photo,
+    /// The photo I_Q.
+    pub photo: Arc<Photo>,
     /// The query camera.
     pub intrinsics: Intrinsics,
-    /// What estimators worked out about this query.
+    /// What estimators worked out about this frame.
     pub memo: Memo,
+}
+
+impl Query {
+    /// A photo and the camera that took it.
+    ///
+    /// # Errors
+    /// [`InputError`] when the photo is not of the camera's size, or no camera is like that.
+    pub fn new(
+        name: impl Into<String>,
+        photo: Photo,
+        intrinsics: Intrinsics,
+    ) -> Result<Self, InputError> {
+        let name = name.into();
+        check_camera(&name, &photo, &intrinsics)?;
+        Ok(Self {
+            name,
+            photo: Arc::new(photo),
+            intrinsics,
+            memo: Memo::off(),
+        })
+    }
 }
 
 /// A photo with known pose and the cloud registered with it: the paper's reference tuple (I_R, P_R).
@@ -27,15 +49,79 @@ pub struct ReferenceTuple {
     /// The frame's name in its scene.
     pub name: String,
     /// The photo I_R.
-    pub photo: Photo,
+    pub photo: Arc<Photo>,
     /// The reference camera.
     pub intrinsics: Intrinsics,
     /// Where the reference camera stood.
     pub world_from_camera: Pose,
     /// The cloud P_R, in the reference camera's frame.
     pub cloud: Cloud,
-    /// What estimators worked out about this reference.
+    /// What estimators worked out about this frame.
     pub memo: Memo,
+}
+
+impl ReferenceTuple {
+    /// A photo, the camera that took it and its pose, and a cloud in the frame of that camera.
+    ///
+    /// # Errors
+    /// [`InputError`] when the photo is not of the camera's size, no camera is like that, or the pose
+    /// is not finite. An empty cloud is no error: every method says that nothing is in view.
+    pub fn new(
+        name: impl Into<String>,
+        photo: Photo,
+        intrinsics: Intrinsics,
+        world_from_camera: Pose,
+        cloud: Cloud,
+    ) -> Result<Self, InputError> {
+        let name = name.into();
+        check_camera(&name, &photo, &intrinsics)?;
+        if !world_from_camera
+            .to_homogeneous()
+            .iter()
+            .all(|x| x.is_finite())
+        {
+            return Err(InputError::Pose { frame: name });
+        }
+        Ok(Self {
+            name,
+            photo: Arc::new(photo),
+            intrinsics,
+            world_from_camera,
+            cloud,
+            memo: Memo::off(),
+        })
+    }
+}
+
+fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<(), InputError> {
+    let Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    } = *intrinsics;
+    let is_focal = |length: f64| length.is_finite() && length > 0.0;
+    if !is_focal(fx)
+        || !is_focal(fy)
+        || !cx.is_finite()
+        || !cy.is_finite()
+        || width == 0
+        || height == 0
+    {
+        return Err(InputError::Camera {
+            frame: name.to_owned(),
+        });
+    }
+    if photo.dimensions() != (width, height) {
+        return Err(InputError::PhotoSize {
+            frame: name.to_owned(),
+            photo: photo.dimensions(),
+            camera: (width, height),
+        });
+    }
+    Ok(())
 }
 
 /// One query to localise against one reference tuple.
@@ -43,9 +129,9 @@ pub struct ReferenceTuple {
 /// Several references are several problems that share their query.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// What is sought.
+    /// The photo whose pose is sought.
     pub query: Arc<Query>,
-    /// What is known.
+    /// The photo, pose and cloud that are known.
     pub reference: Arc<ReferenceTuple>,
     /// How far from the reference the query may be \[m\].
     ///
@@ -56,6 +142,28 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// A query that is at most `uncertainty_radius_m` from the reference, with seed 0.
+    ///
+    /// # Errors
+    /// [`InputError::Radius`] when the radius is not a finite number above 0.
+    pub fn new(
+        query: impl Into<Arc<Query>>,
+        reference: impl Into<Arc<ReferenceTuple>>,
+        uncertainty_radius_m: f64,
+    ) -> Result<Self, InputError> {
+        if !(uncertainty_radius_m.is_finite() && uncertainty_radius_m > 0.0) {
+            return Err(InputError::Radius {
+                radius_m: uncertainty_radius_m,
+            });
+        }
+        Ok(Self {
+            query: query.into(),
+            reference: reference.into(),
+            uncertainty_radius_m,
+            seed: 0,
+        })
+    }
+
     /// The pose of a camera whose pose in the reference camera's frame is `reference_from_query`.
     pub fn world_from_query(&self, reference_from_query: &Pose) -> Pose {
         self.reference.world_from_camera * reference_from_query
@@ -73,5 +181,77 @@ impl Problem {
     /// The inverse of [`Self::world_from_query`].
     pub fn reference_from_query(&self, world_from_query: &Pose) -> Pose {
         self.reference.world_from_camera.inverse() * world_from_query
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::GrayImage;
+
+    const CAMERA: Intrinsics = Intrinsics {
+        fx: 30.0,
+        fy: 30.0,
+        cx: 15.5,
+        cy: 11.5,
+        width: 32,
+        height: 24,
+    };
+
+    fn photo(width: u32, height: u32) -> Photo {
+        Photo::from_gray(GrayImage::new(width, height))
+    }
+
+    #[test]
+    fn a_photo_of_another_size_than_its_camera_is_refused_by_name() {
+        let refused = Query::new("a", photo(24, 32), CAMERA).expect_err("turned");
+        assert_eq!(
+            refused.to_string(),
+            "the photo of a has 24x32 px, its camera 32x24"
+        );
+        let pose = Pose::identity();
+        let cloud = Cloud::default();
+        let refused = ReferenceTuple::new("b", photo(31, 24), CAMERA, pose, cloud);
+        assert!(matches!(refused, Err(InputError::PhotoSize { .. })));
+    }
+
+    #[test]
+    fn what_is_no_camera_no_pose_or_no_radius_is_refused() {
+        for wrong in [
+            Intrinsics { fx: 0.0, ..CAMERA },
+            Intrinsics {
+                fy: f64::NAN,
+                ..CAMERA
+            },
+            Intrinsics {
+                cx: f64::INFINITY,
+                ..CAMERA
+            },
+        ] {
+            let refused = Query::new("a", photo(32, 24), wrong);
+            assert!(
+                matches!(refused, Err(InputError::Camera { .. })),
+                "{wrong:?}"
+            );
+        }
+        let empty = Intrinsics { width: 0, ..CAMERA };
+        let refused = Query::new("a", photo(0, 24), empty);
+        assert!(matches!(refused, Err(InputError::Camera { .. })));
+
+        let nowhere = Pose::translation(f64::NAN, 0.0, 0.0);
+        let reference =
+            |pose| ReferenceTuple::new("b", photo(32, 24), CAMERA, pose, Cloud::default());
+        assert!(matches!(reference(nowhere), Err(InputError::Pose { .. })));
+
+        let query = Arc::new(Query::new("a", photo(32, 24), CAMERA).expect("fits"));
+        let reference = Arc::new(reference(Pose::identity()).expect("fits"));
+        for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let refused = Problem::new(Arc::clone(&query), Arc::clone(&reference), radius);
+            assert!(
+                matches!(refused, Err(InputError::Radius { .. })),
+                "{radius}"
+            );
+        }
+        assert!(Problem::new(query, reference, 3.0).is_ok());
     }
 }

@@ -6,10 +6,11 @@ mod score;
 mod splat;
 
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
-pub use score::{Comparison, Score, Scorer};
+pub use score::{Comparison, MOST_AT_A_TIME, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
 use crate::describe::{About, Describe, ParamVisitor};
+use crate::memo::bits_of_fields;
 
 /// How the cloud is coloured and splatted.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +28,13 @@ pub struct RenderParams {
     /// Side of the window in which a nearer surface hides a point \[px\], odd.
     pub visibility_window_px: usize,
 }
+
+bits_of_fields!(RenderParams {
+    splat_px,
+    visibility,
+    visibility_margin,
+    visibility_window_px,
+});
 
 impl Default for RenderParams {
     fn default() -> Self {

@@ -5,6 +5,7 @@
 //! | [`mod@mlesac`] | which pose makes all the residuals likeliest? | random samples, scored by a mixture |
 //! | `likelihood` | how likely are the residuals of a pose? | Gaussian + uniform, the mixing by EM |
 //! | `local` | which pose do all who agree prefer? | refined on the inliers until likelihood stops rising |
+//! | [`params`] | what decides it? | σ, threshold, confidence, trials |
 //! | [`consensus`] | what came of it? | trials, consensus, errors |
 //! | [`acceptance`] | are the inliers more than chance explains? | an a-contrario test |
 
@@ -13,8 +14,10 @@ pub mod consensus;
 mod likelihood;
 mod local;
 pub mod mlesac;
+pub mod params;
 
 pub use acceptance::{Acceptance, AcceptanceRule, effective_area_px, inliers_beyond_chance};
 pub use consensus::{Consensus, Hypothesis, MlesacError, Trial};
 pub use likelihood::Score;
-pub use mlesac::{MlesacParams, mlesac};
+pub use mlesac::mlesac;
+pub use params::MlesacParams;

@@ -1,12 +1,14 @@
 //! Scenes: anything that yields frames (photo, intrinsics, perhaps a pose, perhaps a cloud).
 
 mod error;
+mod frames;
 
 use std::sync::Arc;
 
 use xxhash_rust::xxh3::Xxh3;
 
 pub use error::SceneError;
+pub use frames::{AtHand, FrameStore};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -24,8 +26,8 @@ pub trait Scene: Send + Sync {
     /// The frames' names, as their files are called, in their order.
     fn frames(&self) -> &[String];
 
-    /// The camera of all frames.
-    fn intrinsics(&self) -> Intrinsics;
+    /// The camera of the frame, and with it the size of its photo.
+    fn intrinsics(&self, frame: usize) -> Intrinsics;
 
     /// `world_from_camera`, where it is known.
     fn pose(&self, frame: usize) -> Option<Pose>;
@@ -39,7 +41,7 @@ pub trait Scene: Send + Sync {
     /// The photo.
     ///
     /// # Errors
-    /// When it cannot be read or is not of the size that the scene has.
+    /// When it cannot be read or is not of the size that its camera has.
     fn photo(&self, frame: usize) -> Result<Photo, SceneError>;
 
     /// The cloud, in the camera's frame.
@@ -55,32 +57,21 @@ pub trait Scene: Send + Sync {
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::new(Query {
             name: self.frames()[frame].clone(),
-            photo: self.photo(frame)?,
-            intrinsics: self.intrinsics(),
+            photo: Arc::new(self.photo(frame)?),
+            intrinsics: self.intrinsics(frame),
             memo: Memo::off(),
         }))
     }
 
-    /// The frame as a reference tuple.
+    /// The frame as a reference tuple: the photo of [`Scene::query`], with which it remembers, and
+    /// pose and cloud. A scene that has these need not have its own.
     ///
     /// # Errors
     /// As [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
     fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
-        let name = &self.frames()[frame];
-        let Some(world_from_camera) = self.pose(frame) else {
-            return Err(SceneError::NoPose {
-                scene: self.name().to_owned(),
-                frame: name.clone(),
-            });
-        };
-        Ok(Arc::new(ReferenceTuple {
-            name: name.clone(),
-            photo: self.photo(frame)?,
-            intrinsics: self.intrinsics(),
-            world_from_camera,
-            cloud: self.cloud(frame)?,
-            memo: Memo::off(),
-        }))
+        let world_from_camera = pose_of(self, frame)?;
+        let query = self.query(frame)?;
+        reference_of(self, frame, world_from_camera, &query)
     }
 
     /// A number that changes with the photos, as far as can be told without reading them: what was
@@ -90,16 +81,55 @@ pub trait Scene: Send + Sync {
     }
 }
 
+fn pose_of(scene: &(impl Scene + ?Sized), frame: usize) -> Result<Pose, SceneError> {
+    scene.pose(frame).ok_or_else(|| SceneError::NoPose {
+        scene: scene.name().to_owned(),
+        frame: scene.frames()[frame].clone(),
+    })
+}
+
+/// The reference tuple of a frame whose photo is read already.
+fn reference_of(
+    scene: &(impl Scene + ?Sized),
+    frame: usize,
+    world_from_camera: Pose,
+    query: &Query,
+) -> Result<Arc<ReferenceTuple>, SceneError> {
+    Ok(Arc::new(ReferenceTuple {
+        name: query.name.clone(),
+        photo: Arc::clone(&query.photo),
+        intrinsics: query.intrinsics,
+        world_from_camera,
+        cloud: scene.cloud(frame)?,
+        memo: query.memo.shared(),
+    }))
+}
+
 /// A number for what a scene is and holds, and whatever else its format knows.
+///
+/// The first frame's camera stands for all, and those that differ from the one before follow the
+/// names: an index that was built when scenes had one camera each is still valid.
 pub fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
     let mut sum = Xxh3::new();
-    let parts = [scene.name(), &format!("{:?}", scene.intrinsics())];
-    for part in parts
-        .into_iter()
-        .chain(scene.frames().iter().map(String::as_str))
-    {
+    let mut add = |part: &str| {
         sum.update(part.as_bytes());
         sum.update(b"\n");
+    };
+    let frames = scene.frames();
+    let cameras = (0..frames.len()).map(|frame| (frame, scene.intrinsics(frame)));
+    let mut last = None;
+    let changes: Vec<_> = cameras
+        .filter(|(_, camera)| last.replace(*camera) != Some(*camera))
+        .collect();
+    add(scene.name());
+    if let Some((_, first)) = changes.first() {
+        add(&format!("{first:?}"));
+    }
+    for name in frames {
+        add(name);
+    }
+    for (frame, camera) in changes.iter().skip(1) {
+        add(&format!("{frame} {camera:?}"));
     }
     sum.update(more);
     sum.digest()
@@ -143,4 +173,74 @@ pub struct Entry {
     pub recognizes: fn(&str) -> bool,
     /// Opens the scene.
     pub open: fn(&str) -> Result<Box<dyn Scene>, SceneError>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use xxhash_rust::xxh3::xxh3_64;
+
+    /// Frames `a`, `b`, `c` with these focal lengths, and nothing else.
+    struct Bare([String; 3], [f64; 3]);
+
+    impl Scene for Bare {
+        fn name(&self) -> &str {
+            "bare"
+        }
+        fn frames(&self) -> &[String] {
+            &self.0
+        }
+        fn intrinsics(&self, frame: usize) -> Intrinsics {
+            Intrinsics {
+                fx: self.1[frame],
+                fy: 1.5,
+                cx: 2.0,
+                cy: 1.0,
+                width: 5,
+                height: 3,
+            }
+        }
+        fn pose(&self, _frame: usize) -> Option<Pose> {
+            None
+        }
+        fn time_s(&self, _frame: usize) -> Option<f64> {
+            None
+        }
+        fn has_cloud(&self, _frame: usize) -> bool {
+            false
+        }
+        fn photo(&self, _frame: usize) -> Result<Photo, SceneError> {
+            Ok(Photo::from_gray(crate::image::GrayImage::new(5, 3)))
+        }
+        fn cloud(&self, _frame: usize) -> Result<Cloud, SceneError> {
+            Ok(Cloud::default())
+        }
+    }
+
+    fn bare(focal_lengths: [f64; 3]) -> Bare {
+        Bare(["a", "b", "c"].map(str::to_owned), focal_lengths)
+    }
+
+    #[test]
+    fn the_fingerprint_of_a_scene_with_one_camera_stays_what_it_was() {
+        let camera = "Intrinsics { fx: 1.5, fy: 1.5, cx: 2.0, cy: 1.0, width: 5, height: 3 }";
+        let written = format!("bare\n{camera}\na\nb\nc\nmore");
+        let scene = bare([1.5; 3]);
+        assert_eq!(fingerprint(&scene, b"more"), xxh3_64(written.as_bytes()));
+        assert_eq!(scene.fingerprint(), fingerprint(&scene, b""));
+    }
+
+    #[test]
+    fn a_fingerprint_tells_which_frame_has_which_camera() {
+        let all = [
+            [1.5, 1.5, 1.5],
+            [1.5, 1.5, 2.0],
+            [1.5, 2.0, 1.5],
+            [1.5, 2.0, 2.0],
+            [2.0, 1.5, 1.5],
+        ];
+        let mut sums = all.map(|lengths| bare(lengths).fingerprint());
+        sums.sort_unstable();
+        assert!(sums.windows(2).all(|two| two[0] != two[1]));
+    }
 }

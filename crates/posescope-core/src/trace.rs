@@ -130,6 +130,14 @@ impl<'a> Trace<'a> {
         Ok(())
     }
 
+    /// Whether anybody wants this kind of event now. For what is kept to be told again: what is told
+    /// at once asks [`Self::emit`], which runs its closure only then.
+    pub fn wants<E: DebugEvent>(&self) -> bool {
+        self.watcher
+            .as_ref()
+            .is_some_and(|watcher| watcher.wanted.contains(E::KIND))
+    }
+
     /// For long loops that tell nothing: lets the watcher pause or stop the run.
     ///
     /// # Errors

@@ -1,16 +1,11 @@
-//! Rays from one point that go nearly the same way, and the few solids that they can meet.
-
-use std::sync::{Arc, OnceLock};
+//! Rays from one point that go nearly the same way.
 
 use nalgebra::{Point3, Vector3};
-
-use super::box_tree::{BoxTree, Thicket, backwards};
-use super::frame::Ray;
 
 /// A pyramid of rays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beam {
-    /// Where they begin.
+    /// The point where all rays begin.
     pub(super) origin: Point3<f64>,
     /// The normals of its four sides, towards its inside.
     sides: [Vector3<f64>; 4],
@@ -54,32 +49,5 @@ impl Beam {
         let [low, high] = corners.map(|corner| corner.cast() - self.origin);
         let outside = Vector3::from_fn(|axis, _| low[axis].max(-high[axis]).max(0.0));
         outside.norm() as f32
-    }
-}
-
-/// A beam and what its rays can meet, for every octant that any of them points to.
-#[derive(Debug)]
-pub(super) struct Sector {
-    beam: Beam,
-    tree: Arc<BoxTree>,
-    octants: [OnceLock<Thicket>; 8],
-}
-
-impl Sector {
-    /// The part of a tree in a beam.
-    pub(super) fn new(tree: &Arc<BoxTree>, beam: Beam) -> Self {
-        Self {
-            beam,
-            tree: Arc::clone(tree),
-            octants: Default::default(),
-        }
-    }
-
-    /// What a ray of the beam can meet.
-    #[inline]
-    pub(super) fn thicket(&self, ray: &Ray) -> &Thicket {
-        let backwards = backwards(&ray.direction);
-        let octant = (0..3).map(|axis| usize::from(backwards[axis]) << axis);
-        self.octants[octant.sum::<usize>()].get_or_init(|| self.tree.within(&self.beam, backwards))
     }
 }

@@ -1,5 +1,6 @@
 //! A hierarchy of bounding boxes over the solids.
 
+mod sector;
 mod thicket;
 
 use std::cell::Cell;
@@ -9,7 +10,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::beam::Beam;
 use super::frame::Ray;
-pub(super) use thicket::Thicket;
+pub(super) use sector::Sector;
+use thicket::Thicket;
 
 /// Solids per leaf.
 const LEAF: usize = 2;
@@ -222,7 +224,7 @@ fn inverse(direction: &Vector3<f64>) -> Vector3<f32> {
 
 /// Along which axes a direction points backwards.
 #[inline]
-pub(super) fn backwards(direction: &Vector3<f64>) -> [bool; 3] {
+fn backwards(direction: &Vector3<f64>) -> [bool; 3] {
     // The sign of a zero counts: its reciprocal has it too.
     [0, 1, 2].map(|axis| direction[axis].is_sign_negative())
 }

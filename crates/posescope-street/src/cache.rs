@@ -21,7 +21,7 @@ pub(crate) trait Stored: Sized {
 
 /// Values by their key. A key names everything that the value depends on.
 pub(crate) struct Cache<T> {
-    recent: Recent<T>,
+    recent: Recent<String, Arc<T>>,
     disk: Option<Arc<DiskCache>>,
 }
 
@@ -50,8 +50,7 @@ impl<T: Stored> Cache<T> {
             }
             made
         }));
-        self.recent.insert(key, Arc::clone(&value));
-        value
+        self.recent.insert(key.to_owned(), value)
     }
 }
 

@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
+use super::contact::{Contact, Part};
 use super::frame::Ray;
 use super::intersect::{Plane, clip, first_beyond};
 use super::noise::{derive, unit};
-use super::shape::{Contact, Part};
 
 const WHEEL_RADIUS: f64 = 0.32;
 const WHEEL_WIDTH: f64 = 0.2;

@@ -2,12 +2,13 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
+use super::appearance::{Appearance, Rgb, blend};
 use super::camera_path::LANE;
+use super::contact::{Contact, Part};
 use super::ground::GroundContact;
-use super::material::{Appearance, Material, Rgb, Solid, blend};
+use super::material::{Material, Solid};
 use super::noise::{Footprint, octaves, value2};
 use super::pattern::step;
-use super::shape::{Contact, Part};
 
 /// Half the distance of a car's wheels \[m\].
 const HALF_TRACK: f64 = 0.75;

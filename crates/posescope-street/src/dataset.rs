@@ -4,8 +4,11 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::Point3;
 
+use super::condition::Condition;
 use super::frame_cache::{self, FrameCache, Poses};
-use super::{Condition, ScanPoint, Size, Traversal, lidar};
+use super::lidar::{self, ScanPoint};
+use super::size::Size;
+use super::traversal::Traversal;
 use posescope_core::camera::Intrinsics;
 use posescope_core::cloud::Cloud;
 use posescope_core::geometry::Pose;
@@ -152,7 +155,7 @@ impl Scene for Street {
         })
     }
 
-    fn intrinsics(&self) -> Intrinsics {
+    fn intrinsics(&self, _frame: usize) -> Intrinsics {
         self.size.intrinsics()
     }
 
@@ -246,7 +249,10 @@ mod tests {
         let fresh = Photo::from_color(drive.image(frame));
         assert_eq!((photo.color, photo.gray), (fresh.color, fresh.gray));
         assert_eq!(cloud.points, positions(&drive.cloud(frame)));
-        assert_eq!(street.poses(), drive.poses);
+        let poses: Vec<_> = (0..drive.frame_count())
+            .map(|frame| drive.world_from_camera(frame))
+            .collect();
+        assert_eq!(street.poses(), poses);
     }
 
     #[test]

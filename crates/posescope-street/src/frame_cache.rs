@@ -13,8 +13,9 @@ use posescope_core::cloud::Cloud;
 use posescope_core::geometry::Pose;
 use posescope_core::image::Photo;
 
-/// In memory. A full-size frame is 3 MB: photo with its grey values, and cloud.
-const FRAMES_IN_MEMORY: usize = 32;
+/// In memory. A full-size frame is 3 MB: photo with its grey values, and cloud. Few, because whoever
+/// localises keeps the frames in use anyway.
+const FRAMES_IN_MEMORY: usize = 4;
 /// On disk \[bytes\]: 240 full-size frames.
 const DISK_LIMIT: u64 = 512 << 20;
 /// Of the renderer's sources.

@@ -4,10 +4,11 @@ use nalgebra::{Point2, Point3, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
+use super::appearance::{Rgb, grey};
 use super::car::CarShape;
 use super::frame::Frame;
 use super::lamps;
-use super::material::{Material, Rgb, Sign, grey};
+use super::material::{Material, Sign};
 use super::network::{HALF_WIDTH, PAVEMENT};
 use super::path::{Station, right_of};
 use super::plot::{Builder, Plot};

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
+use super::appearance::{Appearance, Rgb, blend, grey};
 use super::frame::Ray;
-use super::material::{Appearance, Rgb, blend, grey};
 use super::network::{HALF_WIDTH, Network, PAVEMENT, Place};
 use super::noise::{Footprint, derive, floor, hash2, octaves, unit, value2};
 use super::pattern::{bar, step, stripes};

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::material::Rgb;
-use super::render::town_ray;
+use super::appearance::Rgb;
+use super::world::town_ray;
 use posescope_core::geometry::Pose;
 
 /// Between the two lamps, in the camera frame \[m\].

@@ -3,10 +3,11 @@
 use nalgebra::{Point2, Vector2, Vector3};
 use rand::RngExt;
 
+use super::appearance::{Rgb, grey};
 use super::facade::{Facade, GroundFloor, Wall};
 use super::frame::Frame;
 use super::lamps;
-use super::material::{Material, Rgb, Sign, grey};
+use super::material::{Material, Sign};
 use super::network::{HALF_WIDTH, PAVEMENT};
 use super::path::right_of;
 use super::plot::{Builder, Plot};

@@ -3,8 +3,8 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
+use super::contact::{Contact, Part};
 use super::frame::{Frame, Ray};
-use super::shape::{Contact, Part};
 
 /// A half-space `normal · p ≤ offset`.
 pub(super) type Plane = (Vector3<f64>, f64);

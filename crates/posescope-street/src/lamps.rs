@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
-use super::material::Rgb;
+use super::appearance::Rgb;
 
 /// Colour of sodium light.
 pub(super) const COLOUR: Rgb = Rgb::new(1.0, 0.70, 0.36);

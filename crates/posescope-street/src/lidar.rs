@@ -6,12 +6,12 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::beam::{Beam, Sector};
-use super::box_tree::BoxTree;
+use super::beam::Beam;
+use super::box_tree::{BoxTree, Sector};
 use super::look::Look;
 use super::noise::{derive, hash2, normal, unit};
-use super::render::town_ray;
 use super::town::Town;
+use super::world::town_ray;
 use posescope_core::geometry::Pose;
 
 /// Where the scanner is in the camera frame \[m\]: above and behind.

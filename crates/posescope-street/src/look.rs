@@ -2,9 +2,9 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
+use super::appearance::{Appearance, Rgb, blend};
 use super::cover::Cover;
 use super::lens::Lens;
-use super::material::{Appearance, Rgb, blend};
 use super::noise::{Footprint, octaves, value2, value3};
 
 /// How the town is lit, what lies on it, and how it is exposed. Shading reads nothing else of the

@@ -1,66 +1,16 @@
 //! What the solids of the town are made of, and which of them have holes.
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector2};
 
-use super::facade::{self, Facade};
+use super::appearance::{Appearance, Rgb, blend, grey};
+use super::contact::{Contact, Part};
+use super::facade::Facade;
 use super::frame::Ray;
 use super::noise::{Footprint, derive, floor, hash2, octaves, unit, value2, value3};
 use super::paint;
 use super::pattern::{bar, glyphs, rectangle, step, stripes};
-use super::shape::{Contact, Part, Shape};
-
-/// A colour, linear, red green blue, 0 … 1.
-pub(super) type Rgb = Vector3<f64>;
-
-/// A grey.
-pub(super) fn grey(level: f64) -> Rgb {
-    Rgb::repeat(level)
-}
-
-/// `a` where `share` is 0, `b` where it is 1.
-#[inline]
-pub(super) fn blend(a: Rgb, b: Rgb, share: f64) -> Rgb {
-    a + (b - a) * share
-}
-
-/// How a point of a surface looks, whatever the light.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Appearance {
-    /// Diffuse reflectance.
-    pub(super) albedo: Rgb,
-    /// Strength of the mirror-like reflection, 0 … 1.
-    pub(super) gloss: f64,
-    /// Share of glass in the pixel: light of a laser goes through.
-    pub(super) glass: f64,
-    /// Radiance of its own when lights are on.
-    pub(super) emission: Rgb,
-    /// Share of ledges too small to be solids, on which snow lies.
-    pub(super) ledge: f64,
-    /// Strength of a film of water that mirrors the surroundings, 0 … 1.
-    pub(super) film: f64,
-}
-
-impl Appearance {
-    /// A matt surface.
-    pub(super) fn matt(albedo: Rgb) -> Self {
-        Self {
-            albedo,
-            ..Self::default()
-        }
-    }
-
-    /// This with `share` of it covered by `over`.
-    pub(super) fn covered(self, over: Self, share: f64) -> Self {
-        Self {
-            albedo: blend(self.albedo, over.albedo, share),
-            gloss: self.gloss + (over.gloss - self.gloss) * share,
-            glass: self.glass + (over.glass - self.glass) * share,
-            emission: blend(self.emission, over.emission, share),
-            ledge: self.ledge + (over.ledge - self.ledge) * share,
-            film: self.film + (over.film - self.film) * share,
-        }
-    }
-}
+use super::shape::Shape;
+use super::walls;
 
 /// The shape of a traffic sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,7 +43,7 @@ pub(super) enum Material {
     Hedge(Rgb),
     /// The leaves of a tree or a bush, or its twigs.
     Leaves {
-        /// Colour.
+        /// Colour of the leaves.
         colour: Rgb,
         /// Share of them that is there: 1 in summer.
         density: f64,
@@ -117,7 +67,7 @@ pub(super) enum Material {
 /// A solid of the town.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
-    /// Its geometry.
+    /// Where its surface is.
     pub(super) shape: Shape,
     /// What it is made of.
     pub(super) material: Material,
@@ -154,14 +104,14 @@ impl Solid {
     ) -> Appearance {
         let uv = contact.uv;
         match &self.material {
-            Material::Facade(facade) => facade::appearance(facade, contact.part, uv, footprint),
+            Material::Facade(facade) => walls::appearance(facade, contact.part, uv, footprint),
             Material::Tiles(colour) => tiles(*colour, contact.part, uv, footprint, self.seed),
             Material::Wall {
                 colour,
                 brick: false,
-            } => Appearance::matt(facade::plaster(*colour, uv, footprint, self.seed)),
+            } => Appearance::matt(walls::plaster(*colour, uv, footprint, self.seed)),
             Material::Wall { colour, .. } => {
-                Appearance::matt(facade::brick(*colour, uv, footprint, self.seed))
+                Appearance::matt(walls::brick(*colour, uv, footprint, self.seed))
             }
             Material::Hedge(colour) | Material::Leaves { colour, .. } => {
                 leaves(*colour, contact, point, footprint, self.seed)

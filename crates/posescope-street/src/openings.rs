@@ -2,11 +2,11 @@
 
 use nalgebra::Vector2;
 
+use super::appearance::{Appearance, Rgb, blend, grey};
+use super::contact::Part;
 use super::facade::Facade;
-use super::material::{Appearance, Rgb, blend, grey};
 use super::noise::{Footprint, derive, floor, hash2, unit, value2};
 use super::pattern::{bar, glyphs, rectangle, step, stripes};
-use super::shape::Part;
 
 /// How far windows are set back from the wall \[m\].
 const RECESS: f64 = 0.12;
@@ -19,11 +19,11 @@ pub(super) struct Spot {
     pub(super) bay: i32,
     /// The storey, 0 on the ground.
     pub(super) floor: i32,
-    /// From the middle of the bay, to the right.
+    /// Distance from the middle of the bay, to the right.
     x: f64,
-    /// Above the floor.
+    /// Height above the floor of the storey.
     y: f64,
-    /// From the left edge of the facade.
+    /// Distance from the left edge of the facade.
     u: f64,
     /// Extent of the pixel, horizontally and vertically.
     width: (f64, f64),

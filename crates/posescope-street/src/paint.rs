@@ -1,9 +1,10 @@
 //! The look of parked cars.
 
-use super::material::{Appearance, Rgb, blend, grey};
+use super::appearance::{Appearance, Rgb, blend, grey};
+use super::contact::{Contact, Part};
 use super::noise::{Footprint, derive, octaves, unit, value2};
 use super::pattern::{bar, glyphs, rectangle, step};
-use super::shape::{Contact, Part, Shape};
+use super::shape::Shape;
 
 use super::car::CarShape;
 

@@ -4,8 +4,9 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg32;
 
+use super::appearance::Rgb;
 use super::frame::Frame;
-use super::material::{Material, Rgb, Solid};
+use super::material::{Material, Solid};
 use super::network::Network;
 use super::path::right_of;
 use super::shade::Blot;
@@ -15,7 +16,7 @@ use super::weather::Season;
 /// A rectangle of land.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plot {
-    /// Its middle.
+    /// The middle of the plot.
     pub(super) centre: Point2<f64>,
     /// The direction that its front faces.
     pub(super) ahead: Vector2<f64>,
@@ -67,7 +68,7 @@ impl Plot {
 
 /// A town in the making.
 pub(super) struct Builder<'a> {
-    /// Its streets.
+    /// The streets of the town.
     pub(super) network: &'a Network,
     /// Randomness of what never changes.
     pub(super) rng: Pcg32,

@@ -8,8 +8,8 @@ use image::RgbImage;
 use nalgebra::{Point2, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::beam::{Beam, Sector};
-use super::camera_path::CAMERA_HEIGHT;
+use super::beam::Beam;
+use super::box_tree::Sector;
 use super::frame::Ray;
 use super::headlamp::Headlamp;
 use super::lens::{Levels, Plane};
@@ -17,6 +17,7 @@ use super::look::Look;
 use super::noise::{derive, hash3, normal};
 use super::shading::Shading;
 use super::town::{Face, Sight, Town};
+use super::world::town_ray;
 use posescope_core::camera::Intrinsics;
 use posescope_core::geometry::Pose;
 
@@ -33,11 +34,11 @@ const MID_LEVEL: f64 = 110.0;
 pub(super) struct View<'a> {
     /// What it looks at.
     pub(super) town: &'a Town,
-    /// The light.
+    /// The weather and the light.
     pub(super) look: &'a Look,
-    /// Its optics.
+    /// Focal lengths, principal point and image size.
     pub(super) intrinsics: &'a Intrinsics,
-    /// Where it is.
+    /// Pose of the camera.
     pub(super) world_from_camera: &'a Pose,
     /// Seed of what differs between frames.
     pub(super) frame_seed: u32,
@@ -45,20 +46,6 @@ pub(super) struct View<'a> {
     pub(super) sky_seed: u32,
     /// Seed of what is on the lens.
     pub(super) lens_seed: u32,
-}
-
-/// A world point in town coordinates.
-pub(super) fn town_from_world(p: &Point3<f64>) -> Point3<f64> {
-    Point3::new(p.x, CAMERA_HEIGHT - p.y, p.z)
-}
-
-/// A ray of the camera frame in town coordinates.
-pub(super) fn town_ray(pose: &Pose, origin: &Point3<f64>, direction: &Vector3<f64>) -> Ray {
-    let turned = pose.rotation * direction;
-    Ray {
-        origin: town_from_world(&(pose * origin)),
-        direction: Vector3::new(turned.x, -turned.y, turned.z),
-    }
 }
 
 /// Levels of a pixel, and what it shows.

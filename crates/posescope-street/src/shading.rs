@@ -4,10 +4,10 @@ use std::cell::Cell;
 
 use nalgebra::{Point3, Vector3};
 
+use super::appearance::{Appearance, Rgb};
 use super::frame::Ray;
 use super::headlamp::Headlamp;
 use super::look::{Look, schlick};
-use super::material::{Appearance, Rgb};
 use super::noise::{value2, value3};
 use super::town::{Sight, Town};
 
@@ -16,9 +16,9 @@ const MIRROR_BLUR: f64 = 6e-3;
 
 /// The light in the town at one moment.
 pub(super) struct Shading<'a> {
-    /// What is lit.
+    /// The town that is lit.
     pub(super) town: &'a Town,
-    /// The weather.
+    /// The weather that lights it.
     pub(super) look: &'a Look,
     /// The car's own lamps, if they are on.
     pub(super) headlamp: Option<Headlamp>,

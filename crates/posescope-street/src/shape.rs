@@ -1,58 +1,12 @@
 //! The geometry of the solids of the town.
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::car::CarShape;
+use super::contact::Contact;
 use super::frame::{Frame, Ray};
 use super::intersect::{meet_block, meet_clump, meet_gable, meet_pole};
 use super::path::right_of;
-
-/// The part of a solid that a ray met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    /// The face towards +z of the solid's frame: what looks at the street.
-    Front,
-    /// The face towards −z.
-    Back,
-    /// A face towards ±x.
-    Side,
-    /// A horizontal face.
-    Flat,
-    /// A slope of a roof.
-    Slope,
-    /// The skin of a cylinder or an ellipsoid.
-    Round,
-    /// The roof, bonnet or another plain panel of a car.
-    Panel,
-    /// The flank of a car below the windows.
-    Flank,
-    /// The front of a car.
-    Nose,
-    /// The rear of a car.
-    Tail,
-    /// The side windows of a car.
-    Pane,
-    /// The windscreen or the rear window of a car.
-    Screen,
-    /// The tread of a wheel.
-    Tread,
-    /// The outer face of a wheel.
-    Wheel,
-}
-
-/// Where a ray met a solid.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Contact {
-    /// Distance along the ray \[m\].
-    pub(super) distance: f64,
-    /// Outward normal, of unit length.
-    pub(super) normal: Vector3<f64>,
-    /// Coordinates on the surface \[m\]: along it from its left edge as seen from outside, and up
-    /// from the solid's base.
-    pub(super) uv: Vector2<f64>,
-    /// What was met.
-    pub(super) part: Part,
-}
 
 /// The geometry of a solid.
 #[derive(Clone, Debug)]
@@ -75,9 +29,9 @@ pub(super) enum Shape {
     Pole {
         /// Middle of the base.
         base: Point3<f64>,
-        /// \[m\].
+        /// Radius of the cylinder \[m\].
         radius: f64,
-        /// \[m\].
+        /// Height of the cylinder \[m\].
         height: f64,
     },
     /// A spheroid with a vertical axis.
@@ -161,7 +115,8 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point2;
+    use crate::contact::Part;
+    use nalgebra::{Point2, Vector2};
     use proptest::prelude::*;
 
     fn frame() -> Frame {

@@ -4,20 +4,21 @@ use std::cell::Cell;
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
-use super::beam::{Beam, Sector};
-use super::box_tree::BoxTree;
+use super::appearance::Appearance;
+use super::beam::Beam;
+use super::box_tree::{BoxTree, Sector};
+use super::contact::{Contact, Part};
 use super::cover::Cover;
 use super::frame::Ray;
 use super::furniture;
 use super::ground::{self, GroundContact};
 use super::houses;
 use super::lamps::Lamps;
-use super::material::{Appearance, Solid};
+use super::material::Solid;
 use super::network::Network;
 use super::noise::Footprint;
 use super::plot::Builder;
 use super::shade::ContactShade;
-use super::shape::{Contact, Part};
 use super::weather::Season;
 
 /// Beyond this, there is only sky \[m\].
@@ -52,9 +53,9 @@ pub(super) enum Target {
 /// The first surface on a ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
-    /// Along the ray \[m\].
+    /// Distance along the ray \[m\].
     pub(super) distance: f64,
-    /// Where it is.
+    /// The point where the ray meets it.
     pub(super) point: Point3<f64>,
     /// Its outward normal.
     pub(super) normal: Vector3<f64>,

@@ -2,18 +2,18 @@
 
 use nalgebra::Vector3;
 
-use super::Condition;
+use super::appearance::{Rgb, grey};
+use super::condition::Condition;
 use super::cover::Cover;
 use super::lens::Lens;
 use super::look::Look;
-use super::material::{Rgb, grey};
 
 /// What trees bear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Season {
-    /// Leaves.
+    /// Trees bear leaves.
     Summer,
-    /// Twigs.
+    /// Trees are bare.
     Winter,
 }
 

@@ -4,25 +4,24 @@ mod arrangement;
 mod detail;
 mod funnel;
 mod lidar;
+mod marks;
 mod photos;
 mod sight;
 mod story;
 mod truth;
 
-use egui::{Color32, Ui, UiBuilder};
+use egui::{Ui, UiBuilder};
 
 pub(super) use self::arrangement::Arrangement;
 use self::detail::{Detail, Subject};
+use self::marks::draw_truth;
 use self::photos::{Lenses, Photos, Shown};
 use self::sight::Sights;
-use self::story::{KINDS, Story, UNDECIDED};
+use self::story::{KINDS, Story};
 use self::truth::TrueMatch;
 use super::View;
-use super::canvas::Placement;
-use super::ink::{Ink, Mark};
-use crate::app::{Command, Scope, theme};
-use crate::camera::Intrinsics;
-use crate::features::Keypoint;
+use super::ink::Ink;
+use crate::app::{Command, Scope};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::Run;
@@ -222,43 +221,4 @@ fn point_at(
         response.on_hover_text_at_pointer(format!("query feature {feature}, {words}"));
     }
     hovered
-}
-
-/// The epipolar line, and where the true pose sees the lifted point.
-fn draw_truth(ink: &mut Ink, at: &Placement, camera: &Intrinsics, truth: &TrueMatch) {
-    let place = |pixel: &nalgebra::Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
-    let shade = Color32::from_black_alpha(140);
-    if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
-        ink.line(place(&from), place(&to), 3.5, shade);
-        ink.line(place(&from), place(&to), 1.8, theme::TRUTH);
-    }
-    if let Some(pixel) = &truth.place {
-        ink.disc(place(pixel), 8.0, shade);
-        ink.mark(Mark::Plus, place(pixel), 6.0, theme::TRUTH);
-    }
-}
-
-/// The colour of a state, or of none yet.
-fn color(kind: usize) -> Color32 {
-    if kind == UNDECIDED {
-        theme::CAMERA
-    } else {
-        theme::state(kind)
-    }
-}
-
-/// The mark of a state, or of none yet.
-fn mark(kind: usize) -> Mark {
-    const MARKS: [Mark; UNDECIDED] = [
-        Mark::Cross,
-        Mark::Triangle,
-        Mark::Ring,
-        Mark::Diamond,
-        Mark::Disc,
-    ];
-    MARKS.get(kind).copied().unwrap_or(Mark::Square)
-}
-
-fn position(keypoint: &Keypoint) -> [f32; 2] {
-    [keypoint.x, keypoint.y]
 }

@@ -4,7 +4,7 @@ use egui::{Color32, RichText, ScrollArea, Ui};
 
 use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
-use crate::app::obey::has_failed;
+use crate::app::desk::has_failed;
 use crate::app::{Command, Scope, theme};
 use crate::estimator;
 use crate::event::Side;

@@ -55,6 +55,7 @@ fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
                     cx: 0.0,
                     cy: 0.0,
                 },
+                cameras: Vec::new(),
                 drawn: Vec::new(),
                 queries: Vec::new(),
                 times_s: Vec::new(),

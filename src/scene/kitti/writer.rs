@@ -186,7 +186,7 @@ mod tests {
         let folder = root.path().join("sequences/dusk");
         let scene = KittiOdometry::open(&folder).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(scene.frames(), ["000001"]);
-        assert_eq!(scene.intrinsics(), intrinsics);
+        assert_eq!(scene.intrinsics(0), intrinsics);
         assert_eq!(scene.time_s(0), Some(0.1));
         let read = scene.pose(0).expect("was written");
         assert!((read.to_homogeneous() - pose.to_homogeneous()).amax() < 1e-12);

@@ -14,7 +14,7 @@ use rerun::external::re_log_encoding::{EncodeError, Encoder, EncodingOptions};
 use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
 
-use super::RecordError;
+use super::error::RecordError;
 
 /// A recording file; clones write to the same one.
 #[derive(Clone)]

@@ -10,6 +10,7 @@ use rerun::sink::{GrpcSink, LogSink};
 use rerun::{DEFAULT_CONNECT_URL, DEFAULT_SERVER_PORT, ServerOptions, SpawnError, SpawnOptions};
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::error::RecordError;
 use super::file::RecordingFile;
 use super::viewer::Viewer;
 
@@ -49,60 +50,9 @@ impl Identity {
     }
 }
 
-/// Why there is no recording, or not a whole one.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// The file cannot be created.
-    #[error("cannot create the recording {}: {source}", path.display())]
-    Create {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file was created but could not be written to its end.
-    #[error("the recording {} is incomplete: {message}", path.display())]
-    Incomplete {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        message: String,
-    },
-    /// The URL is not that of a viewer.
-    #[error("cannot connect to `{url}`: {message}")]
-    Address {
-        /// The URL.
-        url: String,
-        /// What is wrong with it.
-        message: String,
-    },
-    /// No viewer could be started.
-    #[error("cannot start a Rerun viewer: {0}")]
-    Spawn(String),
-    /// The port is not free.
-    #[error("cannot serve the recording on port {port}: {source}")]
-    Serve {
-        /// The port.
-        port: u16,
-        /// Why.
-        source: io::Error,
-    },
-    /// A viewer did not take the recording.
-    #[error("the viewer did not receive the whole recording: {0}")]
-    Viewer(String),
-    /// Something could not be put into the form of a recording.
-    #[error("cannot record {what}: {message}")]
-    Encode {
-        /// What.
-        what: String,
-        /// Why.
-        message: String,
-    },
-}
-
 /// Targets that are ready to be written to.
 pub(super) struct OpenTargets {
-    /// All of them.
+    /// The sinks that get every message.
     pub(super) sinks: Vec<Box<dyn LogSink>>,
     /// The file among them, which can also tell what became of it.
     pub(super) file: Option<RecordingFile>,

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::describe::{About, Describe, ParamVisitor};
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
+use crate::memo::{Exact, Key, bits_of_fields};
 
 /// MI's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -30,6 +31,8 @@ pub struct MutualInformationParams {
     /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
     pub bins: usize,
 }
+
+bits_of_fields!(MutualInformationParams { sigma_px, bins });
 
 impl Default for MutualInformationParams {
     fn default() -> Self {
@@ -71,6 +74,10 @@ impl CostParams for MutualInformationParams {
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
     }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
+    }
 }
 
 /// 1 − NMI, NMI = (H(S) + H(Q) − H(S,Q)) / max(H(S), H(Q)), the marginals from the joint histogram.
@@ -93,8 +100,8 @@ impl Cost for MutualInformation {
         gaussian_smoothed(photo, self.params.sigma_px)
     }
 
-    fn query_channel_name(&self) -> String {
-        format!("grey, sigma {}", self.params.sigma_px)
+    fn query_channel_key(&self) -> Key {
+        Key::new(("grey", Exact::of(&self.params.sigma_px)))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::describe::{About, Describe, ParamVisitor};
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
+use crate::memo::{Exact, Key, bits_of_fields};
 
 /// NID among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -40,6 +41,12 @@ pub struct OrientationParams {
     /// Least gradient that has an orientation \[grey values per px\].
     pub least_gradient: f64,
 }
+
+bits_of_fields!(OrientationParams {
+    sigma_px,
+    bins,
+    least_gradient,
+});
 
 impl Default for OrientationParams {
     fn default() -> Self {
@@ -91,6 +98,10 @@ impl CostParams for OrientationParams {
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
     }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
+    }
 }
 
 /// NID = (H(S,Q) − I(S,Q)) / H(S,Q) of the orientations, modulo 180°.
@@ -134,8 +145,8 @@ impl Cost for Orientation {
         self.channel(photo)
     }
 
-    fn query_channel_name(&self) -> String {
-        self.reference_channel_name()
+    fn query_channel_key(&self) -> Key {
+        self.reference_channel_key()
     }
 
     /// Between two orientations lies no third that the photo shows: that of the nearest pixel counts.
@@ -151,8 +162,8 @@ impl Cost for Orientation {
         })
     }
 
-    fn reference_channel_name(&self) -> String {
-        format!("orientation {:?}", self.params)
+    fn reference_channel_key(&self) -> Key {
+        self.params.key()
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

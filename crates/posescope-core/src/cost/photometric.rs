@@ -3,6 +3,7 @@
 use super::{Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair};
 use crate::describe::{About, Describe, ParamVisitor};
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
+use crate::memo::{Exact, Key, bits_of_fields};
 
 /// PM's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -23,6 +24,8 @@ pub struct PhotometricParams {
     /// literal formula, which squares E once more.
     pub power: usize,
 }
+
+bits_of_fields!(PhotometricParams { sigma_px, power });
 
 impl Default for PhotometricParams {
     fn default() -> Self {
@@ -63,6 +66,10 @@ impl CostParams for PhotometricParams {
 
     fn boxed(&self) -> Box<dyn CostParams> {
         Box::new(self.clone())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
     }
 }
 
@@ -110,8 +117,8 @@ impl Cost for Photometric {
         gaussian_smoothed(photo, self.params.sigma_px)
     }
 
-    fn query_channel_name(&self) -> String {
-        format!("grey, sigma {}", self.params.sigma_px)
+    fn query_channel_key(&self) -> Key {
+        Key::new(("grey", Exact::of(&self.params.sigma_px)))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

@@ -2,22 +2,23 @@
 //! (paper, appendix B).
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-use super::{CostSummary, Estimator, Failure, Halt, Outcome, settle};
+use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost};
 use crate::event::{
     CloudColored, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
 };
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
-use crate::memo::Recalled;
+use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::{Problem, ReferenceTuple};
+use crate::problem::Problem;
 use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by};
 use crate::trace::{Cancelled, Trace};
 
@@ -27,8 +28,8 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     render: RenderParams,
     grid: GridParams,
-    /// The cost with all its parameters, as a key of what is remembered.
-    cost_key: String,
+    /// Which cost, with all its parameters.
+    cost_key: Key,
 }
 
 impl Direct {
@@ -41,7 +42,23 @@ impl Direct {
             cost: cost.cost(),
             render: params.render.clone(),
             grid: params.grid.clone(),
-            cost_key: format!("{} {cost:?}", entry.name),
+            cost_key: Key::new((entry.name, cost.key())),
+        }
+    }
+
+    /// The estimator of a cost that is in no registry: it renders and searches as the others do, by
+    /// `params.render` and `params.grid`, and tells what it does as the method of this name.
+    ///
+    /// What is remembered of its scores is never taken for that of another cost, not even of one with
+    /// the same name: every estimator that is made here has a key of its own.
+    pub fn searching(name: &'static str, cost: Box<dyn Cost>, params: &Params) -> Self {
+        static MADE: AtomicU64 = AtomicU64::new(0);
+        Self {
+            method: Method::named(name),
+            cost,
+            render: params.render.clone(),
+            grid: params.grid.clone(),
+            cost_key: Key::new(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
 }
@@ -51,17 +68,13 @@ impl Estimator for Direct {
         let found = trace.stage(Stage::Estimator(self.method), |trace| {
             self.search(problem, trace)
         });
-        Ok(match settle(found)? {
+        Ok(match separate_failure(found)? {
             Ok((pose, cost)) => Outcome {
                 pose: Ok(pose),
                 counts: None,
                 cost: Some(cost),
             },
-            Err(failure) => Outcome {
-                pose: Err(failure),
-                counts: None,
-                cost: None,
-            },
+            Err(failure) => Outcome::failed(failure),
         })
     }
 
@@ -78,6 +91,11 @@ impl Direct {
         problem: &Problem,
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
+        let radius = problem.uncertainty_radius_m;
+        // How large a lattice is depends on no centre, so none is refused after the others were scored.
+        for phase in Phase::ALL {
+            Lattice::new(phase, Offset::default(), radius, &self.grid).map_err(Failure::from)?;
+        }
         let cloud = trace.stage(Stage::Color, |trace| {
             let Recalled {
                 value: cloud,
@@ -93,7 +111,9 @@ impl Direct {
             }
             Ok(cloud)
         })?;
+        trace.checkpoint()?;
         let scorer = self.scorer(problem, &cloud);
+        trace.checkpoint()?;
 
         // The reference pose is the starting value, and its coverage the measure of all others.
         let start = Offset::default();
@@ -115,8 +135,8 @@ impl Direct {
         let mut coarse_positions = None;
         for _ in 0..self.grid.rounds {
             for phase in Phase::ALL {
-                let radius = problem.uncertainty_radius_m;
-                let lattice = Lattice::new(phase, search.best, radius, &self.grid);
+                let lattice =
+                    Lattice::new(phase, search.best, radius, &self.grid).map_err(Failure::from)?;
                 let surface =
                     trace.stage(Stage::Search(phase), |trace| search.phase(lattice, trace))?;
                 if phase == Phase::PositionCoarse {
@@ -140,6 +160,7 @@ impl Direct {
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
             };
             trace.emit(|| search.render(Moment::End, best))?;
+            trace.checkpoint()?;
             let area = problem.query.intrinsics.area();
             let summary = CostSummary {
                 initial: initial.cost,
@@ -167,8 +188,11 @@ impl Direct {
 
     fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        let key = (&self.render, self.cost.reference_channel_name());
-        reference.memo.recall(&key, || {
+        let key = ColoringKey {
+            render: Exact::of(&self.render),
+            channel: self.cost.reference_channel_key(),
+        };
+        reference.memo.recall(key, || {
             color_cloud_by(
                 &reference.cloud,
                 &reference.intrinsics,
@@ -180,7 +204,7 @@ impl Direct {
 
     fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let channel = query.memo.recall(&self.cost.query_channel_name(), || {
+        let channel = query.memo.recall(self.cost.query_channel_key(), || {
             self.cost.query_channel(&query.photo.gray)
         });
         Scorer::new(
@@ -193,36 +217,56 @@ impl Direct {
     }
 }
 
+/// What a coloured cloud depends on beside the reference.
+#[derive(PartialEq, Eq, Hash)]
+struct ColoringKey {
+    render: Exact<RenderParams>,
+    channel: Key,
+}
+
 /// Where the scores of a lattice are remembered: with the query, under all that they depend on.
+#[derive(Clone, Copy)]
 struct Memory<'a> {
     direct: &'a Direct,
     problem: &'a Problem,
 }
 
-/// Remembered scores. They keep their reference alive, so that its address stays its own.
-struct LatticeScores {
-    scores: Vec<Score>,
-    _reference: Arc<ReferenceTuple>,
+/// What scores depend on beside the query.
+#[derive(PartialEq, Eq, Hash)]
+struct ScoresKey {
+    reference: MemoId,
+    cost: Key,
+    render: Exact<RenderParams>,
+    lattice: Exact<Lattice>,
+}
+
+/// Remembered scores.
+struct LatticeScores(Vec<Score>);
+
+impl Remembered for LatticeScores {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
 }
 
 impl Memory<'_> {
     fn scores(
-        &self,
+        self,
         lattice: &Lattice,
-        score: impl FnOnce() -> Vec<Score>,
-    ) -> Recalled<LatticeScores> {
+        score: impl FnOnce() -> Result<Vec<Score>, Cancelled>,
+    ) -> Result<Recalled<LatticeScores>, Cancelled> {
         let Self { direct, problem } = self;
-        let reference = &problem.reference;
-        let key = (
-            Arc::as_ptr(reference),
-            &direct.cost_key,
-            &direct.render,
-            lattice,
-        );
-        problem.query.memo.recall(&key, || LatticeScores {
-            scores: score(),
-            _reference: Arc::clone(reference),
-        })
+        let Some(id) = problem.reference.memo.id() else {
+            return Ok(Recalled::made(Arc::new(LatticeScores(score()?))));
+        };
+        let key = ScoresKey {
+            reference: id,
+            cost: direct.cost_key.clone(),
+            render: Exact::of(&direct.render),
+            lattice: Exact::of(lattice),
+        };
+        let memo = &problem.query.memo;
+        memo.try_recall(key, || Ok(LatticeScores(score()?)))
     }
 }
 
@@ -238,7 +282,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Scores a lattice, tells the scores in scan order, and moves to its minimum.
+    /// Scores a lattice, some hypotheses at a time, tells the scores in scan order, and moves to its
+    /// minimum.
     ///
     /// A lattice where nothing has a cost leaves the search where it is.
     fn phase(
@@ -246,38 +291,34 @@ impl Search<'_> {
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let hypotheses: Vec<(usize, Offset)> = lattice.hypotheses().collect();
-        let poses: Vec<Pose> = hypotheses
-            .iter()
-            .map(|(_, offset)| offset.reference_from_camera())
-            .collect();
         let mut scores = vec![None; lattice.cells()];
-        let mut least: Option<f64> = None;
-        let phase = lattice.phase;
-        let Recalled {
-            value: found,
-            reused,
-        } = self.memory.scores(&lattice, || self.scorer.score(&poses));
-        trace.note_reuse(reused);
-        for (&(cell, offset), &score) in hypotheses.iter().zip(&found.scores) {
-            scores[cell] = Some(score);
-            let cost = score.eligible_cost(self.least_covered);
-            let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
-            if is_best {
-                least = cost;
+        let mut least = None;
+        let (memory, scorer) = (self.memory, self.scorer);
+        let found = memory.scores(&lattice, || {
+            let mut found = Vec::new();
+            let mut hypotheses = lattice.hypotheses();
+            loop {
+                trace.checkpoint()?;
+                let some: Vec<_> = hypotheses.by_ref().take(scorer.at_a_time()).collect();
+                if some.is_empty() {
+                    return Ok(found);
+                }
+                let poses: Vec<Pose> = some
+                    .iter()
+                    .map(|(_, offset)| offset.reference_from_camera())
+                    .collect();
+                for ((cell, offset), score) in some.into_iter().zip(scorer.score(&poses)) {
+                    found.push(score);
+                    scores[cell] = Some(score);
+                    self.tell(lattice.phase, offset, score, &mut least, trace)?;
+                }
             }
-            let evaluation = self.evaluations;
-            self.evaluations += 1;
-            trace.emit(|| PoseScored {
-                phase,
-                evaluation,
-                offset,
-                score,
-                coverage: f64::from(score.covered) / f64::from(self.covered_at_reference.max(1)),
-                is_best,
-            })?;
-            if is_best {
-                trace.emit(|| self.render(Moment::NewBest, offset))?;
+        })?;
+        trace.note_reuse(found.reused);
+        if found.reused {
+            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.0) {
+                scores[cell] = Some(score);
+                self.tell(lattice.phase, offset, score, &mut least, trace)?;
             }
         }
         let surface = Arc::new(ScoredLattice {
@@ -297,6 +338,36 @@ impl Search<'_> {
             best: minimum.and_then(|cell| surface.lattice.offset(cell)),
         })?;
         Ok(surface)
+    }
+
+    /// Tells the score of a hypothesis, and the view where it is the `least` of its lattice so far.
+    fn tell(
+        &mut self,
+        phase: Phase,
+        offset: Offset,
+        score: Score,
+        least: &mut Option<f64>,
+        trace: &mut Trace<'_>,
+    ) -> Result<(), Cancelled> {
+        let cost = score.eligible_cost(self.least_covered);
+        let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
+        if is_best {
+            *least = cost;
+        }
+        let evaluation = self.evaluations;
+        self.evaluations += 1;
+        trace.emit(|| PoseScored {
+            phase,
+            evaluation,
+            offset,
+            score,
+            coverage: f64::from(score.covered) / f64::from(self.covered_at_reference.max(1)),
+            is_best,
+        })?;
+        if is_best {
+            trace.emit(|| self.render(Moment::NewBest, offset))?;
+        }
+        Ok(())
     }
 
     fn render(&self, moment: Moment, offset: Offset) -> ViewRendered {

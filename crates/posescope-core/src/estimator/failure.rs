@@ -1,5 +1,7 @@
 //! Why a query could not be localised.
 
+use crate::grid::LatticeTooLarge;
+
 /// A typed reason with its evidence. In statistics it counts as an infinite error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
@@ -88,6 +90,9 @@ pub enum Failure {
         /// Hypotheses that could be compared with the query.
         hypotheses: usize,
     },
+    /// The parameters ask for more hypotheses than can be scored and kept.
+    #[error(transparent)]
+    LatticeTooLarge(#[from] LatticeTooLarge),
     /// There is nothing to localise against.
     #[error("no reference frame{}", radius_m.map(|radius| format!(" with pose and scan within {radius} m")).unwrap_or_default())]
     NoReference {
@@ -129,6 +134,7 @@ impl Failure {
             Self::TooFewDepths { .. } => "R4",
             Self::OutsideRadius { .. } => "R5",
             Self::NothingComparable { .. } | Self::FlatCost { .. } => "D5",
+            Self::LatticeTooLarge(_) => "D9",
             Self::NoReferenceSucceeded { failure, .. } => failure.code(),
             Self::Internal { .. } => "X9",
         }

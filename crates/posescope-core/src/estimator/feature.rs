@@ -10,7 +10,8 @@ use nalgebra::Point2;
 
 use self::journey::Journey;
 pub use self::params::{DepthRule, FeatureParams};
-use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, settle};
+use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
+use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
 use crate::depth::{DepthReading, ProjectedCloudIndex};
 use crate::event::{
@@ -18,15 +19,17 @@ use crate::event::{
     MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    FeatureCache, Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours, surf,
+    Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours_interruptible,
+    remembered_interruptible,
 };
 use crate::geometry::Pose;
-use crate::memo::Recalled;
+use crate::memo::{Exact, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::robust::{
-    AcceptanceRule, Consensus, MlesacError, Trial, effective_area_px, inliers_beyond_chance, mlesac,
+    AcceptanceRule, Consensus, MlesacError, MlesacParams, Trial, effective_area_px,
+    inliers_beyond_chance, mlesac,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
@@ -34,23 +37,63 @@ use crate::trace::{Cancelled, Trace};
 /// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
 const MINIMUM: usize = 4;
 
-/// Remembered matches. They keep their reference alive, so that its address stays its own.
-struct Decisions {
-    decisions: Arc<[Option<Match>]>,
-    _reference: Arc<ReferenceTuple>,
+/// Trials that are remembered at most, 5 MB: all that the parameters ask for by default. Where there
+/// were more, they are drawn again when somebody wants to hear them.
+const REMEMBERED_TRIALS: usize = 20_000;
+
+/// Matches lifted between two checkpoints.
+const LIFTED_AT_A_TIME: usize = 256;
+
+/// What the matches of two photos depend on beside the query's photo.
+#[derive(PartialEq, Eq, Hash)]
+struct MatchesKey {
+    reference: MemoId,
+    surf: Exact<SurfParams>,
+    ratio: Exact<f64>,
+    unique: bool,
 }
 
-/// What MLESAC found, and all it tried on the way.
+/// Remembered matches.
+struct Decisions(Arc<[Option<Match>]>);
+
+impl Remembered for Decisions {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+}
+
+/// All that a consensus depends on.
+#[derive(PartialEq, Eq, Hash)]
+struct ConsensusKey {
+    camera: Exact<Intrinsics>,
+    params: Exact<MlesacParams>,
+    seed: u64,
+    correspondences: Exact<[Correspondence]>,
+    /// Whether the trials are kept.
+    is_heard: bool,
+}
+
+/// What MLESAC found.
 struct Solved {
-    trials: Vec<Trial>,
-    outcome: Result<Consensus, MlesacError<Infallible>>,
+    outcome: Result<Consensus, Failure>,
+    /// All it tried on the way, if somebody wanted to hear it and it is not too much.
+    trials: Option<Vec<Trial>>,
+}
+
+impl Remembered for Solved {
+    fn heap_bytes(&self) -> usize {
+        let found = self.outcome.as_ref().map_or(0, |consensus| {
+            size_of_val(consensus.inliers.as_slice())
+                + size_of_val(consensus.residuals_px.as_slice())
+        });
+        self.trials.as_deref().map_or(0, size_of_val) + found
+    }
 }
 
 /// The feature-based estimator.
 pub struct FeatureBased {
     surf: SurfParams,
     params: FeatureParams,
-    remembered: Option<Arc<FeatureCache>>,
 }
 
 impl Estimator for FeatureBased {
@@ -60,14 +103,10 @@ impl Estimator for FeatureBased {
             self.localize(problem, &mut counts, trace)
         });
         Ok(Outcome {
-            pose: settle(pose)?,
+            pose: separate_failure(pose)?,
             counts: Some(counts),
             cost: None,
         })
-    }
-
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        self.remembered = Some(Arc::clone(features));
     }
 }
 
@@ -77,7 +116,6 @@ impl FeatureBased {
         Self {
             surf: params.surf,
             params: params.fb.clone(),
-            remembered: None,
         }
     }
 
@@ -126,9 +164,9 @@ impl FeatureBased {
         }
 
         let matches = trace.stage(Stage::Match, |trace| {
-            let decisions = self.best_matches(problem, query, reference);
+            let decisions = self.best_matches(problem, query, reference, trace)?;
             trace.note_reuse(decisions.reused);
-            let decisions = &decisions.value.decisions;
+            let Decisions(decisions) = &*decisions.value;
             trace.emit(|| MatchesDecided {
                 decisions: Arc::clone(decisions),
             })?;
@@ -195,10 +233,8 @@ impl FeatureBased {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let features = memo.recall(&self.surf, || match &self.remembered {
-            Some(cache) => Arc::unwrap_or_clone(cache.surf(&photo.gray, &self.surf)),
-            None => surf(&photo.gray, &self.surf),
-        });
+        let checkpoint = || trace.checkpoint();
+        let features = remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?;
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features.value),
@@ -211,13 +247,22 @@ impl FeatureBased {
         problem: &Problem,
         query: &Features,
         reference: &Features,
-    ) -> Recalled<Decisions> {
-        let FeatureParams { ratio, unique, .. } = self.params;
-        let key = (Arc::as_ptr(&problem.reference), self.surf, ratio, unique);
-        problem.query.memo.recall(&key, || Decisions {
-            decisions: best_matches(query, reference, &self.params),
-            _reference: Arc::clone(&problem.reference),
-        })
+        trace: &mut Trace<'_>,
+    ) -> Result<Recalled<Decisions>, Cancelled> {
+        let mut find = || {
+            let checkpoint = || trace.checkpoint();
+            best_matches(query, reference, &self.params, checkpoint).map(Decisions)
+        };
+        let Some(id) = problem.reference.memo.id() else {
+            return Ok(Recalled::made(Arc::new(find()?)));
+        };
+        let key = MatchesKey {
+            reference: id,
+            surf: Exact::of(&self.surf),
+            ratio: Exact::of(&self.params.ratio),
+            unique: self.params.unique,
+        };
+        problem.query.memo.try_recall(key, find)
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -228,7 +273,7 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = tuple.memo.recall(&"projected", || {
+        let cloud = tuple.memo.recall((), || {
             ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
         });
         let cloud = cloud.value;
@@ -236,9 +281,10 @@ impl FeatureBased {
             points: tuple.cloud.len(),
             in_view: cloud.len(),
         })?;
-        Ok(matches
-            .iter()
-            .map(|&(query_index, reference_index)| {
+        let mut lifted = Vec::with_capacity(matches.len());
+        for matches in matches.chunks(LIFTED_AT_A_TIME) {
+            trace.checkpoint()?;
+            lifted.extend(matches.iter().map(|&(query_index, reference_index)| {
                 let pixel: Point2<f64> = reference.keypoints[reference_index].pixel();
                 let reading = cloud.read(&pixel, self.params.depth_radius_px);
                 LiftedMatch {
@@ -250,8 +296,9 @@ impl FeatureBased {
                         .depth(&reading)
                         .map(|z| tuple.intrinsics.unproject(&pixel, z)),
                 }
-            })
-            .collect())
+            }));
+        }
+        Ok(lifted.into())
     }
 
     fn depth(&self, reading: &DepthReading) -> Option<f64> {
@@ -271,35 +318,72 @@ impl FeatureBased {
         let intrinsics = &problem.query.intrinsics;
         let params = &self.params.mlesac;
         let seed = problem.random_seed("mlesac");
-        let key = (intrinsics, params, seed, correspondences);
-        let solved = problem.query.memo.recall(&key, || {
-            let mut trials = Vec::new();
-            let outcome = mlesac(correspondences, intrinsics, params, seed, |trial| {
-                trials.push(*trial);
-                Ok(())
-            });
-            Solved { trials, outcome }
-        });
+        // Whoever does not listen has no use for the trials.
+        let is_heard = trace.wants::<HypothesisTried>();
+        let key = ConsensusKey {
+            camera: Exact::of(intrinsics),
+            params: Exact::of(params),
+            seed,
+            correspondences: Exact::of(correspondences),
+            is_heard,
+        };
+        let solved = problem.query.memo.try_recall(key, || {
+            let trials = is_heard.then(Vec::new);
+            self.solve(problem, correspondences, trials, trace)
+        })?;
+        let outcome = match &solved.value.trials {
+            None if solved.reused && is_heard => {
+                let again = self.solve(problem, correspondences, None, trace)?;
+                return Ok(again.outcome?);
+            }
+            Some(trials) if solved.reused => {
+                for &trial in trials {
+                    trace.emit(|| HypothesisTried { trial })?;
+                }
+                &solved.value.outcome
+            }
+            _ => &solved.value.outcome,
+        };
         trace.note_reuse(solved.reused);
-        for trial in &solved.value.trials {
-            trace.emit(|| HypothesisTried { trial: *trial })?;
-        }
-        solved.value.outcome.clone().map_err(|error| match error {
-            MlesacError::TooFewCorrespondences { found, .. } => Halt::from(Failure::NoConsensus {
+        Ok(outcome.clone()?)
+    }
+
+    /// Runs MLESAC and tells its trials as it goes; `trials` takes them, unless there are too many.
+    fn solve(
+        &self,
+        problem: &Problem,
+        correspondences: &[Correspondence],
+        mut trials: Option<Vec<Trial>>,
+        trace: &mut Trace<'_>,
+    ) -> Result<Solved, Cancelled> {
+        let intrinsics = &problem.query.intrinsics;
+        let params = &self.params.mlesac;
+        let seed = problem.random_seed("mlesac");
+        let found = mlesac(correspondences, intrinsics, params, seed, |trial| {
+            trials.take_if(|trials| trials.len() == REMEMBERED_TRIALS);
+            if let Some(trials) = &mut trials {
+                trials.push(*trial);
+            }
+            trace.emit(|| HypothesisTried { trial: *trial })
+        });
+        let outcome = match found {
+            Ok(consensus) => Ok(consensus),
+            Err(MlesacError::TooFewCorrespondences { found, .. }) => Err(Failure::NoConsensus {
                 correspondences: found,
                 best_inliers: 0,
                 trials: 0,
             }),
-            MlesacError::NoModel {
+            Err(MlesacError::NoModel {
                 trials,
                 best_inliers,
-            } => Halt::from(Failure::NoConsensus {
+            }) => Err(Failure::NoConsensus {
                 correspondences: correspondences.len(),
                 best_inliers,
                 trials,
             }),
-            MlesacError::Cancelled(never) => match never {},
-        })
+            Err(MlesacError::Cancelled(cancelled)) => return Err(cancelled),
+        };
+        Ok(Solved { outcome, trials })
     }
 
     fn accept(
@@ -347,13 +431,15 @@ impl FeatureBased {
 }
 
 /// The best match of each query feature, and whether it stands out.
-fn best_matches(
+fn best_matches<E>(
     query: &Features,
     reference: &Features,
     params: &FeatureParams,
-) -> Arc<[Option<Match>]> {
-    let forward = nearest_neighbours(&query.descriptors, &reference.descriptors);
-    let backward = nearest_neighbours(&reference.descriptors, &query.descriptors);
+    mut checkpoint: impl FnMut() -> Result<(), E>,
+) -> Result<Arc<[Option<Match>]>, E> {
+    let (query, reference) = (&query.descriptors, &reference.descriptors);
+    let forward = nearest_neighbours_interruptible(query, reference, &mut checkpoint)?;
+    let backward = nearest_neighbours_interruptible(reference, query, &mut checkpoint)?;
     let mut matches = classify(&forward, &backward, params.ratio as f32);
     if !params.unique {
         for found in matches.iter_mut().flatten() {
@@ -362,7 +448,7 @@ fn best_matches(
             }
         }
     }
-    matches.into()
+    Ok(matches.into())
 }
 
 /// How many features of the query have a match in the reference: FB's count after the ratio test and
@@ -371,7 +457,8 @@ pub fn count_matches(query: &Features, reference: &Features, params: &FeaturePar
     if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
         return 0;
     }
-    best_matches(query, reference, params)
+    let Ok(matches) = best_matches(query, reference, params, || Ok::<_, Infallible>(()));
+    matches
         .iter()
         .flatten()
         .filter(|found| found.verdict == MatchVerdict::Candidate)

@@ -3,11 +3,8 @@
 //! HY, that of the paper (section 2.4), is FB and MI: FB is the more accurate where it finds enough
 //! matches, MI still gives a moderate pose where FB finds none.
 
-use std::sync::Arc;
-
 use super::{Estimator, Outcome, entry};
 use crate::event::{BranchTaken, Stage};
-use crate::features::FeatureCache;
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
@@ -79,11 +76,6 @@ impl Estimator for Hybrid {
             let fallback = self.second.estimate(problem, trace)?;
             Ok(hybrid_outcome(&outcome, &fallback))
         })
-    }
-
-    fn remember(&mut self, features: &Arc<FeatureCache>) {
-        self.first.remember(features);
-        self.second.remember(features);
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -24,8 +24,13 @@ const REACH: usize = 2;
 /// Largest lobe of a filter \[px\]: box sums of larger ones may exceed 31 bits in white images.
 const LARGEST_LOBE: usize = 741;
 
-/// Finds all blobs, in the order of octave, layer, row and column, upright.
-pub(super) fn detect(integral: &IntegralImage, params: &SurfParams) -> Vec<Keypoint> {
+/// Finds all blobs, in the order of octave, layer, row and column, upright. `checkpoint` is called
+/// before each pass over the image.
+pub(super) fn detect<E>(
+    integral: &IntegralImage,
+    params: &SurfParams,
+    checkpoint: &mut impl FnMut() -> Result<(), E>,
+) -> Result<Vec<Keypoint>, E> {
     let extent = integral.width().min(integral.height());
     let mut keypoints = Vec::new();
     let mut octave: Vec<Layer> = Vec::new();
@@ -38,14 +43,18 @@ pub(super) fn detect(integral: &IntegralImage, params: &SurfParams) -> Vec<Keypo
         octave = (0..params.intervals)
             .map(|interval| lobe(index, interval))
             .map(|lobe| {
+                checkpoint()?;
                 // Half of the sizes of an octave occur in the one below it already.
-                match octave.iter().find(|layer| layer.filter.lobe() == lobe) {
-                    Some(finer) => finer.decimated(step),
-                    None => Layer::new(integral, BoxFilter::new(lobe), step),
-                }
+                Ok(
+                    match octave.iter().find(|layer| layer.filter.lobe() == lobe) {
+                        Some(finer) => finer.decimated(step),
+                        None => Layer::new(integral, BoxFilter::new(lobe), step),
+                    },
+                )
             })
-            .collect();
+            .collect::<Result<_, E>>()?;
         for layers in octave.array_windows() {
+            checkpoint()?;
             let neighbourhood = Neighbourhood {
                 layers: layers.each_ref(),
                 reach: (REACH / params.initial_step.max(1)).max(1),
@@ -54,7 +63,7 @@ pub(super) fn detect(integral: &IntegralImage, params: &SurfParams) -> Vec<Keypo
         }
         step *= 2;
     }
-    keypoints
+    Ok(keypoints)
 }
 
 /// Lobe width of a filter \[px\]: a third of its size, which goes 9, 15, 21, 27 in the first
@@ -165,6 +174,8 @@ impl Neighbourhood<'_> {
 mod tests {
     use image::{GrayImage, Luma};
 
+    use std::convert::Infallible;
+
     use super::*;
 
     /// A Gaussian blob of standard deviation `sigma` at (`x`, `y`), `contrast` above 100.
@@ -176,8 +187,15 @@ mod tests {
         })
     }
 
+    fn found(image: &GrayImage, params: &SurfParams) -> Vec<Keypoint> {
+        let Ok(keypoints) = detect(&IntegralImage::new(image), params, &mut || {
+            Ok::<_, Infallible>(())
+        });
+        keypoints
+    }
+
     fn strongest(image: &GrayImage) -> Keypoint {
-        detect(&IntegralImage::new(image), &SurfParams::default())
+        found(image, &SurfParams::default())
             .into_iter()
             .max_by(|a, b| a.response.total_cmp(&b.response))
             .expect("a blob")
@@ -214,9 +232,8 @@ mod tests {
             let near = (x as f32 - 29.5).hypot(y as f32 - 29.5) < 4.0;
             Luma([if near { 220 } else { 40 }])
         });
-        let integral = IntegralImage::new(&image);
-        let found = detect(
-            &integral,
+        let found = found(
+            &image,
             &SurfParams {
                 octaves: 1,
                 ..SurfParams::default()

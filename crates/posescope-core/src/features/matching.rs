@@ -1,5 +1,6 @@
 //! Exhaustive matching of descriptors, and the tests a match has to pass.
 
+use std::convert::Infallible;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView};
@@ -11,6 +12,10 @@ use super::Descriptor;
 /// while they are searched.
 const QUERY_BLOCK: usize = 64;
 const REFERENCE_BLOCK: usize = 512;
+
+/// Pairs compared between two checkpoints, if that is work enough for all threads: 2,000 features
+/// with 2,000, which takes about as long as finding them.
+const PAIRS_AT_A_TIME: usize = 1 << 22;
 
 /// Products looked through at a time. Hardly any group holds a new neighbour, and telling so of
 /// a whole group takes a few vector instructions.
@@ -51,30 +56,50 @@ pub fn nearest_neighbours(
     query: &[Descriptor],
     reference: &[Descriptor],
 ) -> Vec<Option<Neighbours>> {
+    let Ok(found) = nearest_neighbours_interruptible(query, reference, || Ok::<_, Infallible>(()));
+    found
+}
+
+/// As [`nearest_neighbours`]. `checkpoint` is called on the caller's thread every four million pairs,
+/// or every block for each thread where that is more, and can stop the search.
+///
+/// # Errors
+/// Those of `checkpoint`.
+pub fn nearest_neighbours_interruptible<E>(
+    query: &[Descriptor],
+    reference: &[Descriptor],
+    mut checkpoint: impl FnMut() -> Result<(), E>,
+) -> Result<Vec<Option<Neighbours>>, E> {
     // With one descriptor per row, each column of the product belongs to one query.
     let rows = as_columns(reference).transpose();
     let half_squares: Vec<f32> = reference.iter().map(|r| 0.5 * squared_norm(r)).collect();
-    query
-        .par_chunks(QUERY_BLOCK)
-        .map_init(
-            || DMatrix::zeros(REFERENCE_BLOCK, QUERY_BLOCK),
-            |products, block| {
-                let mut best = vec![TopTwo::default(); block.len()];
-                for start in (0..reference.len()).step_by(REFERENCE_BLOCK) {
-                    let count = REFERENCE_BLOCK.min(reference.len() - start);
-                    let mut products = products.view_mut((0, 0), (count, block.len()));
-                    products.gemm(1.0, &rows.rows(start, count), &as_columns(block), 0.0);
-                    for (best, products) in best.iter_mut().zip(products.column_iter()) {
-                        best.search(products.as_slice(), &half_squares, start..start + count);
-                    }
-                }
-                let neighbours =
-                    |(query, best): (&Descriptor, TopTwo)| best.resolve(query, reference);
-                block.iter().zip(best).map(neighbours).collect::<Vec<_>>()
-            },
-        )
-        .flatten_iter()
-        .collect()
+    let search = |products: &mut DMatrix<f32>, block: &[Descriptor]| {
+        let mut best = vec![TopTwo::default(); block.len()];
+        for start in (0..reference.len()).step_by(REFERENCE_BLOCK) {
+            let count = REFERENCE_BLOCK.min(reference.len() - start);
+            let mut products = products.view_mut((0, 0), (count, block.len()));
+            products.gemm(1.0, &rows.rows(start, count), &as_columns(block), 0.0);
+            for (best, products) in best.iter_mut().zip(products.column_iter()) {
+                best.search(products.as_slice(), &half_squares, start..start + count);
+            }
+        }
+        let neighbours = |(query, best): (&Descriptor, TopTwo)| best.resolve(query, reference);
+        block.iter().zip(best).map(neighbours).collect::<Vec<_>>()
+    };
+    // Whole blocks: a product does not depend on where the search is interrupted.
+    let blocks = PAIRS_AT_A_TIME / QUERY_BLOCK / reference.len().max(1);
+    let at_a_time = QUERY_BLOCK * blocks.max(rayon::current_num_threads());
+    let mut found = Vec::with_capacity(query.len());
+    for query in query.chunks(at_a_time) {
+        checkpoint()?;
+        let products = || DMatrix::zeros(REFERENCE_BLOCK, QUERY_BLOCK);
+        let neighbours = query
+            .par_chunks(QUERY_BLOCK)
+            .map_init(products, |products, block| search(products, block))
+            .flatten_iter();
+        found.par_extend(neighbours);
+    }
+    Ok(found)
 }
 
 /// Descriptors as the columns of a 64-row matrix.
@@ -307,6 +332,38 @@ mod tests {
         let found = nearest_neighbours(&[at(5.0)], &[at(80.0), at(5.0), at(5.0)]);
         let found = found[0].expect("a neighbour");
         assert_eq!((found.nearest, found.ratio()), (1, 1.0));
+    }
+
+    #[test]
+    fn a_long_search_can_be_stopped_and_is_the_same_on_any_number_of_threads() {
+        // Ten times as many pairs as are compared at a time.
+        let many = |count: u16| -> Vec<Descriptor> {
+            (0..count).map(|i| at(f32::from(i) * 0.7)).collect()
+        };
+        let (query, reference) = (many(5200), many(8100));
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.expect("a thread pool").install(|| {
+                let mut checkpoints = 0;
+                let found = nearest_neighbours_interruptible(&query, &reference, || {
+                    checkpoints += 1;
+                    Ok::<_, ()>(())
+                });
+                assert!(checkpoints >= 10, "{checkpoints}");
+                found
+            })
+        };
+        assert_eq!(on(1), on(3));
+        let mut checkpoints = 0;
+        let stopped = nearest_neighbours_interruptible(&query, &reference, || {
+            checkpoints += 1;
+            if checkpoints == 3 {
+                Err("stopped")
+            } else {
+                Ok(())
+            }
+        });
+        assert_eq!((stopped, checkpoints), (Err("stopped"), 3));
     }
 
     proptest! {

@@ -3,27 +3,25 @@
 //! The one way through for a single query, for an experiment over thousands, and for whoever wants
 //! to watch either.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use super::watch::checkpoint;
 use super::{
-    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, tell_ranking,
+    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, localize_by,
+    tell_ranking,
 };
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::KindSet;
-use crate::features::FeatureCache;
+use crate::features::remembered;
 use crate::fusion::{self, Fusion};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, Query};
 use crate::retrieval::ReferenceRanking;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{AtHand, Scene, SceneError};
 use crate::trace::Fanout;
 use crate::trace::{Cancelled, Sink, Trace};
-
-/// Features of as many photos are kept: those of a query and of the references around it.
-const REMEMBERED_PHOTOS: usize = 32;
 
 /// Why queries could not be localised, for those who have no error of their own.
 #[derive(Debug, thiserror::Error)]
@@ -51,12 +49,14 @@ pub struct Request {
 }
 
 /// Localises the queries of one scene against the references of another, or of the same.
+///
+/// The frames that were used last are at hand for the next method and the next query, with all that
+/// was worked out about them.
 pub struct Localizer<'a> {
-    references: &'a dyn Scene,
-    queries: &'a dyn Scene,
+    references: AtHand<'a>,
+    queries: AtHand<'a>,
     params: &'a Params,
     seed: u64,
-    features: Arc<FeatureCache>,
 }
 
 /// What one method made of one problem.
@@ -85,28 +85,31 @@ impl<'a> Localizer<'a> {
         params: &'a Params,
         seed: u64,
     ) -> Self {
+        Self::at_hand(AtHand::pair(references, queries), params, seed)
+    }
+
+    /// For scenes, references and queries, whose frames are remembered for longer than this.
+    pub fn at_hand(
+        (references, queries): (AtHand<'a>, AtHand<'a>),
+        params: &'a Params,
+        seed: u64,
+    ) -> Self {
         Self {
             references,
             queries,
             params,
             seed,
-            features: Arc::new(FeatureCache::new(REMEMBERED_PHOTOS)),
         }
     }
 
-    /// The scene of the queries.
-    pub fn queries(&self) -> &'a dyn Scene {
-        self.queries
+    /// The scene of the queries, its frames remembered.
+    pub fn queries(&self) -> &dyn Scene {
+        &self.queries
     }
 
-    /// The scene of the references.
-    pub fn references(&self) -> &'a dyn Scene {
-        self.references
-    }
-
-    /// Features found on the way.
-    pub fn features(&self) -> &Arc<FeatureCache> {
-        &self.features
+    /// The scene of the references, its frames remembered.
+    pub fn references(&self) -> &dyn Scene {
+        &self.references
     }
 
     /// Localises one query and hands out the results by method, then request, then fusion (or
@@ -138,6 +141,7 @@ impl<'a> Localizer<'a> {
                     Some(problem) => problem,
                     None => {
                         places.push(place);
+                        checkpoint(watch)?;
                         problems.push(Problem {
                             query: Arc::clone(&loaded),
                             reference: self.references.reference(reference)?,
@@ -191,7 +195,7 @@ impl<'a> Localizer<'a> {
                     }
                 }
                 if !request.fusions.is_empty() {
-                    self.count_matches(&mut work, members);
+                    self.count_matches(&mut work, members, watch)?;
                 }
                 for &fusion in &request.fusions {
                     let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
@@ -212,7 +216,7 @@ impl<'a> Localizer<'a> {
             if !told.iter().any(|known| Arc::ptr_eq(known, ranking)) {
                 watch.begin_retrieval();
                 let sink: &mut dyn Sink = &mut *watch;
-                tell_ranking(ranking, self.references, &mut Trace::to(sink))?;
+                tell_ranking(ranking, &self.references, &mut Trace::to(sink))?;
                 told.push(ranking);
             }
         }
@@ -261,16 +265,19 @@ impl<'a> Localizer<'a> {
         }
         watch.begin_method(problem, method);
         let candidate = match work.hybrid_parts(problem, method) {
-            // Whoever watches wants to see the hybrid at work.
-            Some((feature, direct)) if watch.wanted() == KindSet::NONE => {
-                let runs = [Some(&feature.times), Some(&direct.times)];
+            Some((feature, direct)) => {
+                let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
-                let times = runs.into_iter().flatten().take(used);
-                let outcome = hybrid_outcome(&feature.outcome, &direct.outcome);
-                let times = StageTimes::inside(method.name(), times);
+                let times = StageTimes::inside(method.name(), runs.into_iter().take(used));
+                let outcome = match watch.wanted() == KindSet::NONE {
+                    true => hybrid_outcome(&feature.outcome, &direct.outcome),
+                    // Whoever watches wants to see the hybrid at work. It has everything at hand, so
+                    // what it takes now says nothing.
+                    false => self.estimate(work, problem, method, watch)?.outcome,
+                };
                 self.judged(work, problem, method, outcome, times)
             }
-            _ => self.estimate(work, problem, method, watch)?,
+            None => self.estimate(work, problem, method, watch)?,
         };
         watch.end_method(&candidate.result, &candidate.times);
         let row = estimator::methods().position(|known| known == method);
@@ -289,23 +296,14 @@ impl<'a> Localizer<'a> {
     ) -> Result<Candidate, Cancelled> {
         let mut timings = StageTimings::default();
         let attention = watch.attention();
-        let estimated = catch_unwind(AssertUnwindSafe(|| {
-            let mut estimator = estimator::entry(method).make(self.params);
-            estimator.remember(&self.features);
-            let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
-            let mut fanout = Fanout::new(sinks);
-            let mut trace = match &attention {
-                Some(flag) => Trace::watched(&mut fanout, flag),
-                None => Trace::to(&mut fanout),
-            };
-            estimator.estimate(&work.problems[problem], &mut trace)
-        }));
-        let outcome = match estimated {
-            Ok(outcome) => outcome?,
-            Err(panic) => failed(Failure::Internal {
-                message: words_of(panic.as_ref()),
-            }),
+        let estimator = estimator::entry(method).make(self.params);
+        let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
+        let mut fanout = Fanout::new(sinks);
+        let mut trace = match &attention {
+            Some(flag) => Trace::watched(&mut fanout, flag),
+            None => Trace::to(&mut fanout),
         };
+        let outcome = localize_by(estimator.as_ref(), &work.problems[problem], &mut trace)?;
         Ok(self.judged(work, problem, method, outcome, timings.into_times()))
     }
 
@@ -333,11 +331,17 @@ impl<'a> Localizer<'a> {
     }
 
     /// FB counts them anyway; for the direct methods the same features are matched.
-    fn count_matches(&self, work: &mut Work<'_>, members: &[usize]) {
+    fn count_matches(
+        &self,
+        work: &mut Work<'_>,
+        members: &[usize],
+        watch: &mut dyn Watch,
+    ) -> Result<(), Cancelled> {
         for &problem in members {
             if work.matches[problem].is_some() {
                 continue;
             }
+            checkpoint(watch)?;
             let counted = estimator::methods().find_map(|method| {
                 let candidate = work.candidate(problem, method)?;
                 candidate.outcome.counts
@@ -349,12 +353,13 @@ impl<'a> Localizer<'a> {
                         query, reference, ..
                     } = &work.problems[problem];
                     let surf = &self.params.surf;
-                    let query = self.features.surf(&query.photo.gray, surf);
-                    let reference = self.features.surf(&reference.photo.gray, surf);
-                    count_matches(&query, &reference, &self.params.fb)
+                    let query = remembered(&query.photo.gray, &query.memo, surf);
+                    let reference = remembered(&reference.photo.gray, &reference.memo, surf);
+                    count_matches(&query.value, &reference.value, &self.params.fb)
                 }
             });
         }
+        Ok(())
     }
 
     fn fuse(
@@ -432,22 +437,4 @@ impl Work<'_> {
             |candidate: &Candidate| matches!(candidate.outcome.pose, Err(Failure::Internal { .. }));
         (!panicked(first) && !panicked(second)).then_some((first, second))
     }
-}
-
-fn failed(failure: Failure) -> Outcome {
-    Outcome {
-        pose: Err(failure),
-        counts: None,
-        cost: None,
-    }
-}
-
-/// What a panic said, on one line.
-pub fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
-    let words = panic
-        .downcast_ref::<String>()
-        .map(String::as_str)
-        .or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("a panic without a message");
-    words.replace('\n', " ")
 }

@@ -8,10 +8,11 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-use super::Localizer;
+use super::watch::checkpoint;
+use super::{Localizer, Watch};
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
-use crate::features::FeatureCache;
+use crate::features::remembered;
 use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Query;
@@ -101,16 +102,17 @@ pub trait Ranking: Send + Sync {
     fn criterion(&self) -> Criterion;
 
     /// The best `count` of the candidates, the best first, all of them as positions in the
-    /// references' scene.
+    /// references' scene. `checkpoint` is called between two frames that are looked at.
     ///
     /// # Errors
-    /// When a frame or the index cannot be read.
+    /// When a frame or the index cannot be read, and those of `checkpoint`.
     fn rank(
         &self,
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<Ranked>, SceneError>;
+        checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<Ranked>, ChoiceError>;
 }
 
 /// The references of a query.
@@ -145,10 +147,10 @@ pub fn tell_ranking(
     trace: &mut Trace<'_>,
 ) -> Result<(), Cancelled> {
     let photo = |reference: &RankedReference| {
-        let read = references.photo(reference.ranked.frame);
+        let read = references.query(reference.ranked.frame);
         read.inspect_err(|error| log::warn!("{error}"))
             .ok()
-            .map(Arc::new)
+            .map(|frame| Arc::clone(&frame.photo))
     };
     trace.stage(Stage::Retrieve, |trace| {
         trace.emit(|| ReferencesRanked {
@@ -204,11 +206,14 @@ pub enum ChoiceError {
     /// A frame cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The watcher asked the run to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Chooses references for queries.
 pub struct Chooser<'a> {
-    /// Whose features are compared, and where they are kept.
+    /// Whose frames are ranked, and what is known about them.
     pub localizer: &'a Localizer<'a>,
     /// Parameters of features and matching.
     pub params: &'a Params,
@@ -224,7 +229,7 @@ pub struct Chooser<'a> {
 
 impl Chooser<'_> {
     /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
-    /// that it must not be one; the query itself never is.
+    /// that it must not be one; the query itself never is. `watch` hears nothing, but can stop it.
     ///
     /// # Errors
     /// [`ChoiceError`].
@@ -232,6 +237,7 @@ impl Chooser<'_> {
         &self,
         query: usize,
         left_out: &dyn Fn(usize) -> bool,
+        watch: &mut dyn Watch,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
@@ -262,12 +268,12 @@ impl Chooser<'_> {
                 let by_matches = ByMatches {
                     scene: references,
                     params: self.params,
-                    features: self.localizer.features(),
                 };
-                self.ranked(query, &within, &by_matches)?
+                self.ranked(query, &within, &by_matches, watch)?
             }
             Selection::Retrieved(_) => {
-                self.ranked(query, &within, self.index.ok_or(ChoiceError::NoIndex)?)?
+                let index = self.index.ok_or(ChoiceError::NoIndex)?;
+                self.ranked(query, &within, index, watch)?
             }
         };
         Ok(References {
@@ -281,12 +287,15 @@ impl Chooser<'_> {
         query: usize,
         candidates: &[usize],
         by: &dyn Ranking,
+        watch: &mut dyn Watch,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let count = self.selection.count();
         let depth = ReferenceRanking::depth(count);
         let frames: Vec<RankedReference> = by
-            .rank(&*queries.query(query)?, candidates, depth)?
+            .rank(&*queries.query(query)?, candidates, depth, &mut || {
+                checkpoint(watch)
+            })?
             .into_iter()
             .map(|ranked| RankedReference {
                 name: references.frames()[ranked.frame].clone(),
@@ -310,12 +319,10 @@ impl Chooser<'_> {
 
 /// Ranks by exhaustive matching of features.
 pub struct ByMatches<'a> {
-    /// The references' scene.
+    /// The references' scene. Features are kept with its frames where these are remembered.
     pub scene: &'a dyn Scene,
     /// Parameters of features and matching.
     pub params: &'a Params,
-    /// Where features are kept.
-    pub features: &'a FeatureCache,
 }
 
 impl Ranking for ByMatches<'_> {
@@ -328,12 +335,16 @@ impl Ranking for ByMatches<'_> {
         query: &Query,
         candidates: &[usize],
         count: usize,
-    ) -> Result<Vec<Ranked>, SceneError> {
-        let of_query = self.features.surf(&query.photo.gray, &self.params.surf);
+        checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<Ranked>, ChoiceError> {
+        let surf = &self.params.surf;
+        let of_query = remembered(&query.photo.gray, &query.memo, surf).value;
         let mut ranked = Vec::new();
         for &candidate in candidates {
-            let photo = self.scene.photo(candidate)?;
-            let features = self.features.surf(&photo.gray, &self.params.surf);
+            checkpoint()?;
+            // Neither its pose nor its cloud is needed.
+            let frame = self.scene.query(candidate)?;
+            let features = remembered(&frame.photo.gray, &frame.memo, surf).value;
             ranked.push((
                 count_matches(&of_query, &features, &self.params.fb),
                 candidate,

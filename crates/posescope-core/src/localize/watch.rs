@@ -8,7 +8,7 @@ use crate::event::KindSet;
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::trace::{Cancelled, Record, Sink};
+use crate::trace::{Cancelled, Record, Sink, Trace};
 
 /// Somebody who watches queries being localised: a recording, a progress bar, nobody.
 pub trait Watch: Sink {
@@ -43,6 +43,15 @@ pub trait Watch: Sink {
     /// A flag that is raised when [`Sink::attend`] is to be called although nothing was told.
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         None
+    }
+}
+
+/// Between two steps that tell nothing: calls [`Sink::attend`] where the flag is up.
+pub(super) fn checkpoint(watch: &mut dyn Watch) -> Result<(), Cancelled> {
+    let attention = watch.attention();
+    match &attention {
+        Some(flag) => Trace::watched(watch, flag).checkpoint(),
+        None => Ok(()),
     }
 }
 

@@ -6,6 +6,7 @@ use super::RenderParams;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::image::{GrayImage, cubic_interpolated};
+use crate::memo::Remembered;
 
 /// A point of the cloud with the grey value that the reference photo gives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +35,12 @@ pub struct ColoredCloud {
     pub points: Vec<ColoredPoint>,
     /// What became of the scan's points.
     pub counts: ColoringCounts,
+}
+
+impl Remembered for ColoredCloud {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.points.as_slice())
+    }
 }
 
 /// Gives each point that the reference camera sees the photo's grey value at its projection, by

@@ -8,7 +8,7 @@ use std::f64::consts::{LN_10, PI};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use super::mlesac::{NEEDED, SAMPLE};
+use super::params::{NEEDED, SAMPLE};
 use crate::solver::MAX_SOLUTIONS;
 
 /// Expected number of accepted poses per problem of purely false matches, as a power of ten.

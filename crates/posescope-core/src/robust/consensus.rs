@@ -1,7 +1,7 @@
 //! What MLESAC tells on the way and in the end.
 
 use super::likelihood::Score;
-use super::mlesac::SAMPLE;
+use super::params::SAMPLE;
 use crate::geometry::Pose;
 use crate::solver::Refinement;
 

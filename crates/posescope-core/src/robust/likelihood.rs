@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::mlesac::MlesacParams;
+use super::params::MlesacParams;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 use crate::solver::Correspondence;

@@ -2,7 +2,7 @@
 
 use super::consensus::Hypothesis;
 use super::likelihood::Likelihood;
-use super::mlesac::MlesacParams;
+use super::params::MlesacParams;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 use crate::solver::{Correspondence, Refinement, refine};
@@ -11,9 +11,9 @@ use crate::solver::{Correspondence, Refinement, refine};
 /// must rise each time, so there is no going round in circles.
 const MAX_ROUNDS: usize = 10;
 
-/// A hypothesis after [`settle`].
+/// A hypothesis after [`locally_optimized`].
 #[derive(Clone, Copy)]
-pub(super) struct Settled {
+pub(super) struct LocalOptimum {
     pub(super) hypothesis: Hypothesis,
     /// The refinement that ended at its pose.
     pub(super) refinement: Option<Refinement>,
@@ -21,19 +21,19 @@ pub(super) struct Settled {
 
 /// Refines a hypothesis on its inliers, and again on the inliers of the refined pose, for as long
 /// as the likelihood of all correspondences rises.
-pub(super) fn settle(
+pub(super) fn locally_optimized(
     hypothesis: Hypothesis,
     correspondences: &[Correspondence],
     intrinsics: &Intrinsics,
     params: &MlesacParams,
     likelihood: &mut Likelihood,
-) -> Settled {
-    let mut settled = Settled {
+) -> LocalOptimum {
+    let mut optimum = LocalOptimum {
         hypothesis,
         refinement: None,
     };
     for _ in 0..MAX_ROUNDS {
-        let Hypothesis { pose, score: old } = settled.hypothesis;
+        let Hypothesis { pose, score: old } = optimum.hypothesis;
         let residuals_px = residuals(correspondences, intrinsics, &pose);
         let agreeing: Vec<_> = inliers(&residuals_px, params.inlier_threshold_px)
             .map(|i| correspondences[i])
@@ -41,16 +41,16 @@ pub(super) fn settle(
         let refinement = refine(&agreeing, intrinsics, &pose, params.loss);
         let new = likelihood.score(&refinement.pose);
         if new.log_likelihood > old.log_likelihood {
-            settled.hypothesis = Hypothesis {
+            optimum.hypothesis = Hypothesis {
                 pose: refinement.pose,
                 score: new,
             };
-            settled.refinement = Some(refinement);
+            optimum.refinement = Some(refinement);
         } else {
             break;
         }
     }
-    settled
+    optimum
 }
 
 /// Reprojection error of every correspondence; infinite behind the camera \[px\].

@@ -3,58 +3,13 @@
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_pcg::Pcg64;
-use serde::{Deserialize, Serialize};
 
 use super::consensus::{Consensus, Hypothesis, MlesacError, Trial};
 use super::likelihood::Likelihood;
-use super::local::{Settled, inliers, residuals, settle};
+use super::local::{LocalOptimum, inliers, locally_optimized, residuals};
+use super::params::{MlesacParams, NEEDED, SAMPLE};
 use crate::camera::Intrinsics;
-use crate::solver::Loss;
 use crate::solver::{Correspondence, p3p};
-
-/// Correspondences in a sample: as many as the minimal solver takes.
-pub const SAMPLE: usize = 3;
-
-/// Correspondences without which there is no consensus: a sample and one that agrees with it.
-pub const NEEDED: usize = SAMPLE + 1;
-
-/// Parameters of [`mlesac`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct MlesacParams {
-    /// σ, the noise of a true match per image axis \[px\].
-    pub sigma_px: f64,
-    /// Greatest reprojection error of an inlier \[px\].
-    pub inlier_threshold_px: f64,
-    /// Probability with which a sample without false matches is to be drawn.
-    pub confidence: f64,
-    /// Trials at most.
-    pub max_trials: usize,
-    /// Trials at least.
-    pub min_trials: usize,
-    /// Rounds of expectation–maximisation for the mixing of one hypothesis.
-    pub em_iterations: usize,
-    /// Loss of the refinement.
-    pub loss: Loss,
-}
-
-/// The trials are capped at what 7 % true matches need. The others were tried on synthetic scenes
-/// with 1 px of noise and 10 to 70 % true matches out of 200 and 1,000: fewer than 100 trials at
-/// least (50) and more rounds of EM (8) change nothing that can be measured; for Gaussian noise
-/// the Huber loss at 1.5 px costs 2 % of accuracy against least squares, Cauchy at 2 px 5 %.
-impl Default for MlesacParams {
-    fn default() -> Self {
-        Self {
-            sigma_px: 1.0,
-            inlier_threshold_px: 3.0,
-            confidence: 0.999,
-            max_trials: 20_000,
-            min_trials: 100,
-            em_iterations: 3,
-            loss: Loss::Huber(1.5),
-        }
-    }
-}
 
 /// The pose `camera_from_points` that makes the reprojection errors of all `correspondences`
 /// likeliest.
@@ -100,39 +55,37 @@ pub fn mlesac<C>(
         .collect();
     let mut likelihood = Likelihood::new(correspondences, intrinsics, params);
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut best: Option<Settled> = None;
+    let mut best: Option<LocalOptimum> = None;
     let mut trials = 0;
     let mut trials_needed = params.max_trials;
     while trials < trials_needed {
         let Some(sample) = index::sample_array::<_, SAMPLE>(&mut rng, found) else {
             break;
         };
-        let hypothesis = p3p(
+        let solutions = p3p(
             &sample.map(|i| bearings[i]),
             &sample.map(|i| correspondences[i].point),
-        )
-        .into_iter()
-        .map(|pose| Hypothesis {
+        );
+        let hypothesis = likeliest(solutions.into_iter().map(|pose| Hypothesis {
             pose,
             score: likelihood.score(&pose),
-        })
-        .max_by(|a, b| f64::total_cmp(&a.score.log_likelihood, &b.score.log_likelihood));
+        }));
 
         let old = best.map_or(f64::NEG_INFINITY, |best| {
             best.hypothesis.score.log_likelihood
         });
         let improved = hypothesis.filter(|new| new.score.log_likelihood > old);
         if let Some(hypothesis) = improved {
-            let settled = settle(
+            let optimum = locally_optimized(
                 hypothesis,
                 correspondences,
                 intrinsics,
                 params,
                 &mut likelihood,
             );
-            let wanted = trials_for(settled.hypothesis.score.inliers, found, params.confidence);
+            let wanted = trials_for(optimum.hypothesis.score.inliers, found, params.confidence);
             trials_needed = wanted.max(params.min_trials).min(params.max_trials);
-            best = Some(settled);
+            best = Some(optimum);
         }
         observe(&Trial {
             index: trials,
@@ -149,7 +102,7 @@ pub fn mlesac<C>(
         trials,
         best_inliers,
     };
-    let Settled {
+    let LocalOptimum {
         hypothesis: Hypothesis { pose, score },
         refinement,
     } = best.ok_or_else(|| no_model(0))?;
@@ -169,6 +122,15 @@ pub fn mlesac<C>(
     })
 }
 
+/// The likeliest of the solutions of one sample, of equally likely ones the last.
+///
+/// One whose likelihood is not a number says nothing about the others.
+fn likeliest(solutions: impl Iterator<Item = Hypothesis>) -> Option<Hypothesis> {
+    solutions
+        .filter(|solution| !solution.score.log_likelihood.is_nan())
+        .max_by(|a, b| f64::total_cmp(&a.score.log_likelihood, &b.score.log_likelihood))
+}
+
 /// Trials after which a sample without false matches has been drawn with the given confidence,
 /// if `inliers` of `total` matches are true.
 ///
@@ -185,6 +147,7 @@ fn trials_for(inliers: usize, total: usize, confidence: f64) -> usize {
 mod tests {
     use super::*;
     use crate::geometry::Pose;
+    use crate::robust::Score;
     use nalgebra::{Point2, Point3, Vector2, Vector3};
     use rand::RngExt;
 
@@ -355,6 +318,25 @@ mod tests {
                 assert!(found.inliers.len() >= NEEDED);
             }
         }
+    }
+
+    #[test]
+    fn a_solution_without_a_likelihood_does_not_hide_the_others_of_its_sample() {
+        let solution = |log_likelihood| Hypothesis {
+            pose: truth(),
+            score: Score {
+                log_likelihood,
+                mixing: 0.5,
+                inliers: 10,
+            },
+        };
+        let chosen = |likelihoods: &[f64]| {
+            likeliest(likelihoods.iter().copied().map(solution)).map(|h| h.score.log_likelihood)
+        };
+        assert_eq!(chosen(&[-20.0, f64::NAN, -10.0]), Some(-10.0));
+        assert_eq!(chosen(&[-20.0, -f64::NAN]), Some(-20.0));
+        assert_eq!(chosen(&[f64::NAN]), None);
+        assert_eq!(chosen(&[]), None);
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::memo::Bits;
+
 /// A loss `ρ(r²)` on the squared length of a residual, about `r²` for small residuals.
 ///
 /// Minimising `Σ ρ(rᵢ²)` is, step by step, weighted least squares with the weights
@@ -16,6 +18,18 @@ pub enum Loss {
     Huber(f64),
     /// `s² ln(1 + r²/s²)`: the pull of a residual fades beyond the scale.
     Cauchy(f64),
+}
+
+impl Bits for Loss {
+    fn write(&self, words: &mut Vec<u64>) {
+        let (kind, scale) = match self {
+            Self::Squared => (0, 0.0),
+            Self::Huber(scale) => (1, *scale),
+            Self::Cauchy(scale) => (2, *scale),
+        };
+        words.push(kind);
+        scale.write(words);
+    }
 }
 
 impl Loss {

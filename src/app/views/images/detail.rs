@@ -7,10 +7,10 @@ use nalgebra::Point2;
 
 use super::arrangement::PATCH;
 use super::lidar::{self, SeenPoint};
+use super::marks::{color, draw_truth, mark, position};
 use super::photos::{PhotoTexture, Photos};
 use super::story::{Story, UNDECIDED, name};
 use super::truth::TrueMatch;
-use super::{color, mark, position};
 use crate::app::views::canvas::Placement;
 use crate::app::views::ink::Ink;
 use crate::app::views::legend;
@@ -167,7 +167,7 @@ impl Detail {
         if let (Some(at), Some(truth)) = (at, &subject.truth) {
             let painter = at.painter(ui.painter());
             let mut ink = Ink::new(ui.pixels_per_point());
-            super::draw_truth(&mut ink, &at, &subject.problem.query.intrinsics, truth);
+            draw_truth(&mut ink, &at, &subject.problem.query.intrinsics, truth);
             ink.dry(&painter);
         }
 

@@ -2,8 +2,8 @@
 
 use egui::{Align2, Role, Sense, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2};
 
+use super::marks::{color, mark};
 use super::story::{KINDS, UNDECIDED, name};
-use super::{color, mark};
 use crate::app::views::ink::Ink;
 
 /// Height of the bar \[points\].

@@ -67,7 +67,7 @@ mod tests {
         points.push(-points[0]);
         let tuple = ReferenceTuple {
             name: "reference".to_owned(),
-            photo: Photo::from_gray(GrayImage::new(101, 81)),
+            photo: Photo::from_gray(GrayImage::new(101, 81)).into(),
             intrinsics,
             world_from_camera: Pose::identity(),
             cloud: Cloud { points },

@@ -2,8 +2,8 @@
 
 use egui::{Color32, Pos2};
 
+use super::marks::{color, mark, position};
 use super::story::{KINDS, Story, UNDECIDED};
-use super::{color, mark, position};
 use crate::app::views::canvas::Placement;
 use crate::app::views::ink::{Ink, Mark};
 

@@ -427,7 +427,7 @@ mod tests {
             let centre = Offset { right_m: x, forward_m: y, yaw_rad: 0.0 };
             let params = GridParams::default();
             for phase in [Phase::PositionCoarse, Phase::PositionFine] {
-                let lattice = Lattice::new(phase, centre, 4.0, &params);
+                let lattice = Lattice::new(phase, centre, 4.0, &params).expect("small");
                 for (cell, offset) in lattice.hypotheses() {
                     let right_m = offset.right_m + right * lattice.step;
                     let forward_m = offset.forward_m + forward * lattice.step;

@@ -68,11 +68,13 @@ impl<'a> Search<'a> {
                     // What is told of a lattice before its end are its hypotheses, one by one; where
                     // they are follows from the parameters.
                     let radius_m = problem.uncertainty_radius_m;
-                    filling
-                        .get_or_insert_with(|| {
-                            Filling::new(Lattice::new(scored.phase, centre, radius_m, params))
-                        })
-                        .take(scored);
+                    if filling.is_none() {
+                        let lattice = Lattice::new(scored.phase, centre, radius_m, params);
+                        filling = lattice.ok().map(Filling::new);
+                    }
+                    if let Some(filling) = &mut filling {
+                        filling.take(scored);
+                    }
                     search.hypothesis = Some(scored);
                 }
                 Event::PhaseSearched(searched) => {

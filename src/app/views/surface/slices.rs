@@ -322,10 +322,11 @@ mod tests {
     #[test]
     fn a_slice_takes_the_row_or_the_column_of_its_cell() {
         let params = GridParams::default();
-        let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params);
+        let lattice =
+            Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params).expect("small");
         assert_eq!(Along::Right.cells(&lattice, 5), [3, 4, 5]);
         assert_eq!(Along::Forward.cells(&lattice, 5), [2, 5, 8]);
-        let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params);
+        let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params).expect("small");
         assert_eq!(Along::Yaw.cells(&yaw, 5).len(), yaw.columns);
     }
 

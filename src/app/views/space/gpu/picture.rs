@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use eframe::wgpu;
 
+use super::frame::{Frame, Points};
+use super::guard::guarded;
 use super::pipelines::{COLOR, DEPTH, Made, Pipelines, SAMPLES};
-use super::{Frame, Points, guarded};
 
 /// The picture and what is needed to draw it anew.
 #[derive(Default)]

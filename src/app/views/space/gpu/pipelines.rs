@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use eframe::wgpu;
 
-use super::{Line, Spot, guarded};
+use super::frame::{Line, Spot};
+use super::guard::{guarded, one_line};
 
 /// Samples in a pixel: lines have smooth edges.
 pub(super) const SAMPLES: u32 = 4;
@@ -35,7 +36,7 @@ impl Pipelines {
         let lost: Arc<Mutex<Option<String>>> = Arc::default();
         let told = Arc::clone(&lost);
         device.set_device_lost_callback(move |_, why| {
-            let why = format!("the graphics card was lost {}", super::one_line(&why));
+            let why = format!("the graphics card was lost {}", one_line(&why));
             *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(why.trim().to_owned());
         });
         Self {

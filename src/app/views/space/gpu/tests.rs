@@ -1,11 +1,14 @@
 //! What comes out of the graphics card, against what the processor says.
 
+use egui::Color32;
 use nalgebra::Point3;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
+use super::guard::at_once;
 use super::pipelines::COLOR;
 use super::*;
+use crate::app::views::space::lens::Lens;
 use crate::geometry::Pose;
 
 const SIZE: [u32; 2] = [320, 240];

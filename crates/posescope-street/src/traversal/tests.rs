@@ -1,4 +1,6 @@
 use super::*;
+use crate::Street;
+use crate::world::town_ray;
 use nalgebra::Point3;
 
 fn traversal(size: Size) -> Traversal {
@@ -67,7 +69,7 @@ fn traversals_share_houses_and_differ_in_cars_and_in_the_line_driven() {
     // Far above cars and below roofs, one sees the same walls.
     let sky_hook = Point3::new(0.0, -3.5, 0.0);
     let wall = |drive: &Traversal, pose: &Pose| {
-        let ray = render::town_ray(pose, &sky_hook, &nalgebra::Vector3::x());
+        let ray = town_ray(pose, &sky_hook, &nalgebra::Vector3::x());
         drive.town.look(&ray, 0.0).map(|sight| sight.distance)
     };
     let mut same = 0;
@@ -157,7 +159,7 @@ fn nothing_is_in_the_way_of_the_car() {
             for k in 0..24 {
                 let (sin, cos) = (f64::from(k) * 15.0_f64.to_radians()).sin_cos();
                 let direction = nalgebra::Vector3::new(sin, 0.0, cos);
-                let ray = render::town_ray(pose, &Point3::new(0.0, 0.3, 0.0), &direction);
+                let ray = town_ray(pose, &Point3::new(0.0, 0.3, 0.0), &direction);
                 let sight = drive.town.look(&ray, 0.0);
                 assert!(sight.is_none_or(|s| s.distance > 1.2), "{sight:?}");
             }

@@ -1,0 +1,65 @@
+//! One query against one reference.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use crate::estimator::{self, Estimator, Failure, Outcome};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::trace::{Cancelled, Trace};
+
+/// Localises the query of a problem. A query without a pose is an outcome too, which says why.
+///
+/// The answer depends on the problem, the method and the parameters, never on the number of threads.
+///
+/// # Panics
+/// For a method that is in no registry ([`Method::named`]).
+pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
+    localize_traced(problem, method, params, &mut Trace::off())
+        .unwrap_or_else(|Cancelled| unreachable!("a trace that is off cancels nothing"))
+}
+
+/// As [`localize`], and tells every decision to a trace; that changes nothing of the answer.
+///
+/// # Errors
+/// [`Cancelled`] when whoever listens asks the run to stop.
+///
+/// # Panics
+/// For a method that is in no registry ([`Method::named`]).
+pub fn localize_traced(
+    problem: &Problem,
+    method: Method,
+    params: &Params,
+    trace: &mut Trace<'_>,
+) -> Result<Outcome, Cancelled> {
+    let estimator = estimator::entry(method).make(params);
+    localize_by(estimator.as_ref(), problem, trace)
+}
+
+/// As [`localize_traced`], by an estimator that somebody made. A panic in it is an outcome,
+/// [`Failure::Internal`].
+///
+/// # Errors
+/// [`Cancelled`] when whoever listens asks the run to stop.
+pub fn localize_by(
+    estimator: &dyn Estimator,
+    problem: &Problem,
+    trace: &mut Trace<'_>,
+) -> Result<Outcome, Cancelled> {
+    let estimated = catch_unwind(AssertUnwindSafe(|| estimator.estimate(problem, trace)));
+    estimated.unwrap_or_else(|panic| {
+        let message = words_of(panic.as_ref());
+        Ok(Outcome::failed(Failure::Internal { message }))
+    })
+}
+
+/// What a panic said, on one line.
+pub fn words_of(panic: &(dyn Any + Send)) -> String {
+    let words = panic
+        .downcast_ref::<String>()
+        .map(String::as_str)
+        .or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("a panic without a message");
+    words.replace('\n', " ")
+}

@@ -1,0 +1,222 @@
+//! The frames that were used last, with what was worked out about them.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use super::{Scene, SceneError, pose_of, reference_of};
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use crate::geometry::Pose;
+use crate::image::Photo;
+use crate::memo::Memo;
+use crate::problem::{Query, ReferenceTuple};
+use crate::recent::{Limit, Recent};
+
+/// Frames that are kept unless others hold them anyway: a query, its references, and the candidates
+/// that were looked at to choose them.
+const FRAMES: usize = 64;
+/// Memory that frames may take unless others hold them anyway \[bytes\]: that of 38 candidates within
+/// 15 m of a query on the street, each with its features. A frame with its cloud and all that the four
+/// estimators remember takes three times as much.
+const BYTES: usize = 96 << 20;
+/// Values that one frame's memo keeps: some settings of each stage with several references, so that
+/// going back to the last setting costs nothing either.
+const VALUES: usize = 256;
+
+/// Frames with all that was worked out about them, within a limit. The frame that was not asked for
+/// the longest makes room; one that somebody holds stays, as letting it go would free nothing.
+///
+/// No lock is held while a frame is read. Two threads that ask for the same one may both read it, and
+/// get the same.
+pub struct FrameStore {
+    frames: Recent<Place, Arc<Frame>>,
+    /// Held, so that none is taken for another at the same address.
+    scenes: Mutex<Vec<(Arc<dyn Scene>, SceneId)>>,
+}
+
+/// Which scene: no two are the same within one process.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct SceneId(u64);
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Place {
+    scene: SceneId,
+    frame: usize,
+}
+
+/// Query and reference tuple are made of the same photo and remember together.
+struct Frame {
+    query: Arc<Query>,
+    reference: OnceLock<Arc<ReferenceTuple>>,
+}
+
+impl Frame {
+    fn bytes(&self) -> usize {
+        let cloud = self.reference.get().map_or(0, |reference| {
+            size_of_val(reference.cloud.points.as_slice())
+        });
+        self.query.photo.bytes() + self.query.memo.bytes() + cloud
+    }
+
+    fn is_held(&self) -> bool {
+        let reference = self.reference.get();
+        Arc::strong_count(&self.query) > 1 || reference.is_some_and(|r| Arc::strong_count(r) > 1)
+    }
+}
+
+impl SceneId {
+    fn new() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+impl Default for FrameStore {
+    fn default() -> Self {
+        Self::new(FRAMES, BYTES)
+    }
+}
+
+impl FrameStore {
+    /// A store of at most so many frames, which together take at most so many bytes.
+    pub fn new(count: usize, bytes: usize) -> Self {
+        Self {
+            frames: Recent::within(
+                Limit { count, bytes },
+                |frame: &Arc<Frame>| frame.bytes(),
+                |frame| frame.is_held(),
+            ),
+            scenes: Mutex::default(),
+        }
+    }
+
+    /// Memory that all frames take with what was worked out about them \[bytes\], roughly.
+    pub fn bytes(&self) -> usize {
+        self.frames.bytes()
+    }
+
+    /// The scene with its frames remembered here, those from before too.
+    pub fn of<'a>(self: &Arc<Self>, scene: &'a Arc<dyn Scene>) -> AtHand<'a> {
+        let mut scenes = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = scenes.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
+        let id = known.map(|(_, id)| *id).unwrap_or_else(|| {
+            let id = SceneId::new();
+            scenes.push((Arc::clone(scene), id));
+            id
+        });
+        AtHand {
+            scene: scene.as_ref(),
+            id,
+            store: Arc::clone(self),
+        }
+    }
+}
+
+/// A scene whose frames are remembered in a [`FrameStore`], with all that is worked out about them.
+#[derive(Clone)]
+pub struct AtHand<'a> {
+    scene: &'a dyn Scene,
+    id: SceneId,
+    store: Arc<FrameStore>,
+}
+
+impl<'a> AtHand<'a> {
+    /// The scenes of references and of queries, which may be the same, with a store of their own.
+    pub fn pair(references: &'a dyn Scene, queries: &'a dyn Scene) -> (Self, Self) {
+        let references = Self {
+            scene: references,
+            id: SceneId::new(),
+            store: Arc::default(),
+        };
+        let is_same = std::ptr::eq(references.scene, queries);
+        let queries = Self {
+            scene: queries,
+            id: if is_same {
+                references.id
+            } else {
+                SceneId::new()
+            },
+            store: Arc::clone(&references.store),
+        };
+        (references, queries)
+    }
+
+    /// Where its frames are remembered.
+    pub fn store(&self) -> &Arc<FrameStore> {
+        &self.store
+    }
+
+    fn frame(&self, frame: usize) -> Result<Arc<Frame>, SceneError> {
+        let place = Place {
+            scene: self.id,
+            frame,
+        };
+        let frames = &self.store.frames;
+        if let Some(known) = frames.get(&place) {
+            // It has grown since, by what was worked out about it.
+            frames.trim();
+            return Ok(known);
+        }
+        let query = Query {
+            memo: Memo::of(VALUES),
+            ..Arc::unwrap_or_clone(self.scene.query(frame)?)
+        };
+        let made = Frame {
+            query: Arc::new(query),
+            reference: OnceLock::new(),
+        };
+        Ok(frames.insert(place, Arc::new(made)))
+    }
+}
+
+impl Scene for AtHand<'_> {
+    fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
+        Ok(Arc::clone(&self.frame(frame)?.query))
+    }
+
+    fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
+        let world_from_camera = pose_of(self, frame)?;
+        let known = self.frame(frame)?;
+        if let Some(reference) = known.reference.get() {
+            return Ok(Arc::clone(reference));
+        }
+        let made = reference_of(self, frame, world_from_camera, &known.query)?;
+        Ok(Arc::clone(known.reference.get_or_init(|| made)))
+    }
+
+    fn name(&self) -> &str {
+        self.scene.name()
+    }
+
+    fn frames(&self) -> &[String] {
+        self.scene.frames()
+    }
+
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.scene.intrinsics(frame)
+    }
+
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.scene.pose(frame)
+    }
+
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.scene.time_s(frame)
+    }
+
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.scene.has_cloud(frame)
+    }
+
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        self.scene.photo(frame)
+    }
+
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.scene.cloud(frame)
+    }
+
+    fn fingerprint(&self) -> u64 {
+        self.scene.fingerprint()
+    }
+}

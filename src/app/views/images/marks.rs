@@ -1,0 +1,51 @@
+//! How features are marked: those of a state, and where the ground truth has them.
+
+use egui::Color32;
+
+use super::story::UNDECIDED;
+use super::truth::TrueMatch;
+use crate::app::theme;
+use crate::app::views::canvas::Placement;
+use crate::app::views::ink::{Ink, Mark};
+use crate::camera::Intrinsics;
+use crate::features::Keypoint;
+
+/// The colour of a state, or of none yet.
+pub(super) fn color(kind: usize) -> Color32 {
+    if kind == UNDECIDED {
+        theme::CAMERA
+    } else {
+        theme::state(kind)
+    }
+}
+
+/// The mark of a state, or of none yet.
+pub(super) fn mark(kind: usize) -> Mark {
+    const MARKS: [Mark; UNDECIDED] = [
+        Mark::Cross,
+        Mark::Triangle,
+        Mark::Ring,
+        Mark::Diamond,
+        Mark::Disc,
+    ];
+    MARKS.get(kind).copied().unwrap_or(Mark::Square)
+}
+
+/// Where a keypoint is \[px\].
+pub(super) fn position(keypoint: &Keypoint) -> [f32; 2] {
+    [keypoint.x, keypoint.y]
+}
+
+/// The epipolar line, and where the true pose sees the lifted point.
+pub(super) fn draw_truth(ink: &mut Ink, at: &Placement, camera: &Intrinsics, truth: &TrueMatch) {
+    let place = |pixel: &nalgebra::Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
+    let shade = Color32::from_black_alpha(140);
+    if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
+        ink.line(place(&from), place(&to), 3.5, shade);
+        ink.line(place(&from), place(&to), 1.8, theme::TRUTH);
+    }
+    if let Some(pixel) = &truth.place {
+        ink.disc(place(pixel), 8.0, shade);
+        ink.mark(Mark::Plus, place(pixel), 6.0, theme::TRUTH);
+    }
+}

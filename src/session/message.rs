@@ -1,0 +1,27 @@
+//! What a worker has to say, on its way to the session.
+
+use std::sync::Arc;
+
+use super::loaded::Loaded;
+use super::run::Part;
+use crate::localize::{QueryResult, References, StageTimes};
+use crate::trace::Record;
+
+/// What the worker says to the session.
+pub(super) enum Message {
+    Chosen(References),
+    Loaded(Arc<Loaded>),
+    Began(Part),
+    Told(Box<Record>),
+    Waits {
+        breakpoint: Option<String>,
+    },
+    Goes,
+    Ended {
+        result: Box<QueryResult>,
+        times: Option<StageTimes>,
+    },
+    Finished,
+    Cancelled,
+    Broke(String),
+}

@@ -1,0 +1,516 @@
+//! What is read and worked out once, and what is kept of it.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Barrier, Mutex};
+
+use posescope::camera::Intrinsics;
+use posescope::cloud::Cloud;
+use posescope::event::{Event, StageEnded};
+use posescope::geometry::Pose;
+use posescope::image::Photo;
+use posescope::localize::{
+    Chooser, LocalizeError, Localizer, QueryResult, References, Request, Selection, StageTimes,
+    Unwatched, Watch,
+};
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::{Query, ReferenceTuple};
+use posescope::run::Draw;
+use posescope::scene::{AtHand, FrameStore, Scene, SceneError};
+use posescope::trace::{Cancelled, Record, Sink};
+
+use crate::walls_scene::Walls;
+
+/// The walls, with a count of what was read of which frame.
+struct Counting {
+    walls: Walls,
+    name: &'static str,
+    photos: [AtomicUsize; 5],
+    clouds: [AtomicUsize; 5],
+}
+
+impl Counting {
+    fn new() -> Self {
+        Self {
+            walls: Walls::new(),
+            name: "counting",
+            photos: Default::default(),
+            clouds: Default::default(),
+        }
+    }
+
+    fn photos(&self) -> [usize; 5] {
+        self.photos.each_ref().map(|n| n.load(Ordering::Relaxed))
+    }
+
+    fn clouds(&self) -> [usize; 5] {
+        self.clouds.each_ref().map(|n| n.load(Ordering::Relaxed))
+    }
+}
+
+impl Scene for Counting {
+    fn name(&self) -> &str {
+        self.name
+    }
+    fn frames(&self) -> &[String] {
+        self.walls.frames()
+    }
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.walls.intrinsics(frame)
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.walls.pose(frame)
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.walls.time_s(frame)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.walls.has_cloud(frame)
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        self.photos[frame].fetch_add(1, Ordering::Relaxed);
+        self.walls.photo(frame)
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.clouds[frame].fetch_add(1, Ordering::Relaxed);
+        self.walls.cloud(frame)
+    }
+}
+
+/// How often each stage was worked out, and how often it was at hand.
+#[derive(Default)]
+struct Notebook(BTreeMap<&'static str, [usize; 2]>);
+
+impl Notebook {
+    fn of(&self, stage: &str) -> [usize; 2] {
+        self.0.get(stage).copied().unwrap_or_default()
+    }
+}
+
+impl Sink for Notebook {
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        if let Event::StageEnded(StageEnded { stage, reused, .. }) = record.event {
+            self.0.entry(stage.name()).or_default()[usize::from(reused)] += 1;
+        }
+        Ok(())
+    }
+}
+
+impl Watch for Notebook {}
+
+fn request(references: References) -> Request {
+    Request {
+        radius_m: 3.0,
+        references,
+        fusions: Vec::new(),
+        setting: None,
+    }
+}
+
+fn localize(
+    localizer: &Localizer<'_>,
+    references: References,
+    methods: &[Method],
+    watch: &mut dyn Watch,
+) -> Vec<(QueryResult, StageTimes)> {
+    let mut results = Vec::new();
+    let keep = |result, times| {
+        results.push((result, times));
+        Ok::<(), LocalizeError>(())
+    };
+    localizer
+        .localize(0, 1, &[request(references)], methods, watch, keep)
+        .expect("good data");
+    results
+}
+
+fn without_features() -> Params {
+    let mut params = Params::default();
+    params
+        .assign("surf.threshold=1000000")
+        .expect("a good assignment");
+    params
+}
+
+#[test]
+fn three_methods_color_a_cloud_once_and_read_each_frame_once() {
+    let scene = Counting::new();
+    // FB finds nothing, so the hybrid searches too.
+    let params = without_features();
+    let localizer = Localizer::new(&scene, &scene, &params, 7);
+    let mut notebook = Notebook::default();
+    let direct = [Method::PM, Method::MI, Method::HY];
+    let results = localize(&localizer, vec![0].into(), &direct, &mut notebook);
+    assert!(results.iter().all(|(result, _)| result.pose.is_some()));
+    assert_eq!(notebook.of("color"), [1, 2]);
+    // The hybrid's search is that of MI.
+    assert_eq!(notebook.of("position_coarse"), [2, 1]);
+    assert_eq!(scene.photos(), [1, 1, 0, 0, 0]);
+    assert_eq!(scene.clouds(), [1, 0, 0, 0, 0]);
+}
+
+#[test]
+fn features_are_found_once_for_ranking_and_for_every_reference() {
+    let scene = Counting::new();
+    let params = Params::default();
+    let localizer = Localizer::new(&scene, &scene, &params, 7);
+    let chooser = Chooser {
+        localizer: &localizer,
+        params: &params,
+        selection: Selection::Matched(2),
+        radius_m: 3.0,
+        seed: 7,
+        index: None,
+    };
+    let chosen = chooser
+        .choose(1, &|_| false, &mut Unwatched)
+        .expect("readable");
+    assert_eq!(chosen.frames.len(), 2);
+    assert_eq!(scene.clouds(), [0; 5]);
+    let mut notebook = Notebook::default();
+    localize(&localizer, chosen, &[Method::FB], &mut notebook);
+    assert_eq!(notebook.of("detect"), [0, 2]);
+    assert_eq!(scene.photos(), [1, 1, 1, 0, 0]);
+    assert_eq!(scene.clouds(), [1, 0, 1, 0, 0]);
+}
+
+#[test]
+fn a_hybrid_takes_as_long_whoever_watches() {
+    let stages = |times: &StageTimes| -> Vec<String> {
+        times.iter().map(|(name, _)| name.to_owned()).collect()
+    };
+    for params in [Params::default(), without_features()] {
+        let scene = Walls::new();
+        let all = |watch: &mut dyn Watch| {
+            let localizer = Localizer::new(&scene, &scene, &params, 7);
+            localize(&localizer, vec![0].into(), &Method::PAPER, watch)
+        };
+        let unseen = all(&mut Unwatched);
+        let watched = all(&mut Notebook::default());
+        for ((a, a_times), (b, b_times)) in unseen.iter().zip(&watched) {
+            assert_eq!(a, b);
+            assert_eq!(stages(a_times), stages(b_times));
+        }
+        let times = watched.iter().map(|(_, times)| times.total());
+        let times: Vec<_> = times.collect();
+        assert!(times[3] >= times[0]);
+    }
+}
+
+#[test]
+fn a_store_keeps_to_its_frames_and_what_others_hold() {
+    let counting = Arc::new(Counting::new());
+    let scene: Arc<dyn Scene> = counting.clone();
+    let store = Arc::new(FrameStore::new(2, usize::MAX));
+    let at_hand = store.of(&scene);
+    let look = |frame| at_hand.query(frame).expect("readable");
+    for frame in [0, 1, 2, 2, 1] {
+        look(frame);
+    }
+    assert_eq!(counting.photos(), [1, 1, 1, 0, 0]);
+    // The one that was not asked for the longest has made room.
+    look(0);
+    assert_eq!(counting.photos(), [2, 1, 1, 0, 0]);
+    look(1);
+    assert_eq!(counting.photos(), [2, 1, 1, 0, 0]);
+
+    let held = look(2);
+    for frame in [0, 1, 3, 0, 1, 3] {
+        look(frame);
+    }
+    assert!(Arc::ptr_eq(&held, &look(2)));
+    assert_eq!(counting.photos()[2], 2);
+}
+
+#[test]
+fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
+    let scene = Counting::new();
+    let params = Params::default();
+    let (references, queries) = AtHand::pair(&scene, &scene);
+    let store = Arc::clone(references.store());
+    let localizer = Localizer::at_hand((references, queries), &params, 7);
+    localize(&localizer, vec![0].into(), &Method::PAPER, &mut Unwatched);
+    let of_two = store.bytes();
+    // Both photos, the cloud, and what follows from them.
+    assert!(of_two > 2 * 24_000 + 12 * 12_000, "{of_two}");
+
+    let counting: Arc<dyn Scene> = Arc::new(Counting::new());
+    let small = Arc::new(FrameStore::new(64, of_two / 2));
+    for _ in 0..3 {
+        for query in [1, 3] {
+            let scenes = (small.of(&counting), small.of(&counting));
+            let localizer = Localizer::at_hand(scenes, &params, 7);
+            let keep = |_, _| Ok::<(), LocalizeError>(());
+            let requests = [request(vec![0, 2].into())];
+            localizer
+                .localize(0, query, &requests, &Method::PAPER, &mut Unwatched, keep)
+                .expect("good data");
+            // Nobody holds anything now: the next look makes room.
+            store_is_within(&small, &counting, of_two / 2);
+        }
+    }
+}
+
+/// Asked for a frame that is small, a store lets others go.
+fn store_is_within(store: &Arc<FrameStore>, scene: &Arc<dyn Scene>, limit: usize) {
+    let at_hand = store.of(scene);
+    for _ in 0..2 {
+        drop(at_hand.query(3).expect("readable"));
+    }
+    assert!(store.bytes() <= limit, "{} of {limit}", store.bytes());
+}
+
+#[test]
+fn scenes_of_one_name_are_not_taken_for_each_other() {
+    let store = Arc::new(FrameStore::default());
+    let scenes: [Arc<Counting>; 2] = [Arc::new(Counting::new()), Arc::new(Counting::new())];
+    for scene in &scenes {
+        let scene: Arc<dyn Scene> = scene.clone();
+        store.of(&scene).query(0).expect("readable");
+        store.of(&scene).query(0).expect("readable");
+    }
+    assert_eq!(scenes.map(|scene| scene.photos()[0]), [1, 1]);
+}
+
+/// Reads a photo only when two threads want it.
+struct Meeting(Walls, Barrier);
+
+impl Scene for Meeting {
+    fn name(&self) -> &str {
+        "meeting"
+    }
+    fn frames(&self) -> &[String] {
+        self.0.frames()
+    }
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.0.intrinsics(frame)
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.0.pose(frame)
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.0.time_s(frame)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.0.has_cloud(frame)
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        self.1.wait();
+        self.0.photo(frame)
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.1.wait();
+        self.0.cloud(frame)
+    }
+}
+
+#[test]
+fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
+    let scene = Meeting(Walls::new(), Barrier::new(2));
+    let (at_hand, _) = AtHand::pair(&scene, &scene);
+    let got: Mutex<Vec<(Arc<ReferenceTuple>, Arc<Query>)>> = Mutex::default();
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                let tuple = at_hand.reference(0).expect("readable");
+                let query = at_hand.query(0).expect("is there");
+                got.lock().expect("whole").push((tuple, query));
+            });
+        }
+    });
+    let got = got.into_inner().expect("whole");
+    assert!(Arc::ptr_eq(&got[0].0, &got[1].0));
+    assert!(Arc::ptr_eq(&got[0].1, &got[1].1));
+    assert!(Arc::ptr_eq(&got[0].0.photo, &got[0].1.photo));
+}
+
+/// A scene that answers everything in its own way.
+struct Peculiar(Walls);
+
+impl Scene for Peculiar {
+    fn name(&self) -> &str {
+        "peculiar"
+    }
+    fn frames(&self) -> &[String] {
+        self.0.frames()
+    }
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        Intrinsics {
+            fx: 200.0 + frame as f64,
+            ..self.0.intrinsics(frame)
+        }
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        (frame != 2).then(|| self.0.pose(frame)).flatten()
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        (frame != 1).then_some(7.5 * frame as f64)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.0.has_cloud(frame)
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        self.0.photo(frame)
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.0.cloud(frame)
+    }
+    fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
+        let query = Arc::unwrap_or_clone(self.0.query(frame)?);
+        Ok(Arc::new(Query {
+            name: format!("query {frame}"),
+            intrinsics: self.intrinsics(frame),
+            ..query
+        }))
+    }
+    fn fingerprint(&self) -> u64 {
+        0x0123_4567_89AB_CDEF
+    }
+}
+
+/// Everything that a scene says of a frame, as text: its methods one by one, so that one more in the
+/// trait is one more here.
+fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
+    let error = |error: SceneError| error.to_string();
+    let query = scene.query(frame).map_err(error).map(|query| {
+        let Query {
+            name,
+            photo,
+            intrinsics,
+            memo: _,
+        } = &*query;
+        (name.clone(), photo.gray.clone(), *intrinsics)
+    });
+    let reference = scene.reference(frame).map_err(error).map(|tuple| {
+        let ReferenceTuple {
+            name,
+            photo,
+            intrinsics,
+            world_from_camera,
+            cloud,
+            memo: _,
+        } = &*tuple;
+        let pixels = photo.gray.clone();
+        (
+            name.clone(),
+            pixels,
+            *intrinsics,
+            *world_from_camera,
+            cloud.points.clone(),
+        )
+    });
+    vec![
+        scene.name().to_owned(),
+        format!("{:?}", scene.frames()),
+        format!("{:?}", scene.intrinsics(frame)),
+        format!("{:?}", scene.pose(frame)),
+        format!("{:?}", scene.time_s(frame)),
+        format!("{:?}", scene.has_cloud(frame)),
+        format!("{:?}", scene.photo(frame).map_err(error)),
+        format!("{query:?}"),
+        format!("{reference:?}"),
+        format!("{:?}", scene.fingerprint()),
+    ]
+}
+
+#[test]
+fn a_scene_at_hand_says_all_that_the_scene_says() {
+    let scene = Peculiar(Walls::new());
+    let (at_hand, other) = AtHand::pair(&scene, &scene);
+    // Frame 0 is whole, 2 has no pose, the photo of 4 cannot be read.
+    for frame in [0, 2, 4] {
+        for _ in 0..2 {
+            assert_eq!(said(&at_hand, frame), said(&scene, frame));
+            assert_eq!(said(&other, frame), said(&scene, frame));
+        }
+    }
+    let cloud = |scene: &dyn Scene| scene.cloud(0).expect("has one").points;
+    assert_eq!(cloud(&at_hand), cloud(&scene));
+}
+
+/// Frame 1 is seen by a camera of half the size.
+struct TwoCameras(Walls);
+
+impl Scene for TwoCameras {
+    fn name(&self) -> &str {
+        "two cameras"
+    }
+    fn frames(&self) -> &[String] {
+        self.0.frames()
+    }
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        let camera = self.0.intrinsics(frame);
+        match frame {
+            1 => Intrinsics {
+                fx: camera.fx / 2.0,
+                fy: camera.fy / 2.0,
+                cx: (camera.cx - 0.5) / 2.0,
+                cy: (camera.cy - 0.5) / 2.0,
+                width: camera.width / 2,
+                height: camera.height / 2,
+            },
+            _ => camera,
+        }
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.0.pose(frame)
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.0.time_s(frame)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.0.has_cloud(frame)
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        let photo = self.0.photo(frame)?;
+        let Intrinsics { width, height, .. } = self.intrinsics(frame);
+        if photo.dimensions() == (width, height) {
+            return Ok(photo);
+        }
+        let mean = |x: u32, y: u32| {
+            let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
+            let values = four.map(|(right, down)| {
+                u32::from(photo.gray.get_pixel(2 * x + right, 2 * y + down).0[0])
+            });
+            image::Luma([(values.iter().sum::<u32>() / 4) as u8])
+        };
+        Ok(Photo::from_gray(image::GrayImage::from_fn(
+            width, height, mean,
+        )))
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.0.cloud(frame)
+    }
+}
+
+#[test]
+fn a_query_may_have_another_camera_than_its_reference() {
+    let scene = TwoCameras(Walls::new());
+    let params = Params::default();
+    let localizer = Localizer::new(&scene, &scene, &params, 7);
+    let direct = [Method::PM, Method::MI];
+    for (result, _) in localize(&localizer, vec![0].into(), &direct, &mut Unwatched) {
+        let error = result.error.expect("a pose");
+        assert!(error.translation_m < 0.6, "{}: {error:?}", result.method);
+    }
+}
+
+#[test]
+fn a_run_describes_the_camera_of_each_query_where_they_have_several() {
+    let draw = Draw {
+        share: 1.0,
+        limit: None,
+        only: &[],
+        seed: 0,
+    };
+    let one = Walls::new();
+    let pair = draw.pair(0, &one, &one).expect("queries");
+    assert!(pair.cameras.is_empty());
+    let two = TwoCameras(Walls::new());
+    let pair = draw.pair(0, &two, &two).expect("queries");
+    let widths: Vec<u32> = pair.cameras.iter().map(|camera| camera.width).collect();
+    assert_eq!(widths, [240, 120, 240, 240, 240]);
+    assert_eq!(pair.camera, pair.cameras[0]);
+    assert_ne!(two.fingerprint(), TwoCameras(Walls::new()).0.fingerprint());
+}

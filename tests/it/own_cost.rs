@@ -1,0 +1,95 @@
+//! The ways of a library's user: one call for one query, a cost of one's own.
+
+use posescope::event::{Stage, StageEnded, ViewRendered};
+use posescope::image::{FloatImage, GrayImage, gaussian_smoothed};
+use posescope::memo::Key;
+use posescope::{
+    Cost, Direct, Failure, History, IntensityPair, Method, Params, Problem, Trace, estimator,
+    localize, localize_by, localize_traced,
+};
+
+use crate::conformance::remembering;
+use crate::two_walls::solvable;
+
+/// The mean of some function of each pair.
+struct Mean(fn(&IntensityPair) -> f64);
+
+impl Cost for Mean {
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, 0.0)
+    }
+
+    fn query_channel_key(&self) -> Key {
+        Key::new("grey")
+    }
+
+    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
+        let sum: f64 = pairs.iter().map(self.0).sum();
+        (!pairs.is_empty()).then(|| sum / pairs.len() as f64)
+    }
+}
+
+fn difference(pair: &IntensityPair) -> f64 {
+    f64::from((pair.query - pair.synthetic).abs())
+}
+
+fn brightness(pair: &IntensityPair) -> f64 {
+    f64::from(pair.synthetic)
+}
+
+fn outcome(cost: fn(&IntensityPair) -> f64, problem: &Problem) -> estimator::Outcome {
+    let estimator = Direct::searching("mine", Box::new(Mean(cost)), &Params::default());
+    localize_by(&estimator, problem, &mut Trace::off()).expect("nobody cancels")
+}
+
+#[test]
+fn one_call_gives_what_the_estimator_gives() {
+    let problem = solvable();
+    let params = Params::default();
+    for entry in estimator::all() {
+        let expected = entry.make(&params).estimate(&problem, &mut Trace::off());
+        let outcome = localize(&problem, entry.method, &params);
+        assert_eq!(Ok(&outcome), expected.as_ref(), "{}", entry.method.name());
+        let mut history = History::default();
+        let mut trace = Trace::to(&mut history);
+        let traced = localize_traced(&problem, entry.method, &params, &mut trace);
+        assert_eq!(Ok(outcome), traced);
+        assert!(history.records().len() > 10);
+    }
+}
+
+#[test]
+fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
+    let problem = solvable();
+    let estimator = Direct::searching("mine", Box::new(Mean(difference)), &Params::default());
+    let mut history = History::default();
+    let outcome = localize_by(&estimator, &problem, &mut Trace::to(&mut history));
+    let pose = outcome.expect("nobody cancels").pose.expect("textured");
+    let ahead = problem.reference_from_query(&pose).translation.vector;
+    assert!((ahead - nalgebra::Vector3::z()).norm() < 0.3, "{ahead}");
+    let last = history.last::<StageEnded>().expect("it ended");
+    assert_eq!(
+        (last.stage, last.stage.name()),
+        (Stage::Estimator(Method::named("mine")), "mine")
+    );
+    // It explains nothing, which is no reason not to show its views.
+    let view = history.last::<ViewRendered>().expect("shown at the end");
+    assert!(view.comparison.score.cost.is_some() && view.comparison.explanation.is_none());
+}
+
+#[test]
+fn what_is_remembered_of_one_cost_is_not_taken_for_another_of_the_same_name() {
+    let problem = remembering();
+    for _ in 0..2 {
+        for cost in [difference, brightness] {
+            assert_eq!(outcome(cost, &problem), outcome(cost, &solvable()));
+        }
+    }
+}
+
+#[test]
+fn a_panic_in_a_cost_is_an_outcome() {
+    let panicking = outcome(|_| panic!("no\nidea"), &solvable());
+    let message = "no idea".to_owned();
+    assert_eq!(panicking.pose, Err(Failure::Internal { message }));
+}
