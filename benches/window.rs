@@ -11,7 +11,6 @@ use divan::Bencher;
 use eframe::egui_wgpu::{
     RenderState, RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup,
 };
-use eframe::wgpu;
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use nalgebra::Point3;
@@ -222,6 +221,7 @@ fn open() -> Option<Window> {
         query,
         chosen: vec![reference].into(),
         index: Arc::default(),
+        failure_radius_m: 10.0,
         mode: RunMode::Running,
         results: BTreeMap::new(),
         folder: std::env::temp_dir(),

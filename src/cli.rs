@@ -3,6 +3,7 @@
 mod args;
 mod audience;
 mod demo;
+mod demo_settings;
 mod diff;
 mod eval;
 mod export;

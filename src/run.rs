@@ -6,7 +6,7 @@ mod protocol;
 mod run_file;
 mod run_folder;
 
-pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes, is_success};
+pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes};
 pub use experiment::{
     Defaults, Draw, DrawError, Experiment, default_failure_radius_m, default_prior_m, defaults,
 };

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
-use eframe::wgpu;
 
 /// How the window's adapter and device are chosen.
 ///

@@ -9,7 +9,7 @@ use super::setup::Setup;
 use super::shown::ShownAt;
 use super::textures::Textures;
 use crate::geometry::Pose;
-use crate::localize::{QueryResult, Status};
+use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::scene::FrameStore;
 use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
@@ -368,14 +368,4 @@ fn start(setup: &Setup, mode: RunMode, frames: &Arc<FrameStore>, ctx: &egui::Con
         Breakpoints::new(setup.task.breakpoints.iter().cloned()),
         move || ctx.request_repaint(),
     )
-}
-
-/// Whether a method has no pose, or one that is far from the truth by the paper's measure.
-pub(super) fn has_failed(result: &QueryResult) -> bool {
-    /// The failure radius of the paper for KITTI \[m\].
-    const FAILURE_RADIUS_M: f64 = 10.0;
-    result.status == Status::Failed
-        || result
-            .error
-            .is_some_and(|error| error.translation_m >= FAILURE_RADIUS_M)
 }

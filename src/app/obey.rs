@@ -5,7 +5,7 @@ use std::path::Path;
 use super::App;
 use super::camera::Place;
 use super::command::Command;
-use super::desk::{Comparing, Desk, Kept, has_failed};
+use super::desk::{Comparing, Desk, Kept};
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use crate::event::PhaseSearched;
@@ -286,13 +286,17 @@ impl Desk {
         }
     }
 
+    /// Whether a method is known to fail on a query.
+    pub(super) fn has_failed(&self, query: usize) -> bool {
+        let results = self.results.get(&query).map_or(&[][..], Vec::as_slice);
+        let failure_radius_m = self.setup.failure_radius_m;
+        let mut results = results.iter();
+        results.any(|result| !result.is_success(failure_radius_m))
+    }
+
     fn next_failure(&mut self, back: bool) {
-        let fails = |desk: &Self, query: usize| {
-            let results = desk.results.get(&query);
-            results.is_some_and(|results| results.iter().any(has_failed))
-        };
-        if self.results.keys().any(|query| fails(self, *query)) {
-            self.next_query(back, fails);
+        if self.results.keys().any(|query| self.has_failed(*query)) {
+            self.next_query(back, Self::has_failed);
         } else {
             self.note("No query is known to fail; run all of them first", false);
         }

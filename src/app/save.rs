@@ -74,6 +74,7 @@ impl Desk {
             references: setup.reference_names(),
             configuration: run.params.to_toml(),
             seed: setup.task.protocol.seed,
+            failure_radius_m: setup.failure_radius_m,
         };
         let mut recorder = Recorder::open(targets, &identity, &setup.task.protocol.methods)?;
         recorder.begin_query(0, &loaded.problems, loaded.truth.as_ref());

@@ -61,6 +61,8 @@ pub struct Setup {
     pub chosen: References,
     /// What a choice by looks asks.
     pub index: Arc<IndexFile>,
+    /// The translation error from which on a pose counts as a failure \[m\].
+    pub failure_radius_m: f64,
     /// Whether it waits at the first step or runs.
     pub mode: RunMode,
     /// Results that are known already, by query.

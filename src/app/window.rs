@@ -32,11 +32,19 @@ pub fn has_display() -> bool {
     is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
 }
 
+/// The picture of the window in the task bar.
+fn icon() -> egui::IconData {
+    let png = include_bytes!("../../assets/posescope.png");
+    // A window without a picture is a window all the same; a test reads it.
+    eframe::icon_data::from_png_bytes(png).unwrap_or_default()
+}
+
 /// How the window is opened and painted.
 pub fn window_options() -> eframe::NativeOptions {
     eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_app_id("posescope")
+            .with_icon(icon())
             .with_inner_size([1500.0, 950.0]),
         // There are no wide gradients, and it costs time for every pixel on a software adapter.
         dithering: false,
@@ -69,4 +77,15 @@ pub fn open(setup: Setup) -> Result<(), WindowError> {
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::icon;
+
+    #[test]
+    fn the_window_has_its_picture() {
+        let icon = icon();
+        assert_eq!((icon.width, icon.height), (256, 256));
+    }
 }

@@ -17,12 +17,6 @@ use posescope::session::{Breakpoint, Task};
 use super::failure::CliError;
 use super::params;
 
-/// The query of the bare command: a place on the street where parked cars hide part of what the
-/// reference saw.
-pub const DEMO_QUERY: &str = "000070";
-/// Its reference.
-pub const DEMO_REFERENCE: &str = "000062";
-
 /// See why a camera pose estimate fails.
 ///
 /// Without a command: runs all four estimators on the built-in street, prints the table of results,
@@ -119,7 +113,7 @@ impl ViewArgs {
     /// The window of the bare command.
     pub fn demo() -> Self {
         Self {
-            scene: "street".to_owned(),
+            scene: super::demo_settings::settings().scene.clone(),
             query: None,
             task: TaskArgs::default(),
         }

@@ -1,33 +1,35 @@
 //! The bare command: all four estimators on the built-in street.
 
-use std::path::PathBuf;
-
-use super::args::{DEMO_QUERY, DEMO_REFERENCE, RecordingArgs, RunArgs, TaskArgs};
+use super::args::{RecordingArgs, RunArgs, TaskArgs};
+use super::demo_settings::{Settings, settings};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
 #[cfg(feature = "app")]
 use posescope::session::RunMode;
 
-const RECORDING: &str = "recordings/demo.rrd";
-
 /// Runs the demonstration and saves its recording.
 pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
-    let recording = PathBuf::from(RECORDING);
+    let Settings {
+        scene,
+        query,
+        reference,
+        recording,
+    } = settings();
     if let Some(folder) = recording.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
     run::run(
         &RunArgs {
-            scene: "street".to_owned(),
-            query: vec![DEMO_QUERY.to_owned()],
+            scene: scene.clone(),
+            query: vec![query.clone()],
             all: false,
             task: TaskArgs {
-                reference: vec![DEMO_REFERENCE.to_owned()],
+                reference: vec![reference.clone()],
                 ..TaskArgs::default()
             },
             recording: RecordingArgs {
-                save: Some(recording),
+                save: Some(recording.clone()),
                 ..RecordingArgs::default()
             },
             json: None,

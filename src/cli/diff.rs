@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::measure::{Change, Comparison, Row, Tolerance, read_rows};
+use posescope::measure::{Change, Comparison, Tolerance, read_rows};
 use posescope::run::read_run;
 use posescope::sink::rerun::{Targets, record_comparison};
 
@@ -96,18 +96,10 @@ pub fn text(comparison: &Comparison) -> String {
             one.change.name(),
             one.before.query,
             one.before.method,
-            error(&one.before),
-            error(&one.after),
+            one.verdicts[0].words(one.before.error.as_ref()),
+            one.verdicts[1].words(one.after.error.as_ref()),
             one.before.group()
         );
     }
     text
-}
-
-fn error(row: &Row) -> String {
-    match (&row.error, row.status) {
-        (Some(error), _) => format!("{:.2} m {:.2}°", error.translation_m, error.rotation_deg),
-        (None, posescope::localize::Status::Ok) => "a pose".to_owned(),
-        (None, posescope::localize::Status::Failed) => "no pose".to_owned(),
-    }
 }

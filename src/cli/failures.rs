@@ -29,6 +29,7 @@ pub struct FailureRecordings<'a> {
     room: Room,
     params: &'a Params,
     seed: u64,
+    failure_radius_m: f64,
     several_pairs: bool,
     bar: indicatif::ProgressBar,
     audience: Audience,
@@ -101,6 +102,7 @@ impl<'a> FailureRecordings<'a> {
             room,
             params,
             seed: run.protocol.seed,
+            failure_radius_m: run.failure_radius_m,
             several_pairs,
             bar,
             audience: Audience::new(indicatif::ProgressBar::hidden(), None),
@@ -127,6 +129,7 @@ impl<'a> FailureRecordings<'a> {
                 .collect(),
             configuration: self.params.to_toml(),
             seed: self.seed,
+            failure_radius_m: self.failure_radius_m,
         };
         let mut recorder = Recorder::open(&targets, &identity, &[query.method])?;
         // A panic was told as the query's result; here it only ends the recording.

@@ -44,7 +44,7 @@ pub fn print(config: &ConfigArgs) -> Result<(), CliError> {
             value,
             row.about.unit.to_owned(),
             row.domain.to_string(),
-            row.about.help.to_owned(),
+            row.about.help(),
         ]);
     }
     output::print(&table)

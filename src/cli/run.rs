@@ -5,6 +5,7 @@ use std::time::Duration;
 use posescope::localize::{
     Chooser, Localizer, QueryResult, Ranking, References, Request, Selection, Unwatched,
 };
+use posescope::run::default_failure_radius_m;
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
@@ -84,7 +85,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     bar.finish_and_clear();
 
     // Whatever went wrong, what was computed is shown and the recording is closed.
-    let shown = show(args, &results, terminal);
+    let shown = plan.show(&results, terminal);
     let reached = audience.stop.as_ref().and_then(StopAtBreakpoint::reached);
     if let (Some(breakpoint), false) = (reached, terminal.is_quiet()) {
         eprintln!("Stopped at {breakpoint}");
@@ -113,23 +114,27 @@ pub fn use_threads(threads: Option<std::num::NonZeroUsize>) -> Result<(), CliErr
         .map_err(|error| CliError::Usage(error.to_string()))
 }
 
-fn show(
-    args: &RunArgs,
-    results: &[(QueryResult, Duration)],
-    terminal: &Terminal,
-) -> Result<(), CliError> {
-    if terminal.is_quiet() || results.is_empty() {
-        return Ok(());
-    }
-    let table = table::results(results);
-    if args.json.as_deref().is_some_and(output::is_stdout) {
-        eprintln!("{table}");
-        return Ok(());
-    }
-    output::print(&table)
-}
-
 impl Plan<'_> {
+    fn failure_radius_m(&self) -> f64 {
+        default_failure_radius_m(self.localizer.references().name())
+    }
+
+    fn show(
+        &self,
+        results: &[(QueryResult, Duration)],
+        terminal: &Terminal,
+    ) -> Result<(), CliError> {
+        if terminal.is_quiet() || results.is_empty() {
+            return Ok(());
+        }
+        let table = table::results(results, self.failure_radius_m());
+        if self.args.json.as_deref().is_some_and(output::is_stdout) {
+            eprintln!("{table}");
+            return Ok(());
+        }
+        output::print(&table)
+    }
+
     fn queries(&self) -> Result<Vec<Planned>, CliError> {
         let (args, task, protocol) = (self.args, self.task, &self.task.protocol);
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
@@ -213,6 +218,7 @@ impl Plan<'_> {
             references: names(from, &mut references.copied()),
             configuration: self.task.params.to_toml(),
             seed: self.task.protocol.seed,
+            failure_radius_m: self.failure_radius_m(),
         };
         Ok(Some(Recorder::open(
             &targets,

@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
-use posescope::localize::{QueryResult, Status};
+use posescope::geometry::PoseError;
+use posescope::localize::{QueryResult, Status, Verdict};
 
 /// One row per query, reference and method.
-pub fn results(results: &[(QueryResult, Duration)]) -> Table {
+pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Table {
     let mut table = Table::new();
     table
         .load_preset(presets::UTF8_HORIZONTAL_ONLY)
@@ -18,37 +19,36 @@ pub fn results(results: &[(QueryResult, Duration)]) -> Table {
             "method",
             "error",
             "rotation",
+            "max Euler",
             "evidence",
             "time",
         ]);
-    for index in [2, 4, 5, 7] {
+    for index in [2, 4, 5, 6, 8] {
         if let Some(column) = table.column_mut(index) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     for (result, time) in results {
-        let (error, rotation) = match (&result.pose, &result.error) {
-            (None, _) => ("failed".to_owned(), String::new()),
-            (Some(_), None) => ("unknown".to_owned(), String::new()),
-            (Some(_), Some(error)) => (
-                format!("{:.2} m", error.translation_m),
-                format!("{:.2}°", error.max_euler_deg),
-            ),
+        let part = |part: fn(&PoseError) -> String| result.error.as_ref().map(part);
+        let translation = part(PoseError::translation).unwrap_or_default();
+        let error = match result.verdict(failure_radius_m) {
+            Verdict::NoPose => "failed".to_owned(),
+            Verdict::Unmeasured => "unknown".to_owned(),
+            Verdict::Far => format!("far: {translation}"),
+            Verdict::Near => translation,
         };
-        let start = result
-            .initial_error
-            .map(|error| format!("{:.1} m", error.translation_m))
-            .unwrap_or_default();
+        let start = result.initial_error.as_ref().map(PoseError::translation);
         table.add_row([
             result.query.clone(),
             result.references.join(" "),
-            start,
+            start.unwrap_or_default(),
             match &result.fusion {
                 Some(fusion) => format!("{} {fusion}", result.method),
                 None => result.method.to_string(),
             },
             error,
-            rotation,
+            part(PoseError::rotation).unwrap_or_default(),
+            part(PoseError::max_euler).unwrap_or_default(),
             evidence(result),
             format!("{:.2} s", time.as_secs_f64()),
         ]);

@@ -8,11 +8,12 @@ use clap::Parser as _;
 use posescope::app::{self, ReferencePick, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::params::Params;
-use posescope::run::{Protocol, read_results, read_run};
+use posescope::run::{Protocol, default_failure_radius_m, read_results, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task};
 
-use super::args::{Arguments, Command, DEMO_QUERY, DEMO_REFERENCE, ViewArgs};
+use super::args::{Arguments, Command, ViewArgs};
+use super::demo_settings::settings as demo_settings;
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
@@ -76,6 +77,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<_, _>>()?;
+    let failure_radius_m = default_failure_radius_m(references.name());
     let mut setup = Setup {
         offered: (0..queries.frames().len()).collect(),
         references,
@@ -84,6 +86,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         chosen: named.into(),
         index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
         task,
+        failure_radius_m,
         mode: RunMode::Paused,
         results: BTreeMap::new(),
         folder: PathBuf::from(FOLDER),
@@ -96,14 +99,14 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
 fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
     let has_reference =
         |setup: &Setup, query| setup.task.by_hand || !setup.candidates(query).is_empty();
-    let is_demo = args.scene == "street"
+    let is_demo = args.scene == demo_settings().scene
         && args.query.is_none()
         && setup.task.queries.is_none()
         && setup.pick() == ReferencePick::By(Protocol::default().references);
     setup.query = match &args.query {
         _ if is_demo => {
-            setup.chosen = vec![setup.references.find(DEMO_REFERENCE)?].into();
-            setup.queries.find(DEMO_QUERY)?
+            setup.chosen = vec![setup.references.find(&demo_settings().reference)?].into();
+            setup.queries.find(&demo_settings().query)?
         }
         Some(name) => setup.queries.find(name)?,
         None => {
@@ -164,10 +167,14 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             results.entry(frame).or_default().push(result);
         }
     }
-    let is_failure = |results: &&Vec<QueryResult>| results.iter().any(|r| r.pose.is_none());
+    let failure_radius_m = file.failure_radius_m;
+    let is_failure = |results: &[QueryResult]| {
+        let mut results = results.iter();
+        results.any(|result| !result.is_success(failure_radius_m))
+    };
     let first = results
         .iter()
-        .find(|(_, results)| is_failure(results))
+        .find(|(_, results)| is_failure(results.as_slice()))
         .or_else(|| results.iter().next());
     let query = match (&args.query, first) {
         (Some(name), _) => queries.find(name)?,
@@ -204,6 +211,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         chosen: reference_frames.into(),
         index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
         task,
+        failure_radius_m,
         mode: RunMode::Paused,
         results,
         folder: PathBuf::from(FOLDER),

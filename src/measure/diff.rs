@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::metrics::Row;
+use crate::localize::Verdict;
 
 /// Changes of a pose's error that are not worth mentioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +57,8 @@ pub struct Difference {
     pub before: Row,
     /// The result in the second run.
     pub after: Row,
+    /// What became of the query in the first and in the second run, each by its failure radius.
+    pub verdicts: [Verdict; 2],
 }
 
 /// All differences of two runs.
@@ -84,13 +87,14 @@ impl Comparison {
                 continue;
             };
             comparison.common += 1;
-            let was = row.is_success(before.1);
-            let is = other.is_success(after.1);
+            let verdicts = [row.verdict(before.1), other.verdict(after.1)];
+            let [was, is] = verdicts.map(Verdict::is_success);
             if let Some(change) = change(was, is, row, other, tolerance) {
                 comparison.differences.push(Difference {
                     change,
                     before: row.clone(),
                     after: other.clone(),
+                    verdicts,
                 });
             }
         }

@@ -348,7 +348,7 @@ fn csv(folder: &Path, run: &RunFile, choice: &Choice) -> Result<String, ExportEr
         if !choice.takes(&result) {
             continue;
         }
-        let success = crate::run::is_success(&result, run.failure_radius_m);
+        let success = result.is_success(run.failure_radius_m);
         let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
         let setting = result.setting;
         let mut cells = vec![

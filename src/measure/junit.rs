@@ -34,13 +34,11 @@ pub fn junit(folder: &Path, run: &RunFile, passages: &[Passage]) -> Result<Strin
             name += &format!(" ← {queries}");
         }
         name += &format!(" {}", row.method);
+        let verdict = row.verdict(run.failure_radius_m);
         let status = match &reason {
-            _ if row.is_success(run.failure_radius_m) => TestCaseStatus::success(),
+            _ if verdict.is_success() => TestCaseStatus::success(),
             Some(reason) => failure(&reason.code, &reason.text),
-            None => {
-                let error = row.error.map_or(f64::NAN, |error| error.translation_m);
-                failure("far", &format!("the pose is {error:.2} m from the truth"))
-            }
+            None => failure("far", &verdict.words(row.error.as_ref())),
         };
         let case = TestCase::new(case_name(&row.query, row.setting, row.fusion), status);
         match suites.iter_mut().find(|suite| suite.name.as_str() == name) {

@@ -1,8 +1,8 @@
 //! What the results of many queries amount to.
 //!
-//! A failure is a self-reported one or a pose farther off than the failure radius (paper, section
-//! 4.2). Medians and RMSE are over successes, once over those of the method, once over queries that
-//! all methods succeed on. In the recall, a failure has an infinite error.
+//! Medians and RMSE are over successes ([`Verdict`]), once over those of the method, once over
+//! queries that all methods succeed on; their rotation is the greatest Euler angle, as in the paper.
+//! In the recall, which goes by the rotation angle, a failure has an infinite error.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
-use crate::localize::{Setting, Status};
+use crate::localize::{Setting, Status, Verdict};
 use crate::method::Method;
 
 /// The limits of the recall: metres and degrees.
@@ -42,8 +42,12 @@ pub struct Row {
 impl Row {
     /// Whether there is a pose and, where the truth is known, a near one.
     pub fn is_success(&self, failure_radius_m: f64) -> bool {
-        let near = |error: PoseError| error.translation_m < failure_radius_m;
-        self.status == Status::Ok && self.error.is_none_or(near)
+        self.verdict(failure_radius_m).is_success()
+    }
+
+    /// What became of the query.
+    pub fn verdict(&self, failure_radius_m: f64) -> Verdict {
+        Verdict::new(self.status, self.error.as_ref(), failure_radius_m)
     }
 
     /// What is measured together with this row.

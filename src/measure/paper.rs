@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 /// `table,scene,query_scene,method,radius_m,references,fusion,measure,value`.
-const FIGURES: &str = include_str!("paper.csv");
+const FIGURES: &str = include_str!("../../assets/paper.csv");
 
 struct Figure {
     key: String,

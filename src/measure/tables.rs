@@ -39,16 +39,16 @@ fn overview(measures: &[Measures]) -> Table {
         "queries",
         "success (%)",
         "median (m)",
-        "median (°)",
+        "median max Euler (°)",
         "RMSE (m)",
-        "RMSE (°)",
+        "RMSE max Euler (°)",
         "solved by all",
         "median of these (m)",
-        "median of these (°)",
+        "median max Euler of these (°)",
     ]
     .map(str::to_owned)
     .into();
-    header.extend(RECALL_LIMITS.map(|(m, deg)| format!("within {m} m, {deg}° (%)")));
+    header.extend(RECALL_LIMITS.map(|(m, deg)| format!("within {m} m, {deg}° rotation (%)")));
     let mut table = Table::new(
         "overview",
         "All figures of the run; failures count as infinite in the shares within limits.",
@@ -159,12 +159,9 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
         ("translation", "translation error (m)", "median_m", |one| {
             one.of_common.median_m
         }),
-        (
-            "rotation",
-            "max orientation error (°)",
-            "median_deg",
-            |one| one.of_common.median_deg,
-        ),
+        ("rotation", "max Euler error (°)", "median_deg", |one| {
+            one.of_common.median_deg
+        }),
     ];
     let mut all = Vec::new();
     for (name, what, measure, figure) in tables {
@@ -250,7 +247,10 @@ fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
         (1..=most).flat_map(|count| [format!("{count}: RMSE (m)"), format!("{count}: RMSE (°)")]);
     let mut rmse = Table::new(
         of_pair.slug("multi-rmse"),
-        format!("RMSE with 1 to {most} references by method and fusion, over successes: {title}"),
+        format!(
+            "RMSE (of max Euler in °) with 1 to {most} references by method and fusion, over \
+             successes: {title}"
+        ),
         std::iter::once("#references".to_owned()).chain(columns),
     );
     let Some(&radius) = run.radii_m.first() else {
@@ -352,7 +352,8 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
 
 fn caption_of_large(run: &RunFile) -> String {
     format!(
-        "References by {} within {} m: success rate (within {} m) and RMSE over successes",
+        "References by {} within {} m: success rate (within {} m) and RMSE (of max Euler in °) over \
+         successes",
         run.protocol.references,
         run.protocol.prior_m.unwrap_or_default(),
         run.failure_radius_m

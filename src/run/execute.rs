@@ -8,7 +8,7 @@ use super::run_folder::{FolderError, RunFolder};
 use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
-    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes, Status,
+    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes,
     Unwatched, Watch,
 };
 use crate::method::Method;
@@ -227,7 +227,7 @@ impl Execution<'_> {
         let per_request = self.run.protocol.fusions.len().max(1);
         for (&method, of_method) in methods.iter().zip(results.chunks(per_method)) {
             let failed = |(result, _): &(QueryResult, StageTimes)| {
-                !is_success(result, self.run.failure_radius_m)
+                !result.is_success(self.run.failure_radius_m)
             };
             let Some(request) = of_method
                 .iter()
@@ -282,10 +282,4 @@ impl Execution<'_> {
         }
         results
     }
-}
-
-/// Whether a result has a pose, and, where the truth is known, one that is near enough.
-pub fn is_success(result: &QueryResult, failure_radius_m: f64) -> bool {
-    let near = |error: crate::geometry::PoseError| error.translation_m < failure_radius_m;
-    result.status == Status::Ok && result.error.is_none_or(near)
 }

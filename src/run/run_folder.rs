@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 use super::run_file::{Misread, RunFile};
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
+use crate::params::Params;
 use posescope_core::files::write_whole;
 use posescope_core::text::json_message;
 
@@ -148,8 +149,7 @@ impl RunFolder {
                 is_run: false,
             });
         }
-        let there = fs::read_to_string(&file).map_err(FolderError::io(&file))?;
-        same_run(path, &there, &toml_of(run))?;
+        same_run(path, &toml_of(&read_run(path)?), &toml_of(run))?;
         sweep(path).map_err(FolderError::io(path))?;
         let mut folder = Self::open(path)?;
         let results: Prefix = folder.prefix(RESULTS)?;
@@ -362,11 +362,25 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
         }
         read => read.map_err(FolderError::io(&path))?,
     };
-    RunFile::read(&text).map_err(|Misread { line, message }| FolderError::Damaged {
-        path,
-        line,
-        message,
-    })
+    let mut run =
+        RunFile::read(&text).map_err(|Misread { line, message }| FolderError::Damaged {
+            path,
+            line,
+            message,
+        })?;
+    run.params = completed(run.params);
+    Ok(run)
+}
+
+/// The parameters of a run whose description may lack those that its version did not know or did
+/// not write: they had their defaults.
+fn completed(params: toml::Table) -> toml::Table {
+    let mut all = Params::default();
+    match all.merge_toml(&params.to_string()) {
+        Ok(()) => all.to_toml().parse().unwrap_or(params),
+        // Whoever uses them says what is wrong with them.
+        Err(_) => params,
+    }
 }
 
 /// Reads the lines of `results.jsonl` one by one, as far as `T` wants to know them.

@@ -14,8 +14,7 @@ use posescope::localize::{QueryResult, Selection, Unwatched, Watch};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Companion, Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, Scenes, is_success,
-    read_results,
+    Companion, Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, Scenes, read_results,
 };
 use posescope::scene::{self, Scene, SceneError};
 
@@ -121,7 +120,7 @@ fn a_run_folder_holds_what_is_promised() {
     assert_eq!(junit.matches("<testcase ").count(), 24);
     let failed: Vec<String> = results
         .iter()
-        .filter(|result| !is_success(result, 0.000001))
+        .filter(|result| !result.is_success(0.000001))
         .map(|result| format!("{}-{}", result.query, result.method))
         .collect();
     assert!(failed.len() > 3, "{failed:?}");
@@ -193,6 +192,12 @@ fn background(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> std::proc
         .expect("the binary starts")
 }
 
+/// Whole lines in a file that may not be there yet.
+fn lines(path: &Path) -> usize {
+    let bytes = fs::read(path).unwrap_or_default();
+    bytes.iter().filter(|byte| **byte == b'\n').count()
+}
+
 #[test]
 fn a_killed_run_goes_on_to_the_same_bytes() {
     let sequence = SmallSequence::of(&FRAMES);
@@ -200,17 +205,60 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         sequence.path().join("whole"),
         sequence.path().join("killed"),
     );
-    let started = std::time::Instant::now();
-    run(&sequence, &whole, &["--failure-radius", "0.5"]);
-    let duration = started.elapsed();
-    for part in [1, 3, 4, 6] {
-        let mut child = background(&sequence, &killed, &["--failure-radius", "0.5", "--resume"]);
-        std::thread::sleep(duration * part / 10);
+    let extra = ["--failure-radius", "0.5", "--resume", "--threads", "1"];
+    run(&sequence, &whole, &extra);
+    let (results, all) = (
+        killed.join("results.jsonl"),
+        lines(&whole.join("results.jsonl")),
+    );
+    // Each is killed as soon as it has results of its own, queries away from the end.
+    for _ in 0..3 {
+        let before = lines(&results);
+        let mut child = background(&sequence, &killed, &extra);
+        while lines(&results) <= before {
+            assert!(child.try_wait().expect("it is ours").is_none(), "it ended");
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
         child.kill().expect("it may be killed");
-        child.wait().expect("it ends");
+        assert!(!child.wait().expect("it ends").success(), "it was not hit");
+        assert!(lines(&results) < all);
     }
-    run(&sequence, &killed, &["--failure-radius", "0.5", "--resume"]);
+    run(&sequence, &killed, &extra);
     assert_same(&whole, &killed);
+}
+
+/// Versions before did not write all parameters.
+#[test]
+fn a_run_whose_description_lacks_a_parameter_goes_on_and_compares() {
+    let sequence = SmallSequence::of(&FRAMES[..4]);
+    let (whole, old) = (sequence.path().join("whole"), sequence.path().join("old"));
+    run(&sequence, &whole, &[]);
+    run(&sequence, &old, &[]);
+    let file = old.join("run.toml");
+    let text = fs::read_to_string(&file).expect("text");
+    let known = |line: &&str| {
+        let unknown = ["min_trials", "em_iterations", "loss", "loss_scale"];
+        !unknown
+            .iter()
+            .any(|name| line.starts_with(&format!("{name} = ")))
+    };
+    let fewer: Vec<&str> = text.lines().filter(known).collect();
+    assert_eq!(fewer.len() + 4, text.lines().count(), "{text}");
+    fs::write(&file, fewer.join("\n") + "\n").expect("writable");
+    fs::write(old.join("results.jsonl"), "").expect("writable");
+    run(&sequence, &old, &["--resume"]);
+    let results = |folder: &Path| fs::read(folder.join("results.jsonl")).expect("results");
+    assert!(results(&whole) == results(&old));
+    posescope()
+        .arg("diff")
+        .args([&whole, &old])
+        .assert()
+        .code(0);
+    expect_line(
+        &mut eval(&sequence, &old, &["--resume", "--set", "fb.min_trials=7"]),
+        2,
+        &["asked for otherwise", "min_trials = 7"],
+    );
 }
 
 #[test]

@@ -1,74 +1,154 @@
-//! What every view looks like: pictures of each at several moments of one run, in both themes.
+//! What every view looks like and says at several moments of one run: pictures of those whose point
+//! is pixels, in both themes, and the words of the others.
 //!
-//! After a change that is meant, `UPDATE_SNAPSHOTS=1 cargo test looks` writes them anew.
+//! After a change that is meant, `UPDATE_SNAPSHOTS=1 INSTA_UPDATE=always cargo test looks` writes
+//! them anew.
 
+use egui::accesskit::Role;
+use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{Command, views};
+use posescope::app::{App, Command, views};
 use posescope::method::Method;
 use posescope::session::{RunMode, State};
 
 use crate::painted::{Painted, painted};
 use crate::window::{settle, setup, wait};
 
-#[test]
-fn every_view_looks_as_it_did() {
-    let Some(mut painted) = painted(setup(), [760.0, 520.0]) else {
-        return;
-    };
-    settle(&mut painted.window);
-    let mut unlike = Vec::new();
-    let mut shoot = |painted: &mut Painted, moment: &str, of: &[&str]| {
-        let is_wanted = |entry: &&views::Entry| of.is_empty() || of.contains(&entry.name);
-        for entry in views::ALL.iter().filter(is_wanted) {
-            let window = &mut painted.window;
-            window.state_mut().send(Command::Maximize(Some(entry.name)));
-            // What is in sight asks for its thumbnails.
-            window.run_steps(2);
-            wait(window, |app| {
-                !app.desk().is_probing() && !app.desk().queries.is_painting()
-            });
-            window.run_steps(4);
-            if let Some(trouble) = window.query_by_label_contains("Nothing is drawn") {
-                panic!("{:?}", trouble.accesskit_node().value());
-            }
-            let compared = painted.compare(&format!("{}-{moment}", entry.name));
-            unlike.extend(compared.err());
-        }
-    };
-    shoot(&mut painted, "waiting", &[]);
-    painted.window.state_mut().send(Command::Run);
-    wait(&mut painted.window, |app| {
-        *app.desk().state() == State::Finished
+/// The views whose point is pixels.
+const PICTURES: [&str; 4] = ["images", "synthetic", "space", "surface"];
+/// Room of the window \[points\].
+const SIZE: [f32; 2] = [760.0, 520.0];
+
+/// Brings a view before all others and waits until it is complete.
+fn show(window: &mut Harness<'_, App>, view: &'static str) {
+    window.state_mut().send(Command::Maximize(Some(view)));
+    // What is in sight asks for its thumbnails.
+    window.run_steps(2);
+    wait(window, |app| {
+        !app.desk().is_probing() && !app.desk().queries.is_painting()
     });
-    painted
-        .window
-        .state_mut()
-        .send(Command::SelectMethod(Method::FB));
-    shoot(&mut painted, "features", &[]);
-    painted
-        .window
-        .state_mut()
-        .send(Command::SelectMethod(Method::MI));
-    shoot(&mut painted, "search", &[]);
-    painted.window.state_mut().send(Command::SwitchTheme);
-    shoot(&mut painted, "light", &[]);
-    painted
-        .window
-        .state_mut()
-        .send(Command::SetReferences(vec![0, 2]));
+    window.run_steps(4);
+}
+
+/// Goes through the moments of a run, and tells each with the views that have something to say then.
+fn at_every_moment(
+    window: &mut Harness<'_, App>,
+    mut see: impl FnMut(&mut Harness<'_, App>, &str, &[&str]),
+) {
+    settle(window);
+    see(window, "waiting", &[]);
+    window.state_mut().send(Command::Run);
+    wait(window, |app| *app.desk().state() == State::Finished);
+    window.state_mut().send(Command::SelectMethod(Method::FB));
+    see(window, "features", &[]);
+    window.state_mut().send(Command::SelectMethod(Method::MI));
+    see(window, "search", &[]);
+    window.state_mut().send(Command::SwitchTheme);
+    see(window, "light", &[]);
+    window.state_mut().send(Command::SetReferences(vec![0, 2]));
     let all = posescope::fusion::Fusion::all().collect();
-    painted.window.state_mut().send(Command::SetFusions(all));
-    painted.window.run_steps(2);
-    wait(&mut painted.window, |app| {
-        *app.desk().state() == State::Finished
-    });
-    painted.window.state_mut().send(Command::Last);
-    shoot(
-        &mut painted,
+    window.state_mut().send(Command::SetFusions(all));
+    window.run_steps(2);
+    wait(window, |app| *app.desk().state() == State::Finished);
+    window.state_mut().send(Command::Last);
+    see(
+        window,
         "fused",
         &["references", "fusion", "report", "space"],
     );
+}
+
+/// The views of a moment that are seen: in pictures or in words.
+fn seen(of: &[&str], in_pictures: bool) -> impl Iterator<Item = &'static str> {
+    let names = views::ALL.iter().map(|entry| entry.name);
+    let wanted: Vec<&'static str> = names
+        .filter(|name| of.is_empty() || of.contains(name))
+        .filter(|name| PICTURES.contains(name) == in_pictures)
+        .collect();
+    wanted.into_iter()
+}
+
+#[test]
+fn every_picture_looks_as_it_did() {
+    let Some(Painted {
+        mut window,
+        mut judge,
+    }) = painted(setup(), SIZE)
+    else {
+        return;
+    };
+    let mut unlike = Vec::new();
+    at_every_moment(&mut window, |window, moment, of| {
+        for view in seen(of, true) {
+            show(window, view);
+            if let Some(trouble) = window.query_by_label_contains("Nothing is drawn") {
+                panic!("{:?}", trouble.accesskit_node().value());
+            }
+            let compared = judge.compare(window, &format!("{view}-{moment}"));
+            unlike.extend(compared.err());
+        }
+    });
     assert!(unlike.is_empty(), "{}", unlike.join("\n"));
+}
+
+/// One line for each thing of the maximised view that assistive technology is told of.
+fn words(window: &Harness<'_, App>) -> String {
+    let mut text = String::new();
+    let nodes = window.root().children_recursive();
+    let mut nodes = nodes.map(|node| node.accesskit_node());
+    // The view comes last, behind the button that leads back to all of them.
+    let back = nodes.find(|node| node.label().as_deref() == Some("All views"));
+    assert!(back.is_some(), "no view is maximised");
+    // A run of text repeats what it is part of.
+    for node in nodes.filter(|node| node.role() != Role::TextRun) {
+        let words = [node.label(), node.value()];
+        let words: Vec<String> = words
+            .into_iter()
+            .flatten()
+            .filter(|w| !w.is_empty())
+            .collect();
+        if words.is_empty() {
+            continue;
+        }
+        text += &format!(
+            "{:?}: {}",
+            node.role(),
+            words.join(" = ").replace('\n', " / ")
+        );
+        if let Some(toggled) = node.toggled() {
+            text += &format!(" ({toggled:?})");
+        }
+        if node.is_selected() == Some(true) {
+            text += " (selected)";
+        }
+        if node.is_disabled() {
+            text += " (disabled)";
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn every_view_says_what_it_said() {
+    let mut window = Harness::builder()
+        .with_size(SIZE)
+        .build_eframe(|creation| App::new(creation, setup()));
+    let mut settings = insta::Settings::clone_current();
+    settings.set_snapshot_path("../snapshots");
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    at_every_moment(&mut window, |window, moment, of| {
+        // The theme says nothing.
+        if moment == "light" {
+            return;
+        }
+        for view in seen(of, false) {
+            show(window, view);
+            let said = words(window);
+            settings.bind(|| insta::assert_snapshot!(format!("{view}-{moment}"), said));
+        }
+    });
 }
 
 /// Without a run there is something to say too.

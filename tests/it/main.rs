@@ -28,5 +28,7 @@ mod stored;
 mod surf_warp;
 mod synth;
 mod two_walls;
+mod verdicts;
+mod view;
 mod walls_scene;
 mod window;

@@ -1,7 +1,6 @@
 //! Windows that are really painted, and how far their pictures can be compared with the stored ones.
 
 use eframe::egui_wgpu::{RenderState, RendererOptions, WgpuConfiguration};
-use eframe::wgpu;
 use egui_kittest::wgpu::{WgpuTestRenderer, default_wgpu_setup};
 use egui_kittest::{Harness, SnapshotOptions};
 use image::RgbaImage;
@@ -11,6 +10,11 @@ use posescope::app::{App, Setup};
 /// A window with something to paint it.
 pub struct Painted {
     pub window: Harness<'static, App>,
+    pub judge: Judge,
+}
+
+/// Holds pictures against the stored ones.
+pub struct Judge {
     adapter: wgpu::AdapterInfo,
     /// Pictures that were compared coarsely.
     coarsely: usize,
@@ -52,12 +56,14 @@ pub fn painted(setup: Setup, size: [f32; 2]) -> Option<Painted> {
         .build_eframe(|creation| App::new(creation, setup));
     Some(Painted {
         window,
-        adapter,
-        coarsely: 0,
+        judge: Judge {
+            adapter,
+            coarsely: 0,
+        },
     })
 }
 
-impl Painted {
+impl Judge {
     /// Whether this is the rasterizer that painted the stored pictures: only its pixels can be
     /// compared one by one.
     fn painted_the_stored(&self) -> bool {
@@ -66,15 +72,15 @@ impl Painted {
 
     /// Compares the window with its stored picture: pixel by pixel where the same rasterizer painted
     /// it, in its broad lines elsewhere.
-    pub fn compare(&mut self, name: &str) -> Result<(), String> {
+    pub fn compare(&mut self, window: &mut Harness<'_, App>, name: &str) -> Result<(), String> {
         if self.painted_the_stored() {
             // Glyph edges and points differ by little from one version to the next.
             let options = SnapshotOptions::new().threshold(2.0).max_failed_pixels(900);
-            let compared = self.window.try_snapshot_options(name, &options);
+            let compared = window.try_snapshot_options(name, &options);
             return compared.map_err(|error| error.to_string());
         }
         self.coarsely += 1;
-        let picture = self.window.render()?;
+        let picture = window.render()?;
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots");
         let stored = image::open(format!("{folder}/{name}.png")).map_err(|why| why.to_string())?;
         let off = share_off(&picture, &stored.into_rgba8());
@@ -91,7 +97,7 @@ impl Painted {
     }
 }
 
-impl Drop for Painted {
+impl Drop for Judge {
     fn drop(&mut self) {
         if self.coarsely > 0 {
             println!(

@@ -33,6 +33,7 @@ fn identity() -> Identity {
         references: vec!["reference".to_owned()],
         configuration: Params::default().to_toml(),
         seed: 7,
+        failure_radius_m: 10.0,
     }
 }
 

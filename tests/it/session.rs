@@ -1,7 +1,7 @@
 //! Driving an estimator: pause, step, break, cancel.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
@@ -148,8 +148,23 @@ fn a_breakpoint_stops_a_run_and_says_which_it_was() {
 
 #[test]
 fn a_running_session_pauses_and_a_paused_one_stays() {
-    let mut session = start(job(1), RunMode::Running, &[]);
+    // The worker holds still at its fifth message, in the middle of its run, until it is to pause.
+    let (arrived, arrival) = mpsc::channel();
+    let (release, released) = mpsc::channel::<()>();
+    let (messages, released) = (AtomicUsize::new(0), Mutex::new(released));
+    let wake = move || {
+        if messages.fetch_add(1, Ordering::Relaxed) == 4 {
+            arrived.send(()).expect("the test waits");
+            let released = released.lock().expect("nobody else has it");
+            released.recv().expect("the test lets it go");
+        }
+    };
+    let mut session = Session::start(job(1), RunMode::Running, Breakpoints::default(), wake);
+    arrival.recv().expect("the run has five messages");
+    session.drain();
+    assert_eq!(session.state(), &State::Running);
     session.set_mode(RunMode::Paused);
+    release.send(()).expect("the worker waits");
     assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
     let told = session.run().len();
     session.set_mode(RunMode::Paused);

@@ -38,6 +38,7 @@ pub fn setup() -> Setup {
         query: 1,
         chosen: vec![0].into(),
         index: Arc::default(),
+        failure_radius_m: 10.0,
         mode: RunMode::Paused,
         results: Default::default(),
         folder: std::env::temp_dir(),

@@ -1,7 +1,7 @@
 //! How parameters describe themselves: name, unit, range, meaning.
 //!
-//! A struct of parameters shows its fields to a [`ParamVisitor`] and knows nothing of the other
-//! structs; [`crate::params`] puts them together.
+//! A struct of parameters is declared by `parameters!`, shows its fields to a [`ParamVisitor`] and
+//! knows nothing of the other structs; [`crate::params`] puts them together.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -13,8 +13,20 @@ pub struct About {
     pub name: &'static str,
     /// The unit, empty for a pure number.
     pub unit: &'static str,
-    /// One phrase.
-    pub help: &'static str,
+    /// The field's doc comment.
+    pub doc: &'static str,
+}
+
+impl About {
+    /// What it is good for: the first paragraph of the doc comment, without its last full stop.
+    pub fn help(&self) -> String {
+        let lines = self.doc.lines().map(str::trim);
+        let paragraph: Vec<&str> = lines.take_while(|line| !line.is_empty()).collect();
+        let text = paragraph.join(" ");
+        // A link is only its text here.
+        let text = text.replace("[`", "").replace("`]", "");
+        text.strip_suffix('.').unwrap_or(&text).to_owned()
+    }
 }
 
 /// A parameter that takes one of a few names.
@@ -139,5 +151,192 @@ fn hint(nearest: &Option<String>) -> String {
     match nearest {
         Some(key) => format!(" (did you mean `{key}`?)"),
         None => String::new(),
+    }
+}
+
+/// Declares a struct of parameters together with its [`Describe`]: each field with its kind, key,
+/// unit and range. What it means is the first paragraph of its doc comment.
+///
+/// ```text
+/// parameters! {
+///     /// How to look.
+///     #[derive(Clone, Debug, PartialEq)]
+///     pub struct LookParams {
+///         /// How far to look.
+///         pub reach_m: f64 = number("reach", "m", 0.1..=50.0),
+///         /// How often to look.
+///         pub rounds: usize = count("rounds", "", 1..=10),
+///         /// Whether to look back.
+///         pub back: bool = flag("back"),
+///         /// Where to begin.
+///         pub side: Side = choice("side"),
+///         /// What the struct inside says of itself.
+///         pub glasses: GlassesParams = group(),
+///     }
+/// }
+/// ```
+///
+/// A field without a description does not compile, so that none can be lost.
+macro_rules! parameters {
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])*
+                $field_visibility:vis $field:ident: $type:ty = $kind:ident $said:tt
+            ),* $(,)?
+        }
+    ) => {
+        $(#[$attribute])*
+        $visibility struct $name {
+            $(
+                $(#[doc = $doc])*
+                #[doc = $crate::describe::parameters!(@doc $kind $said)]
+                $field_visibility $field: $type,
+            )*
+        }
+
+        impl $crate::describe::Describe for $name {
+            fn visit(&mut self, visitor: &mut dyn $crate::describe::ParamVisitor) {
+                $(
+                    $crate::describe::parameters!(
+                        @show $kind $said, visitor, &mut self.$field, concat!($($doc, "\n"),*)
+                    );
+                )*
+            }
+        }
+    };
+
+    (@doc number $said:tt) => { $crate::describe::parameters!(@range $said) };
+    (@doc count $said:tt) => { $crate::describe::parameters!(@range $said) };
+    (@doc $kind:ident $said:tt) => { "" };
+    (@range ($key:literal, "", $range:expr)) => {
+        concat!("\n`", stringify!($range), "`")
+    };
+    (@range ($key:literal, $unit:literal, $range:expr)) => {
+        concat!("\n`", stringify!($range), "` \\[", $unit, "\\]")
+    };
+
+    (@show group (), $visitor:ident, $place:expr, $doc:expr) => {
+        $crate::describe::Describe::visit($place, $visitor)
+    };
+    (@show $kind:ident ($key:literal), $visitor:ident, $place:expr, $doc:expr) => {
+        $visitor.$kind($crate::describe::About { name: $key, unit: "", doc: $doc }, $place)
+    };
+    (@show $kind:ident ($key:literal, $unit:literal, $range:expr),
+        $visitor:ident, $place:expr, $doc:expr) => {
+        $visitor.$kind(
+            $crate::describe::About { name: $key, unit: $unit, doc: $doc },
+            $place,
+            $range,
+        )
+    };
+}
+pub(crate) use parameters;
+
+/// Gives the variants of an enum without fields the names by which a parameter chooses them.
+macro_rules! choice {
+    ($type:ident: $($variant:ident = $name:literal),+ $(,)?) => {
+        impl $crate::describe::Choice for $type {
+            fn names(&self) -> &'static [&'static str] {
+                &[$($name),+]
+            }
+            fn index(&self) -> usize {
+                match self {
+                    $(Self::$variant => Self::$variant as usize),+
+                }
+            }
+            fn choose(&mut self, index: usize) {
+                *self = [$(Self::$variant),+][index];
+            }
+        }
+    };
+}
+pub(crate) use choice;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    choice!(Side: Left = "left", Right = "right");
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Side {
+        Left,
+        Right,
+    }
+
+    parameters! {
+        /// What is inside.
+        struct Inner {
+            /// A number of times,
+            /// at most.
+            ///
+            /// This is nobody's business.
+            rounds: usize = count("rounds", "", 1..=10),
+        }
+    }
+
+    parameters! {
+        /// One of each kind.
+        struct All {
+            /// How far, as in [`std`].
+            reach_m: f64 = number("reach", "m", 0.5..=2.0),
+            /// Whether at all.
+            is_on: bool = flag("on"),
+            /// Inside.
+            inner: Inner = group(),
+            /// Which side.
+            side: Side = choice("side"),
+        }
+    }
+
+    /// Writes down what it is shown.
+    #[derive(Default)]
+    struct Clerk(Vec<String>);
+
+    impl Clerk {
+        fn write(&mut self, about: About, rest: &str) {
+            let About { name, unit, .. } = about;
+            self.0
+                .push(format!("{name} [{unit}] {}: {rest}", about.help()));
+        }
+    }
+
+    impl ParamVisitor for Clerk {
+        fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
+            self.write(about, &format!("{value} in {range:?}"));
+        }
+        fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
+            self.write(about, &format!("{value} in {range:?}"));
+        }
+        fn flag(&mut self, about: About, value: &mut bool) {
+            self.write(about, &format!("{value}"));
+        }
+        fn choice(&mut self, about: About, value: &mut dyn Choice) {
+            let chosen = value.names()[value.index()];
+            value.choose(0);
+            self.write(about, &format!("{chosen} of {:?}", value.names()));
+        }
+    }
+
+    #[test]
+    fn every_field_is_shown_in_order_with_the_first_paragraph_of_its_doc_comment() {
+        let mut all = All {
+            reach_m: 1.5,
+            is_on: true,
+            inner: Inner { rounds: 3 },
+            side: Side::Right,
+        };
+        let mut clerk = Clerk::default();
+        all.visit(&mut clerk);
+        let shown = [
+            "reach [m] How far, as in std: 1.5 in 0.5..=2.0",
+            "on [] Whether at all: true",
+            "rounds [] A number of times, at most: 3 in 1..=10",
+            "side [] Which side: right of [\"left\", \"right\"]",
+        ];
+        assert_eq!(clerk.0, shown);
+        assert_eq!(all.side, Side::Left);
     }
 }

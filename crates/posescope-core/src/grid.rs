@@ -6,37 +6,39 @@
 
 use nalgebra::{Translation3, Vector3};
 
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::geometry::{Pose, yaw};
 use crate::memo::{Bits, bits_of_fields};
 use crate::render::Score;
 
-/// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GridParams {
-    /// Step of the coarse positions \[m\].
-    pub coarse_step_m: f64,
-    /// Half width of the square of fine positions \[m\].
-    pub fine_range_m: f64,
-    /// Step of the fine positions \[m\].
-    pub fine_step_m: f64,
-    /// Half range of the coarse yaw angles \[°\].
-    pub yaw_range_deg: f64,
-    /// Step of the coarse yaw angles \[°\].
-    pub yaw_step_deg: f64,
-    /// Half range of the fine yaw angles \[°\].
-    pub yaw_fine_range_deg: f64,
-    /// Step of the fine yaw angles \[°\].
-    pub yaw_fine_step_deg: f64,
-    /// How often position and yaw are searched, one after the other; the paper does it once.
-    pub rounds: usize,
-    /// A hypothesis that covers fewer pixels than this share of those covered at the reference pose
-    /// has no say.
-    ///
-    /// Fewer pixels make lower costs: without a floor both costs have their global minimum where
-    /// less than 1 % is covered. At 0.15 and above the right basin is cut off when the query is
-    /// 8 to 10 m ahead.
-    pub coverage_floor: f64,
+parameters! {
+    /// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct GridParams {
+        /// Step of the coarse positions.
+        pub coarse_step_m: f64 = number("coarse_step", "m", 0.05..=10.0),
+        /// Half width of the square of fine positions.
+        pub fine_range_m: f64 = number("fine_range", "m", 0.0..=10.0),
+        /// Step of the fine positions.
+        pub fine_step_m: f64 = number("fine_step", "m", 0.01..=5.0),
+        /// Half range of the coarse yaw angles.
+        pub yaw_range_deg: f64 = number("yaw_range", "°", 0.0..=180.0),
+        /// Step of the coarse yaw angles.
+        pub yaw_step_deg: f64 = number("yaw_step", "°", 0.05..=45.0),
+        /// Half range of the fine yaw angles.
+        pub yaw_fine_range_deg: f64 = number("yaw_fine_range", "°", 0.0..=45.0),
+        /// Step of the fine yaw angles.
+        pub yaw_fine_step_deg: f64 = number("yaw_fine_step", "°", 0.01..=10.0),
+        /// How often position and yaw are searched, one after the other; the paper does it once.
+        pub rounds: usize = count("rounds", "", 1..=10),
+        /// Least coverage of a hypothesis that has a say, as a share of the pixels covered at the
+        /// reference pose.
+        ///
+        /// Fewer pixels make lower costs: without a floor both costs have their global minimum where
+        /// less than 1 % is covered. At 0.15 and above the right basin is cut off when the query is
+        /// 8 to 10 m ahead.
+        pub coverage_floor: f64 = number("coverage_floor", "", 0.0..=1.0),
+    }
 }
 
 impl Default for GridParams {
@@ -52,65 +54,6 @@ impl Default for GridParams {
             rounds: 1,
             coverage_floor: 0.05,
         }
-    }
-}
-
-impl Describe for GridParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        let about = |name, unit, help| About { name, unit, help };
-        visitor.number(
-            about("coarse_step", "m", "step of the coarse positions"),
-            &mut self.coarse_step_m,
-            0.05..=10.0,
-        );
-        visitor.number(
-            about("fine_range", "m", "half width of the fine positions"),
-            &mut self.fine_range_m,
-            0.0..=10.0,
-        );
-        visitor.number(
-            about("fine_step", "m", "step of the fine positions"),
-            &mut self.fine_step_m,
-            0.01..=5.0,
-        );
-        visitor.number(
-            about("yaw_range", "°", "half range of the coarse yaw angles"),
-            &mut self.yaw_range_deg,
-            0.0..=180.0,
-        );
-        visitor.number(
-            about("yaw_step", "°", "step of the coarse yaw angles"),
-            &mut self.yaw_step_deg,
-            0.05..=45.0,
-        );
-        visitor.number(
-            about("yaw_fine_range", "°", "half range of the fine yaw angles"),
-            &mut self.yaw_fine_range_deg,
-            0.0..=45.0,
-        );
-        visitor.number(
-            about("yaw_fine_step", "°", "step of the fine yaw angles"),
-            &mut self.yaw_fine_step_deg,
-            0.01..=10.0,
-        );
-        visitor.count(
-            about(
-                "rounds",
-                "",
-                "how often position and yaw are searched in turn",
-            ),
-            &mut self.rounds,
-            1..=10,
-        );
-        visitor.number(
-            about(
-                "coverage_floor",
-                "",
-                "least coverage of a hypothesis, as a share of that at the reference pose",
-            ),
-            &mut self.coverage_floor,
-            0.0..=1.0,
-        );
     }
 }
 

@@ -6,6 +6,7 @@ mod result;
 mod select;
 mod single;
 mod timing;
+mod verdict;
 mod watch;
 
 pub use localizer::{LocalizeError, Localizer, Request};
@@ -18,4 +19,5 @@ pub use select::{
 };
 pub use single::{localize, localize_by, localize_traced, words_of};
 pub use timing::{StageTimes, StageTimings};
+pub use verdict::Verdict;
 pub use watch::{Unwatched, Watch};

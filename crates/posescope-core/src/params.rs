@@ -274,7 +274,11 @@ mod tests {
             params
                 .set(&row.key, &row.value.to_string())
                 .unwrap_or_else(|error| panic!("{error}"));
-            assert!(!row.about.help.is_empty(), "{} needs a help text", row.key);
+            assert!(
+                !row.about.help().is_empty(),
+                "{} needs a help text",
+                row.key
+            );
         }
         assert_eq!(params, Params::default());
         let mut keys: Vec<_> = rows.iter().map(|row| &row.key).collect();

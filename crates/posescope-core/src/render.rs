@@ -9,24 +9,26 @@ pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_c
 pub use score::{Comparison, MOST_AT_A_TIME, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::memo::bits_of_fields;
 
-/// How the cloud is coloured and splatted.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RenderParams {
-    /// Side of the square that a point covers in the synthetic view \[px\], odd.
-    ///
-    /// One pixel is the default: over 40 real pairs 10 m apart it served the photometric cost best
-    /// (30 of 30 within 2 m, 28 for 3 px) and mutual information equally.
-    pub splat_px: usize,
-    /// Whether points that the reference camera cannot see are left uncoloured.
-    pub visibility: bool,
-    /// A point counts as hidden when a surface nearer by more than this share of its depth lies
-    /// before it.
-    pub visibility_margin: f64,
-    /// Side of the window in which a nearer surface hides a point \[px\], odd.
-    pub visibility_window_px: usize,
+parameters! {
+    /// How the cloud is coloured and splatted.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct RenderParams {
+        /// Side of the square that a point covers in the synthetic view, odd.
+        ///
+        /// One pixel is the default: over 40 real pairs 10 m apart it served the photometric cost
+        /// best (30 of 30 within 2 m, 28 for 3 px) and mutual information equally.
+        pub splat_px: usize = count("splat_px", "px", 1..=15),
+        /// Whether points that the reference camera cannot see are left uncoloured.
+        pub visibility: bool = flag("visibility"),
+        /// A point counts as hidden when a surface nearer by more than this share of its depth lies
+        /// before it.
+        pub visibility_margin: f64 = number("visibility_margin", "", 0.0..=1.0),
+        /// Side of the window in which a nearer surface hides a point, odd.
+        pub visibility_window_px: usize = count("visibility_window_px", "px", 1..=31),
+    }
 }
 
 bits_of_fields!(RenderParams {
@@ -44,45 +46,5 @@ impl Default for RenderParams {
             visibility_margin: 0.10,
             visibility_window_px: 5,
         }
-    }
-}
-
-impl Describe for RenderParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        visitor.count(
-            About {
-                name: "splat_px",
-                unit: "px",
-                help: "side of the square that a point covers in the synthetic view",
-            },
-            &mut self.splat_px,
-            1..=15,
-        );
-        visitor.flag(
-            About {
-                name: "visibility",
-                unit: "",
-                help: "leave points uncoloured that the reference camera cannot see",
-            },
-            &mut self.visibility,
-        );
-        visitor.number(
-            About {
-                name: "visibility_margin",
-                unit: "",
-                help: "a surface nearer by more than this share of a point's depth hides it",
-            },
-            &mut self.visibility_margin,
-            0.0..=1.0,
-        );
-        visitor.count(
-            About {
-                name: "visibility_window_px",
-                unit: "px",
-                help: "side of the window in which a nearer surface hides a point",
-            },
-            &mut self.visibility_window_px,
-            1..=31,
-        );
     }
 }

@@ -11,7 +11,7 @@ mod loss;
 pub mod p3p;
 pub mod refine;
 
-pub use loss::Loss;
+pub use loss::{Loss, LossShape};
 pub use p3p::{MAX_SOLUTIONS, p3p};
 pub use refine::{Refinement, refine};
 

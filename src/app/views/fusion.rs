@@ -73,10 +73,7 @@ fn error(scope: &Scope<'_>, pose: Option<&Pose>) -> String {
     match (pose, scope.truth()) {
         (None, _) => "× no pose".to_owned(),
         (Some(_), None) => "a pose".to_owned(),
-        (Some(pose), Some(truth)) => {
-            let error = PoseError::between(truth, pose);
-            format!("{:.3} m, {:.3}°", error.translation_m, error.rotation_deg)
-        }
+        (Some(pose), Some(truth)) => PoseError::between(truth, pose).to_string(),
     }
 }
 

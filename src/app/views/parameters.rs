@@ -67,7 +67,7 @@ impl Parameters {
             let row = &rows[index];
             let differs = row.value != references[index].value;
             (row.key.to_lowercase().contains(&filter)
-                || row.about.help.to_lowercase().contains(&filter))
+                || row.about.help().to_lowercase().contains(&filter))
                 && (differs || !scope.desk.only_differences)
         };
         let shown: Vec<bool> = (0..rows.len()).map(is_shown).collect();
@@ -131,7 +131,7 @@ impl Editor<'_, '_> {
         } = self;
         let key = format!("{group}.{}", about.name);
         let default = defaults[index].value.to_string();
-        let help = format!("{}\n{key}, {range}, default {default}", about.help);
+        let help = format!("{}\n{key}, {range}, default {default}", about.help());
         ui.horizontal(|ui| {
             let is_default = present == default;
             let name = RichText::new(about.name);

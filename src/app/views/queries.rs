@@ -1,14 +1,14 @@
 //! All queries with what is known of them.
 
-use egui::{Color32, RichText, ScrollArea, Ui};
+use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
-use crate::app::desk::has_failed;
+use crate::app::desk::Desk;
 use crate::app::{Command, Scope, theme};
 use crate::estimator;
 use crate::event::Side;
-use crate::localize::QueryResult;
+use crate::localize::{QueryResult, Verdict};
 
 /// The list of queries.
 #[derive(Default)]
@@ -31,11 +31,8 @@ impl View for QueryList {
                 scope.send(Command::RunAllQueries);
             }
             ui.checkbox(&mut self.only_failures, "Failures only");
-            let failed = desk
-                .results
-                .values()
-                .filter(|results| results.iter().any(has_failed))
-                .count();
+            let failed = desk.results.keys().filter(|query| desk.has_failed(**query));
+            let failed = failed.count();
             ui.weak(format!("{failed} of {} failed", desk.results.len()));
         });
         let shown: Vec<usize> = desk
@@ -43,10 +40,7 @@ impl View for QueryList {
             .offered
             .iter()
             .copied()
-            .filter(|query| {
-                let results = desk.results.get(query);
-                !self.only_failures || results.is_some_and(|results| results.iter().any(has_failed))
-            })
+            .filter(|query| !self.only_failures || desk.has_failed(*query))
             .collect();
         ScrollArea::vertical().auto_shrink(false).show_rows(
             ui,
@@ -73,32 +67,25 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
                 scope.send(Command::SelectQuery(query));
             }
             let results = desk.results.get(&query).map_or(&[][..], Vec::as_slice);
-            ui.horizontal(|ui| dots(ui, results, desk.shows_truth));
+            ui.horizontal(|ui| dots(ui, desk, results));
         });
     });
 }
 
 /// One mark per method: what it is tells the shape too.
-pub(super) fn dots(ui: &mut Ui, results: &[QueryResult], shows_truth: bool) {
+pub(super) fn dots(ui: &mut Ui, desk: &Desk, results: &[QueryResult]) {
+    let failure_radius_m = desk.setup.failure_radius_m;
     ui.spacing_mut().item_spacing.x = 2.0;
     for method in estimator::methods() {
         for result in results.iter().filter(|r| r.method == method) {
-            let (mark, color, words) = match (&result.reason, &result.error) {
-                (Some(reason), _) => ("×", theme::ESTIMATE, reason.text.clone()),
-                (None, Some(error)) if has_failed(result) => (
-                    "▲",
-                    Color32::from_rgb(0xE6, 0x9F, 0x00),
-                    format!("{:.1} m off", error.translation_m),
-                ),
-                (None, Some(error)) => (
-                    "●",
-                    theme::TRUTH,
-                    format!("{:.2} m off", error.translation_m),
-                ),
-                (None, None) => ("●", theme::REFERENCE, "a pose".to_owned()),
+            let (mark, color) = match result.verdict(failure_radius_m) {
+                Verdict::NoPose => ("×", theme::ESTIMATE),
+                Verdict::Far => ("▲", theme::FAR),
+                Verdict::Near => ("●", theme::TRUTH),
+                Verdict::Unmeasured => ("●", theme::REFERENCE),
             };
-            let words = match shows_truth {
-                true => format!("{}: {words}", method.name()),
+            let words = match desk.shows_truth {
+                true => format!("{}: {}", method.name(), result.words(failure_radius_m)),
                 false => method.name().to_owned(),
             };
             ui.label(RichText::new(mark).color(color))

@@ -175,7 +175,7 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
                     .filter(|result| result.fusion.is_none() && result.references == [name.clone()])
                     .cloned()
                     .collect();
-                dots(ui, &results, desk.shows_truth);
+                dots(ui, desk, &results);
                 if let Some(words) = distance(scope, frame) {
                     ui.weak(words);
                 }
@@ -190,10 +190,8 @@ fn distance(scope: &Scope<'_>, frame: usize) -> Option<String> {
     let reference = setup.references.pose(frame)?;
     let query = setup.queries.pose(setup.query)?;
     let error = PoseError::between(&query, &reference);
-    scope.desk.shows_truth.then(|| {
-        format!(
-            "{:.1} m, {:.1}° away",
-            error.translation_m, error.rotation_deg
-        )
-    })
+    scope
+        .desk
+        .shows_truth
+        .then(|| format!("{}, {} away", error.translation(), error.rotation()))
 }

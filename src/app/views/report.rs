@@ -3,9 +3,9 @@
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::desk::Comparing;
+use crate::app::desk::{Comparing, Desk};
 use crate::app::{Scope, theme};
-use crate::localize::{QueryResult, Status};
+use crate::localize::{QueryResult, Verdict};
 use crate::session::Span;
 
 /// The report of the run, so far.
@@ -87,26 +87,15 @@ fn name(ui: &mut Ui, span: &Span) {
     ui.label(RichText::new(name).color(theme::method(method)).strong());
 }
 
-fn verdict(result: &QueryResult) -> (String, Option<Color32>) {
-    match (result.status, &result.reason, &result.error) {
-        (Status::Failed, Some(reason), _) => (
-            format!("× {} {}", reason.code, reason.text),
-            Some(theme::ESTIMATE),
-        ),
-        (Status::Failed, None, _) => ("× no pose".to_owned(), Some(theme::ESTIMATE)),
-        (Status::Ok, _, Some(error)) => (
-            format!("{:.3} m, {:.3}°", error.translation_m, error.rotation_deg),
-            None,
-        ),
-        (Status::Ok, _, None) => ("a pose".to_owned(), None),
-    }
-}
-
-/// An error tells the ground truth, which may be hidden.
-fn shown_verdict(result: &QueryResult, shows_truth: bool) -> (String, Option<Color32>) {
-    match result.status {
-        Status::Ok if !shows_truth => ("a pose".to_owned(), None),
-        _ => verdict(result),
+/// The verdict in words and its colour. An error tells the ground truth, which may be hidden.
+fn verdict(result: &QueryResult, desk: &Desk) -> (String, Option<Color32>) {
+    let failure_radius_m = desk.setup.failure_radius_m;
+    let words = result.words(failure_radius_m);
+    match result.verdict(failure_radius_m) {
+        Verdict::NoPose => (format!("× {words}"), Some(theme::ESTIMATE)),
+        _ if !desk.shows_truth => ("a pose".to_owned(), None),
+        Verdict::Far => (format!("▲ {words}"), Some(theme::FAR)),
+        Verdict::Near | Verdict::Unmeasured => (words, None),
     }
 }
 
@@ -123,8 +112,8 @@ fn verdicts(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
                 continue;
             };
             ui.label(result.references.join(", "));
-            let (text, color) = shown_verdict(result, shows_truth);
-            let other = counterpart(span, others).map(|other| shown_verdict(other, shows_truth).0);
+            let (text, color) = verdict(result, scope.desk);
+            let other = counterpart(span, others).map(|other| verdict(other, scope.desk).0);
             let marked = other.is_some_and(|other| other != text);
             let text = RichText::new(if marked { format!("{text} ≠") } else { text });
             ui.label(color.map_or(text.clone(), |color| text.color(color)));
@@ -133,10 +122,7 @@ fn verdicts(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
     });
     let initial = scope.run.results().find_map(|result| result.initial_error);
     if let (Some(error), true) = (initial, shows_truth) {
-        ui.weak(format!(
-            "The reference itself is {:.2} m and {:.2}° from the truth",
-            error.translation_m, error.rotation_deg
-        ));
+        ui.weak(format!("The reference itself, from the truth: {error}"));
     }
     for finding in scope.run.results().flat_map(|result| &result.diagnosis) {
         ui.label(format!("{} {}", finding.code, finding.text));

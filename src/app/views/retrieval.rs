@@ -111,7 +111,7 @@ fn distance(scope: &Scope<'_>, frame: &RankedReference) -> String {
     match (scope.truth(), &frame.world_from_camera) {
         (Some(truth), Some(pose)) => {
             let error = PoseError::between(truth, pose);
-            format!("{:.1} m, {:.0}°", error.translation_m, error.rotation_deg)
+            format!("{}, {}", error.translation(), error.rotation())
         }
         _ => "–".to_owned(),
     }

@@ -15,7 +15,7 @@ use super::{Identity, RecordError, Targets, blueprint, entities, report, retriev
 use crate::estimator;
 use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
-use crate::localize::{PoseReport, QueryResult, StageTimes, Status, Watch};
+use crate::localize::{PoseReport, QueryResult, StageTimes, Watch};
 use crate::method::Method;
 use crate::narration;
 use crate::palette;
@@ -31,6 +31,7 @@ use crate::trace::{Cancelled, Record, Sink};
 pub struct Recorder {
     stream: Stream,
     configuration: String,
+    failure_radius_m: f64,
     render: RenderParams,
     methods: Vec<Method>,
     /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
@@ -84,6 +85,7 @@ impl Recorder {
             stream: Stream::open(targets, identity)?,
             render: params.render,
             configuration: identity.configuration.clone(),
+            failure_radius_m: identity.failure_radius_m,
             methods: methods.to_vec(),
             origin: None,
             is_laid_out: false,
@@ -163,17 +165,10 @@ impl Recorder {
     }
 
     fn result_in_words(&mut self, result: &QueryResult) {
-        let outcome = match (&result.reason, &result.error) {
-            (Some(reason), _) => format!("{} {}", reason.code, reason.text),
-            (None, Some(error)) => format!(
-                "{:.3} m and {:.3}° from the truth",
-                error.translation_m, error.rotation_deg
-            ),
-            (None, None) => "a pose".to_owned(),
-        };
-        let level = match result.status {
-            Status::Ok => TextLogLevel::INFO,
-            Status::Failed => TextLogLevel::WARN,
+        let outcome = result.words(self.failure_radius_m);
+        let level = match result.is_success(self.failure_radius_m) {
+            true => TextLogLevel::INFO,
+            false => TextLogLevel::WARN,
         };
         self.say(&format!("{} result: {outcome}", result.method), level);
     }
@@ -183,7 +178,13 @@ impl Recorder {
         let Query {
             problems, results, ..
         } = &self.query;
-        let text = report::markdown(problems, results, &self.configuration, origin);
+        let text = report::markdown(
+            problems,
+            results,
+            &self.configuration,
+            self.failure_radius_m,
+            origin,
+        );
         self.stream
             .log(entities::REPORT, &TextDocument::from_markdown(text));
     }

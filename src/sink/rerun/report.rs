@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use super::scene::Origin;
-use crate::localize::{QueryResult, Status};
+use crate::geometry::PoseError;
+use crate::localize::{QueryResult, Verdict};
 use crate::params::Params;
 use crate::problem::Problem;
 
@@ -12,6 +13,7 @@ pub(super) fn markdown(
     problems: &[Problem],
     results: &[QueryResult],
     configuration: &str,
+    failure_radius_m: f64,
     origin: Origin,
 ) -> String {
     let mut text = String::new();
@@ -25,7 +27,7 @@ pub(super) fn markdown(
             problem.seed
         );
     }
-    text += &verdicts(results);
+    text += &verdicts(results, failure_radius_m);
     text += &features(results);
     text += &costs(results);
     text += &changes(configuration);
@@ -38,19 +40,20 @@ pub(super) fn markdown(
     text
 }
 
-fn verdicts(results: &[QueryResult]) -> String {
-    let mut text = "| method | reference | result | error \\[m\\] | error \\[°\\] |\n\
-                    |:--|:--|:--|--:|--:|\n"
+fn verdicts(results: &[QueryResult], failure_radius_m: f64) -> String {
+    let mut text = "| method | reference | result | error | rotation | max Euler |\n\
+                    |:--|:--|:--|--:|--:|--:|\n"
         .to_owned();
     for result in results {
-        let verdict = match (&result.status, &result.reason) {
-            (Status::Ok, _) => "pose".to_owned(),
-            (Status::Failed, Some(reason)) => format!("**{}** {}", reason.code, reason.text),
-            (Status::Failed, None) => "no pose".to_owned(),
+        let verdict = match (result.verdict(failure_radius_m), &result.reason) {
+            (Verdict::NoPose, Some(reason)) => format!("**{}** {}", reason.code, reason.text),
+            (Verdict::NoPose, None) => "no pose".to_owned(),
+            (Verdict::Far, _) => "**far**".to_owned(),
+            (Verdict::Near | Verdict::Unmeasured, _) => "pose".to_owned(),
         };
-        let [metres, degrees] = match &result.error {
-            Some(error) => [error.translation_m, error.rotation_deg].map(|e| format!("{e:.3}")),
-            None => ["–".to_owned(), "–".to_owned()],
+        let part = |part: fn(&PoseError) -> String| {
+            let error = result.error.as_ref();
+            error.map_or("–".to_owned(), part)
         };
         row(
             &mut text,
@@ -58,17 +61,15 @@ fn verdicts(results: &[QueryResult]) -> String {
                 result.method.name(),
                 &result.references.join(", "),
                 &verdict,
-                &metres,
-                &degrees,
+                &part(PoseError::translation),
+                &part(PoseError::rotation),
+                &part(PoseError::max_euler),
             ],
         );
     }
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
-        text += &format!(
-            "\nThe first reference itself is {:.3} m and {:.3}° from the truth.\n",
-            error.translation_m, error.rotation_deg
-        );
+        text += &format!("\nThe first reference itself, from the truth: {error}.\n");
     }
     for finding in results.iter().flat_map(|result| &result.diagnosis) {
         text += &format!("\n- **{}** {}", finding.code, finding.text);

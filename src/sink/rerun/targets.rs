@@ -28,7 +28,7 @@ pub struct Targets {
 }
 
 /// What the stable id of a recording follows from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identity {
     /// The scene's name.
     pub scene: String,
@@ -40,6 +40,8 @@ pub struct Identity {
     pub configuration: String,
     /// The seed of every random choice.
     pub seed: u64,
+    /// The translation error from which on a pose counts as a failure \[m\].
+    pub failure_radius_m: f64,
 }
 
 impl Identity {

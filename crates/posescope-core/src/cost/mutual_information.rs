@@ -4,7 +4,7 @@ use super::{
     Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram,
     Similarity,
 };
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Exact, Key, bits_of_fields};
 
@@ -21,15 +21,17 @@ pub(super) const ENTRY: Entry = Entry {
     params: || Box::new(MutualInformationParams::default()),
 };
 
-/// Parameters of the mutual-information cost.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MutualInformationParams {
-    /// Standard deviation of the Gaussian that smooths the query \[px\].
-    pub sigma_px: f64,
-    /// Bins per axis of the joint histogram, over 0 … 255.
-    ///
-    /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
-    pub bins: usize,
+parameters! {
+    /// Parameters of the mutual-information cost.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct MutualInformationParams {
+        /// Standard deviation of the Gaussian that smooths the query.
+        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        /// Bins per axis of the joint histogram, over 0 … 255.
+        ///
+        /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
+        pub bins: usize = count("bins", "", 2..=256),
+    }
 }
 
 bits_of_fields!(MutualInformationParams { sigma_px, bins });
@@ -40,29 +42,6 @@ impl Default for MutualInformationParams {
             sigma_px: 1.5,
             bins: 16,
         }
-    }
-}
-
-impl Describe for MutualInformationParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        visitor.number(
-            About {
-                name: "sigma",
-                unit: "px",
-                help: "Gaussian smoothing of the query",
-            },
-            &mut self.sigma_px,
-            0.0..=20.0,
-        );
-        visitor.count(
-            About {
-                name: "bins",
-                unit: "",
-                help: "bins per axis of the joint histogram over 0 to 255",
-            },
-            &mut self.bins,
-            2..=256,
-        );
     }
 }
 

@@ -13,7 +13,7 @@ use super::{
     Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram,
     Similarity,
 };
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Exact, Key, bits_of_fields};
 
@@ -30,16 +30,18 @@ pub(super) const ENTRY: Entry = Entry {
     params: || Box::new(OrientationParams::default()),
 };
 
-/// Parameters of the cost of orientations.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OrientationParams {
-    /// Standard deviation of the Gaussian that smooths both photos before they are differentiated
-    /// \[px\].
-    pub sigma_px: f64,
-    /// Bins per axis of the joint histogram. The first one holds what has no orientation.
-    pub bins: usize,
-    /// Least gradient that has an orientation \[grey values per px\].
-    pub least_gradient: f64,
+parameters! {
+    /// Parameters of the cost of orientations.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct OrientationParams {
+        /// Standard deviation of the Gaussian that smooths both photos before they are
+        /// differentiated.
+        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        /// Bins per axis of the joint histogram. The first one holds what has no orientation.
+        pub bins: usize = count("bins", "", 3..=64),
+        /// Least gradient that has an orientation.
+        pub least_gradient: f64 = number("least_gradient", "grey values per px", 0.0..=100.0),
+    }
 }
 
 bits_of_fields!(OrientationParams {
@@ -55,38 +57,6 @@ impl Default for OrientationParams {
             bins: 9,
             least_gradient: 2.0,
         }
-    }
-}
-
-impl Describe for OrientationParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        visitor.number(
-            About {
-                name: "sigma",
-                unit: "px",
-                help: "Gaussian smoothing of both photos before they are differentiated",
-            },
-            &mut self.sigma_px,
-            0.0..=20.0,
-        );
-        visitor.count(
-            About {
-                name: "bins",
-                unit: "",
-                help: "bins per axis of the joint histogram; the first holds what has no orientation",
-            },
-            &mut self.bins,
-            3..=64,
-        );
-        visitor.number(
-            About {
-                name: "least_gradient",
-                unit: "grey values per px",
-                help: "least gradient that has an orientation",
-            },
-            &mut self.least_gradient,
-            0.0..=100.0,
-        );
     }
 }
 

@@ -1,7 +1,7 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
 use super::{Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair};
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Exact, Key, bits_of_fields};
 
@@ -15,14 +15,16 @@ pub(super) const ENTRY: Entry = Entry {
     params: || Box::new(PhotometricParams::default()),
 };
 
-/// Parameters of the photometric cost.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhotometricParams {
-    /// Standard deviation of the Gaussian that smooths the query \[px\].
-    pub sigma_px: f64,
-    /// The power of E in the weighted mean: 1 averages the squared differences E; 2 is the paper's
-    /// literal formula, which squares E once more.
-    pub power: usize,
+parameters! {
+    /// Parameters of the photometric cost.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct PhotometricParams {
+        /// Standard deviation of the Gaussian that smooths the query.
+        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        /// The power of the squared difference E in the weighted mean: 1 averages it; 2 is the
+        /// paper's literal formula, which squares E once more.
+        pub power: usize = count("power", "", 1..=2),
+    }
 }
 
 bits_of_fields!(PhotometricParams { sigma_px, power });
@@ -33,29 +35,6 @@ impl Default for PhotometricParams {
             sigma_px: 1.5,
             power: 1,
         }
-    }
-}
-
-impl Describe for PhotometricParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        visitor.number(
-            About {
-                name: "sigma",
-                unit: "px",
-                help: "Gaussian smoothing of the query",
-            },
-            &mut self.sigma_px,
-            0.0..=20.0,
-        );
-        visitor.count(
-            About {
-                name: "power",
-                unit: "",
-                help: "power of the squared difference in the mean; 2 is the paper's literal formula",
-            },
-            &mut self.power,
-            1..=2,
-        );
     }
 }
 

@@ -10,31 +10,36 @@ use super::detector::detect;
 use super::integral::IntegralImage;
 use super::orientation::OrientationEstimator;
 use super::{Features, Keypoint};
-use crate::describe::{About, Describe, ParamVisitor};
+use crate::describe::parameters;
 
-/// What [`surf`] looks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfParams {
-    /// Smallest response of a feature.
-    ///
-    /// The response is the determinant of (2.5 σ)² times the Hessian of an image with values from
-    /// 0 to 255, as for OpenCV's `hessianThreshold`. A Gaussian blob whose peak differs by a from the
-    /// ground reaches about 0.8 a².
-    pub threshold: f64,
-    /// Number of octaves. The first finds blobs with σ from 1.6 px to 3.2 px; each further one
-    /// doubles the scale (section 3.3).
-    pub octaves: usize,
-    /// Number of filter sizes in each octave, at least 3. Octaves join without a gap from 4 on; more
-    /// make them overlap, and the features that are found twice fail the ratio test.
-    pub intervals: usize,
-    /// Whether to leave features upright (U-SURF): for cameras that do not roll, this is faster,
-    /// and tells more features apart.
-    pub upright: bool,
-    /// Distance between the samples of the first octave \[px\], at least 1; it doubles with each
-    /// octave.
-    pub initial_step: usize,
-    /// Largest number of features to keep, the strongest; 0 keeps all.
-    pub max_keypoints: usize,
+parameters! {
+    /// What [`surf`] looks for.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SurfParams {
+        /// Smallest response of a feature, the determinant of the Hessian.
+        ///
+        /// The response is the determinant of (2.5 σ)² times the Hessian of an image with values from
+        /// 0 to 255, as for OpenCV's `hessianThreshold`. A Gaussian blob whose peak differs by a from
+        /// the ground reaches about 0.8 a².
+        pub threshold: f64 = number("threshold", "", 0.0..=1e6),
+        /// Number of octaves, doublings of the scale that are searched.
+        ///
+        /// The first finds blobs with σ from 1.6 px to 3.2 px; each further one doubles the scale
+        /// (section 3.3).
+        pub octaves: usize = count("octaves", "", 1..=8),
+        /// Number of filter sizes in each octave.
+        ///
+        /// Octaves join without a gap from 4 on; more make them overlap, and the features that are
+        /// found twice fail the ratio test.
+        pub intervals: usize = count("intervals", "", 3..=12),
+        /// Whether to leave features upright (U-SURF): for cameras that do not roll, this is faster,
+        /// and tells more features apart.
+        pub upright: bool = flag("upright"),
+        /// Distance between the samples of the first octave; it doubles with each octave.
+        pub initial_step: usize = count("initial_step", "px", 1..=8),
+        /// Largest number of features to keep, the strongest; 0 keeps all.
+        pub max_keypoints: usize = count("max_keypoints", "", 0..=1_000_000),
+    }
 }
 
 impl Default for SurfParams {
@@ -52,57 +57,6 @@ impl Default for SurfParams {
             initial_step: 1,
             max_keypoints: 0,
         }
-    }
-}
-
-impl Describe for SurfParams {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        let about = |name, unit, help| About { name, unit, help };
-        visitor.number(
-            about(
-                "threshold",
-                "",
-                "least determinant of the Hessian of a feature",
-            ),
-            &mut self.threshold,
-            0.0..=1e6,
-        );
-        visitor.count(
-            about("octaves", "", "doublings of the scale that are searched"),
-            &mut self.octaves,
-            1..=8,
-        );
-        visitor.count(
-            about("intervals", "", "filter sizes in each octave"),
-            &mut self.intervals,
-            3..=12,
-        );
-        visitor.flag(
-            about(
-                "upright",
-                "",
-                "leave features upright; for cameras that do not roll",
-            ),
-            &mut self.upright,
-        );
-        visitor.count(
-            about(
-                "initial_step",
-                "px",
-                "distance of the samples of the first octave",
-            ),
-            &mut self.initial_step,
-            1..=8,
-        );
-        visitor.count(
-            about(
-                "max_keypoints",
-                "",
-                "largest number of features to keep; 0 keeps all",
-            ),
-            &mut self.max_keypoints,
-            0..=1_000_000,
-        );
     }
 }
 

@@ -9,6 +9,7 @@ use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 use super::params::{NEEDED, SAMPLE};
+use crate::describe::choice;
 use crate::solver::MAX_SOLUTIONS;
 
 /// Expected number of accepted poses per problem of purely false matches, as a power of ten.
@@ -30,6 +31,8 @@ pub enum AcceptanceRule {
     /// Four inliers, whatever the number of correspondences.
     Paper,
 }
+
+choice!(AcceptanceRule: Consensus = "consensus", Paper = "paper");
 
 impl AcceptanceRule {
     /// Whether the rule accepts the pose that the verdict is about.

@@ -38,7 +38,7 @@ pub(super) fn locally_optimized(
         let agreeing: Vec<_> = inliers(&residuals_px, params.inlier_threshold_px)
             .map(|i| correspondences[i])
             .collect();
-        let refinement = refine(&agreeing, intrinsics, &pose, params.loss);
+        let refinement = refine(&agreeing, intrinsics, &pose, params.loss());
         let new = likelihood.score(&refinement.pose);
         if new.log_likelihood > old.log_likelihood {
             optimum.hypothesis = Hypothesis {

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::describe::parameters;
 use crate::memo::bits_of_fields;
-use crate::solver::Loss;
+use crate::solver::{Loss, LossShape};
 
 /// Correspondences in a sample: as many as the minimal solver takes.
 pub const SAMPLE: usize = 3;
@@ -11,24 +12,29 @@ pub const SAMPLE: usize = 3;
 /// Correspondences without which there is no consensus: a sample and one that agrees with it.
 pub const NEEDED: usize = SAMPLE + 1;
 
-/// Parameters of [`super::mlesac()`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct MlesacParams {
-    /// σ, the noise of a true match per image axis \[px\].
-    pub sigma_px: f64,
-    /// Greatest reprojection error of an inlier \[px\].
-    pub inlier_threshold_px: f64,
-    /// Probability with which a sample without false matches is to be drawn.
-    pub confidence: f64,
-    /// Trials at most.
-    pub max_trials: usize,
-    /// Trials at least.
-    pub min_trials: usize,
-    /// Rounds of expectation–maximisation for the mixing of one hypothesis.
-    pub em_iterations: usize,
-    /// Loss of the refinement.
-    pub loss: Loss,
+parameters! {
+    /// Parameters of [`super::mlesac()`].
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct MlesacParams {
+        /// MLESAC: σ, the noise of a true match per image axis.
+        pub sigma_px: f64 = number("sigma", "px", 0.05..=20.0),
+        /// MLESAC: greatest reprojection error of an inlier.
+        pub inlier_threshold_px: f64 = number("inlier", "px", 0.1..=50.0),
+        /// MLESAC: probability with which a sample without false matches is to be drawn.
+        pub confidence: f64 = number("confidence", "", 0.5..=0.999_999),
+        /// MLESAC: trials at most.
+        pub max_trials: usize = count("max_trials", "", 1..=10_000_000),
+        /// MLESAC: trials at least, unless that is more than at most.
+        pub min_trials: usize = count("min_trials", "", 1..=10_000_000),
+        /// MLESAC: rounds of expectation–maximisation for the mixing of one hypothesis.
+        pub em_iterations: usize = count("em_iterations", "", 1..=1000),
+        /// Refinement: loss of a residual.
+        pub loss: LossShape = choice("loss"),
+        /// Refinement: residual from which on the loss grows more slowly than its square; least
+        /// squares have none.
+        pub loss_scale_px: f64 = number("loss_scale", "px", 0.05..=50.0),
+    }
 }
 
 bits_of_fields!(MlesacParams {
@@ -39,6 +45,7 @@ bits_of_fields!(MlesacParams {
     min_trials,
     em_iterations,
     loss,
+    loss_scale_px,
 });
 
 /// The trials are capped at what 7 % true matches need. The others were tried on synthetic scenes
@@ -54,7 +61,15 @@ impl Default for MlesacParams {
             max_trials: 20_000,
             min_trials: 100,
             em_iterations: 3,
-            loss: Loss::Huber(1.5),
+            loss: LossShape::Huber,
+            loss_scale_px: 1.5,
         }
+    }
+}
+
+impl MlesacParams {
+    /// The loss of the refinement.
+    pub fn loss(&self) -> Loss {
+        self.loss.at(self.loss_scale_px)
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::describe::choice;
 use crate::memo::Bits;
 
 /// A loss `ρ(r²)` on the squared length of a residual, about `r²` for small residuals.
@@ -20,15 +21,34 @@ pub enum Loss {
     Cauchy(f64),
 }
 
-impl Bits for Loss {
+/// The shape of a [`Loss`], without its scale.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossShape {
+    /// [`Loss::Squared`].
+    Squared,
+    /// [`Loss::Huber`].
+    Huber,
+    /// [`Loss::Cauchy`].
+    Cauchy,
+}
+
+impl Bits for LossShape {
     fn write(&self, words: &mut Vec<u64>) {
-        let (kind, scale) = match self {
-            Self::Squared => (0, 0.0),
-            Self::Huber(scale) => (1, *scale),
-            Self::Cauchy(scale) => (2, *scale),
-        };
-        words.push(kind);
-        scale.write(words);
+        words.push(*self as u64);
+    }
+}
+
+choice!(LossShape: Squared = "squared", Huber = "huber", Cauchy = "cauchy");
+
+impl LossShape {
+    /// The loss of this shape with a scale; least squares have none.
+    pub fn at(self, scale: f64) -> Loss {
+        match self {
+            Self::Squared => Loss::Squared,
+            Self::Huber => Loss::Huber(scale),
+            Self::Cauchy => Loss::Cauchy(scale),
+        }
     }
 }
 

@@ -179,10 +179,7 @@ pub(super) fn cameras(
             && who != Who::Truth
         {
             let error = PoseError::between(truth, &world);
-            about.push_str(&format!(
-                "; {:.2} m and {:.2}° from the truth",
-                error.translation_m, error.rotation_deg
-            ));
+            about.push_str(&format!("; from the truth {error}"));
         }
         Camera {
             who,

@@ -16,7 +16,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use eframe::egui_wgpu::{
     Callback, CallbackResources, CallbackTrait, RenderState, ScreenDescriptor,
 };
-use eframe::wgpu;
 use egui::{PaintCallbackInfo, Rect};
 
 pub(super) use frame::{Frame, Line, Points, Spot};

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use eframe::wgpu;
-
 use super::frame::{Frame, Points};
 use super::guard::guarded;
 use super::pipelines::{COLOR, DEPTH, Made, Pipelines, SAMPLES};

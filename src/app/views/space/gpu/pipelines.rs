@@ -2,8 +2,6 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use eframe::wgpu;
-
 use super::frame::{Line, Spot};
 use super::guard::{guarded, one_line};
 

@@ -1,0 +1,32 @@
+//! What the demonstration shows: `assets/demo.toml`.
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+/// What the demonstration runs, and where its recording goes.
+#[derive(serde::Deserialize)]
+pub struct Settings {
+    pub scene: String,
+    pub query: String,
+    pub reference: String,
+    pub recording: PathBuf,
+}
+
+/// Those of `assets/demo.toml`.
+pub fn settings() -> &'static Settings {
+    static SETTINGS: LazyLock<Settings> = LazyLock::new(|| {
+        let settings = toml::from_str(include_str!("../../assets/demo.toml"));
+        settings.unwrap_or_else(|error| unreachable!("a test reads it: {error}"))
+    });
+    &SETTINGS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::settings;
+
+    #[test]
+    fn the_settings_are_read() {
+        assert_eq!(settings().scene, "street");
+    }
+}

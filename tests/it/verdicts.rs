@@ -1,0 +1,121 @@
+//! One meaning of success and one way to write an error, wherever a result is shown.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use posescope::app::{Command, Setup};
+use posescope::localize::QueryResult;
+use posescope::measure::{measure, read_rows};
+use posescope::method::Method;
+use posescope::run::read_results;
+use posescope::scene::{self, Scene};
+
+use crate::binary::posescope;
+use crate::small_sequence::SmallSequence;
+use crate::window::{finished, is_said, settle, setup, window};
+
+#[test]
+fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
+    let sequence = SmallSequence::write();
+    let output = posescope()
+        .arg("run")
+        .arg(sequence.folder())
+        .args(["--query", "5", "--reference", "4", "--method", "fb"])
+        .args(["--radius", "3", "--seed", "7", "--json"])
+        .arg(sequence.path().join("results.jsonl"))
+        .output()
+        .expect("the binary starts");
+    let table = String::from_utf8_lossy(&output.stdout);
+    let line = std::fs::read_to_string(sequence.path().join("results.jsonl")).expect("written");
+    let result: QueryResult = serde_json::from_str(line.trim()).expect("a result");
+    let error = result.error.expect("the truth is known");
+
+    let columns = [
+        ("error", error.translation()),
+        ("rotation", error.rotation()),
+        ("max Euler", error.max_euler()),
+    ];
+    let cells = |line: &str| -> Vec<String> {
+        let cells = line.split("  ").map(str::trim);
+        let cells = cells.filter(|cell| !cell.is_empty());
+        cells.map(str::to_owned).collect()
+    };
+    let lines: Vec<Vec<String>> = table.lines().map(cells).collect();
+    let of = |first: &str| {
+        let found = lines.iter().find(|cells| cells.iter().any(|c| c == first));
+        found.unwrap_or_else(|| panic!("{first} is missing in {table}"))
+    };
+    let (names, values) = (of("query"), of("000005"));
+    for (name, value) in columns {
+        let column = names.iter().position(|cell| cell == name);
+        let column = column.unwrap_or_else(|| panic!("no column {name} in {table}"));
+        assert_eq!(values[column], value, "{name} in {table}");
+    }
+
+    let folder = sequence.folder().display().to_string();
+    let scene: Arc<dyn Scene> = scene::open(&folder, None).expect("a scene").into();
+    let frame = |name| scene.find(name).expect("a frame");
+    let mut setup = Setup {
+        offered: vec![frame("5")],
+        query: frame("5"),
+        chosen: vec![frame("4")].into(),
+        queries: scene.clone(),
+        references: scene.clone(),
+        ..setup()
+    };
+    setup.task.scene = folder;
+    setup.task.protocol.methods = vec![Method::FB];
+    let mut window = finished(setup);
+    window.state_mut().send(Command::Maximize(Some("report")));
+    window.run_steps(3);
+    assert!(is_said(&window, &error.to_string()), "{error}");
+    assert!(error.to_string().contains("max Euler"));
+}
+
+#[test]
+fn the_window_counts_the_failures_that_the_run_counts() {
+    let sequence = SmallSequence::of(&[0, 1, 2, 3, 4, 5]);
+    let out = sequence.path().join("run");
+    posescope()
+        .arg("eval")
+        .arg(sequence.folder())
+        .args([
+            "--method",
+            "mi",
+            "--references",
+            "random:1",
+            "--radius",
+            "3",
+        ])
+        .args(["--max-recordings", "0", "--out"])
+        .arg(&out)
+        .assert()
+        .code(0);
+    let rows = read_rows(&out).expect("results");
+    let mut errors: Vec<f64> = rows
+        .iter()
+        .filter_map(|row| Some(row.error?.translation_m))
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    // Nearer than 10 m, all of them.
+    let failure_radius_m = errors[errors.len() / 2];
+    assert!(failure_radius_m < 10.0);
+    let measures = measure(&rows, failure_radius_m);
+    let failed = measures[0].queries - measures[0].successes;
+    assert!(failed > 0 && failed < 6, "{failed} of 6 failed");
+
+    let mut results: BTreeMap<usize, Vec<QueryResult>> = BTreeMap::new();
+    for (query, result) in read_results(&out).expect("a file").enumerate() {
+        results.insert(query, vec![result.expect("a result")]);
+    }
+    let mut window = window(Setup {
+        offered: results.keys().copied().filter(|query| *query < 3).collect(),
+        failure_radius_m,
+        results,
+        ..setup()
+    });
+    settle(&mut window);
+    window.state_mut().send(Command::Maximize(Some("queries")));
+    window.run_steps(3);
+    assert!(is_said(&window, &format!("{failed} of 6 failed")));
+}

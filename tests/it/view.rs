@@ -1,0 +1,111 @@
+//! `posescope view` as a process: what it does with a display and without.
+
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::process::{Child, Command as Process, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::binary::{CACHE, posescope};
+use crate::small_sequence::SmallSequence;
+
+#[test]
+fn without_a_display_it_records_instead() {
+    let sequence = SmallSequence::write();
+    let output = posescope()
+        .current_dir(sequence.path())
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .arg("view")
+        .arg(sequence.folder())
+        .args(["--query", "5", "--reference", "4", "--method", "fb"])
+        .output()
+        .expect("the binary starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("no display is set"), "{said}");
+    assert!(said.contains("instead"), "{said}");
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("000005"), "{table}");
+    assert!(sequence.path().join("recordings/000005.rrd").is_file());
+}
+
+/// A process that ends with the test.
+struct Ending(Child);
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        // One that is over already is just as well.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A display of its own, and its number; none where there is no Xvfb.
+fn virtual_display() -> Option<(Ending, String)> {
+    let mut server = Process::new("Xvfb")
+        .args(["-displayfd", "1", "-nolisten", "tcp"])
+        .args(["-screen", "0", "1600x1000x24"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()?;
+    let mut number = String::new();
+    let mut words = BufReader::new(server.stdout.take()?);
+    let server = Ending(server);
+    words.read_line(&mut number).ok()?;
+    let number = number.trim();
+    (!number.is_empty()).then(|| (server, format!(":{number}")))
+}
+
+/// The window's title as the display's server knows it; none without somebody who can ask.
+fn is_shown(display: &str, title: &str) -> Option<bool> {
+    let found = Process::new("xdotool")
+        .args(["search", "--name", title])
+        .env("DISPLAY", display)
+        .stderr(Stdio::null())
+        .output()
+        .ok()?;
+    Some(found.status.success())
+}
+
+#[test]
+fn on_a_display_it_opens_a_window_that_stays() {
+    let Some((_server, display)) = virtual_display() else {
+        println!("skipped: no Xvfb");
+        return;
+    };
+    if is_shown(&display, "posescope").is_none() {
+        println!("skipped: no xdotool");
+        return;
+    }
+    let sequence = SmallSequence::write();
+    let child = Process::new(env!("CARGO_BIN_EXE_posescope"))
+        .current_dir(sequence.path())
+        .env("POSESCOPE_CACHE", CACHE)
+        .env("DISPLAY", &display)
+        .env_remove("WAYLAND_DISPLAY")
+        .arg("view")
+        .arg(sequence.folder())
+        .args(["--query", "5", "--reference", "4", "--method", "fb"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    let mut child = Ending(child);
+    let begun = Instant::now();
+    while is_shown(&display, "posescope") != Some(true) {
+        if let Some(status) = child.0.try_wait().expect("it is ours") {
+            let mut said = String::new();
+            let stderr = child.0.stderr.as_mut();
+            stderr.map(|stderr| stderr.read_to_string(&mut said));
+            if said.contains("no graphics adapter") {
+                println!("skipped: no graphics adapter");
+                return;
+            }
+            panic!("{status}: {said}");
+        }
+        assert!(begun.elapsed() < Duration::from_secs(120), "no window");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(child.0.try_wait().expect("it is ours").is_none());
+    assert!(!sequence.path().join("recordings").exists());
+}
