@@ -14,15 +14,13 @@ use eframe::egui_wgpu::{
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use nalgebra::Point3;
-use posescope::app::{self, App, Command, ReferencePick, Setup};
+use posescope::app::{self, App, Command, Setup};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
-use posescope::method::Method;
-use posescope::params::Params;
 use posescope::scene::{self, Scene, SceneError};
-use posescope::session::{RunMode, State};
+use posescope::session::{RunMode, State, Task};
 
 /// Size of the window, as it opens.
 const SIZE: [f32; 2] = [1500.0, 950.0];
@@ -213,23 +211,17 @@ fn open() -> Option<Window> {
     let query = street.find("000070").ok()?;
     let reference = street.find("000062").ok()?;
     let setup = Setup {
-        scene_argument: "street".to_owned(),
+        task: Task {
+            by_hand: true,
+            ..Task::of("street")
+        },
         references: Arc::clone(&street),
-        queries_argument: None,
         queries: Arc::clone(&street),
         offered: vec![query],
         query,
         chosen: vec![reference].into(),
-        pick: ReferencePick::ByHand,
         index: Arc::default(),
-        methods: Method::PAPER.to_vec(),
-        fusions: Vec::new(),
-        params: Params::default(),
-        uncertainty_radius_m: 15.0,
-        prior_m: None,
         failure_radius_m: 10.0,
-        seed: 0,
-        breakpoints: Vec::new(),
         mode: RunMode::Running,
         results: BTreeMap::new(),
         folder: std::env::temp_dir(),

@@ -25,7 +25,7 @@ pub use posescope_core::{
 pub use posescope_core::{
     camera, cloud, cost, depth, describe, estimator, event, features, fusion, geometry, grid,
     history, image, localize, memo, method, params, problem, render, retrieval, robust, solver,
-    trace,
+    text, trace,
 };
 
 #[cfg(feature = "app")]

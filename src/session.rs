@@ -11,6 +11,7 @@ mod job;
 mod loaded;
 mod message;
 mod run;
+mod task;
 
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver};
@@ -23,6 +24,7 @@ pub use index_file::IndexFile;
 pub use job::{Job, JobError};
 pub use loaded::Loaded;
 pub use run::{Part, Run, Span, StageBar};
+pub use task::Task;
 
 use gate::Control;
 use message::Message;
@@ -70,7 +72,7 @@ impl Session {
         let control = Arc::new(Control::new(mode, breakpoints));
         // Unbounded: a full queue that nobody drains would keep a cancelled worker waiting.
         let (outbox, inbox) = mpsc::channel();
-        let run = Run::new(job.params.clone());
+        let run = Run::new(job.task.params.clone());
         job::spawn(job, Arc::clone(&control), outbox, Arc::new(wake));
         Self {
             control,

@@ -7,7 +7,7 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 use super::camera::{Nudge, Place};
 use super::desk::Comparing;
 use super::setup::ReferencePick;
-use crate::fusion;
+use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::method::Method;
 
@@ -59,7 +59,7 @@ pub enum Command {
     /// Use other reference frames.
     SetReferences(Vec<usize>),
     /// Fuse what several references give, in these ways, and run again.
-    SetFusions(Vec<&'static fusion::Entry>),
+    SetFusions(Vec<Fusion>),
     /// Change the uncertainty radius \[m\] and run again.
     SetRadius(f64),
     /// Change the seed and run again.

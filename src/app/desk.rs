@@ -166,7 +166,7 @@ impl Meaning {
 
 impl Desk {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
-        let params = Arc::new(setup.params.clone());
+        let params = Arc::new(setup.task.params.clone());
         let frames = Arc::default();
         let session = start(&setup, setup.mode, &frames, &ctx);
         Self {
@@ -337,7 +337,7 @@ impl Desk {
         self.results = setup.results.clone();
         self.queries = Queries::new(self.ctx.clone());
         self.setup = setup;
-        self.params = Arc::new(self.setup.params.clone());
+        self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
         self.comparing = Comparing::default();
         // The scenes are others, even where they have the same names.
@@ -353,7 +353,7 @@ impl Desk {
         self.stop_queries();
         let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
         let follows = self.follows && self.session.is_alive();
-        self.params = Arc::new(self.setup.params.clone());
+        self.params = Arc::new(self.setup.task.params.clone());
         self.begin(RunMode::Running);
         self.follows = follows;
         self.anchor = anchor;
@@ -362,14 +362,10 @@ impl Desk {
 
 fn start(setup: &Setup, mode: RunMode, frames: &Arc<FrameStore>, ctx: &egui::Context) -> Session {
     let ctx = ctx.clone();
-    let breakpoints = setup
-        .breakpoints
-        .iter()
-        .filter_map(|text| text.parse().ok());
     Session::start(
         setup.job(frames),
         mode,
-        Breakpoints::new(breakpoints),
+        Breakpoints::new(setup.task.breakpoints.iter().cloned()),
         move || ctx.request_repaint(),
     )
 }

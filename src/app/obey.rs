@@ -54,26 +54,26 @@ impl App {
             Command::PickReferences(pick) => desk.pick_references(pick),
             Command::SetReferences(frames) => desk.set_references(frames),
             Command::SetFusions(fusions) => {
-                desk.setup.fusions = fusions;
+                desk.setup.task.protocol.fusions = fusions;
                 desk.begin_again();
             }
             Command::SetRadius(radius_m) => {
-                desk.setup.uncertainty_radius_m = radius_m;
+                desk.setup.task.radius_m = radius_m;
                 desk.setup.go_to(desk.setup.query);
                 desk.begin_again();
             }
             Command::SetSeed(seed) => {
-                desk.setup.seed = seed;
+                desk.setup.task.protocol.seed = seed;
                 desk.setup.go_to(desk.setup.query);
                 desk.begin_again();
             }
-            Command::SetParam { key, value } => match desk.setup.params.set(&key, &value) {
-                Ok(()) if desk.setup.params != *desk.params => desk.begin_again(),
+            Command::SetParam { key, value } => match desk.setup.task.params.set(&key, &value) {
+                Ok(()) if desk.setup.task.params != *desk.params => desk.begin_again(),
                 Ok(()) => {}
                 Err(error) => desk.note(error.to_string(), true),
             },
             Command::ResetParams => {
-                desk.setup.params = crate::params::Params::default();
+                desk.setup.task.params = crate::params::Params::default();
                 desk.begin_again();
             }
             Command::SetBreakpoints(texts) => desk.set_breakpoints(texts),
@@ -304,8 +304,9 @@ impl Desk {
 
     fn pick_references(&mut self, pick: ReferencePick) {
         self.stop_queries();
-        self.setup.pick = pick;
-        if pick != ReferencePick::ByHand {
+        self.setup.task.by_hand = pick == ReferencePick::ByHand;
+        if let ReferencePick::By(selection) = pick {
+            self.setup.task.protocol.references = selection;
             self.setup.chosen = References::default();
             self.begin(RunMode::Running);
         }
@@ -317,7 +318,7 @@ impl Desk {
             return;
         }
         self.stop_queries();
-        self.setup.pick = ReferencePick::ByHand;
+        self.setup.task.by_hand = true;
         self.setup.chosen = frames.into();
         self.begin(RunMode::Running);
     }
@@ -326,8 +327,9 @@ impl Desk {
         let parsed: Result<Vec<Breakpoint>, _> = texts.iter().map(|text| text.parse()).collect();
         match parsed {
             Ok(breakpoints) => {
-                self.session.set_breakpoints(Breakpoints::new(breakpoints));
-                self.setup.breakpoints = texts;
+                self.session
+                    .set_breakpoints(Breakpoints::new(breakpoints.iter().cloned()));
+                self.setup.task.breakpoints = breakpoints;
             }
             Err(error) => self.note(error.to_string(), true),
         }

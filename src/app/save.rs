@@ -16,7 +16,7 @@ use crate::trace::Sink as _;
 pub(super) fn menu(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     ui.menu_button("Save", |ui| {
         let folder = &desk.setup.folder;
-        let name = &desk.setup.queries.frames()[desk.setup.query];
+        let name = desk.setup.query_name();
         let mut item = |text: &str, help: &str, command: Command| {
             if ui.button(text).on_hover_text(help).clicked() {
                 commands.send(command);
@@ -68,18 +68,15 @@ impl Desk {
             return Ok(());
         };
         let setup = &self.setup;
-        let reference_names = setup.chosen.frames.iter();
         let identity = Identity {
             scene: setup.references.name().to_owned(),
-            queries: vec![setup.queries.frames()[setup.query].clone()],
-            references: reference_names
-                .map(|&frame| setup.references.frames()[frame].clone())
-                .collect(),
+            queries: vec![setup.query_name().to_owned()],
+            references: setup.reference_names(),
             configuration: run.params.to_toml(),
-            seed: setup.seed,
+            seed: setup.task.protocol.seed,
             failure_radius_m: setup.failure_radius_m,
         };
-        let mut recorder = Recorder::open(targets, &identity, &setup.methods)?;
+        let mut recorder = Recorder::open(targets, &identity, &setup.task.protocol.methods)?;
         recorder.begin_query(0, &loaded.problems, loaded.truth.as_ref());
         for span in run.spans() {
             match span.part {

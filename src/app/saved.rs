@@ -1,76 +1,106 @@
-//! A session on disk: scene, query, settings, layout.
+//! A session on disk: what is asked, query, layout.
 
 use std::path::Path;
 use std::sync::Arc;
 
+use posescope_core::files;
+use posescope_core::text::json_message;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::setup::{ReferencePick, Setup};
-use crate::fusion;
+use crate::fusion::Fusion;
 use crate::method::Method;
 use crate::params::Params;
-use crate::run::default_failure_radius_m;
+use crate::run::{Protocol, default_failure_radius_m};
 use crate::scene::{self, Scene};
-use crate::session::IndexFile;
-use posescope_core::files;
+use crate::session::{Breakpoint, IndexFile, Task};
 
 /// The version of the file's form.
-const SCHEMA: &str = "posescope.session/1";
+const SCHEMA: &str = "posescope.session/2";
+/// The version before, which is read too.
+const SCHEMA_1: &str = "posescope.session/1";
 
 /// What is kept of a session.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct SavedSession {
     schema: String,
-    scene: String,
-    queries: Option<String>,
+    task: Task,
     query: String,
     references: Vec<String>,
-    /// As [`ReferencePick`] is written.
-    pick: String,
-    methods: Vec<String>,
-    #[serde(default)]
-    fusions: Vec<String>,
-    radius_m: f64,
-    #[serde(default)]
-    prior_m: Option<f64>,
     /// The scene's own where a session says nothing of it.
     #[serde(default)]
     failure_radius_m: Option<f64>,
-    seed: u64,
-    breakpoints: Vec<String>,
-    /// Every parameter, as in a configuration file.
-    params: String,
     /// The position of the cursor.
     pub(super) cursor: usize,
     /// The tree of views.
     pub(super) layout: serde_json::Value,
 }
 
+/// As the first version was written. It had neither the format nor the index.
+#[derive(Deserialize)]
+struct SavedSession1 {
+    scene: String,
+    queries: Option<String>,
+    query: String,
+    references: Vec<String>,
+    pick: ReferencePick,
+    methods: Vec<Method>,
+    #[serde(default)]
+    fusions: Vec<Fusion>,
+    radius_m: f64,
+    #[serde(default)]
+    prior_m: Option<f64>,
+    #[serde(default)]
+    failure_radius_m: Option<f64>,
+    seed: u64,
+    breakpoints: Vec<Breakpoint>,
+    #[serde(deserialize_with = "posescope_core::text::parsed")]
+    params: Params,
+    cursor: usize,
+    layout: serde_json::Value,
+}
+
+impl From<SavedSession1> for SavedSession {
+    fn from(saved: SavedSession1) -> Self {
+        let default = Protocol::default();
+        Self {
+            schema: SCHEMA_1.to_owned(),
+            task: Task {
+                queries: saved.queries,
+                by_hand: saved.pick == ReferencePick::ByHand,
+                radius_m: saved.radius_m,
+                protocol: Protocol {
+                    references: match saved.pick {
+                        ReferencePick::ByHand => default.references,
+                        ReferencePick::By(selection) => selection,
+                    },
+                    prior_m: saved.prior_m,
+                    methods: saved.methods,
+                    fusions: saved.fusions,
+                    seed: saved.seed,
+                },
+                params: saved.params,
+                breakpoints: saved.breakpoints,
+                ..Task::of(saved.scene)
+            },
+            failure_radius_m: saved.failure_radius_m,
+            query: saved.query,
+            references: saved.references,
+            cursor: saved.cursor,
+            layout: saved.layout,
+        }
+    }
+}
+
 impl SavedSession {
     pub(super) fn new(setup: &Setup, cursor: usize, layout: serde_json::Value) -> Self {
-        let name = |scene: &Arc<dyn Scene>, frame: usize| scene.frames()[frame].clone();
-        let references = setup.chosen.frames.iter();
         Self {
             schema: SCHEMA.to_owned(),
-            scene: setup.scene_argument.clone(),
-            queries: setup.queries_argument.clone(),
-            query: name(&setup.queries, setup.query),
-            references: references
-                .map(|&frame| name(&setup.references, frame))
-                .collect(),
-            pick: setup.pick.to_string(),
-            methods: setup
-                .methods
-                .iter()
-                .map(|method| method.name().to_owned())
-                .collect(),
-            fusions: setup.fusions.iter().map(|f| f.name.to_owned()).collect(),
-            radius_m: setup.uncertainty_radius_m,
-            prior_m: setup.prior_m,
+            task: setup.task.clone(),
             failure_radius_m: Some(setup.failure_radius_m),
-            seed: setup.seed,
-            breakpoints: setup.breakpoints.clone(),
-            params: setup.params.to_toml(),
+            query: setup.query_name().to_owned(),
+            references: setup.reference_names(),
             cursor,
             layout,
         }
@@ -85,27 +115,39 @@ impl SavedSession {
         files::write_whole(path, text.as_bytes()).map_err(|error| said(&error))
     }
 
+    /// Reads a session of this version or the one before. What is wrong is told with file and line.
     pub(super) fn read(path: &Path) -> Result<Self, String> {
+        #[derive(Deserialize)]
+        struct Head {
+            schema: String,
+        }
         let said = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
         let text = std::fs::read_to_string(path).map_err(|error| said(&error))?;
-        let saved: Self = serde_json::from_str(&text).map_err(|error| said(&error))?;
-        if saved.schema != SCHEMA {
-            return Err(said(&format!("{SCHEMA} expected, {} found", saved.schema)));
+        let Head { schema } = parsed(path, &text)?;
+        match schema.as_str() {
+            SCHEMA => parsed(path, &text),
+            SCHEMA_1 => parsed::<SavedSession1>(path, &text).map(Self::from),
+            other => Err(said(&format!("{SCHEMA} expected, {other} found"))),
         }
-        Ok(saved)
     }
 
     /// The setup of the session. Scenes that are open already are not opened again.
     pub(super) fn setup(&self, present: &Setup) -> Result<Setup, String> {
         let words = |error: scene::SceneError| error.to_string();
-        let open = |argument: &str| -> Result<Arc<dyn Scene>, String> {
-            if argument == present.scene_argument {
+        let (task, now) = (&self.task, &present.task);
+        let open = |argument: &String| -> Result<Arc<dyn Scene>, String> {
+            let is_same_format = task.format.is_none() || task.format == now.format;
+            if is_same_format && *argument == now.scene {
                 return Ok(Arc::clone(&present.references));
             }
-            Ok(scene::open(argument, None).map_err(words)?.into())
+            if is_same_format && Some(argument) == now.queries.as_ref() {
+                return Ok(Arc::clone(&present.queries));
+            }
+            let scene = scene::open(argument, task.format.as_deref());
+            Ok(scene.map_err(words)?.into())
         };
-        let references = open(&self.scene)?;
-        let queries = match &self.queries {
+        let references = open(&task.scene)?;
+        let queries = match &task.queries {
             Some(argument) => open(argument)?,
             None => Arc::clone(&references),
         };
@@ -115,18 +157,17 @@ impl SavedSession {
             .iter()
             .map(|name| references.find(name).map_err(words))
             .collect::<Result<_, _>>()?;
-        let mut params = Params::default();
-        params
-            .merge_toml(&self.params)
-            .map_err(|error| error.to_string())?;
-        let is_same_scene =
-            self.scene == present.scene_argument && self.queries == present.queries_argument;
+        let is_same_scene = task.scene == now.scene && task.queries == now.queries;
+        let mut task = task.clone();
+        if is_same_scene && self.schema == SCHEMA_1 {
+            // What was not written down then.
+            task.format = task.format.or_else(|| now.format.clone());
+            task.index = task.index.or_else(|| now.index.clone());
+        }
         let failure_radius_m = self
             .failure_radius_m
             .unwrap_or_else(|| default_failure_radius_m(references.name()));
         Ok(Setup {
-            scene_argument: self.scene.clone(),
-            queries_argument: self.queries.clone(),
             offered: match is_same_scene {
                 true => present.offered.clone(),
                 false => (0..queries.frames().len()).collect(),
@@ -135,31 +176,20 @@ impl SavedSession {
             queries,
             query,
             chosen: reference_frames.into(),
-            index: match is_same_scene {
+            index: match is_same_scene && task.index == now.index {
                 true => Arc::clone(&present.index),
-                false => Arc::new(IndexFile::new(&self.scene, None)),
+                false => Arc::new(IndexFile::new(&task.scene, task.index.clone())),
             },
-            pick: self
-                .pick
-                .parse()
-                .map_or(ReferencePick::ByHand, ReferencePick::By),
-            methods: self
-                .methods
-                .iter()
-                .filter_map(|name| name.parse::<Method>().ok())
-                .collect(),
-            fusions: self
-                .fusions
-                .iter()
-                .filter_map(|name| fusion::find(name))
-                .collect(),
-            params,
-            uncertainty_radius_m: self.radius_m,
-            prior_m: self.prior_m,
+            task,
             failure_radius_m,
-            seed: self.seed,
-            breakpoints: self.breakpoints.clone(),
             ..present.clone()
         })
     }
+}
+
+fn parsed<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, String> {
+    serde_json::from_str(text).map_err(|error| {
+        let message = json_message(&error).replace('\n', " ");
+        format!("{}:{}: {message}", path.display(), error.line())
+    })
 }

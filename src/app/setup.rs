@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use crate::estimator;
-use crate::fusion;
 use crate::localize::{QueryResult, References, Selection, frames_within};
 use crate::method::Method;
-use crate::params::Params;
 use crate::scene::{FrameStore, Scene};
-use crate::session::{IndexFile, Job, RunMode};
+use crate::session::{IndexFile, Job, RunMode, Task};
+use crate::text::UnknownWord;
 
 /// How the references of a query are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,15 +31,26 @@ impl fmt::Display for ReferencePick {
     }
 }
 
+impl FromStr for ReferencePick {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        match text {
+            "by hand" => Ok(Self::ByHand),
+            text => text.parse().map(Self::By),
+        }
+    }
+}
+
+posescope_core::serde_as_text!(ReferencePick);
+
 /// What is run, and how the window begins.
 #[derive(Clone)]
 pub struct Setup {
-    /// The scene as it was named on the command line.
-    pub scene_argument: String,
+    /// What is asked of every query.
+    pub task: Task,
     /// Where the references are.
     pub references: Arc<dyn Scene>,
-    /// The scene of the queries, if it is another one.
-    pub queries_argument: Option<String>,
     /// Where the queries are; often the same scene.
     pub queries: Arc<dyn Scene>,
     /// The queries that the list offers, as positions in their scene.
@@ -48,27 +59,10 @@ pub struct Setup {
     pub query: usize,
     /// Its references; none where they are still to be chosen.
     pub chosen: References,
-    /// How the references of other queries are chosen.
-    pub pick: ReferencePick,
     /// What a choice by looks asks.
     pub index: Arc<IndexFile>,
-    /// The methods to run.
-    pub methods: Vec<Method>,
-    /// What to make of several references: nothing, or one pose by each of these.
-    pub fusions: Vec<&'static fusion::Entry>,
-    /// Their parameters.
-    pub params: Params,
-    /// How far the query may be from a reference \[m\].
-    pub uncertainty_radius_m: f64,
-    /// How far from the query's known position references are chosen \[m\]; without it, within the
-    /// radius.
-    pub prior_m: Option<f64>,
     /// The translation error from which on a pose counts as a failure \[m\].
     pub failure_radius_m: f64,
-    /// Seed of every random choice.
-    pub seed: u64,
-    /// Breakpoints to begin with.
-    pub breakpoints: Vec<String>,
     /// Whether it waits at the first step or runs.
     pub mode: RunMode,
     /// Results that are known already, by query.
@@ -84,17 +78,8 @@ impl Setup {
             queries: Arc::clone(&self.queries),
             query: self.query,
             chosen: self.chosen.clone(),
-            selection: match self.pick {
-                ReferencePick::ByHand => None,
-                ReferencePick::By(selection) => Some(selection),
-            },
+            task: self.task.clone(),
             index: Arc::clone(&self.index),
-            methods: self.methods.clone(),
-            fusions: self.fusions.clone(),
-            params: self.params.clone(),
-            uncertainty_radius_m: self.uncertainty_radius_m,
-            prior_m: self.prior_m,
-            seed: self.seed,
             frames: Arc::clone(frames),
         }
     }
@@ -102,17 +87,25 @@ impl Setup {
     /// The methods whose cost can be looked at: those asked for that search one, those of the paper
     /// where there are none.
     pub fn direct_methods(&self) -> Vec<Method> {
-        let direct = estimator::direct_methods(&self.methods);
+        let direct = estimator::direct_methods(&self.task.protocol.methods);
         match direct.as_slice() {
             [] => vec![Method::PM, Method::MI],
             _ => direct,
         }
     }
 
+    /// How the references of queries are chosen.
+    pub fn pick(&self) -> ReferencePick {
+        match self.task.by_hand {
+            true => ReferencePick::ByHand,
+            false => ReferencePick::By(self.task.protocol.references),
+        }
+    }
+
     /// Goes to another query; where references are not chosen by hand, new ones are needed.
     pub(super) fn go_to(&mut self, query: usize) {
         self.query = query;
-        if self.pick != ReferencePick::ByHand {
+        if !self.task.by_hand {
             self.chosen = References::default();
         }
     }
@@ -124,10 +117,7 @@ impl Setup {
         let is_same_scene = references.name() == queries.name();
         let is_query = |frame| is_same_scene && frame == query;
         match queries.pose(query) {
-            Some(place) => {
-                let radius_m = self.prior_m.unwrap_or(self.uncertainty_radius_m);
-                frames_within(references, &place, radius_m, &is_query)
-            }
+            Some(place) => frames_within(references, &place, self.task.reach_m(), &is_query),
             None => (0..references.frames().len())
                 .filter(|&frame| !is_query(frame) && references.has_cloud(frame))
                 .filter(|&frame| references.pose(frame).is_some())
@@ -135,57 +125,34 @@ impl Setup {
         }
     }
 
-    /// The command line that repeats this run.
+    /// The name of the query.
+    pub fn query_name(&self) -> &str {
+        &self.queries.frames()[self.query]
+    }
+
+    /// The names of its references.
+    pub fn reference_names(&self) -> Vec<String> {
+        let chosen = self.chosen.frames.iter();
+        chosen
+            .map(|&frame| self.references.frames()[frame].clone())
+            .collect()
+    }
+
+    /// The references that repeating the run has to name: those that were ranked are ranked again.
+    fn named_references(&self) -> Vec<String> {
+        match self.chosen.ranking {
+            Some(_) => Vec::new(),
+            None => self.reference_names(),
+        }
+    }
+
+    /// The arguments that repeat this run. See [`Task::arguments`].
+    pub fn arguments(&self) -> Vec<String> {
+        (self.task).arguments(self.query_name(), &self.named_references())
+    }
+
+    /// The command line that repeats this run. See [`Task::command_line`].
     pub fn command_line(&self) -> String {
-        let mut words = vec!["posescope".to_owned(), "run".to_owned()];
-        words.push(self.scene_argument.clone());
-        if let Some(queries) = &self.queries_argument {
-            words.extend(["--queries".to_owned(), queries.clone()]);
-        }
-        let frame = |scene: &Arc<dyn Scene>, index: usize| scene.frames()[index].clone();
-        words.extend(["--query".to_owned(), frame(&self.queries, self.query)]);
-        for &reference in &self.chosen.frames {
-            words.extend(["--reference".to_owned(), frame(&self.references, reference)]);
-        }
-        if self.methods != Method::PAPER {
-            let names: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
-            words.extend(["--method".to_owned(), names.join(",")]);
-        }
-        if !self.fusions.is_empty() {
-            let names: Vec<_> = self.fusions.iter().map(|fusion| fusion.name).collect();
-            words.extend(["--fusion".to_owned(), names.join(",")]);
-        }
-        words.extend(["--radius".to_owned(), self.uncertainty_radius_m.to_string()]);
-        words.extend(["--seed".to_owned(), self.seed.to_string()]);
-        for change in self.params.changes() {
-            words.extend(["--set".to_owned(), change]);
-        }
-        words
-            .iter()
-            .map(|word| quoted(word))
-            .collect::<Vec<_>>()
-            .join(" ")
-    }
-}
-
-/// A word as a POSIX shell reads it back.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_split_them() {
-        assert_eq!(quoted("street:night"), "street:night");
-        assert_eq!(quoted("my data/00"), "'my data/00'");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
+        (self.task).command_line(self.query_name(), &self.named_references())
     }
 }

@@ -131,12 +131,12 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
             ReferencePick::By(Selection::Matched(1)),
             ReferencePick::ByHand,
         ] {
-            if ui.radio(setup.pick == pick, pick.to_string()).clicked() {
+            if ui.radio(setup.pick() == pick, pick.to_string()).clicked() {
                 commands.send(Command::PickReferences(pick));
             }
         }
         ui.separator();
-        let mut radius = setup.uncertainty_radius_m;
+        let mut radius = setup.task.radius_m;
         let label = ui.label("Radius");
         let drag = egui::DragValue::new(&mut radius)
             .range(1.0..=500.0)
@@ -146,11 +146,11 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         if response.drag_stopped() || response.lost_focus() {
             commands.send(Command::SetRadius(radius));
         }
-        let mut seed = setup.seed;
+        let mut seed = setup.task.protocol.seed;
         let label = ui.label("Seed");
         let drag = egui::DragValue::new(&mut seed).update_while_editing(false);
         let response = ui.add(drag).labelled_by(label.id);
-        if (response.drag_stopped() || response.lost_focus()) && seed != setup.seed {
+        if (response.drag_stopped() || response.lost_focus()) && seed != setup.task.protocol.seed {
             commands.send(Command::SetSeed(seed));
         }
     });
@@ -161,7 +161,7 @@ fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         .run()
         .span_at(desk.cursor)
         .and_then(|span| span.part.method());
-    let asked = desk.setup.methods.iter().copied();
+    let asked = desk.setup.task.protocol.methods.iter().copied();
     let others = asked.filter(|method| !Method::PAPER.contains(method));
     for method in Method::PAPER.into_iter().chain(others) {
         let is_here = here == Some(method);

@@ -62,7 +62,7 @@ pub fn open(setup: Setup) -> Result<(), WindowError> {
         return Err(WindowError::NoDisplay);
     }
     let mut options = window_options();
-    let title = format!("posescope: {}", setup.scene_argument);
+    let title = format!("posescope: {}", setup.task.scene);
     options.viewport = options.viewport.with_title(title);
     eframe::run_native(
         "posescope",

@@ -5,14 +5,17 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
-use posescope::estimator::UnknownMethod;
-use posescope::fusion;
+use posescope::estimator;
+use posescope::fusion::Fusion;
 use posescope::localize::Selection;
 use posescope::measure::{Format, Gate, Tolerance};
 use posescope::method::Method;
-use posescope::run::{Experiment, Shard};
+use posescope::run::{Experiment, Protocol, Shard};
 use posescope::scene::street::{Size, Street};
-use posescope::session::Breakpoint;
+use posescope::session::{Breakpoint, Task};
+
+use super::failure::CliError;
+use super::params;
 
 /// See why a camera pose estimate fails.
 ///
@@ -85,7 +88,7 @@ pub struct RunArgs {
     #[arg(long, conflicts_with = "query")]
     pub all: bool,
     #[command(flatten)]
-    pub job: JobArgs,
+    pub task: TaskArgs,
     #[command(flatten)]
     pub recording: RecordingArgs,
     /// Write the results as JSON, one object per line; - for stdout
@@ -102,7 +105,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "FRAME")]
     pub query: Option<String>,
     #[command(flatten)]
-    pub job: JobArgs,
+    pub task: TaskArgs,
 }
 
 #[cfg(feature = "app")]
@@ -112,60 +115,87 @@ impl ViewArgs {
         Self {
             scene: super::demo_settings::settings().scene.clone(),
             query: None,
-            job: JobArgs::default(),
+            task: TaskArgs::default(),
         }
     }
 }
 
-/// How a query is localised, whether somebody looks on or not.
+/// What is asked of a query, whether somebody looks on or not.
 #[derive(Debug, Args)]
-pub struct JobArgs {
-    /// The format of the scene, if its content does not tell
-    #[arg(long, value_name = "NAME")]
-    pub format: Option<String>,
+pub struct TaskArgs {
     /// Take the queries from another scene in the same world frame
     #[arg(long, value_name = "SCENE")]
     pub queries: Option<String>,
     /// A frame with known pose and cloud to localise against; repeatable
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", conflicts_with = "references")]
     pub reference: Vec<String>,
-    /// How references are chosen where --reference names none: random:K, nearest:K, maxf:K (those
-    /// with the most feature matches) or retrieve:K (those that the index of `posescope index` ranks
-    /// first) of the frames within the radius of the query's known position
-    #[arg(
-        long,
-        value_name = "HOW",
-        default_value_t = Self::REFERENCES,
-        conflicts_with = "reference"
-    )]
-    pub references: Selection,
     /// The index that retrieve:K asks [default: where `posescope index` puts it]
     #[arg(long, value_name = "FILE")]
     pub index: Option<PathBuf>,
     /// How far the query may be from its reference: the disc that the direct methods search [m]
-    #[arg(long, value_name = "METRES", default_value_t = Self::RADIUS_M, value_parser = positive)]
+    #[arg(long, value_name = "METRES", default_value_t = Protocol::RADIUS_M, value_parser = positive)]
     pub radius: f64,
+    #[command(flatten)]
+    pub protocol: ProtocolArgs,
+    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10), with the
+    /// recording up to there; repeatable
+    #[arg(long = "break", value_name = "EXPR")]
+    pub breakpoints: Vec<Breakpoint>,
+}
+
+impl TaskArgs {
+    /// What is asked of the queries of a scene.
+    pub fn task(&self, scene: &str) -> Result<Task, CliError> {
+        Ok(Task {
+            scene: scene.to_owned(),
+            queries: self.queries.clone(),
+            format: self.protocol.format.clone(),
+            by_hand: !self.reference.is_empty(),
+            index: self.index.clone(),
+            radius_m: self.radius,
+            protocol: self.protocol.over(Protocol::default()),
+            params: params::resolve(&self.protocol.config)?,
+            breakpoints: self.breakpoints.clone(),
+        })
+    }
+}
+
+/// As without any option.
+impl Default for TaskArgs {
+    fn default() -> Self {
+        Self {
+            queries: None,
+            reference: Vec::new(),
+            index: None,
+            radius: Protocol::RADIUS_M,
+            protocol: ProtocolArgs::default(),
+            breakpoints: Vec::new(),
+        }
+    }
+}
+
+/// How queries are localised, one or thousands.
+#[derive(Debug, Default, Args)]
+pub struct ProtocolArgs {
+    /// The format of the scenes, if their content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// How references are chosen: random:K, nearest:K, maxf:K (those with the most feature matches)
+    /// or retrieve:K (those that the index of `posescope index` ranks first) of the frames around the
+    /// query's known position [default: random:1]
+    #[arg(long, value_name = "HOW")]
+    pub references: Option<Selection>,
     /// How far from the query's known position references may be, where that is more than the radius
     /// [m] [default: the radius]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub prior: Option<f64>,
-    /// The methods to run
-    #[arg(
-        long,
-        value_name = "fb,pm,mi,hy",
-        value_delimiter = ',',
-        value_parser = method,
-        default_value = "fb,pm,mi,hy"
-    )]
+    /// The methods to run [default: fb,pm,mi,hy]
+    #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',')]
     pub method: Vec<Method>,
-    /// Fuse the poses of several references into one; otherwise each reference gives its own
-    #[arg(
-        long,
-        value_name = "maxf,avg,wavg,r-wavg",
-        value_delimiter = ',',
-        value_parser = fusion
-    )]
-    pub fusion: Vec<&'static fusion::Entry>,
+    /// Fuse the poses of several references into one, by each of these [default: none, and each
+    /// reference gives its own; eval: r-wavg]
+    #[arg(long, value_name = "maxf,avg,wavg,r-wavg", value_delimiter = ',')]
+    pub fusion: Vec<Fusion>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -174,39 +204,26 @@ pub struct JobArgs {
     /// Number of threads [default: one per core]; results do not depend on it
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10), with the
-    /// recording up to there; repeatable
-    #[arg(long = "break", value_name = "EXPR")]
-    pub breakpoints: Vec<Breakpoint>,
 }
 
-impl JobArgs {
-    const REFERENCES: Selection = Selection::Random(1);
-    const RADIUS_M: f64 = 15.0;
-
-    /// How far from the query's known position references may be [m].
-    pub fn reach_m(&self) -> f64 {
-        self.prior.unwrap_or(self.radius)
-    }
-}
-
-/// As without any option.
-impl Default for JobArgs {
-    fn default() -> Self {
-        Self {
-            format: None,
-            queries: None,
-            reference: Vec::new(),
-            references: Self::REFERENCES,
-            index: None,
-            radius: Self::RADIUS_M,
-            prior: None,
-            method: Method::PAPER.to_vec(),
-            fusion: Vec::new(),
-            seed: 0,
-            config: ConfigArgs::default(),
-            threads: None,
-            breakpoints: Vec::new(),
+impl ProtocolArgs {
+    /// What was given, and the defaults for the rest. Methods are put in the order of the registry.
+    pub fn over(&self, defaults: Protocol) -> Protocol {
+        let methods = match self.method.as_slice() {
+            [] => &defaults.methods,
+            wanted => wanted,
+        };
+        Protocol {
+            references: self.references.unwrap_or(defaults.references),
+            prior_m: self.prior.or(defaults.prior_m),
+            methods: estimator::methods()
+                .filter(|method| methods.contains(method))
+                .collect(),
+            fusions: match self.fusion.as_slice() {
+                [] => defaults.fusions,
+                wanted => wanted.to_vec(),
+            },
+            seed: self.seed,
         }
     }
 }
@@ -233,43 +250,30 @@ pub struct EvalArgs {
     /// Where the references are, as in `run`; several scenes are evaluated one after the other
     #[arg(value_name = "SCENE", required_unless_present = "merge")]
     pub scenes: Vec<String>,
-    /// The format of the scenes, if their content does not tell
-    #[arg(long, value_name = "NAME")]
-    pub format: Option<String>,
     /// Take the queries from this scene in the same world frame; repeatable: every scene of
     /// references is paired with every one of queries
     #[arg(long, value_name = "SCENE")]
     pub queries: Vec<String>,
-    /// One of the paper's experiments, which sets the defaults below: one random reference within 10,
-    /// 15, 20, 25 m; 1 to 5 references and four fusions; 5 ranked references within a large prior
-    #[arg(long, value_name = "single|multi|large", value_parser = experiment)]
+    /// One of the paper's experiments, which sets other defaults. single: one random reference within
+    /// 10, 15, 20, 25 m, methods fb,pm,mi; multi: random:5 within 10 m, 1 to 5 of them with all
+    /// fusions, methods fb,pm,mi; large: retrieve:5 within a prior of 200 m, RobotCar 50 m. All: a
+    /// tenth of the frames as queries
+    #[arg(long, value_name = "single|multi|large")]
     pub experiment: Option<Experiment>,
-    /// How references are chosen: random:K, nearest:K, maxf:K or retrieve:K [default: random:1;
-    /// multi: random:5; large: retrieve:5]
-    #[arg(long, value_name = "HOW")]
-    pub references: Option<Selection>,
     /// The index that retrieve:K asks; repeatable, one per scene of references, in their order
     /// [default: where `posescope index` puts it]
     #[arg(long, value_name = "FILE")]
     pub index: Vec<PathBuf>,
-    /// Uncertainty radius; several are run one by one [m] [default: 15; multi: 10]
-    #[arg(long, value_name = "METRES", value_delimiter = ',', value_parser = positive)]
-    pub radius: Vec<f64>,
-    /// How far from a query's known position references may be, where that is more than the radius
-    /// [m] [default for large: 200, RobotCar 50]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    pub prior: Option<f64>,
-    /// The methods to run [default: all; single and multi: fb,pm,mi]
-    #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',', value_parser = method)]
-    pub method: Vec<Method>,
-    /// Fusions of several references [default: r-wavg; multi: all]
     #[arg(
         long,
-        value_name = "maxf,avg,wavg,r-wavg",
+        value_name = "METRES",
         value_delimiter = ',',
-        value_parser = fusion
+        value_parser = positive,
+        help = format!("Uncertainty radius; several are run one by one [m] [default: {}]", Protocol::RADIUS_M)
     )]
-    pub fusion: Vec<&'static fusion::Entry>,
+    pub radius: Vec<f64>,
+    #[command(flatten)]
+    pub protocol: ProtocolArgs,
     /// Draw this share of the frames as queries; the others are the references [default: 1, where
     /// every frame is a query of all others; experiments: 0.1]
     #[arg(long, value_name = "SHARE", value_parser = share)]
@@ -283,14 +287,6 @@ pub struct EvalArgs {
     /// A pose as far off counts as a failure [m] [default: 10, RobotCar 20]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub failure_radius: Option<f64>,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
-    #[command(flatten)]
-    pub config: ConfigArgs,
-    /// Number of threads [default: one per core]; results do not depend on it
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
     /// The run folder [default: below runs/, named after what is asked]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -352,11 +348,11 @@ pub struct ExportArgs {
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Results of this method only, as the following
-    #[arg(long, value_parser = method)]
+    #[arg(long)]
     pub method: Option<Method>,
     /// Results of this fusion
-    #[arg(long, value_parser = fusion)]
-    pub fusion: Option<&'static fusion::Entry>,
+    #[arg(long)]
+    pub fusion: Option<Fusion>,
     /// Results with this uncertainty radius [m]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub radius: Option<f64>,
@@ -421,31 +417,11 @@ pub struct IndexArgs {
     pub threads: Option<NonZeroUsize>,
 }
 
-fn fusion(name: &str) -> Result<&'static fusion::Entry, String> {
-    fusion::find(name).ok_or_else(|| {
-        let names: Vec<&str> = fusion::ALL.iter().map(|entry| entry.name).collect();
-        format!("{} expected", names.join(", "))
-    })
-}
-
-fn experiment(name: &str) -> Result<Experiment, String> {
-    match name {
-        "single" => Ok(Experiment::Single),
-        "multi" => Ok(Experiment::Multi),
-        "large" => Ok(Experiment::Large),
-        _ => Err("single, multi or large expected".to_owned()),
-    }
-}
-
 fn share(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|share: &f64| *share > 0.0 && *share <= 1.0)
         .ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
-}
-
-fn method(name: &str) -> Result<Method, UnknownMethod> {
-    name.parse()
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -463,5 +439,78 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    /// The task of a command line.
+    fn task(words: &[&str]) -> (Task, Vec<String>) {
+        let words = ["posescope"].iter().chain(words);
+        match Arguments::try_parse_from(words).map(|parsed| parsed.command) {
+            Ok(Some(Command::Run(args))) => {
+                let task = args.task.task(&args.scene).expect("good parameters");
+                (task, args.task.reference)
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_task_is_read_from_the_command_line_that_it_writes() {
+        for line in [
+            &["run", "street", "--query", "70"][..],
+            &[
+                "run",
+                "my data/00",
+                "--query",
+                "70",
+                "--format",
+                "kitti",
+                "--queries",
+                "it's",
+                "--references",
+                "retrieve:3",
+                "--index",
+                "an index",
+                "--radius",
+                "12.5",
+                "--prior",
+                "80",
+                "--method",
+                "mi,fb",
+                "--fusion",
+                "avg,r-wavg",
+                "--seed",
+                "9",
+                "--set",
+                "fb.ratio=0.75",
+                "--break",
+                "inliers < 10",
+                "--break",
+                "fb.ransac",
+            ],
+            &[
+                "run",
+                "street",
+                "--query",
+                "70",
+                "--reference",
+                "62",
+                "--reference",
+                "64",
+                "--prior",
+                "80",
+            ],
+        ] {
+            let (task, references) = self::task(line);
+            let again = task.arguments("70", &references);
+            let again: Vec<&str> = again.iter().map(String::as_str).collect();
+            assert_eq!(self::task(&again), (task, references), "{again:?}");
+        }
+    }
+
+    #[test]
+    fn methods_run_once_each_in_the_order_of_the_registry() {
+        let (task, _) = task(&["run", "street", "--all", "--method", "mi,fb,mi"]);
+        let expected = [Method::FB, Method::MI];
+        assert_eq!(task.protocol.methods, expected);
     }
 }

@@ -1,6 +1,6 @@
 //! The bare command: all four estimators on the built-in street.
 
-use super::args::{JobArgs, RecordingArgs, RunArgs};
+use super::args::{RecordingArgs, RunArgs, TaskArgs};
 use super::demo_settings::{Settings, settings};
 use super::failure::CliError;
 use super::run;
@@ -24,9 +24,9 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
             scene: scene.clone(),
             query: vec![query.clone()],
             all: false,
-            job: JobArgs {
+            task: TaskArgs {
                 reference: vec![reference.clone()],
-                ..JobArgs::default()
+                ..TaskArgs::default()
             },
             recording: RecordingArgs {
                 save: Some(recording.clone()),

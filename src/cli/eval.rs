@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use posescope::estimator;
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Comparison, Gate, Report, Tolerance, read_rows, write_report};
 use posescope::params::Params;
@@ -22,7 +21,7 @@ use super::{diff, params};
 
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.threads)?;
+    use_threads(args.protocol.threads)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
     let run = if args.merge.is_empty() {
         execute(args, &folder, terminal)?
@@ -39,7 +38,7 @@ fn default_folder(args: &EvalArgs) -> PathBuf {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let mut name: String = args.scenes.join("-").chars().map(plain).collect();
     if let Some(experiment) = args.experiment {
-        name = format!("{name}-{experiment:?}").to_lowercase();
+        name = format!("{name}-{experiment}").to_lowercase();
     }
     if let Some(shard) = args.shard {
         name = format!("{name}-{}-of-{}", shard.number, shard.of);
@@ -48,7 +47,7 @@ fn default_folder(args: &EvalArgs) -> PathBuf {
 }
 
 fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFile, CliError> {
-    let params = params::resolve(&args.config)?;
+    let params = params::resolve(&args.protocol.config)?;
     let scenes = Scenes {
         references: open_all(&args.scenes, args)?,
         queries: open_all(&args.queries, args)?,
@@ -77,7 +76,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
 }
 
 fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>, CliError> {
-    let format = args.format.as_deref();
+    let format = args.protocol.format.as_deref();
     let scenes = arguments.iter().map(|scene| scene::open(scene, format));
     Ok(scenes.collect::<Result<_, _>>()?)
 }
@@ -89,7 +88,7 @@ fn indices(
     scenes: &Scenes,
     params: &Params,
 ) -> Result<Vec<Box<dyn Ranking>>, CliError> {
-    let Selection::Retrieved(_) = run.selection() else {
+    let Selection::Retrieved(_) = run.protocol.references else {
         return Ok(Vec::new());
     };
     let (files, scenes) = (&args.index, &scenes.references);
@@ -114,34 +113,26 @@ fn indices(
 /// What is asked, with everything that was left open filled in.
 fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile, CliError> {
     let defaults = defaults(args.experiment);
-    let references = args.references.unwrap_or(defaults.references);
     let first = scenes.references.first();
     let scene_name = first.map(|scene| scene.name()).unwrap_or_default();
-    let methods = match args.method.as_slice() {
-        [] => defaults.methods.to_vec(),
-        wanted => wanted.to_vec(),
-    };
-    let methods = estimator::methods().filter(|m| methods.contains(m));
-    let fusions = match args.fusion.as_slice() {
-        [] if references.count() == 1 && args.experiment != Some(Experiment::Multi) => Vec::new(),
-        [] => defaults.fusions,
-        wanted => wanted.to_vec(),
-    };
+    let mut protocol = args.protocol.over(defaults.protocol);
+    let is_single = protocol.references.count() == 1;
+    if is_single && args.protocol.fusion.is_empty() && args.experiment != Some(Experiment::Multi) {
+        protocol.fusions = Vec::new();
+    }
+    if args.experiment == Some(Experiment::Large) {
+        protocol.prior_m = protocol.prior_m.or(Some(default_prior_m(scene_name)));
+    }
     let radii_m = match args.radius.as_slice() {
         [] => defaults.radii_m.to_vec(),
         wanted => wanted.to_vec(),
-    };
-    let is_large = args.experiment == Some(Experiment::Large);
-    let prior_m = match args.prior {
-        None if is_large => Some(default_prior_m(scene_name)),
-        prior => prior,
     };
     let share = args.queries_share.unwrap_or(defaults.share);
     let draw = Draw {
         share,
         limit: args.limit.map(|limit| limit as usize),
         only: &args.only,
-        seed: args.seed,
+        seed: protocol.seed,
     };
     let table = params.to_toml().parse();
     Ok(RunFile {
@@ -149,22 +140,15 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scenes: args.scenes.clone(),
         queries: args.queries.clone(),
-        format: args.format.clone(),
+        format: args.protocol.format.clone(),
         experiment: args.experiment,
-        methods: methods.map(|method| method.name().to_owned()).collect(),
-        references: references.to_string(),
-        fusions: fusions
-            .iter()
-            .map(|fusion| fusion.name.to_owned())
-            .collect(),
+        protocol,
         radii_m,
-        prior_m,
         share,
         limit: args.limit.map(|limit| limit as usize),
         failure_radius_m: args
             .failure_radius
             .unwrap_or_else(|| default_failure_radius_m(scene_name)),
-        seed: args.seed,
         shard: args.shard,
         pairs: pairs(&draw, scenes)?,
         params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),

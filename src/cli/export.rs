@@ -14,8 +14,8 @@ use super::terminal::Terminal;
 pub fn run(args: &ExportArgs, terminal: &Terminal) -> Result<(), CliError> {
     let run = read_run(&args.run)?;
     let choice = Choice {
-        method: args.method.map(|method| method.name().to_owned()),
-        fusion: args.fusion.map(|fusion| fusion.name.to_owned()),
+        method: args.method,
+        fusion: args.fusion,
         radius_m: args.radius,
         references: args.references,
         scene: args.scene.clone(),

@@ -7,6 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use posescope::localize::{LocalizeError, Watch};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{Companion, FailedQuery, FolderError, Item, RunError, RunFile, RunFolder};
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
@@ -80,8 +81,8 @@ impl<'a> FailureRecordings<'a> {
         let dropped = read_dropped(&path)?;
         let mut still_dropped = String::new();
         for item in run.items().take(folder.done()) {
-            for method in &run.methods {
-                let name = name_of(&item, method, several_pairs);
+            for method in &run.protocol.methods {
+                let name = name_of(&item, *method, several_pairs);
                 if dropped.contains(&name) {
                     room.is_full = true;
                     still_dropped += &format!("{name}\n");
@@ -100,7 +101,7 @@ impl<'a> FailureRecordings<'a> {
             folder: path,
             room,
             params,
-            seed: run.seed,
+            seed: run.protocol.seed,
             failure_radius_m: run.failure_radius_m,
             several_pairs,
             bar,
@@ -169,8 +170,8 @@ impl<'a> FailureRecordings<'a> {
         }
         let mut dropped = 0;
         for item in run.plan() {
-            for method in &run.methods {
-                let name = name_of(&item, method, run.pairs.len() > 1);
+            for method in &run.protocol.methods {
+                let name = name_of(&item, *method, run.pairs.len() > 1);
                 let file = format!("{name}.rrd");
                 let sources = parts.iter().map(|part| part.join(FOLDER).join(&file));
                 let source = sources.into_iter().find(|path| path.exists());
@@ -203,7 +204,7 @@ impl Companion for FailureRecordings<'_> {
     }
 
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let name = name_of(&query.item, query.method.name(), self.several_pairs);
+        let name = name_of(&query.item, query.method, self.several_pairs);
         let path = self.folder.join(format!("{name}.rrd"));
         remove_if_there(&path)?;
         if query.request.references.frames.is_empty() {
@@ -232,7 +233,7 @@ impl Companion for FailureRecordings<'_> {
 }
 
 /// `QUERY-METHOD`, with the scenes before it where there are several pairs of them.
-fn name_of(item: &Item<'_>, method: &str, several_pairs: bool) -> String {
+fn name_of(item: &Item<'_>, method: Method, several_pairs: bool) -> String {
     let pair = item.pair;
     let name = if several_pairs {
         format!(

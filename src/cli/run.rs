@@ -2,78 +2,78 @@
 
 use std::time::Duration;
 
-use posescope::estimator;
 use posescope::localize::{
     Chooser, Localizer, QueryResult, Ranking, References, Request, Selection, Unwatched,
 };
-use posescope::method::Method;
-use posescope::params::Params;
 use posescope::run::default_failure_radius_m;
 use posescope::scene::{self, Retriever, Scene};
-use posescope::session::{Breakpoints, StopAtBreakpoint};
+use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
 use super::audience::Audience;
 use super::failure::CliError;
 use super::output::{self, JsonLines};
+use super::table;
 use super::terminal::Terminal;
-use super::{params, table};
 
 /// What is asked of every query.
 struct Plan<'a> {
     args: &'a RunArgs,
-    params: &'a Params,
+    task: &'a Task,
     localizer: Localizer<'a>,
 }
 
 /// One query, as its position in its scene, with its references.
-struct Task {
+struct Planned {
     query: usize,
     references: References,
 }
 
 /// Runs the command.
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.job.threads)?;
-    let params = params::resolve(&args.job.config)?;
-    let references = scene::open(&args.scene, args.job.format.as_deref())?;
-    let others = match &args.job.queries {
-        Some(queries) => Some(scene::open(queries, args.job.format.as_deref())?),
-        None => None,
-    };
+    use_threads(args.task.protocol.threads)?;
+    let task = args.task.task(&args.scene)?;
+    let open = |scene: &str| scene::open(scene, task.format.as_deref());
+    let references = open(&task.scene)?;
+    let others = task.queries.as_deref().map(open).transpose()?;
     let queries = others.as_deref().unwrap_or(references.as_ref());
     let plan = Plan {
         args,
-        params: &params,
-        localizer: Localizer::new(references.as_ref(), queries, &params, args.job.seed),
+        task: &task,
+        localizer: Localizer::new(
+            references.as_ref(),
+            queries,
+            &task.params,
+            task.protocol.seed,
+        ),
     };
-    let tasks = plan.tasks()?;
+    let tasks = plan.queries()?;
     let mut json = match &args.json {
         Some(path) => Some(JsonLines::create(path)?),
         None => None,
     };
     let mut results = Vec::new();
-    let methods = plan.methods();
+    let methods = &task.protocol.methods;
     let estimates = tasks.iter().map(|task| task.references.frames.len());
     let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
     let mut audience = Audience::new(bar.clone(), plan.recorder(&tasks)?);
-    if !args.job.breakpoints.is_empty() {
-        let breakpoints = Breakpoints::new(args.job.breakpoints.iter().cloned());
+    if !task.breakpoints.is_empty() {
+        let breakpoints = Breakpoints::new(task.breakpoints.iter().cloned());
         audience.stop = Some(StopAtBreakpoint::new(breakpoints));
     }
-    let outcome = tasks.iter().enumerate().try_for_each(|(index, task)| {
+    let outcome = tasks.iter().enumerate().try_for_each(|(index, query)| {
         let request = Request {
-            radius_m: args.job.radius,
-            references: task.references.clone(),
-            fusions: args.job.fusion.clone(),
+            radius_m: task.radius_m,
+            references: query.references.clone(),
+            fusions: task.protocol.fusions.clone(),
             setting: None,
         };
         plan.localizer.localize(
             index,
-            task.query,
+            query.query,
             &[request],
-            &methods,
+            methods,
             &mut audience,
             |result, times| {
                 let written = json.as_mut().map_or(Ok(()), |json| json.write(&result));
@@ -135,15 +135,8 @@ impl Plan<'_> {
         output::print(&table)
     }
 
-    /// In the order of the registry, each once.
-    fn methods(&self) -> Vec<Method> {
-        estimator::methods()
-            .filter(|method| self.args.job.method.contains(method))
-            .collect()
-    }
-
-    fn tasks(&self) -> Result<Vec<Task>, CliError> {
-        let args = self.args;
+    fn queries(&self) -> Result<Vec<Planned>, CliError> {
+        let (args, task, protocol) = (self.args, self.task, &self.task.protocol);
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let wanted = if args.all {
             (0..queries.frames().len()).collect()
@@ -154,26 +147,26 @@ impl Plan<'_> {
                 .collect::<Result<Vec<_>, _>>()?
         };
         let named = args
-            .job
+            .task
             .reference
             .iter()
             .map(|name| references.find(name))
             .collect::<Result<Vec<_>, _>>()?;
-        let index = match args.job.references {
+        let index = match protocol.references {
             Selection::Retrieved(_) if named.is_empty() => Some(Retriever::find(
-                args.job.index.as_deref(),
+                task.index.as_deref(),
                 references,
-                &args.scene,
-                self.params,
+                &task.scene,
+                &task.params,
             )?),
             _ => None,
         };
         let chooser = Chooser {
             localizer: &self.localizer,
-            params: self.params,
-            selection: args.job.references,
-            radius_m: args.job.reach_m(),
-            seed: args.job.seed,
+            params: &task.params,
+            selection: protocol.references,
+            radius_m: task.reach_m(),
+            seed: protocol.seed,
             index: index.as_ref().map(|index| index as &dyn Ranking),
         };
         wanted
@@ -184,7 +177,7 @@ impl Plan<'_> {
                 } else {
                     named.clone().into()
                 };
-                Ok(Task { query, references })
+                Ok(Planned { query, references })
             })
             .collect()
     }
@@ -197,13 +190,13 @@ impl Plan<'_> {
                 "{}: no frame with pose and scan within {} m of query {name}; \
                  raise --radius or --prior, or name one with --reference",
                 self.localizer.references().name(),
-                self.args.job.reach_m()
+                self.task.reach_m()
             )));
         }
         Ok(chosen)
     }
 
-    fn recorder(&self, tasks: &[Task]) -> Result<Option<Recorder>, CliError> {
+    fn recorder(&self, tasks: &[Planned]) -> Result<Option<Recorder>, CliError> {
         let recording = &self.args.recording;
         let targets = Targets {
             save: recording.save.clone(),
@@ -223,10 +216,14 @@ impl Plan<'_> {
             scene: from.name().to_owned(),
             queries: names(of, &mut tasks.iter().map(|task| task.query)),
             references: names(from, &mut references.copied()),
-            configuration: self.params.to_toml(),
-            seed: self.args.job.seed,
+            configuration: self.task.params.to_toml(),
+            seed: self.task.protocol.seed,
             failure_radius_m: self.failure_radius_m(),
         };
-        Ok(Some(Recorder::open(&targets, &identity, &self.methods())?))
+        Ok(Some(Recorder::open(
+            &targets,
+            &identity,
+            &self.task.protocol.methods,
+        )?))
     }
 }

@@ -44,7 +44,7 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
             start.unwrap_or_default(),
             match &result.fusion {
                 Some(fusion) => format!("{} {fusion}", result.method),
-                None => result.method.clone(),
+                None => result.method.to_string(),
             },
             error,
             part(PoseError::rotation).unwrap_or_default(),

@@ -4,88 +4,54 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use clap::Parser as _;
 use posescope::app::{self, ReferencePick, Setup, WindowError};
-use posescope::estimator;
-use posescope::localize::{QueryResult, Selection};
-use posescope::method::Method;
+use posescope::localize::QueryResult;
 use posescope::params::Params;
-use posescope::run::{default_failure_radius_m, read_results, read_run};
+use posescope::run::{Protocol, default_failure_radius_m, read_results, read_run};
 use posescope::scene::{self, Scene};
-use posescope::session::{IndexFile, RunMode};
+use posescope::session::{IndexFile, RunMode, Task};
 
-use super::args::{ConfigArgs, JobArgs, RecordingArgs, RunArgs, ViewArgs};
+use super::args::{Arguments, Command, ViewArgs};
 use super::demo_settings::settings as demo_settings;
 use super::failure::CliError;
+use super::run;
 use super::terminal::Terminal;
-use super::{params, run};
 
 /// Where the window saves things unless somebody says otherwise.
 const FOLDER: &str = "recordings";
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
-    run::use_threads(args.job.threads)?;
+    run::use_threads(args.task.protocol.threads)?;
     let setup = setup(args, mode)?;
     let headless = setup.clone();
     match app::open(setup) {
         Ok(()) => Ok(()),
         Err(
             error @ (WindowError::NoDisplay | WindowError::NoAdapter(_) | WindowError::Failed(_)),
-        ) => record_instead(args, &headless, &error, terminal),
+        ) => record_instead(&headless, &error, terminal),
     }
 }
 
 /// The same run, as a recording.
-fn record_instead(
-    args: &ViewArgs,
-    setup: &Setup,
-    why: &WindowError,
-    terminal: &Terminal,
-) -> Result<(), CliError> {
-    let query = setup.queries.frames()[setup.query].clone();
+fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Result<(), CliError> {
+    let query = setup.query_name();
     let recording = setup.folder.join(format!("{query}.rrd"));
     std::fs::create_dir_all(&setup.folder).map_err(CliError::io(&setup.folder))?;
     eprintln!(
         "posescope: {why}; recording {} instead",
         recording.display()
     );
-    let references = setup.chosen.frames.iter();
-    run::run(
-        &RunArgs {
-            scene: setup.scene_argument.clone(),
-            query: vec![query],
-            all: false,
-            job: JobArgs {
-                format: args.job.format.clone(),
-                queries: setup.queries_argument.clone(),
-                reference: references
-                    .map(|&frame| setup.references.frames()[frame].clone())
-                    .collect(),
-                references: match setup.pick {
-                    ReferencePick::By(selection) => selection,
-                    ReferencePick::ByHand => args.job.references,
-                },
-                index: setup.index.file().cloned(),
-                radius: setup.uncertainty_radius_m,
-                prior: setup.prior_m,
-                method: setup.methods.clone(),
-                fusion: setup.fusions.clone(),
-                seed: setup.seed,
-                config: ConfigArgs {
-                    config: None,
-                    assignments: setup.params.changes(),
-                },
-                threads: args.job.threads,
-                breakpoints: args.job.breakpoints.clone(),
-            },
-            recording: RecordingArgs {
-                save: Some(recording),
-                ..RecordingArgs::default()
-            },
-            json: None,
-        },
-        terminal,
-    )
+    let mut arguments = vec!["posescope".to_owned()];
+    arguments.extend(setup.arguments());
+    arguments.extend(["--save".to_owned(), recording.display().to_string()]);
+    let parsed = Arguments::try_parse_from(arguments);
+    match parsed.map(|parsed| parsed.command) {
+        Ok(Some(Command::Run(args))) => run::run(&args, terminal),
+        Ok(_) => unreachable!("a task's arguments begin with `run`"),
+        Err(error) => Err(CliError::Usage(error.to_string())),
+    }
 }
 
 fn setup(args: &ViewArgs, mode: RunMode) -> Result<Setup, CliError> {
@@ -95,49 +61,32 @@ fn setup(args: &ViewArgs, mode: RunMode) -> Result<Setup, CliError> {
         false => of_a_scene(args)?,
     };
     setup.mode = mode;
-    setup.breakpoints = args
-        .job
-        .breakpoints
-        .iter()
-        .map(ToString::to_string)
-        .collect();
     Ok(setup)
 }
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
-    let references: Arc<dyn Scene> = scene::open(&args.scene, args.job.format.as_deref())?.into();
-    let queries: Arc<dyn Scene> = match &args.job.queries {
-        Some(queries) => scene::open(queries, args.job.format.as_deref())?.into(),
+    let task = args.task.task(&args.scene)?;
+    let references: Arc<dyn Scene> = scene::open(&task.scene, task.format.as_deref())?.into();
+    let queries: Arc<dyn Scene> = match &task.queries {
+        Some(queries) => scene::open(queries, task.format.as_deref())?.into(),
         None => Arc::clone(&references),
     };
     let named: Vec<usize> = args
-        .job
+        .task
         .reference
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<_, _>>()?;
     let failure_radius_m = default_failure_radius_m(references.name());
     let mut setup = Setup {
-        scene_argument: args.scene.clone(),
         offered: (0..queries.frames().len()).collect(),
         references,
-        queries_argument: args.job.queries.clone(),
         queries,
         query: 0,
-        pick: match named.as_slice() {
-            [] => ReferencePick::By(args.job.references),
-            _ => ReferencePick::ByHand,
-        },
         chosen: named.into(),
-        index: Arc::new(IndexFile::new(&args.scene, args.job.index.clone())),
-        methods: methods(&args.job.method),
-        fusions: args.job.fusion.clone(),
-        params: params::resolve(&args.job.config)?,
-        uncertainty_radius_m: args.job.radius,
-        prior_m: args.job.prior,
+        index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
+        task,
         failure_radius_m,
-        seed: args.job.seed,
-        breakpoints: Vec::new(),
         mode: RunMode::Paused,
         results: BTreeMap::new(),
         folder: PathBuf::from(FOLDER),
@@ -148,13 +97,12 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
 
 /// The query that was named, the demonstration's, or the first that has a reference.
 fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
-    let has_reference = |setup: &Setup, query| {
-        setup.pick == ReferencePick::ByHand || !setup.candidates(query).is_empty()
-    };
+    let has_reference =
+        |setup: &Setup, query| setup.task.by_hand || !setup.candidates(query).is_empty();
     let is_demo = args.scene == demo_settings().scene
-        && args.job.queries.is_none()
         && args.query.is_none()
-        && setup.pick == ReferencePick::By(Selection::Random(1));
+        && setup.task.queries.is_none()
+        && setup.pick() == ReferencePick::By(Protocol::default().references);
     setup.query = match &args.query {
         _ if is_demo => {
             setup.chosen = vec![setup.references.find(&demo_settings().reference)?].into();
@@ -172,18 +120,12 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
         return Ok(());
     }
     Err(CliError::NoReference(format!(
-        "{}: no frame with pose and scan within {} m of query {}; raise --radius or name one with \
-         --reference",
+        "{}: no frame with pose and scan within {} m of query {}; raise --radius or --prior, or \
+         name one with --reference",
         args.scene,
-        setup.prior_m.unwrap_or(setup.uncertainty_radius_m),
-        setup.queries.frames()[setup.query]
+        setup.task.reach_m(),
+        setup.query_name()
     )))
-}
-
-/// In the order of the registry, each once.
-fn methods(asked: &[Method]) -> Vec<Method> {
-    let all = estimator::methods();
-    all.filter(|method| asked.contains(method)).collect()
 }
 
 /// The queries of a run, with its results; the first failure is looked at first.
@@ -197,7 +139,8 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         )));
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
-    let format = args.job.format.as_deref().or(file.format.as_deref());
+    let given = &args.task.protocol;
+    let format = given.format.as_deref().or(file.format.as_deref());
     let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
     let other = file
         .queries
@@ -245,32 +188,30 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<Vec<_>, _>>()?;
-    let selection = file.references.parse().map_err(CliError::Usage)?;
+    let radius_m = file.radii_m.first().copied();
+    let task = Task {
+        scene: scene_argument,
+        queries: other.cloned(),
+        format: format.map(str::to_owned),
+        by_hand: false,
+        index: args.task.index.clone(),
+        radius_m: radius_m.unwrap_or(args.task.radius),
+        protocol: Protocol {
+            prior_m: given.prior.or(file.protocol.prior_m),
+            ..file.protocol
+        },
+        params,
+        breakpoints: args.task.breakpoints.clone(),
+    };
     Ok(Setup {
-        scene_argument,
         offered: results.keys().copied().collect(),
         references,
-        queries_argument: other.cloned(),
         queries,
         query,
         chosen: reference_frames.into(),
-        pick: ReferencePick::By(selection),
-        index: Arc::new(IndexFile::new(
-            &file.scenes[pair.scene_index],
-            args.job.index.clone(),
-        )),
-        methods: file
-            .methods
-            .iter()
-            .filter_map(|name| name.parse::<Method>().ok())
-            .collect(),
-        fusions: file.fusions(),
-        params,
-        prior_m: args.job.prior.or(file.prior_m),
-        uncertainty_radius_m: file.radii_m.first().copied().unwrap_or(args.job.radius),
+        index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
+        task,
         failure_radius_m,
-        seed: file.seed,
-        breakpoints: Vec::new(),
         mode: RunMode::Paused,
         results,
         folder: PathBuf::from(FOLDER),

@@ -11,8 +11,10 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use super::report::read_rows;
 use super::table::Table;
 use super::{measure, tables};
+use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
+use crate::method::Method;
 use crate::run::{Camera, Item, RunFile};
 use crate::run::{FolderError, read_results};
 
@@ -56,9 +58,9 @@ impl Format {
 #[derive(Clone, Debug, Default)]
 pub struct Choice {
     /// The method.
-    pub method: Option<String>,
+    pub method: Option<Method>,
     /// The fusion.
-    pub fusion: Option<String>,
+    pub fusion: Option<Fusion>,
     /// The uncertainty radius \[m\].
     pub radius_m: Option<f64>,
     /// The number of references asked for.
@@ -70,10 +72,8 @@ pub struct Choice {
 impl Choice {
     fn takes(&self, result: &QueryResult) -> bool {
         let setting = result.setting;
-        let is =
-            |wanted: &Option<String>, found: &str| wanted.as_deref().is_none_or(|w| w == found);
-        is(&self.method, &result.method)
-            && is(&self.scene, &result.scene)
+        (self.method).is_none_or(|method| method == result.method)
+            && (self.scene.as_ref()).is_none_or(|scene| *scene == result.scene)
             && (self.fusion.is_none() || self.fusion == result.fusion)
             && (self.radius_m).is_none_or(|radius| setting.is_some_and(|s| s.radius_m == radius))
             && (self.references).is_none_or(|count| setting.is_some_and(|s| s.references == count))
@@ -90,13 +90,13 @@ pub enum ExportError {
     #[error(
         "query {query} has several results; say which with --method ({}), --fusion, --radius, \
          --references or --scene",
-        methods.join(", ")
+        methods.iter().map(|method| method.name()).collect::<Vec<_>>().join(", ")
     )]
     Ambiguous {
         /// The query.
         query: String,
         /// The methods of the run.
-        methods: Vec<String>,
+        methods: Vec<Method>,
     },
     /// Nothing is left.
     #[error("the run has no such results")]
@@ -206,7 +206,7 @@ fn localized<'a>(
             if chosen.is_some() {
                 return Err(ExportError::Ambiguous {
                     query: item.query.to_owned(),
-                    methods: run.methods.clone(),
+                    methods: run.protocol.methods.clone(),
                 });
             }
             chosen = Some(result);
@@ -355,8 +355,8 @@ fn csv(folder: &Path, run: &RunFile, choice: &Choice) -> Result<String, ExportEr
             result.scene.clone(),
             result.query_scene.unwrap_or(result.scene),
             result.query,
-            result.method,
-            result.fusion.unwrap_or_default(),
+            result.method.to_string(),
+            (result.fusion.map(|fusion| fusion.to_string())).unwrap_or_default(),
             optional(setting.map(|setting| setting.radius_m)),
             setting
                 .map(|s| s.references.to_string())

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use super::metrics::Measures;
+use crate::method::Method;
 
 /// What a gate looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +31,7 @@ enum Comparison {
 pub struct Gate {
     text: String,
     metric: Metric,
-    method: String,
+    method: Method,
     comparison: Comparison,
     limit: f64,
 }
@@ -69,13 +70,14 @@ impl FromStr for Gate {
         let (left, right) = text.split_once(sign).ok_or_else(expected)?;
         let (metric, method) = left.trim().rsplit_once('@').ok_or_else(expected)?;
         let limit: f64 = right.trim().parse().map_err(|_| expected())?;
-        if !limit.is_finite() || method.parse::<crate::method::Method>().is_err() {
+        let method: Method = method.parse().map_err(|_| expected())?;
+        if !limit.is_finite() {
             return Err(expected());
         }
         Ok(Self {
             text: text.trim().to_owned(),
             metric: metric_of(metric).ok_or_else(expected)?,
-            method: method.to_owned(),
+            method,
             comparison,
             limit,
         })

@@ -6,6 +6,7 @@ use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::gate::Passage;
 use super::metrics::Row;
+use crate::fusion::Fusion;
 use crate::localize::{Reason, Setting};
 use crate::run::RunFile;
 use crate::run::{FolderError, read_results};
@@ -39,10 +40,7 @@ pub fn junit(folder: &Path, run: &RunFile, passages: &[Passage]) -> Result<Strin
             Some(reason) => failure(&reason.code, &reason.text),
             None => failure("far", &verdict.words(row.error.as_ref())),
         };
-        let case = TestCase::new(
-            case_name(&row.query, row.setting, row.fusion.as_deref()),
-            status,
-        );
+        let case = TestCase::new(case_name(&row.query, row.setting, row.fusion), status);
         match suites.iter_mut().find(|suite| suite.name.as_str() == name) {
             Some(suite) => drop(suite.add_test_case(case)),
             None => {
@@ -75,7 +73,7 @@ fn failure(kind: &str, message: &str) -> TestCaseStatus {
     status
 }
 
-fn case_name(query: &str, setting: Option<Setting>, fusion: Option<&str>) -> String {
+fn case_name(query: &str, setting: Option<Setting>, fusion: Option<Fusion>) -> String {
     let mut name = query.to_owned();
     if let Some(setting) = setting {
         name += &format!(" {} m {} ref", setting.radius_m, setting.references);

@@ -8,8 +8,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use crate::fusion::Fusion;
 use crate::geometry::PoseError;
 use crate::localize::{Setting, Status, Verdict};
+use crate::method::Method;
 
 /// The limits of the recall: metres and degrees.
 pub const RECALL_LIMITS: [(f64, f64); 3] = [(0.25, 2.0), (0.5, 5.0), (5.0, 10.0)];
@@ -25,9 +27,9 @@ pub struct Row {
     /// The query frame.
     pub query: String,
     /// The method.
-    pub method: String,
+    pub method: Method,
     /// The fusion.
-    pub fusion: Option<String>,
+    pub fusion: Option<Fusion>,
     /// What the experiment varied.
     #[serde(default)]
     pub setting: Option<Setting>,
@@ -54,7 +56,7 @@ impl Row {
             scene: self.scene.clone(),
             query_scene: self.query_scene.clone(),
             setting: self.setting,
-            fusion: self.fusion.clone(),
+            fusion: self.fusion,
         }
     }
 }
@@ -70,7 +72,7 @@ pub struct Group {
     /// What the experiment varied.
     pub setting: Option<Setting>,
     /// The fusion.
-    pub fusion: Option<String>,
+    pub fusion: Option<Fusion>,
 }
 
 impl std::fmt::Display for Group {
@@ -144,7 +146,7 @@ pub struct Measures {
     #[serde(flatten)]
     pub group: Group,
     /// The method.
-    pub method: String,
+    pub method: Method,
     /// Queries asked.
     pub queries: usize,
     /// Of those, with a pose.
@@ -197,19 +199,19 @@ pub fn measure(rows: &[Row], failure_radius_m: f64) -> Vec<Measures> {
 }
 
 fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Measures> {
-    let mut methods: Vec<&str> = Vec::new();
-    let mut succeeded: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    let mut methods: Vec<Method> = Vec::new();
+    let mut succeeded: BTreeMap<Method, BTreeSet<&str>> = BTreeMap::new();
     for row in rows {
-        if !methods.contains(&row.method.as_str()) {
-            methods.push(&row.method);
+        if !methods.contains(&row.method) {
+            methods.push(row.method);
         }
-        let of_method = succeeded.entry(&row.method).or_default();
+        let of_method = succeeded.entry(row.method).or_default();
         if row.is_success(failure_radius_m) {
             of_method.insert(&row.query);
         }
     }
     let is_common = |query: &str| succeeded.values().all(|queries| queries.contains(query));
-    let measure = |method: &str| {
+    let measure = |method: Method| {
         let rows: Vec<&&Row> = rows.iter().filter(|row| row.method == method).collect();
         let errors_of = |wanted: &dyn Fn(&Row) -> bool| {
             let errors = rows.iter().filter(|row| wanted(row));
@@ -227,7 +229,7 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
         };
         let mut measures = Measures {
             group: group.clone(),
-            method: method.to_owned(),
+            method,
             queries: rows.len(),
             poses: count(&|row| row.status == Status::Ok),
             successes: count(&success),
@@ -254,7 +256,7 @@ pub(super) mod tests {
             scene: "street".to_owned(),
             query_scene: None,
             query: query.to_owned(),
-            method: method.to_owned(),
+            method: method.parse().expect("a method"),
             fusion: None,
             setting: None,
             status: if error.is_some() {

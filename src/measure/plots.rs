@@ -5,6 +5,7 @@ use plotters::prelude::*;
 
 use super::metrics::Measures;
 use super::tables::slug;
+use crate::method::Method;
 use crate::run::Experiment;
 use crate::run::RunFile;
 
@@ -12,16 +13,16 @@ use crate::run::RunFile;
 pub type Plot = (String, Result<String, String>);
 
 /// Okabe and Ito's colours, which colour-blind readers tell apart; by method.
-const COLORS: [(&str, RGBColor); 4] = [
-    ("fb", RGBColor(0x00, 0x72, 0xB2)),
-    ("pm", RGBColor(0xE6, 0x9F, 0x00)),
-    ("mi", RGBColor(0x00, 0x9E, 0x73)),
-    ("hy", RGBColor(0xD5, 0x5E, 0x00)),
+const COLORS: [(Method, RGBColor); 4] = [
+    (Method::FB, RGBColor(0x00, 0x72, 0xB2)),
+    (Method::PM, RGBColor(0xE6, 0x9F, 0x00)),
+    (Method::MI, RGBColor(0x00, 0x9E, 0x73)),
+    (Method::HY, RGBColor(0xD5, 0x5E, 0x00)),
 ];
 
 /// One line of a plot.
 struct Line {
-    method: String,
+    method: Method,
     points: Vec<(f64, f64)>,
 }
 
@@ -52,7 +53,7 @@ pub fn plots(run: &RunFile, measures: &[Measures]) -> Vec<Plot> {
                 draw(axis, "success rate (%)", &lines, true),
             ));
         }
-        let lines = recall_lines(&run.methods, &of_pair);
+        let lines = recall_lines(&run.protocol.methods, &of_pair);
         if !lines.is_empty() {
             let axis = "translation error (m), failures infinite";
             all.push((name("recall"), draw(axis, "queries (%)", &lines, false)));
@@ -63,7 +64,8 @@ pub fn plots(run: &RunFile, measures: &[Measures]) -> Vec<Plot> {
 
 fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
     let is_multi = run.experiment == Some(Experiment::Multi);
-    let robust = |one: &&&Measures| !is_multi || one.group.fusion.as_deref() == Some("r-wavg");
+    let robust =
+        |one: &&&Measures| !is_multi || one.group.fusion.is_some_and(|f| f.name == "r-wavg");
     let point = |one: &&Measures| {
         let setting = one.group.setting?;
         let x = if is_multi {
@@ -73,7 +75,7 @@ fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
         };
         Some((x, 100.0 * one.success_rate))
     };
-    lines(&run.methods, |method| {
+    lines(&run.protocol.methods, |method| {
         let of_method = measures.iter().filter(|one| one.method == method);
         of_method.filter(robust).filter_map(point).collect()
     })
@@ -81,7 +83,7 @@ fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
 
 /// For the last group alone: the largest radius, or the most references. Steps, all as long as the
 /// longest: a method does not lose what it has found.
-fn recall_lines(methods: &[String], measures: &[&Measures]) -> Vec<Line> {
+fn recall_lines(methods: &[Method], measures: &[&Measures]) -> Vec<Line> {
     let mut all = lines(methods, |method| {
         let last = measures.iter().rfind(|one| one.method == method);
         let Some(errors) = last.and_then(|one| one.errors.as_ref()) else {
@@ -109,9 +111,9 @@ fn recall_lines(methods: &[String], measures: &[&Measures]) -> Vec<Line> {
     all
 }
 
-fn lines(methods: &[String], points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Line> {
-    let lines = methods.iter().map(|method| Line {
-        method: method.clone(),
+fn lines(methods: &[Method], points: impl Fn(Method) -> Vec<(f64, f64)>) -> Vec<Line> {
+    let lines = methods.iter().map(|&method| Line {
+        method,
         points: points(method),
     });
     lines.filter(|line| !line.points.is_empty()).collect()
@@ -162,7 +164,7 @@ fn draw_into(
                 line.points.iter().copied(),
                 color.stroke_width(2),
             ))?
-            .label(line.method.to_uppercase())
+            .label(line.method.name().to_uppercase())
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
         if dotted {
             let dots = line
@@ -197,7 +199,7 @@ mod tests {
         ];
         let measures = measure(&rows, 10.0);
         let measures: Vec<&Measures> = measures.iter().collect();
-        let methods = ["fb", "mi"].map(str::to_owned);
+        let methods = [Method::FB, Method::MI];
         let lines = recall_lines(&methods, &measures);
         let fb = [
             (0.0, 0.0),

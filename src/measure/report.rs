@@ -105,15 +105,15 @@ fn markdown(run: &RunFile, tables: &[Table], passages: &[Passage]) -> String {
             false => format!("{} ← {}", pair.scene, pair.query_scene),
         })
         .collect();
-    let prior = run.prior_m.map_or(String::new(), |metres| {
+    let prior = run.protocol.prior_m.map_or(String::new(), |metres| {
         format!(" within {metres} m of the known position")
     });
     let mut text = format!(
         "# {}\n\n{} queries, references {}{prior}, seed {}; a pose {} m off or more is a failure.\n\n",
         scenes.join(", "),
         run.plan().count(),
-        run.references,
-        run.seed,
+        run.protocol.references,
+        run.protocol.seed,
         run.failure_radius_m
     );
     for passage in passages {

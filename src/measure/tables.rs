@@ -3,6 +3,8 @@
 use super::metrics::{Measures, RECALL_LIMITS};
 use super::paper::{self, Sought};
 use super::table::Table;
+use crate::fusion::Fusion;
+use crate::method::Method;
 use crate::run::Experiment;
 use crate::run::{Pair, RunFile};
 
@@ -56,7 +58,7 @@ fn overview(measures: &[Measures]) -> Table {
         let (own, common) = (&one.of_successes, &one.of_common);
         let mut cells = vec![
             one.group.to_string(),
-            one.method.to_uppercase(),
+            one.method.name().to_uppercase(),
             one.queries.to_string(),
             percent(one.success_rate),
             number(own.median_m, 2),
@@ -97,15 +99,15 @@ impl<'a> OfPair<'a> {
 
     fn find(
         &self,
-        method: &str,
+        method: Method,
         radius_m: f64,
         references: usize,
-        fusion: Option<&str>,
+        fusion: Option<Fusion>,
     ) -> Option<&'a Measures> {
         self.measures.iter().copied().find(|one| {
             let setting = one.group.setting;
             one.method == method
-                && one.group.fusion.as_deref() == fusion
+                && one.group.fusion == fusion
                 && setting.is_some_and(|s| s.radius_m == radius_m && s.references == references)
         })
     }
@@ -169,9 +171,9 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
             header(),
         );
         let common = |radius: f64| {
-            let methods = run.methods.iter();
+            let methods = run.protocol.methods.iter();
             methods
-                .filter_map(|method| of_pair.find(method, radius, 1, None))
+                .filter_map(|&method| of_pair.find(method, radius, 1, None))
                 .next()
         };
         let row = |name: &str, cell: &dyn Fn(f64) -> Option<String>| -> Option<Vec<String>> {
@@ -204,7 +206,7 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
             row("#images", &counted),
             row("#images (paper)", &counted_by_paper),
         ];
-        for method in &run.methods {
+        for &method in &run.protocol.methods {
             let ours = |radius: f64| {
                 let one = of_pair.find(method, radius, 1, None)?;
                 Some(number(figure(one), 2))
@@ -212,11 +214,11 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
             let papers = |radius: f64| {
                 let figure = paper::figure(&Sought {
                     radius_m: Some(radius),
-                    ..of_pair.sought(1, method, measure)
+                    ..of_pair.sought(1, method.name(), measure)
                 });
                 Some(number(Some(figure?), 2))
             };
-            let name = method.to_uppercase();
+            let name = method.name().to_uppercase();
             rows.push(row(&name, &ours));
             rows.push(row(&format!("{name} (paper)"), &papers));
         }
@@ -228,10 +230,10 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
         format!("Success rate (%) with a single reference: {title}"),
         header(),
     );
-    for method in &run.methods {
+    for &method in &run.protocol.methods {
         let rate = |&radius: &f64| rate_cell(of_pair.find(method, radius, 1, None));
         let rates = run.radii_m.iter().map(rate);
-        success.push(std::iter::once(method.to_uppercase()).chain(rates));
+        success.push(std::iter::once(method.name().to_uppercase()).chain(rates));
     }
     all.push(success);
     all
@@ -240,7 +242,7 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
 /// The paper's table 2 and figure "multi".
 fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
     let title = of_pair.title();
-    let most = run.selection().count();
+    let most = run.protocol.references.count();
     let columns =
         (1..=most).flat_map(|count| [format!("{count}: RMSE (m)"), format!("{count}: RMSE (°)")]);
     let mut rmse = Table::new(
@@ -254,9 +256,9 @@ fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
     let Some(&radius) = run.radii_m.first() else {
         return vec![rmse];
     };
-    for method in &run.methods {
-        for fusion in &run.fusions {
-            let name = format!("{} {fusion}", method.to_uppercase());
+    for &method in &run.protocol.methods {
+        for &fusion in &run.protocol.fusions {
+            let name = format!("{} {fusion}", method.name().to_uppercase());
             let ours = (1..=most).flat_map(|count| {
                 let one = of_pair.find(method, radius, count, Some(fusion));
                 let spread = one.map(|one| one.of_successes);
@@ -272,8 +274,8 @@ fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
                         paper::figure(&Sought {
                             radius_m: Some(radius),
                             references,
-                            fusion: Some(fusion),
-                            ..of_pair.sought(2, method, measure)
+                            fusion: Some(fusion.name),
+                            ..of_pair.sought(2, method.name(), measure)
                         })
                     })
                 })
@@ -289,10 +291,10 @@ fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
         format!("Success rate (%) with 1 to {most} references: {title}"),
         std::iter::once("#references".to_owned()).chain((1..=most).map(|k| k.to_string())),
     );
-    for method in &run.methods {
-        for fusion in &run.fusions {
+    for &method in &run.protocol.methods {
+        for &fusion in &run.protocol.fusions {
             let rate = |count| rate_cell(of_pair.find(method, radius, count, Some(fusion)));
-            let name = format!("{} {fusion}", method.to_uppercase());
+            let name = format!("{} {fusion}", method.name().to_uppercase());
             success.push(std::iter::once(name).chain((1..=most).map(rate)));
         }
     }
@@ -306,7 +308,7 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
     for pair in &run.pairs {
         let of_pair = OfPair::new(pair, measures);
         for one in &of_pair.measures {
-            let mut cells = vec![of_pair.title(), one.method.to_uppercase()];
+            let mut cells = vec![of_pair.title(), one.method.name().to_uppercase()];
             cells.push(one.queries.to_string());
             cells.extend(triple(one));
             let papers = ["success_percent", "rmse_m", "rmse_deg"].map(|measure| {
@@ -318,7 +320,7 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
                 paper::figure(&Sought {
                     references: 5,
                     fusion: Some("r-wavg"),
-                    ..of_pair.sought(number, &one.method, measure)
+                    ..of_pair.sought(number, one.method.name(), measure)
                 })
             });
             rows.push((cells, papers));
@@ -352,8 +354,8 @@ fn caption_of_large(run: &RunFile) -> String {
     format!(
         "References by {} within {} m: success rate (within {} m) and RMSE (of max Euler in °) over \
          successes",
-        run.references,
-        run.prior_m.unwrap_or_default(),
+        run.protocol.references,
+        run.protocol.prior_m.unwrap_or_default(),
         run.failure_radius_m
     )
 }
@@ -385,8 +387,8 @@ fn confusion(run: &RunFile, measures: &[Measures]) -> Table {
             .chain(columns),
     );
     for scene in scenes {
-        for method in &run.methods {
-            let mut cells = vec![scene.to_owned(), method.to_uppercase()];
+        for &method in &run.protocol.methods {
+            let mut cells = vec![scene.to_owned(), method.name().to_uppercase()];
             for query in &queries {
                 let pair = run
                     .pairs
@@ -396,7 +398,7 @@ fn confusion(run: &RunFile, measures: &[Measures]) -> Table {
                 let one = of_pair
                     .iter()
                     .flat_map(|of_pair| &of_pair.measures)
-                    .find(|one| one.method == *method);
+                    .find(|one| one.method == method);
                 cells.extend(one.map_or([NOTHING; 3].map(str::to_owned), |one| triple(one)));
             }
             table.push(cells);

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use super::run_file::{Item, Pair, RunFile};
 use super::run_folder::{FolderError, RunFolder};
 use crate::estimator::Failure;
+use crate::fusion::Fusion;
 use crate::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes,
     Unwatched, Watch,
@@ -116,7 +117,8 @@ impl Execution<'_> {
             let (now, later) = rest.split_at(rest.iter().take_while(same).count());
             let references = self.scenes.references[first.pair.scene_index].as_ref();
             let queries = self.scenes.of_queries(first.pair);
-            let localizer = Localizer::new(references, queries, self.params, self.run.seed);
+            let localizer =
+                Localizer::new(references, queries, self.params, self.run.protocol.seed);
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
                 let results = self.results(item, &localizer, &left_out, companion)?;
@@ -150,12 +152,11 @@ impl Execution<'_> {
         let mut results = Vec::new();
         let localized = catch_unwind(AssertUnwindSafe(|| -> Result<_, RunError> {
             let requests = self.requests(localizer, frame, left_out)?;
-            let methods = self.run.methods();
             localizer.localize(
                 item.index,
                 frame,
                 &requests,
-                &methods,
+                &self.run.protocol.methods,
                 companion.watch(),
                 |result, times| {
                     results.push((result, times));
@@ -180,7 +181,7 @@ impl Execution<'_> {
         frame: usize,
         left_out: &BTreeSet<usize>,
     ) -> Result<Vec<Request>, RunError> {
-        let selection = self.run.selection();
+        let protocol = &self.run.protocol;
         let index = localizer.references().name();
         let index = (self.scenes.references.iter())
             .position(|scene| scene.name() == index)
@@ -190,9 +191,9 @@ impl Execution<'_> {
             let chooser = Chooser {
                 localizer,
                 params: self.params,
-                selection,
+                selection: protocol.references,
                 radius_m,
-                seed: self.run.seed,
+                seed: protocol.seed,
                 index,
             };
             chooser.choose(frame, &|frame| left_out.contains(&frame), &mut Unwatched)
@@ -200,7 +201,7 @@ impl Execution<'_> {
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;
         for setting in self.run.settings() {
-            let radius = self.run.prior_m.unwrap_or(setting.radius_m);
+            let radius = protocol.reach_m(setting.radius_m);
             let chosen = match last.take() {
                 Some((known, chosen)) if known == radius => chosen,
                 _ => choose(radius)?,
@@ -221,9 +222,9 @@ impl Execution<'_> {
         results: &[(QueryResult, StageTimes)],
         companion: &mut dyn Companion,
     ) -> Result<(), RunError> {
-        let methods = self.run.methods();
+        let methods = &self.run.protocol.methods;
         let per_method = (results.len() / methods.len().max(1)).max(1);
-        let per_request = self.run.fusions.len().max(1);
+        let per_request = self.run.protocol.fusions.len().max(1);
         for (&method, of_method) in methods.iter().zip(results.chunks(per_method)) {
             let failed = |(result, _): &(QueryResult, StageTimes)| {
                 !result.is_success(self.run.failure_radius_m)
@@ -252,24 +253,25 @@ impl Execution<'_> {
             message: message.to_owned(),
         };
         let pair = item.pair;
-        let fusions: Vec<Option<String>> = match self.run.fusions.as_slice() {
+        let protocol = &self.run.protocol;
+        let fusions: Vec<Option<Fusion>> = match protocol.fusions.as_slice() {
             [] => vec![None],
-            fusions => fusions.iter().cloned().map(Some).collect(),
+            fusions => fusions.iter().copied().map(Some).collect(),
         };
         let mut results = Vec::new();
-        for method in self.run.methods() {
+        for &method in &protocol.methods {
             for setting in self.run.settings() {
-                for fusion in &fusions {
+                for &fusion in &fusions {
                     let result = QueryResult {
                         query_scene: (pair.scene != pair.query_scene)
                             .then(|| pair.query_scene.clone()),
                         setting: Some(setting),
-                        fusion: fusion.clone(),
+                        fusion,
                         ..QueryResult::new(
                             &pair.scene,
                             item.query,
                             method,
-                            self.run.seed,
+                            protocol.seed,
                             Err(&failure),
                             None,
                         )

@@ -1,21 +1,23 @@
 //! The paper's experiments, and which frames they take as queries.
 
 use std::collections::BTreeSet;
+use std::fmt;
+use std::str::FromStr;
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
-use serde::{Deserialize, Serialize};
 
+use super::protocol::Protocol;
 use super::run_file::{Pair, cameras_of, times_of};
-use crate::fusion;
+use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;
 use crate::scene::{Scene, SceneError};
+use crate::text::UnknownWord;
 
 /// One of the experiments of the paper's section 4.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Experiment {
     /// One random reference within 10, 15, 20 and 25 m (section 4.3, table 1).
     Single,
@@ -25,53 +27,87 @@ pub enum Experiment {
     Large,
 }
 
+impl Experiment {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Single, Self::Multi, Self::Large];
+
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Multi => "multi",
+            Self::Large => "large",
+        }
+    }
+}
+
+impl fmt::Display for Experiment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Experiment {
+    type Err = UnknownWord;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWord> {
+        let found = Self::ALL.into_iter().find(|known| known.name() == name);
+        found.ok_or_else(|| UnknownWord::among(name, "experiment", Self::ALL.map(Self::name)))
+    }
+}
+
+posescope_core::serde_as_text!(Experiment);
+
 /// What an experiment asks where the user says nothing else.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Defaults {
-    /// The methods.
-    pub methods: &'static [Method],
+    /// How queries are localised; fusions are of use where there are several references.
+    pub protocol: Protocol,
     /// Uncertainty radii \[m\].
     pub radii_m: &'static [f64],
-    /// How references are chosen.
-    pub references: Selection,
-    /// The fusions; none for a single reference.
-    pub fusions: Vec<&'static fusion::Entry>,
     /// Share of the frames that are queries.
     pub share: f64,
 }
 
 const WITHOUT_HYBRID: &[Method] = &[Method::FB, Method::PM, Method::MI];
 
-/// What is asked in an experiment, or without one: every frame against one reference within 15 m.
+/// What is asked in an experiment, or without one: every frame against one reference.
 pub fn defaults(experiment: Option<Experiment>) -> Defaults {
-    let robust: Vec<_> = fusion::find("r-wavg").into_iter().collect();
+    let protocol = Protocol {
+        fusions: Fusion::all().filter(|f| f.name == "r-wavg").collect(),
+        ..Protocol::default()
+    };
     match experiment {
         None => Defaults {
-            methods: &Method::PAPER,
-            radii_m: &[15.0],
-            references: Selection::Random(1),
-            fusions: robust,
+            protocol,
+            radii_m: &[Protocol::RADIUS_M],
             share: 1.0,
         },
         Some(Experiment::Single) => Defaults {
-            methods: WITHOUT_HYBRID,
+            protocol: Protocol {
+                methods: WITHOUT_HYBRID.to_vec(),
+                fusions: Vec::new(),
+                ..protocol
+            },
             radii_m: &[10.0, 15.0, 20.0, 25.0],
-            references: Selection::Random(1),
-            fusions: Vec::new(),
             share: 0.1,
         },
         Some(Experiment::Multi) => Defaults {
-            methods: WITHOUT_HYBRID,
+            protocol: Protocol {
+                methods: WITHOUT_HYBRID.to_vec(),
+                references: Selection::Random(5),
+                fusions: Fusion::all().collect(),
+                ..protocol
+            },
             radii_m: &[10.0],
-            references: Selection::Random(5),
-            fusions: fusion::ALL.iter().collect(),
             share: 0.1,
         },
         Some(Experiment::Large) => Defaults {
-            methods: &Method::PAPER,
-            radii_m: &[15.0],
-            references: Selection::Retrieved(5),
-            fusions: robust,
+            protocol: Protocol {
+                references: Selection::Retrieved(5),
+                ..protocol
+            },
+            radii_m: &[Protocol::RADIUS_M],
             share: 0.1,
         },
     }

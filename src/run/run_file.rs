@@ -1,10 +1,12 @@
 //! `run.toml`: everything that an evaluation was asked, and over which queries.
 
 use serde::{Deserialize, Serialize};
+use toml::Spanned;
 
 use super::experiment::Experiment;
+use super::protocol::Protocol;
 use crate::camera::Intrinsics;
-use crate::fusion;
+use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
 use crate::scene::Scene;
@@ -47,21 +49,11 @@ impl std::str::FromStr for Shard {
     }
 }
 
-impl Serialize for Shard {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for Shard {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        text.parse().map_err(serde::de::Error::custom)
-    }
-}
+posescope_core::serde_as_text!(Shard);
 
 /// A run as its folder describes it. Threads are missing: results do not depend on them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Form", into = "Form")]
 pub struct RunFile {
     /// [`RUN_SCHEMA`].
     pub schema: String,
@@ -72,39 +64,156 @@ pub struct RunFile {
     /// The scenes of the queries, as arguments; none where each scene has its own.
     pub queries: Vec<String>,
     /// Their format, where it was given.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<String>,
     /// Which of the paper's experiments, if any.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub experiment: Option<Experiment>,
-    /// The methods, in the order of their results.
-    pub methods: Vec<String>,
-    /// How references are chosen.
-    pub references: String,
-    /// The fusions.
-    pub fusions: Vec<String>,
+    /// How each query is localised.
+    pub protocol: Protocol,
     /// Uncertainty radii \[m\].
     pub radii_m: Vec<f64>,
-    /// How far from the query's known position retrieval may look \[m\].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub prior_m: Option<f64>,
     /// Share of the frames that were drawn as queries.
     pub share: f64,
     /// At most as many of them.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<usize>,
     /// A pose with a greater translation error is a failure \[m\].
     pub failure_radius_m: f64,
-    /// Seed of every random choice.
-    pub seed: u64,
     /// Which part of the run this is.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
     /// Scenes paired, with the queries.
-    #[serde(rename = "pair")]
     pub pairs: Vec<Pair>,
-    /// Every parameter of the estimators.
+    /// Every parameter of the estimators, as it was written: another version may have had others.
     pub params: toml::Table,
+}
+
+/// The file, key by key in its order.
+#[derive(Serialize, Deserialize)]
+struct Form {
+    schema: String,
+    version: String,
+    scenes: Vec<String>,
+    queries: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    format: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    experiment: Option<Experiment>,
+    methods: Vec<Method>,
+    references: Selection,
+    fusions: Vec<Fusion>,
+    radii_m: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    prior_m: Option<f64>,
+    share: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limit: Option<usize>,
+    failure_radius_m: f64,
+    seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shard: Option<Shard>,
+    #[serde(rename = "pair")]
+    pairs: Vec<Pair>,
+    params: toml::Table,
+}
+
+impl From<Form> for RunFile {
+    fn from(form: Form) -> Self {
+        Self {
+            schema: form.schema,
+            version: form.version,
+            scenes: form.scenes,
+            queries: form.queries,
+            format: form.format,
+            experiment: form.experiment,
+            protocol: Protocol {
+                references: form.references,
+                prior_m: form.prior_m,
+                methods: form.methods,
+                fusions: form.fusions,
+                seed: form.seed,
+            },
+            radii_m: form.radii_m,
+            share: form.share,
+            limit: form.limit,
+            failure_radius_m: form.failure_radius_m,
+            shard: form.shard,
+            pairs: form.pairs,
+            params: form.params,
+        }
+    }
+}
+
+impl From<RunFile> for Form {
+    fn from(run: RunFile) -> Self {
+        Self {
+            schema: run.schema,
+            version: run.version,
+            scenes: run.scenes,
+            queries: run.queries,
+            format: run.format,
+            experiment: run.experiment,
+            methods: run.protocol.methods,
+            references: run.protocol.references,
+            fusions: run.protocol.fusions,
+            radii_m: run.radii_m,
+            prior_m: run.protocol.prior_m,
+            share: run.share,
+            limit: run.limit,
+            failure_radius_m: run.failure_radius_m,
+            seed: run.protocol.seed,
+            shard: run.shard,
+            pairs: run.pairs,
+            params: run.params,
+        }
+    }
+}
+
+/// What is wrong with the text of a `run.toml`, and where.
+#[derive(Debug)]
+pub(super) struct Misread {
+    /// From 1.
+    pub line: usize,
+    /// On one line.
+    pub message: String,
+}
+
+/// Where the values stand that are held against each other once all are read.
+#[derive(Deserialize)]
+struct Places {
+    schema: Spanned<String>,
+    methods: Spanned<Vec<Method>>,
+    radii_m: Spanned<Vec<f64>>,
+    pair: Vec<PairPlaces>,
+}
+
+#[derive(Deserialize)]
+struct PairPlaces {
+    scene_index: Spanned<usize>,
+}
+
+impl Places {
+    /// The first thing that is wrong, with its place \[bytes\].
+    fn wrong(&self, run: &RunFile) -> Option<(usize, String)> {
+        if run.schema != RUN_SCHEMA {
+            let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
+            return Some((self.schema.span().start, message));
+        }
+        if run.protocol.methods.is_empty() {
+            let message = "a run has at least one method".to_owned();
+            return Some((self.methods.span().start, message));
+        }
+        let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
+        if run.radii_m.is_empty() || !run.radii_m.iter().all(is_length) {
+            let message = "one positive radius or more expected".to_owned();
+            return Some((self.radii_m.span().start, message));
+        }
+        let scenes = run.scenes.len();
+        let mut pairs = self.pair.iter().map(|pair| &pair.scene_index);
+        let outside = pairs.find(|index| *index.get_ref() >= scenes)?;
+        let message = format!(
+            "scene_index {} names none of the {scenes} scenes, which are counted from 0",
+            outside.get_ref()
+        );
+        Some((outside.span().start, message))
+    }
 }
 
 /// A scene of references with one of queries, perhaps the same.
@@ -204,26 +313,9 @@ impl RunFile {
             .filter(|item| self.shard.is_none_or(|shard| shard.has(item.index)))
     }
 
-    /// The methods.
-    pub fn methods(&self) -> Vec<Method> {
-        let methods = self.methods.iter();
-        methods.filter_map(|name| name.parse().ok()).collect()
-    }
-
-    /// The fusions.
-    pub fn fusions(&self) -> Vec<&'static fusion::Entry> {
-        let fusions = self.fusions.iter();
-        fusions.filter_map(|name| fusion::find(name)).collect()
-    }
-
-    /// How references are chosen.
-    pub fn selection(&self) -> Selection {
-        self.references.parse().unwrap_or(Selection::Random(1))
-    }
-
     /// What is asked of every query, still without references: by radius, then number of references.
     pub fn settings(&self) -> Vec<Setting> {
-        let most_references = self.selection().count();
+        let most_references = self.protocol.references.count();
         let counts = match self.experiment {
             Some(Experiment::Multi) => 1..=most_references,
             _ => most_references..=most_references,
@@ -246,31 +338,35 @@ impl RunFile {
             radius_m: setting.radius_m,
             references: References {
                 frames: chosen.frames[..count].to_vec(),
-                ranking: chosen.ranking.clone(),
+                ..chosen.clone()
             },
-            fusions: self.fusions(),
+            fusions: self.protocol.fusions.clone(),
             setting: Some(setting),
         }
     }
 
     /// Results of each query.
     pub fn results_per_item(&self) -> usize {
-        self.methods.len() * self.settings().len() * self.fusions.len().max(1)
+        let protocol = &self.protocol;
+        protocol.methods.len() * self.settings().len() * protocol.fusions.len().max(1)
     }
 
-    /// Whether every name in it is known; says which is not.
-    pub(super) fn check(&self) -> Result<(), String> {
-        let unknown_method = |name: &&String| name.parse::<Method>().is_err();
-        let unknown_fusion = |name: &&String| fusion::find(name).is_none();
-        let unknown = (self.methods.iter().find(unknown_method))
-            .or_else(|| self.fusions.iter().find(unknown_fusion));
-        if let Some(name) = unknown {
-            return Err(format!("`{name}` is neither a method nor a fusion"));
+    /// Reads the text of a `run.toml` and checks it.
+    pub(super) fn read(text: &str) -> Result<Self, Misread> {
+        let misread = |at: usize, message: String| Misread {
+            line: text[..at.min(text.len())].matches('\n').count() + 1,
+            message: message.replace('\n', " "),
+        };
+        let syntax = |error: toml::de::Error| {
+            let at = error.span().map_or(0, |span| span.start);
+            misread(at, error.message().to_owned())
+        };
+        let run: Self = toml::from_str(text).map_err(syntax)?;
+        let places: Places = toml::from_str(text).map_err(syntax)?;
+        match places.wrong(&run) {
+            Some((at, message)) => Err(misread(at, message)),
+            None => Ok(run),
         }
-        if self.methods.is_empty() || self.radii_m.is_empty() {
-            return Err("a run has at least one method and one radius".to_owned());
-        }
-        self.references.parse::<Selection>().map(drop)
     }
 
     /// The same run in one piece.

@@ -10,10 +10,12 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::run_file::{RUN_SCHEMA, RunFile};
+use super::run_file::{Misread, RunFile};
 use crate::localize::{QueryResult, StageTimes};
+use crate::method::Method;
 use crate::params::Params;
 use posescope_core::files::write_whole;
+use posescope_core::text::json_message;
 
 const RUN: &str = "run.toml";
 const RESULTS: &str = "results.jsonl";
@@ -107,7 +109,7 @@ pub struct RunFolder {
 #[derive(Serialize)]
 struct Timing<'a> {
     query: &'a str,
-    method: &'a str,
+    method: Method,
     #[serde(flatten)]
     stages: &'a StageTimes,
 }
@@ -213,7 +215,7 @@ impl RunFolder {
             push_line(&mut lines, result).map_err(FolderError::io(&self.path))?;
             let timing = Timing {
                 query: &result.query,
-                method: &result.method,
+                method: result.method,
                 stages,
             };
             push_line(&mut times, &timing).map_err(FolderError::io(&self.path))?;
@@ -360,21 +362,12 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
         }
         read => read.map_err(FolderError::io(&path))?,
     };
-    let damaged = |line: usize, message: String| FolderError::Damaged {
-        path: path.clone(),
-        line,
-        message,
-    };
-    let mut run: RunFile = toml::from_str(&text).map_err(|error| {
-        let at = error.span().map_or(0, |span| span.start);
-        let line = text[..at.min(text.len())].matches('\n').count() + 1;
-        damaged(line, error.message().to_owned())
-    })?;
-    if run.schema != RUN_SCHEMA {
-        let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
-        return Err(damaged(1, message));
-    }
-    run.check().map_err(|message| damaged(1, message))?;
+    let mut run =
+        RunFile::read(&text).map_err(|Misread { line, message }| FolderError::Damaged {
+            path,
+            line,
+            message,
+        })?;
     run.params = completed(run.params);
     Ok(run)
 }
@@ -404,7 +397,7 @@ pub fn read_results<T: DeserializeOwned>(
         serde_json::from_str(&line).map_err(|error| FolderError::Damaged {
             path: path.clone(),
             line: index + 1,
-            message: error.to_string(),
+            message: json_message(&error),
         })
     }))
 }

@@ -3,10 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::estimator::{self, UnknownMethod};
+use crate::estimator;
 use crate::event::{Event, Stage, StageStarted};
 use crate::grid::Phase;
 use crate::method::Method;
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Record, Sink};
 
 /// A number that events carry, under the name that breakpoints know it by.
@@ -258,7 +259,7 @@ impl FromStr for Breakpoint {
             Some((method, name)) => {
                 let known = method
                     .parse()
-                    .map_err(|error: UnknownMethod| refuse(error.to_string()))?;
+                    .map_err(|error: UnknownWord| refuse(error.to_string()))?;
                 (Some(known), name)
             }
             None => (None, scoped),
@@ -302,6 +303,8 @@ impl FromStr for Breakpoint {
         })
     }
 }
+
+posescope_core::serde_as_text!(Breakpoint);
 
 /// Breakpoints, and what they remember of the run.
 #[derive(Clone, Debug, Default)]
@@ -539,7 +542,7 @@ mod tests {
                 .to_string()
         };
         assert!(message("fb.ransack").contains("ransac"));
-        assert!(message("xy.ransac").contains("no method `xy`"));
+        assert!(message("xy.ransac").contains("`xy` is no method"));
         assert!(message("inlers < 10").contains("inliers"));
         assert!(message("inliers < ten").contains("no number"));
         assert!(message("").contains("fb.ransac"));

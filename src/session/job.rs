@@ -8,13 +8,11 @@ use std::thread;
 use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
 use super::message::Message;
-use crate::fusion;
+use super::task::Task;
 use crate::localize::{
     ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
     Selection, Watch, words_of,
 };
-use crate::method::Method;
-use crate::params::Params;
 use crate::scene::{FrameStore, NoIndex, Scene};
 
 /// One query, its references, and what to do with them.
@@ -28,23 +26,10 @@ pub struct Job {
     pub query: usize,
     /// The references, once they are chosen.
     pub chosen: References,
-    /// How they are chosen where there are none yet.
-    pub selection: Option<Selection>,
+    /// What is asked of the query.
+    pub task: Task,
     /// What a choice by looks asks.
     pub index: Arc<IndexFile>,
-    /// The methods to run, in this order, each on every reference.
-    pub methods: Vec<Method>,
-    /// What to make of several references.
-    pub fusions: Vec<&'static fusion::Entry>,
-    /// The parameters of all methods.
-    pub params: Params,
-    /// How far the query may be from a reference \[m\].
-    pub uncertainty_radius_m: f64,
-    /// How far from the query's known position references are chosen \[m\]; without it, within the
-    /// radius.
-    pub prior_m: Option<f64>,
-    /// Seed of every random choice.
-    pub seed: u64,
     /// Where frames are remembered, with all that is worked out about them, for the next job too.
     pub frames: Arc<FrameStore>,
 }
@@ -69,13 +54,13 @@ pub enum JobError {
     },
     /// No frame is near enough to be a reference.
     #[error(
-        "no frame with pose and scan within {radius_m} m of query {query}; raise the radius or \
-         choose references by hand"
+        "no frame with pose and scan within {radius_m} m of query {query}; raise the radius \
+         or the prior, or choose references by hand"
     )]
     NoneNear {
         /// The query frame's name.
         query: String,
-        /// The radius.
+        /// How far from the query they were sought \[m\].
         radius_m: f64,
     },
 }
@@ -140,17 +125,18 @@ impl Job {
         watch: &mut dyn Watch,
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
+        let (task, protocol) = (&self.task, &self.task.protocol);
         let scenes = (
             self.frames.of(&self.references),
             self.frames.of(&self.queries),
         );
-        let localizer = Localizer::at_hand(scenes, &self.params, self.seed);
+        let localizer = Localizer::at_hand(scenes, &task.params, protocol.seed);
         let chosen = self.choose(&localizer, watch)?;
         on_choice(&chosen);
         let request = Request {
-            radius_m: self.uncertainty_radius_m,
+            radius_m: task.radius_m,
             references: chosen,
-            fusions: self.fusions.clone(),
+            fusions: protocol.fusions.clone(),
             setting: None,
         };
         let mut results = Vec::new();
@@ -158,7 +144,7 @@ impl Job {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };
-        localizer.localize(0, self.query, &[request], &self.methods, watch, keep)?;
+        localizer.localize(0, self.query, &[request], &protocol.methods, watch, keep)?;
         Ok(results)
     }
 
@@ -171,29 +157,29 @@ impl Job {
             return Ok(self.chosen.clone());
         }
         let query = || self.queries.frames()[self.query].clone();
-        let Some(selection) = self.selection else {
+        let (task, protocol) = (&self.task, &self.task.protocol);
+        if task.by_hand {
             return Err(JobError::NoneNamed { query: query() });
-        };
-        let index = match selection {
+        }
+        let index = match protocol.references {
             Selection::Retrieved(_) => {
-                Some(self.index.open(self.references.as_ref(), &self.params)?)
+                Some(self.index.open(self.references.as_ref(), &task.params)?)
             }
             _ => None,
         };
-        let radius_m = self.prior_m.unwrap_or(self.uncertainty_radius_m);
         let chooser = Chooser {
             localizer,
-            params: &self.params,
-            selection,
-            radius_m,
-            seed: self.seed,
+            params: &task.params,
+            selection: protocol.references,
+            radius_m: task.reach_m(),
+            seed: protocol.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),
         };
         let chosen = chooser.choose(self.query, &|_| false, watch)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear {
                 query: query(),
-                radius_m,
+                radius_m: task.reach_m(),
             });
         }
         Ok(chosen)

@@ -141,6 +141,41 @@ fn a_reference_is_chosen_within_the_radius_and_never_the_query_itself() {
 }
 
 #[test]
+fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
+    let sequence = SmallSequence::write();
+    let said = |command: &str, extra: &[&str]| {
+        let output = posescope()
+            .arg(command)
+            .arg(sequence.folder())
+            .args(["--query", "5", "--method", "mi", "--radius", "15"])
+            .args(extra)
+            .output()
+            .expect("the binary starts");
+        assert_eq!(output.status.code(), Some(3));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    for command in ["run", "view"] {
+        let message = said(command, &["--prior", "0.5"]);
+        let words = "within 0.5 m of query 000005; raise --radius or --prior, or name one";
+        assert!(message.contains(words), "{message}");
+    }
+    let out = sequence.path().join("run");
+    let output = posescope()
+        .arg("eval")
+        .arg(sequence.folder())
+        .args(["--method", "mi", "--prior", "0.5", "-q", "--out"])
+        .arg(&out)
+        .output()
+        .expect("the binary starts");
+    assert_eq!(output.status.code(), Some(0));
+    let results = std::fs::read(out.join("results.jsonl")).expect("results");
+    for result in json_lines(&results) {
+        let reason = &result["reason"]["text"];
+        assert_eq!(reason, "no reference frame with pose and scan within 0.5 m");
+    }
+}
+
+#[test]
 fn every_parameter_is_listed_and_changes_are_marked() {
     let output = posescope()
         .args(["params", "--set", "mi.bins=32"])

@@ -10,10 +10,11 @@ use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
-use posescope::localize::{QueryResult, Unwatched, Watch};
+use posescope::localize::{QueryResult, Selection, Unwatched, Watch};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Companion, Draw, Execution, RUN_SCHEMA, RunFile, RunFolder, Scenes, read_results,
+    Companion, Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, Scenes, read_results,
 };
 use posescope::scene::{self, Scene, SceneError};
 
@@ -106,11 +107,11 @@ fn a_run_folder_holds_what_is_promised() {
         .collect::<Result<_, _>>()
         .expect("one per line");
     assert_eq!(results.len(), 24);
-    let order = |at: usize| (results[at].query.as_str(), results[at].method.as_str());
+    let order = |at: usize| (results[at].query.as_str(), results[at].method.name());
     let expected = [("000000", "fb"), ("000000", "mi"), ("000001", "fb")];
     assert_eq!([order(0), order(1), order(2)], expected);
     for result in &results {
-        assert_eq!(result.fusion.as_deref(), Some("r-wavg"));
+        assert_eq!(result.fusion.map(|fusion| fusion.name), Some("r-wavg"));
         let alone = result.per_reference.as_ref().expect("several were fused");
         assert_eq!(alone.len(), 2);
         assert!(alone.iter().all(|one| one.per_reference.is_none()));
@@ -417,7 +418,7 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
         .expect("one per line");
     let of_mi: Vec<_> = results
         .iter()
-        .filter(|result| result.method == "mi")
+        .filter(|result| result.method == Method::MI)
         .collect();
     let position = of_mi[1].pose.as_ref().expect("a pose").position_m;
     let tum = text("tum");
@@ -542,15 +543,15 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         queries: Vec::new(),
         format: None,
         experiment: None,
-        methods: vec!["fb".to_owned(), "mi".to_owned()],
-        references: "nearest:1".to_owned(),
-        fusions: Vec::new(),
+        protocol: Protocol {
+            methods: vec![Method::FB, Method::MI],
+            references: Selection::Nearest(1),
+            ..Protocol::default()
+        },
         radii_m: vec![3.0],
-        prior_m: None,
         share: 1.0,
         limit: None,
         failure_radius_m: 10.0,
-        seed: 0,
         shard: None,
         pairs: vec![draw.pair(0, references, references).expect("queries")],
         params: Params::default().to_toml().parse().expect("a table"),

@@ -46,7 +46,7 @@ fn at_every_moment(
     window.state_mut().send(Command::SwitchTheme);
     see(window, "light", &[]);
     window.state_mut().send(Command::SetReferences(vec![0, 2]));
-    let all = posescope::fusion::ALL.iter().collect();
+    let all = posescope::fusion::Fusion::all().collect();
     window.state_mut().send(Command::SetFusions(all));
     window.run_steps(2);
     wait(window, |app| *app.desk().state() == State::Finished);

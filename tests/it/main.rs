@@ -24,6 +24,7 @@ mod search_views;
 mod session;
 mod small_sequence;
 mod space;
+mod stored;
 mod surf_warp;
 mod synth;
 mod two_walls;

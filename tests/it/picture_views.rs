@@ -248,7 +248,7 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
         ));
         window.get_by_label(&format!("best {:.4}", assessed.best));
         let results = window.state().desk().run().results();
-        let mut costs = results.filter(|result| result.method == method.name());
+        let mut costs = results.filter(|result| result.method == method);
         let cost = costs
             .find_map(|result| result.cost.clone())
             .expect("it has a cost");

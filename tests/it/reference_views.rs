@@ -67,7 +67,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     assert_eq!(settle(&mut window), State::Finished);
     let fused: Vec<_> = results(&window)
         .into_iter()
-        .filter(|result| result.fusion.as_deref() == Some("wavg"))
+        .filter(|result| result.fusion.is_some_and(|f| f.name == "wavg"))
         .collect();
     assert_eq!(fused.len(), Method::PAPER.len());
     // Only the fusion is new.
@@ -118,9 +118,9 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
 #[test]
 fn references_may_be_as_far_away_as_the_prior_allows() {
     let mut narrow = setup();
-    narrow.uncertainty_radius_m = 0.6;
+    narrow.task.radius_m = 0.6;
     assert_eq!(narrow.candidates(1), [2]);
-    narrow.prior_m = Some(3.0);
+    narrow.task.protocol.prior_m = Some(3.0);
     assert_eq!(narrow.candidates(1), [2, 0]);
     let mut window = finished(narrow);
     assert_eq!(pick(&mut window, Selection::Nearest(2)), State::Finished);

@@ -268,6 +268,7 @@ fn a_ranking_is_told_once_after_the_query_and_a_lost_photo_does_not_matter() {
         references: References {
             frames: vec![0],
             ranking,
+            within_m: None,
         },
         fusions: Vec::new(),
         setting: None,

@@ -234,7 +234,7 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
     window.get_by_label("Run with this floor").click();
     window.run_steps(2);
     assert_eq!(settle(&mut window), State::Finished);
-    let floor = window.state().desk().setup.params.grid.coverage_floor;
+    let floor = window.state().desk().setup.task.params.grid.coverage_floor;
     assert!((floor - moving).abs() < 1e-9, "{floor}");
     let surfaces = told::<PhaseSearched>(&window, Method::MI);
     assert_eq!(surfaces[0].1.surface.minimum(), Some(cell));

@@ -5,11 +5,11 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
-use posescope::fusion;
+use posescope::fusion::Fusion;
 use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
 use posescope::method::Method;
-use posescope::params::Params;
-use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State};
+use posescope::run::Protocol;
+use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State, Task};
 use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
@@ -21,14 +21,16 @@ fn job(query: usize) -> Job {
         queries: scene,
         query,
         chosen: vec![0].into(),
-        selection: None,
+        task: Task {
+            by_hand: true,
+            radius_m: 3.0,
+            protocol: Protocol {
+                seed: 7,
+                ..Protocol::default()
+            },
+            ..Task::of("walls")
+        },
         index: Arc::default(),
-        methods: Method::PAPER.to_vec(),
-        fusions: Vec::new(),
-        params: Params::default(),
-        uncertainty_radius_m: 3.0,
-        prior_m: None,
-        seed: 7,
         frames: Arc::default(),
     }
 }
@@ -216,9 +218,9 @@ fn wait(session: &mut Session, is_so: impl Fn(&Session) -> bool) {
 #[test]
 fn a_session_pauses_and_stops_within_a_lattice() {
     let mut endless = job(1);
-    endless.methods = vec![Method::PM];
+    endless.task.protocol.methods = vec![Method::PM];
     for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
-        endless.params.assign(change).expect("a good value");
+        endless.task.params.assign(change).expect("a good value");
     }
     let mut session = start(endless, RunMode::Running, &[]);
     let in_the_lattice = |session: &Session| session.run().len() > 500;
@@ -239,11 +241,12 @@ fn a_session_pauses_and_stops_within_a_lattice() {
 
 #[test]
 fn references_that_are_ranked_can_be_stopped_too() {
-    let ranked = Job {
+    let mut ranked = Job {
         chosen: Default::default(),
-        selection: Some("maxf:2".parse().expect("a selection")),
         ..job(1)
     };
+    ranked.task.by_hand = false;
+    ranked.task.protocol.references = "maxf:2".parse().expect("a selection");
     let mut stopped = UntilStopped(Arc::new(AtomicBool::new(true)));
     let error = ranked.work(&mut stopped, |_| panic!("none was chosen"));
     assert!(error.expect_err("it was stopped").is_cancelled());
@@ -298,7 +301,8 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
     let mut again = job(1);
     let mut first = start(again.clone(), RunMode::Running, &[]);
     settle(&mut first);
-    again.params.assign("fb.ratio=0.7").expect("a good value");
+    let params = &mut again.task.params;
+    params.assign("fb.ratio=0.7").expect("a good value");
     let mut second = start(again, RunMode::Running, &[]);
     settle(&mut second);
     let reused: Vec<_> = second
@@ -323,18 +327,19 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
 
 #[test]
 fn several_references_are_fused_as_without_a_session() {
-    let several = Job {
+    let mut several = Job {
         chosen: vec![0, 2].into(),
-        fusions: fusion::ALL.iter().collect(),
         ..job(1)
     };
+    several.task.protocol.fusions = Fusion::all().collect();
+    let task = several.task.clone();
     let mut expected = Vec::new();
     let scene = Walls::new();
-    let localizer = Localizer::new(&scene, &scene, &several.params, several.seed);
+    let localizer = Localizer::new(&scene, &scene, &task.params, task.protocol.seed);
     let request = Request {
-        radius_m: several.uncertainty_radius_m,
+        radius_m: task.radius_m,
         references: several.chosen.clone(),
-        fusions: several.fusions.clone(),
+        fusions: task.protocol.fusions.clone(),
         setting: None,
     };
     let keep = |result, _| {
@@ -342,7 +347,14 @@ fn several_references_are_fused_as_without_a_session() {
         Ok::<(), LocalizeError>(())
     };
     localizer
-        .localize(0, 1, &[request], &several.methods, &mut Unwatched, keep)
+        .localize(
+            0,
+            1,
+            &[request],
+            &task.protocol.methods,
+            &mut Unwatched,
+            keep,
+        )
         .expect("good data");
 
     let mut session = start(several, RunMode::Running, &["fusion"]);

@@ -55,16 +55,17 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
     let folder = sequence.folder().display().to_string();
     let scene: Arc<dyn Scene> = scene::open(&folder, None).expect("a scene").into();
     let frame = |name| scene.find(name).expect("a frame");
-    let mut window = finished(Setup {
+    let mut setup = Setup {
         offered: vec![frame("5")],
         query: frame("5"),
         chosen: vec![frame("4")].into(),
-        methods: vec![Method::FB],
-        scene_argument: folder,
         queries: scene.clone(),
         references: scene.clone(),
         ..setup()
-    });
+    };
+    setup.task.scene = folder;
+    setup.task.protocol.methods = vec![Method::FB];
+    let mut window = finished(setup);
     window.state_mut().send(Command::Maximize(Some("report")));
     window.run_steps(3);
     assert!(is_said(&window, &error.to_string()), "{error}");

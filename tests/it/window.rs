@@ -6,14 +6,15 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, Comparing, ReferencePick, Setup};
+use posescope::app::{App, Command, Comparing, Setup};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, QueryResult, Request, Unwatched};
 use posescope::method::Method;
 use posescope::params::Params;
+use posescope::run::Protocol;
 use posescope::scene;
 use posescope::scene::Scene;
-use posescope::session::{RunMode, State};
+use posescope::session::{RunMode, State, Task};
 
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
@@ -22,23 +23,22 @@ use crate::walls_scene::{GREY, UNREADABLE, Walls};
 pub fn setup() -> Setup {
     let scene = Arc::new(Walls::new());
     Setup {
-        scene_argument: "walls".to_owned(),
+        task: Task {
+            by_hand: true,
+            radius_m: 3.0,
+            protocol: Protocol {
+                seed: 7,
+                ..Protocol::default()
+            },
+            ..Task::of("walls")
+        },
         references: scene.clone(),
-        queries_argument: None,
         queries: scene,
         offered: vec![1, 2, GREY],
         query: 1,
         chosen: vec![0].into(),
-        pick: ReferencePick::ByHand,
         index: Arc::default(),
-        methods: Method::PAPER.to_vec(),
-        fusions: Vec::new(),
-        params: Params::default(),
-        uncertainty_radius_m: 3.0,
-        prior_m: None,
-        seed: 7,
         failure_radius_m: 10.0,
-        breakpoints: Vec::new(),
         mode: RunMode::Paused,
         results: Default::default(),
         folder: std::env::temp_dir(),
@@ -205,7 +205,9 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     window.get_by_label("Add").click();
     window.step();
     window.step();
-    assert_eq!(window.state().desk().setup.breakpoints, ["mi.yaw_coarse"]);
+    let breakpoints = &window.state().desk().setup.task.breakpoints;
+    assert_eq!(breakpoints[0].to_string(), "mi.yaw_coarse");
+    assert_eq!(breakpoints.len(), 1);
     press(&mut window, Modifiers::NONE, Key::F5);
     wait(&mut window, |app| app.desk().run().len() > 10);
     let stopped = State::Paused {
@@ -306,12 +308,12 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     let mut setup = Setup {
         references: Arc::clone(&scene),
         queries: Arc::clone(&scene),
-        methods: vec![Method::PM],
         ..setup()
     };
+    setup.task.protocol.methods = vec![Method::PM];
     // A million hypotheses.
     for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
-        setup.params.assign(change).expect("a good value");
+        setup.task.params.assign(change).expect("a good value");
     }
     let mut window = window(setup);
     settle(&mut window);
@@ -392,7 +394,7 @@ fn a_session_is_saved_and_restored() {
     settle(&mut window);
     let desk = window.state().desk();
     assert_eq!(desk.setup.query, 1);
-    assert_eq!(desk.setup.params.changes(), ["fb.ratio=0.8"]);
+    assert_eq!(desk.setup.task.params.changes(), ["fb.ratio=0.8"]);
     assert_eq!(desk.cursor, 40);
     std::fs::write(&path, "{}").expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
@@ -424,6 +426,109 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     assert_eq!(problem.query.photo.gray, photo.expect("readable").gray);
 }
 
+/// A session that was saved before sessions were typed: with a choice, a prior, fusions.
+const EARLIER_SESSION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/session-1.json");
+
+#[test]
+fn a_session_of_an_earlier_program_is_restored() {
+    let mut window = finished(setup());
+    let restore = Command::RestoreSession(EARLIER_SESSION.into());
+    window.state_mut().send(restore);
+    window.step();
+    settle(&mut window);
+    let setup = &window.state().desk().setup;
+    let task = &setup.task;
+    assert_eq!(setup.pick().to_string(), "maxf:2");
+    assert_eq!(setup.chosen.frames, [0, 2]);
+    assert_eq!(task.protocol.prior_m, Some(5.0));
+    let methods = [Method::FB, Method::MI];
+    assert_eq!(task.protocol.methods, methods);
+    let fusions: Vec<&str> = task.protocol.fusions.iter().map(|f| f.name).collect();
+    assert_eq!(fusions, ["avg", "r-wavg"]);
+    assert_eq!(task.params.changes(), ["fb.ratio=0.75"]);
+    let breakpoints = task.breakpoints.iter().map(ToString::to_string);
+    let breakpoints: Vec<String> = breakpoints.collect();
+    assert_eq!(breakpoints, ["mi.yaw_coarse", "inliers < 3"]);
+}
+
+#[test]
+fn what_is_wrong_in_a_session_is_told_with_its_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("session.json");
+    let earlier = std::fs::read_to_string(EARLIER_SESSION).expect("text");
+    let mut window = finished(setup());
+    window.state_mut().send(Command::SaveSession(path.clone()));
+    window.step();
+    let now = std::fs::read_to_string(&path).expect("just saved");
+    for (good, from, to, words) in [
+        (&earlier, "\"mi\"", "\"mo\"", "`mo` is no method"),
+        (&earlier, "\"avg\"", "\"mean\"", "`mean` is no fusion"),
+        (
+            &earlier,
+            "maxf:2",
+            "best:2",
+            "`best:2` is no choice of references",
+        ),
+        (&earlier, "inliers <", "inlers <", "`inlers` is none of"),
+        (&earlier, "fb]\\nratio", "fb]\\nratoi", "`fb.ratoi`"),
+        (&now, "\"mi\"", "\"mo\"", "`mo` is no method"),
+        (
+            &now,
+            "random:1",
+            "best:1",
+            "`best:1` is no choice of references",
+        ),
+    ] {
+        let bad = good.replacen(from, to, 1);
+        assert_ne!(bad, *good);
+        let at = bad.find(to).expect("replaced");
+        let line = bad[..at].matches('\n').count() + 1;
+        std::fs::write(&path, &bad).expect("writable");
+        let restore = Command::RestoreSession(path.clone());
+        window.state_mut().send(restore);
+        window.step();
+        window.step();
+        let place = format!("session.json:{line}: ");
+        let note = window.state().desk().notes.last().expect("it is said");
+        let said = &note.text;
+        assert!(said.contains(&place) && said.contains(words), "{said}");
+        assert!(!said.contains('\n') && note.is_error, "{said}");
+    }
+}
+
+#[test]
+fn a_session_keeps_the_format_and_the_index() {
+    let sequence = SmallSequence::of(&[0, 1]);
+    let folder = sequence.folder();
+    let name = folder.to_str().expect("a plain path");
+    let open = |format| -> Arc<dyn Scene> { scene::open(name, format).expect("a scene").into() };
+    let mut setup = setup();
+    (setup.references, setup.queries) = (open(None), open(None));
+    setup.offered = vec![0, 1];
+    setup.task.scene = name.to_owned();
+    setup.task.format = Some("kitti".to_owned());
+    setup.task.index = Some("an.index".into());
+    let path = sequence.path().join("session.json");
+    let mut there = finished(setup);
+    there.state_mut().send(Command::SaveSession(path.clone()));
+    there.step();
+    let mut here = finished(self::setup());
+    here.state_mut().send(Command::RestoreSession(path.clone()));
+    here.step();
+    settle(&mut here);
+    let restored = &here.state().desk().setup;
+    assert_eq!(restored.task, there.state().desk().setup.task);
+    let index = restored.index.file().and_then(|file| file.to_str());
+    assert_eq!(index, Some("an.index"));
+    // A format that does not fit is refused as it would be on the command line.
+    let saved = std::fs::read_to_string(&path).expect("saved");
+    std::fs::write(&path, saved.replace("\"kitti\"", "\"colmap\"")).expect("writable");
+    here.state_mut().send(Command::RestoreSession(path));
+    here.step();
+    here.step();
+    assert!(is_said(&here, "colmap"));
+}
+
 #[test]
 fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -442,6 +547,25 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
 }
 
 #[test]
+fn the_command_line_names_format_prior_and_breakpoints() {
+    let mut setup = setup();
+    setup.task.format = Some("kitti".to_owned());
+    setup.task.protocol.prior_m = Some(5.0);
+    setup.task.breakpoints = vec!["inliers < 3".parse().expect("a breakpoint")];
+    assert_eq!(
+        setup.command_line(),
+        "posescope run walls --format kitti --query 000001 --reference 000000 --radius 3 --prior 5 \
+         --seed 7 --break 'inliers < 3'"
+    );
+    // References that are still to be chosen are chosen in the same way.
+    setup.task.by_hand = false;
+    setup.task.protocol.references = "nearest:2".parse().expect("a choice");
+    setup.chosen = Vec::new().into();
+    let command = setup.command_line();
+    assert!(command.contains("--references nearest:2 "), "{command}");
+}
+
+#[test]
 fn the_camera_in_hand_has_costs_of_its_own() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::Num9);
@@ -452,7 +576,7 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     let probe = desk.probe().expect("answered");
     for (method, comparison) in &probe.comparisons {
         let results = results(&window);
-        let result = results.iter().find(|result| result.method == method.name());
+        let result = results.iter().find(|result| result.method == *method);
         let report = result
             .and_then(|result| result.cost.as_ref())
             .expect("a cost");

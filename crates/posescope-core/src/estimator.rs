@@ -24,6 +24,7 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Score};
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
 /// How many features passed each step of FB. Every query keypoint is in exactly one state, so
@@ -217,26 +218,12 @@ pub fn entry(method: Method) -> &'static Entry {
         .unwrap_or_else(|| panic!("{method} is in no registry"))
 }
 
-/// A name that no estimator has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no method `{given}`; there are {}", names())]
-pub struct UnknownMethod {
-    /// The name.
-    pub given: String,
-}
-
-fn names() -> String {
-    methods().map(Method::name).collect::<Vec<_>>().join(", ")
-}
-
 impl FromStr for Method {
-    type Err = UnknownMethod;
+    type Err = UnknownWord;
 
-    fn from_str(text: &str) -> Result<Self, UnknownMethod> {
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
         let found = methods().find(|method| method.name() == text);
-        found.ok_or_else(|| UnknownMethod {
-            given: text.to_owned(),
-        })
+        found.ok_or_else(|| UnknownWord::among(text, "method", methods().map(Method::name)))
     }
 }
 
@@ -280,7 +267,7 @@ mod tests {
             assert_eq!(method.name().parse(), Ok(method));
         }
         let unknown = "sift".parse::<Method>().map_err(|error| error.to_string());
-        let words = "there is no method `sift`; there are fb, pm, mi, hy, nid";
+        let words = "`sift` is no method; fb, pm, mi, hy or nid expected";
         assert_eq!(unknown, Err(words.to_owned()));
     }
 }

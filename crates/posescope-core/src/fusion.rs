@@ -14,6 +14,9 @@ mod r_wavg;
 pub mod share;
 mod wavg;
 
+use std::fmt;
+use std::ops::Deref;
+use std::str::FromStr;
 use std::sync::Arc;
 
 pub use average::average_pose;
@@ -22,6 +25,7 @@ pub use share::{Fate, Share};
 use crate::estimator::Failure;
 use crate::event::{ReferencesFused, Stage};
 use crate::geometry::Pose;
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
 /// A fusion's place in the registry.
@@ -36,19 +40,59 @@ pub struct Entry {
     pub weigh: fn(&[usize]) -> Vec<f64>,
 }
 
-impl PartialEq for Entry {
+/// Every fusion, in the paper's order.
+pub const ALL: &[Entry] = &[maxf::ENTRY, avg::ENTRY, wavg::ENTRY, r_wavg::ENTRY];
+
+/// A fusion of the registry, to be handed around. Two are equal that have the same name.
+#[derive(Clone, Copy)]
+pub struct Fusion(&'static Entry);
+
+impl Fusion {
+    /// Every fusion, in the order of [`ALL`].
+    pub fn all() -> impl Iterator<Item = Self> {
+        ALL.iter().map(Self)
+    }
+}
+
+impl Deref for Fusion {
+    type Target = Entry;
+
+    fn deref(&self) -> &Entry {
+        self.0
+    }
+}
+
+impl PartialEq for Fusion {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
     }
 }
 
-/// Every fusion, in the paper's order.
-pub const ALL: &[Entry] = &[maxf::ENTRY, avg::ENTRY, wavg::ENTRY, r_wavg::ENTRY];
+impl Eq for Fusion {}
 
-/// The fusion of a name.
-pub fn find(name: &str) -> Option<&'static Entry> {
-    ALL.iter().find(|entry| entry.name == name)
+impl fmt::Debug for Fusion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Fusion").field(&self.name).finish()
+    }
 }
+
+impl fmt::Display for Fusion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name)
+    }
+}
+
+impl FromStr for Fusion {
+    type Err = UnknownWord;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWord> {
+        let names = ALL.iter().map(|entry| entry.name);
+        let found = Self::all().find(|fusion| fusion.name == name);
+        found.ok_or_else(|| UnknownWord::among(name, "fusion", names))
+    }
+}
+
+crate::serde_as_text!(Fusion);
 
 /// What one reference alone gave.
 #[derive(Clone, Debug)]
@@ -181,8 +225,8 @@ mod tests {
             })
             .collect();
         let mut history = History::default();
-        let entry = find(name).expect("a fusion");
-        let pose = fuse(entry, &candidates, &mut Trace::to(&mut history)).expect("not cancelled");
+        let entry: Fusion = name.parse().expect("a fusion");
+        let pose = fuse(&entry, &candidates, &mut Trace::to(&mut history)).expect("not cancelled");
         let told = history
             .records()
             .iter()
@@ -196,6 +240,21 @@ mod tests {
 
     fn x(name: &str, candidates: &[(usize, Result<Pose, Failure>)]) -> f64 {
         fused(name, candidates).0.expect("a pose").translation.x
+    }
+
+    #[test]
+    fn every_fusion_is_read_as_it_is_written() {
+        for fusion in Fusion::all() {
+            assert_eq!(fusion.to_string().parse(), Ok(fusion));
+            let json = serde_json::to_string(&fusion).expect("a string");
+            assert_eq!(json, format!("\"{}\"", fusion.name));
+            assert_eq!(serde_json::from_str::<Fusion>(&json).ok(), Some(fusion));
+        }
+        let error = "mean".parse::<Fusion>().expect_err("unknown").to_string();
+        assert_eq!(
+            error,
+            "`mean` is no fusion; maxf, avg, wavg or r-wavg expected"
+        );
     }
 
     #[test]

@@ -60,6 +60,7 @@ pub mod retrieval;
 pub mod robust;
 pub mod scene;
 pub mod solver;
+pub mod text;
 pub mod trace;
 
 pub use nalgebra;

@@ -50,7 +50,7 @@ impl Method {
 
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.0)
+        f.pad(self.0)
     }
 }
 
@@ -65,5 +65,23 @@ impl Ord for Method {
 impl PartialOrd for Method {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
+    }
+}
+
+crate::serde_as_text!(Method);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator;
+
+    #[test]
+    fn every_method_is_read_as_it_is_written() {
+        for method in estimator::methods() {
+            assert_eq!(method.to_string().parse(), Ok(method));
+            let json = serde_json::to_string(&method).expect("a string");
+            assert_eq!(json, format!("\"{}\"", method.name()));
+            assert_eq!(serde_json::from_str::<Method>(&json).ok(), Some(method));
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! from what the groups say of themselves ([`crate::describe`]).
 
 use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 use crate::cost::CostSettings;
 use crate::describe::{
@@ -30,6 +31,17 @@ pub struct Params {
     pub costs: CostSettings,
     /// `retrieval`: visual words, and the verification of what they find.
     pub retrieval: RetrievalParams,
+}
+
+/// Reads a configuration over the defaults, as [`Params::merge_toml`] does.
+impl FromStr for Params {
+    type Err = ParamError;
+
+    fn from_str(text: &str) -> Result<Self, ParamError> {
+        let mut params = Self::default();
+        params.merge_toml(text)?;
+        Ok(params)
+    }
 }
 
 impl Params {

@@ -14,7 +14,8 @@ pub struct BreakpointList {
 
 impl View for BreakpointList {
     fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let breakpoints = &scope.desk.setup.breakpoints;
+        let breakpoints = scope.desk.setup.task.breakpoints.iter();
+        let breakpoints: Vec<String> = breakpoints.map(ToString::to_string).collect();
         let parsed = self.text.parse::<Breakpoint>();
         let mut is_added = false;
         ui.horizontal(|ui| {

@@ -59,7 +59,7 @@ fn told<'a>(scope: &Scope<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
             })
             .collect()
     };
-    let others = scope.desk.setup.methods.iter().copied().rev();
+    let others = scope.desk.setup.task.protocol.methods.iter().copied().rev();
     scope
         .method()
         .into_iter()

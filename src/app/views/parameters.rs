@@ -33,7 +33,7 @@ impl View for Parameters {
             }
         });
         let mut params = match present {
-            true => scope.desk.setup.params.clone(),
+            true => scope.desk.setup.task.params.clone(),
             false => scope.run.params.clone(),
         };
         let other = match (&scope.desk.kept, present) {

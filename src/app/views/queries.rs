@@ -77,7 +77,7 @@ pub(super) fn dots(ui: &mut Ui, desk: &Desk, results: &[QueryResult]) {
     let failure_radius_m = desk.setup.failure_radius_m;
     ui.spacing_mut().item_spacing.x = 2.0;
     for method in estimator::methods() {
-        for result in results.iter().filter(|r| r.method == method.name()) {
+        for result in results.iter().filter(|r| r.method == method) {
             let (mark, color) = match result.verdict(failure_radius_m) {
                 Verdict::NoPose => ("×", theme::ESTIMATE),
                 Verdict::Far => ("▲", theme::FAR),

@@ -7,7 +7,7 @@ use super::queries::dots;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ReferencePick, Scope, theme};
 use crate::event::Side;
-use crate::fusion;
+use crate::fusion::Fusion;
 use crate::geometry::PoseError;
 use crate::localize::{QueryResult, Selection};
 
@@ -67,7 +67,7 @@ impl References {
     /// Looking for them in a long scene at every frame would be too slow.
     fn nearby(&mut self, scope: &Scope<'_>) -> &Nearby {
         let setup = &scope.desk.setup;
-        let radius_m = setup.prior_m.unwrap_or(setup.uncertainty_radius_m);
+        let radius_m = setup.task.reach_m();
         let is_known = self.nearby.as_ref().is_some_and(|nearby| {
             nearby.query == setup.query
                 && nearby.radius_m == radius_m
@@ -93,18 +93,18 @@ fn choice(ui: &mut Ui, scope: &Scope<'_>) {
             .map_or("", |(name, _)| name),
     };
     ui.horizontal(|ui| {
-        let count = match setup.pick {
+        let count = match setup.pick() {
             ReferencePick::ByHand => setup.chosen.frames.len(),
             ReferencePick::By(selection) => selection.count(),
         };
         let label = ui.label("Choose");
         ComboBox::from_id_salt("way")
-            .selected_text(name(setup.pick))
+            .selected_text(name(setup.pick()))
             .show_ui(ui, |ui| {
                 let ways = WAYS.map(|(_, way)| ReferencePick::By(way.with_count(count.max(1))));
                 for pick in ways.into_iter().chain([ReferencePick::ByHand]) {
                     if ui
-                        .selectable_label(setup.pick == pick, name(pick))
+                        .selectable_label(setup.pick() == pick, name(pick))
                         .clicked()
                     {
                         scope.send(Command::PickReferences(pick));
@@ -113,7 +113,7 @@ fn choice(ui: &mut Ui, scope: &Scope<'_>) {
             })
             .response
             .labelled_by(label.id);
-        if let ReferencePick::By(selection) = setup.pick {
+        if let ReferencePick::By(selection) = setup.pick() {
             let mut wanted = count;
             let drag = DragValue::new(&mut wanted)
                 .range(1..=20)
@@ -132,15 +132,15 @@ fn fusions(ui: &mut Ui, scope: &Scope<'_>) {
     let setup = &scope.desk.setup;
     ui.horizontal(|ui| {
         ui.label("Fuse");
-        for entry in fusion::ALL {
-            let is_on = setup.fusions.contains(&entry);
-            let response = ui.selectable_label(is_on, entry.name);
-            if response.on_hover_text(entry.about).clicked() {
+        let present = &setup.task.protocol.fusions;
+        for fusion in Fusion::all() {
+            let is_on = present.contains(&fusion);
+            let response = ui.selectable_label(is_on, fusion.name);
+            if response.on_hover_text(fusion.about).clicked() {
                 // In the order of the registry.
-                let all = fusion::ALL.iter();
-                let wanted = all.filter(|other| match *other == entry {
+                let wanted = Fusion::all().filter(|other| match *other == fusion {
                     true => !is_on,
-                    false => setup.fusions.contains(other),
+                    false => present.contains(other),
                 });
                 scope.send(Command::SetFusions(wanted.collect()));
             }

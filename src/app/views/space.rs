@@ -99,7 +99,7 @@ impl View for Space {
         let looks = ui.horizontal_wrapped(|ui| {
             controls::looks(
                 ui,
-                &scope.desk.setup.methods,
+                &scope.desk.setup.task.protocol.methods,
                 &mut self.layers,
                 &content.cameras,
                 through,

@@ -2,8 +2,12 @@
 
 use super::super::metrics::{Row, measure, tests::row};
 use super::*;
-use crate::localize::Setting;
-use crate::run::{Camera, RUN_SCHEMA};
+use crate::localize::{Selection, Setting};
+use crate::run::{Camera, Protocol, RUN_SCHEMA};
+
+fn fusion(name: &str) -> Fusion {
+    name.parse().expect("a fusion")
+}
 
 fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
     let names = |of: fn(&(&str, &str)) -> String| scenes.iter().map(of).collect::<Vec<_>>();
@@ -14,28 +18,28 @@ fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
         queries: names(|pair| pair.1.to_owned()),
         format: None,
         experiment: Some(experiment),
-        methods: vec!["fb".to_owned(), "mi".to_owned()],
-        references: if experiment == Experiment::Single {
-            "random:1"
-        } else {
-            "random:2"
-        }
-        .to_owned(),
-        fusions: match experiment {
-            Experiment::Single => Vec::new(),
-            Experiment::Multi => vec!["avg".to_owned(), "r-wavg".to_owned()],
-            Experiment::Large => vec!["r-wavg".to_owned()],
+        protocol: Protocol {
+            methods: vec![Method::FB, Method::MI],
+            references: match experiment {
+                Experiment::Single => Selection::Random(1),
+                Experiment::Multi | Experiment::Large => Selection::Random(2),
+            },
+            fusions: match experiment {
+                Experiment::Single => Vec::new(),
+                Experiment::Multi => vec![fusion("avg"), fusion("r-wavg")],
+                Experiment::Large => vec![fusion("r-wavg")],
+            },
+            prior_m: (experiment == Experiment::Large).then_some(200.0),
+            seed: 0,
         },
         radii_m: if experiment == Experiment::Single {
             vec![10.0, 15.0]
         } else {
             vec![10.0]
         },
-        prior_m: (experiment == Experiment::Large).then_some(200.0),
         share: 0.1,
         limit: None,
         failure_radius_m: 10.0,
-        seed: 0,
         shard: None,
         pairs: scenes
             .iter()
@@ -68,7 +72,7 @@ fn at(row: Row, scene: &str, radius_m: f64, references: usize, fusion: Option<&s
             radius_m,
             references,
         }),
-        fusion: fusion.map(str::to_owned),
+        fusion: fusion.map(self::fusion),
         ..row
     }
 }

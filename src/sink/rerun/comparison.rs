@@ -12,6 +12,7 @@ use super::scene::Origin;
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets};
 use crate::localize::QueryResult;
+use crate::method::Method;
 use crate::palette::{self, Rgb};
 use crate::run::{FolderError, read_results};
 
@@ -42,14 +43,14 @@ pub fn record_comparison(
 ) -> Result<(), ComparisonError> {
     let mut queries: BTreeMap<String, usize> = BTreeMap::new();
     let mut stream: Option<(Stream, Origin)> = None;
-    let mut methods: Vec<String> = Vec::new();
+    let mut methods: Vec<Method> = Vec::new();
     for ((run, color), folder) in RUNS.into_iter().zip([before, after]) {
         for result in read_results::<QueryResult>(folder)? {
             let result = result?;
             let next = queries.len();
             let query = *queries.entry(key(&result)).or_insert(next);
             if !methods.contains(&result.method) {
-                methods.push(result.method.clone());
+                methods.push(result.method);
             }
             let (stream, origin) = match &mut stream {
                 Some(open) => open,
@@ -124,9 +125,9 @@ fn log(stream: &mut Stream, origin: Origin, result: &QueryResult, run: &str, col
     );
 }
 
-fn root(methods: &[String]) -> Node {
+fn root(methods: &[Method]) -> Node {
     let errors = methods.iter().map(|method| {
-        let name = format!("{}: translation error (m)", method.to_uppercase());
+        let name = format!("{}: translation error (m)", method.name().to_uppercase());
         (
             1.0,
             View::new("TimeSeries", name, format!("error/{method}")).into(),

@@ -58,7 +58,7 @@ fn verdicts(results: &[QueryResult], failure_radius_m: f64) -> String {
         row(
             &mut text,
             &[
-                &result.method,
+                result.method.name(),
                 &result.references.join(", "),
                 &verdict,
                 &part(PoseError::translation),
@@ -96,7 +96,7 @@ fn features(results: &[QueryResult]) -> String {
             counts.inliers,
         ]
         .map(|count| count.to_string());
-        let mut cells: Vec<&str> = vec![&result.method];
+        let mut cells: Vec<&str> = vec![result.method.name()];
         cells.extend(numbers.iter().map(String::as_str));
         row(&mut text, &cells);
     }
@@ -115,7 +115,7 @@ fn costs(results: &[QueryResult]) -> String {
         row(
             &mut text,
             &[
-                &result.method,
+                result.method.name(),
                 &number(Some(cost.best)),
                 &number(cost.truth),
                 &number(cost.initial),

@@ -13,7 +13,7 @@ use super::{
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::KindSet;
 use crate::features::remembered;
-use crate::fusion;
+use crate::fusion::{self, Fusion};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::params::Params;
@@ -43,7 +43,7 @@ pub struct Request {
     /// fails.
     pub references: References,
     /// The fusions to make; without any, each reference gives a result of its own.
-    pub fusions: Vec<&'static fusion::Entry>,
+    pub fusions: Vec<Fusion>,
     /// What the results are marked with.
     pub setting: Option<Setting>,
 }
@@ -172,9 +172,9 @@ impl<'a> Localizer<'a> {
                 };
                 if members.is_empty() {
                     let failure = Failure::NoReference {
-                        radius_m: Some(request.radius_m),
+                        radius_m: request.references.within_m,
                     };
-                    let fusions = request.fusions.iter().map(|fusion| Some(fusion.name));
+                    let fusions = request.fusions.iter().copied().map(Some);
                     let lines = if request.fusions.is_empty() {
                         vec![None]
                     } else {
@@ -197,7 +197,7 @@ impl<'a> Localizer<'a> {
                 if !request.fusions.is_empty() {
                     self.count_matches(&mut work, members, watch)?;
                 }
-                for fusion in &request.fusions {
+                for &fusion in &request.fusions {
                     let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
                     emit(result, times)?;
                 }
@@ -236,11 +236,11 @@ impl<'a> Localizer<'a> {
         &self,
         work: &Work<'_>,
         method: Method,
-        fusion: Option<&str>,
+        fusion: Option<Fusion>,
         failure: &Failure,
     ) -> QueryResult {
         QueryResult {
-            fusion: fusion.map(str::to_owned),
+            fusion,
             ..QueryResult::new(
                 self.references.name(),
                 &work.query.name,
@@ -367,7 +367,7 @@ impl<'a> Localizer<'a> {
         work: &Work<'_>,
         members: &[usize],
         method: Method,
-        fusion: &fusion::Entry,
+        fusion: Fusion,
         watch: &mut dyn Watch,
     ) -> Result<(QueryResult, StageTimes), Cancelled> {
         let solved: Vec<(&Problem, usize, &Candidate)> = members
@@ -388,7 +388,7 @@ impl<'a> Localizer<'a> {
             .collect();
         watch.begin_fusion(method);
         let sink: &mut dyn Sink = watch;
-        let pose = fusion::fuse(fusion, &candidates, &mut Trace::to(sink))?;
+        let pose = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
         let truth = work.truth.as_ref();
         // Where one would start from with a single reference: the one with the most matches.
         let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
@@ -397,7 +397,7 @@ impl<'a> Localizer<'a> {
                 .iter()
                 .map(|(problem, ..)| problem.reference.name.clone())
                 .collect(),
-            fusion: Some(fusion.name.to_owned()),
+            fusion: Some(fusion),
             initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
                 PoseError::between(truth, &problem.reference.world_from_camera)
             }),

@@ -1,13 +1,18 @@
 //! One query, one method: the object of `run --json` and of a run folder.
 
+use std::fmt;
+use std::str::FromStr;
+
 use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
 use crate::estimator::{self, CostSummary, Failure, FeatureCounts, Outcome};
+use crate::fusion::Fusion;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
+use crate::text::UnknownWord;
 
 /// The version of the result's form.
 pub const SCHEMA: &str = "posescope.result/1";
@@ -26,10 +31,10 @@ pub struct QueryResult {
     pub query: String,
     /// The reference frames' names.
     pub references: Vec<String>,
-    /// Short name of the method.
-    pub method: String,
-    /// Short name of the fusion, if references were fused.
-    pub fusion: Option<String>,
+    /// The method.
+    pub method: Method,
+    /// The fusion, if references were fused.
+    pub fusion: Option<Fusion>,
     /// The seed of every random choice.
     pub seed: u64,
     /// What an experiment varies.
@@ -66,14 +71,43 @@ pub struct Setting {
 }
 
 /// Whether a query was localised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// There is a pose.
     Ok,
     /// There is a reason.
     Failed,
 }
+
+impl Status {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Ok, Self::Failed];
+
+    /// In one word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Status {
+    type Err = UnknownWord;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWord> {
+        let found = Self::ALL.into_iter().find(|status| status.name() == name);
+        found.ok_or_else(|| UnknownWord::among(name, "status", Self::ALL.map(Self::name)))
+    }
+}
+
+crate::serde_as_text!(Status);
 
 /// A reason with its code.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -215,7 +249,7 @@ impl QueryResult {
             query_scene: None,
             query: query.to_owned(),
             references: Vec::new(),
-            method: method.name().to_owned(),
+            method,
             fusion: None,
             seed,
             setting: None,

@@ -18,6 +18,7 @@ use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use crate::scene::{Scene, SceneError};
+use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
 /// How references are chosen.
@@ -70,11 +71,14 @@ impl fmt::Display for Selection {
 }
 
 impl FromStr for Selection {
-    type Err = String;
+    type Err = UnknownWord;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected =
-            || "random:K, nearest:K, maxf:K or retrieve:K expected, with K from 1".to_owned();
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let expected = || UnknownWord {
+            found: text.to_owned(),
+            kind: "choice of references",
+            expected: "random:K, nearest:K, maxf:K or retrieve:K with K from 1".to_owned(),
+        };
         let (how, count) = text.split_once(':').ok_or_else(expected)?;
         let count: usize = count.parse().map_err(|_| expected())?;
         if count == 0 {
@@ -89,6 +93,8 @@ impl FromStr for Selection {
         }
     }
 }
+
+crate::serde_as_text!(Selection);
 
 /// Something that ranks reference frames for a query by what they look like: an index to ask.
 pub trait Ranking: Send + Sync {
@@ -116,6 +122,9 @@ pub struct References {
     pub frames: Vec<usize>,
     /// How they were found, where something ranked them.
     pub ranking: Option<Arc<ReferenceRanking>>,
+    /// How far from the query's known position they were sought \[m\]; `None` where they were named,
+    /// or the position is not known.
+    pub within_m: Option<f64>,
 }
 
 impl From<Vec<usize>> for References {
@@ -123,6 +132,7 @@ impl From<Vec<usize>> for References {
         Self {
             frames,
             ranking: None,
+            within_m: None,
         }
     }
 }
@@ -248,24 +258,28 @@ impl Chooser<'_> {
             }
         };
         let count = self.selection.count();
-        match self.selection {
-            Selection::Random(_) => Ok(draw(within, count, name, self.seed).into()),
+        let chosen = match self.selection {
+            Selection::Random(_) => draw(within, count, name, self.seed).into(),
             Selection::Nearest(_) => {
                 within.truncate(count);
-                Ok(within.into())
+                within.into()
             }
             Selection::Matched(_) => {
                 let by_matches = ByMatches {
                     scene: references,
                     params: self.params,
                 };
-                self.ranked(query, &within, &by_matches, watch)
+                self.ranked(query, &within, &by_matches, watch)?
             }
             Selection::Retrieved(_) => {
                 let index = self.index.ok_or(ChoiceError::NoIndex)?;
-                self.ranked(query, &within, index, watch)
+                self.ranked(query, &within, index, watch)?
             }
-        }
+        };
+        Ok(References {
+            within_m: place.map(|_| self.radius_m),
+            ..chosen
+        })
     }
 
     fn ranked(
@@ -298,6 +312,7 @@ impl Chooser<'_> {
                 chosen: count.min(frames.len()),
                 frames,
             })),
+            within_m: None,
         })
     }
 }

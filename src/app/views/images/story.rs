@@ -51,7 +51,7 @@ impl<'a> Story<'a> {
         let part = match scope.method().filter(|&here| with_features(here)) {
             Some(here) => scope.of(here),
             None => {
-                let mut asked = scope.desk.setup.methods.iter().copied();
+                let mut asked = scope.desk.setup.task.protocol.methods.iter().copied();
                 asked.find_map(|method| with_features(method).then(|| scope.of(method))?)
             }
         };

@@ -195,7 +195,7 @@ pub(super) fn cameras(
     };
     let mut all = vec![camera(Who::Reference, problem.reference.world_from_camera)];
     all.extend(truth.map(|pose| camera(Who::Truth, *pose)));
-    for &method in &scope.desk.setup.methods {
+    for &method in &scope.desk.setup.task.protocol.methods {
         if let Some(pose) = estimate(scope, method) {
             all.push(camera(Who::Estimate(method), pose));
         }

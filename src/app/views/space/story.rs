@@ -132,7 +132,7 @@ impl<'a> SearchStory<'a> {
 pub(super) fn colored<'a>(scope: &Scope<'a>) -> Option<&'a Arc<ColoredCloud>> {
     let here = scope.latest::<CloudColored>();
     let other = || {
-        let methods = scope.desk.setup.methods.iter();
+        let methods = scope.desk.setup.task.protocol.methods.iter();
         methods
             .copied()
             .find_map(|method| scope.latest_of::<CloudColored>(method))

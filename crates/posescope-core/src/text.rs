@@ -1,0 +1,114 @@
+//! What is written as a word: on the command line, in files, in tables.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::str::FromStr;
+
+use serde::Deserializer;
+use serde::de::Visitor;
+
+/// A word that is none of those expected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{found}` is no {kind}; {expected} expected")]
+pub struct UnknownWord {
+    /// The word.
+    pub found: String,
+    /// What it should have named.
+    pub kind: &'static str,
+    /// The words there are.
+    pub expected: String,
+}
+
+impl UnknownWord {
+    /// One of `names` expected.
+    pub fn among(
+        found: &str,
+        kind: &'static str,
+        names: impl IntoIterator<Item = &'static str>,
+    ) -> Self {
+        let names: Vec<&str> = names.into_iter().collect();
+        let expected = match names.split_last() {
+            Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+            _ => names.concat(),
+        };
+        Self {
+            found: found.to_owned(),
+            kind,
+            expected,
+        }
+    }
+}
+
+/// What is wrong with a piece of JSON, without the line, which its reader counts in the whole file.
+pub fn json_message(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    match text.strip_suffix(&place) {
+        Some(message) => format!("column {}: {message}", error.column()),
+        None => text,
+    }
+}
+
+/// Reads a string as what it says. An error has the place of the string.
+///
+/// # Errors
+/// No string, or what `FromStr` says of it.
+pub fn parsed<'de, T, D>(deserializer: D) -> Result<T, D::Error>
+where
+    T: FromStr,
+    T::Err: fmt::Display,
+    D: Deserializer<'de>,
+{
+    // Parsed within the visitor: what is refused only later has a later place.
+    struct Words<T>(PhantomData<T>);
+
+    impl<T: FromStr<Err: fmt::Display>> Visitor<'_> for Words<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a string")
+        }
+
+        fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<T, E> {
+            text.parse().map_err(E::custom)
+        }
+    }
+
+    deserializer.deserialize_str(Words(PhantomData))
+}
+
+/// Reads and writes a type that has `Display` and `FromStr` as a string. What `FromStr` says of a
+/// wrong one reaches the reader of the file.
+#[macro_export]
+macro_rules! serde_as_text {
+    ($type:ty) => {
+        impl ::serde::Serialize for $type {
+            fn serialize<S: ::serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.collect_str(self)
+            }
+        }
+
+        impl<'de> ::serde::Deserialize<'de> for $type {
+            fn deserialize<D: ::serde::Deserializer<'de>>(
+                deserializer: D,
+            ) -> Result<Self, D::Error> {
+                $crate::text::parsed(deserializer)
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_word_is_told_which_there_are() {
+        let unknown = UnknownWord::among("xx", "method", ["fb", "pm", "mi"]);
+        assert_eq!(
+            unknown.to_string(),
+            "`xx` is no method; fb, pm or mi expected"
+        );
+        assert_eq!(UnknownWord::among("xx", "fusion", ["avg"]).expected, "avg");
+    }
+}

@@ -1,0 +1,193 @@
+//! What is asked, by `run`, by `view` and in the window: everything but the query.
+
+use std::fmt::Display;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::breakpoint::Breakpoint;
+use crate::method::Method;
+use crate::params::Params;
+use crate::run::Protocol;
+
+/// Where references and queries are, and how a query is localised. The command line turns into it,
+/// the window and its sessions keep it, and [`Self::command_line`] writes it down again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// The scene of the references, as it is named on the command line.
+    pub scene: String,
+    /// The scene of the queries, if it is another one.
+    pub queries: Option<String>,
+    /// The format of both, where their content does not tell.
+    pub format: Option<String>,
+    /// Whether references are named by hand, rather than chosen as the protocol says.
+    pub by_hand: bool,
+    /// The index that a choice by looks asks; without it, the one in its usual place.
+    pub index: Option<PathBuf>,
+    /// How far the query may be from a reference \[m\].
+    pub radius_m: f64,
+    /// How references are chosen and queries localised.
+    pub protocol: Protocol,
+    /// Parameters of the estimators.
+    #[serde(
+        serialize_with = "write_params",
+        deserialize_with = "posescope_core::text::parsed"
+    )]
+    pub params: Params,
+    /// Where the run is to stop.
+    pub breakpoints: Vec<Breakpoint>,
+}
+
+/// As a configuration file, with every parameter.
+fn write_params<S: Serializer>(params: &Params, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&params.to_toml())
+}
+
+impl Task {
+    /// What is asked of a scene where nobody says more.
+    pub fn of(scene: impl Into<String>) -> Self {
+        Self {
+            scene: scene.into(),
+            queries: None,
+            format: None,
+            by_hand: false,
+            index: None,
+            radius_m: Protocol::RADIUS_M,
+            protocol: Protocol::default(),
+            params: Params::default(),
+            breakpoints: Vec::new(),
+        }
+    }
+
+    /// How far from a query's known position its references may be \[m\].
+    pub fn reach_m(&self) -> f64 {
+        self.protocol.reach_m(self.radius_m)
+    }
+
+    /// The arguments of `posescope` that ask the same of a query: `run`, the scene, the options.
+    /// With `references`, against these frames; without, against those that the protocol chooses.
+    pub fn arguments(&self, query: &str, references: &[String]) -> Vec<String> {
+        let protocol = &self.protocol;
+        let mut arguments = vec!["run".to_owned(), self.scene.clone()];
+        let mut option = |name: &str, value: &dyn Display| {
+            arguments.extend([format!("--{name}"), value.to_string()]);
+        };
+        if let Some(format) = &self.format {
+            option("format", format);
+        }
+        if let Some(queries) = &self.queries {
+            option("queries", queries);
+        }
+        option("query", &query);
+        for reference in references {
+            option("reference", reference);
+        }
+        if references.is_empty() {
+            option("references", &protocol.references);
+        }
+        if let Some(index) = &self.index {
+            option("index", &index.display());
+        }
+        option("radius", &self.radius_m);
+        if let Some(prior_m) = protocol.prior_m {
+            option("prior", &prior_m);
+        }
+        if protocol.methods != Method::PAPER {
+            option("method", &joined(&protocol.methods));
+        }
+        if !protocol.fusions.is_empty() {
+            option("fusion", &joined(&protocol.fusions));
+        }
+        option("seed", &protocol.seed);
+        for change in self.params.changes() {
+            option("set", &change);
+        }
+        for breakpoint in &self.breakpoints {
+            option("break", breakpoint);
+        }
+        arguments
+    }
+
+    /// The command line that asks the same of a query, for a POSIX shell. See [`Self::arguments`].
+    pub fn command_line(&self, query: &str, references: &[String]) -> String {
+        let arguments = self.arguments(query, references);
+        let words: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
+        format!("posescope {}", words.join(" "))
+    }
+}
+
+fn joined(names: &[impl Display]) -> String {
+    let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+    names.join(",")
+}
+
+/// A word as a POSIX shell reads it back.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With nothing as it is by default.
+    fn task() -> Task {
+        let mut params = Params::default();
+        params.assign("fb.ratio=0.75").expect("a good value");
+        Task {
+            queries: Some("street:night".to_owned()),
+            format: Some("street".to_owned()),
+            index: Some("my index".into()),
+            radius_m: 12.5,
+            protocol: Protocol {
+                references: "retrieve:3".parse().expect("a choice"),
+                prior_m: Some(80.0),
+                methods: vec![Method::FB, Method::MI],
+                fusions: ["avg", "r-wavg"]
+                    .map(|name| name.parse().expect("a fusion"))
+                    .to_vec(),
+                seed: 9,
+            },
+            params,
+            breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
+            ..Task::of("street")
+        }
+    }
+
+    #[test]
+    fn the_command_line_leaves_nothing_out() {
+        assert_eq!(
+            task().command_line("000070", &[]),
+            "posescope run street --format street --queries street:night --query 000070 \
+             --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
+             --fusion avg,r-wavg --seed 9 --set fb.ratio=0.75 --break 'inliers < 10'"
+        );
+        let by_hand = Task {
+            by_hand: true,
+            ..Task::of("street")
+        };
+        assert_eq!(
+            by_hand.command_line("000070", &["000062".to_owned()]),
+            "posescope run street --query 000070 --reference 000062 --radius 15 --seed 0"
+        );
+    }
+
+    #[test]
+    fn a_task_is_read_as_it_is_written() {
+        let json = serde_json::to_string(&task()).expect("a form in JSON");
+        let read: Task = serde_json::from_str(&json).expect("our own");
+        assert_eq!(read, task());
+    }
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_split_them() {
+        assert_eq!(quoted("street:night"), "street:night");
+        assert_eq!(quoted("my data/00"), "'my data/00'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
+}
