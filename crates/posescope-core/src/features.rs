@@ -25,6 +25,7 @@ mod hessian;
 mod integral;
 mod matching;
 mod orientation;
+mod params;
 mod remembered;
 mod state;
 mod surf;
@@ -34,9 +35,10 @@ use nalgebra::Point2;
 pub use matching::{
     Match, MatchVerdict, Neighbours, classify, nearest_neighbours, nearest_neighbours_interruptible,
 };
+pub use params::SurfParams;
 pub use remembered::{remembered, remembered_interruptible};
 pub use state::FeatureState;
-pub use surf::{SurfParams, surf, surf_interruptible};
+pub use surf::{surf, surf_interruptible};
 
 /// A blob: the place in an image that a descriptor describes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,56 +9,7 @@ use super::descriptor::Describer;
 use super::detector::detect;
 use super::integral::IntegralImage;
 use super::orientation::OrientationEstimator;
-use super::{Features, Keypoint};
-use crate::describe::parameters;
-
-parameters! {
-    /// What [`surf`] looks for.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct SurfParams {
-        /// Smallest response of a feature, the determinant of the Hessian.
-        ///
-        /// The response is the determinant of (2.5 σ)² times the Hessian of an image with values from
-        /// 0 to 255, as for OpenCV's `hessianThreshold`. A Gaussian blob whose peak differs by a from
-        /// the ground reaches about 0.8 a².
-        pub threshold: f64 = number("threshold", "", 0.0..=1e6),
-        /// Number of octaves, doublings of the scale that are searched.
-        ///
-        /// The first finds blobs with σ from 1.6 px to 3.2 px; each further one doubles the scale
-        /// (section 3.3).
-        pub octaves: usize = count("octaves", "", 1..=8),
-        /// Number of filter sizes in each octave.
-        ///
-        /// Octaves join without a gap from 4 on; more make them overlap, and the features that are
-        /// found twice fail the ratio test.
-        pub intervals: usize = count("intervals", "", 3..=12),
-        /// Whether to leave features upright (U-SURF): for cameras that do not roll, this is faster,
-        /// and tells more features apart.
-        pub upright: bool = flag("upright"),
-        /// Distance between the samples of the first octave; it doubles with each octave.
-        pub initial_step: usize = count("initial_step", "px", 1..=8),
-        /// Largest number of features to keep, the strongest; 0 keeps all.
-        pub max_keypoints: usize = count("max_keypoints", "", 0..=1_000_000),
-    }
-}
-
-impl Default for SurfParams {
-    /// Four octaves of four filter sizes as in the paper, but sampled at every pixel at first, not
-    /// at every second one, which loses a third of the features, and of the remaining ones finds
-    /// fewer again in a turned and enlarged image: 0.64 in place of 0.68. The threshold gives
-    /// about 2,000 features for a street scene of 1241 × 376 px. Upright, because cars do not roll:
-    /// that gives more matches and smaller errors there.
-    fn default() -> Self {
-        Self {
-            threshold: 500.0,
-            octaves: 4,
-            intervals: 4,
-            upright: true,
-            initial_step: 1,
-            max_keypoints: 0,
-        }
-    }
-}
+use super::{Features, Keypoint, SurfParams};
 
 /// Finds the SURF features of an image.
 ///
