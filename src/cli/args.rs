@@ -10,12 +10,12 @@ use posescope::fusion::Fusion;
 use posescope::localize::Selection;
 use posescope::measure::{Format, Gate, Tolerance};
 use posescope::method::Method;
+use posescope::params::Params;
 use posescope::run::{Experiment, Protocol, Shard};
 use posescope::scene::street::{Size, Street};
 use posescope::session::{Breakpoint, Task};
 
 use super::failure::CliError;
-use super::params;
 
 /// See why a camera pose estimate fails.
 ///
@@ -74,6 +74,26 @@ pub struct ConfigArgs {
     /// Set a parameter, after --config; repeatable, for example fb.ratio=0.7
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub assignments: Vec<String>,
+}
+
+impl ConfigArgs {
+    /// The parameters that the arguments describe.
+    pub fn resolve(&self) -> Result<Params, CliError> {
+        let mut params = Params::default();
+        if let Some(path) = &self.config {
+            let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;
+            params
+                .merge_toml(&text)
+                .map_err(|source| CliError::Config {
+                    path: path.clone(),
+                    source,
+                })?;
+        }
+        for assignment in &self.assignments {
+            params.assign(assignment)?;
+        }
+        Ok(params)
+    }
 }
 
 #[derive(Debug, Args)]
@@ -154,7 +174,7 @@ impl TaskArgs {
             index: self.index.clone(),
             radius_m: self.radius,
             protocol: self.protocol.over(Protocol::default()),
-            params: params::resolve(&self.protocol.config)?,
+            params: self.protocol.config.resolve()?,
             breakpoints: self.breakpoints.clone(),
         })
     }

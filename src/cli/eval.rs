@@ -12,12 +12,12 @@ use posescope::run::{
 use posescope::scene::{self, Retriever, Scene};
 
 use super::args::EvalArgs;
+use super::diff;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
 use super::output;
 use super::run::use_threads;
 use super::terminal::Terminal;
-use super::{diff, params};
 
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
@@ -47,7 +47,7 @@ fn default_folder(args: &EvalArgs) -> PathBuf {
 }
 
 fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFile, CliError> {
-    let params = params::resolve(&args.protocol.config)?;
+    let params = args.protocol.config.resolve()?;
     let scenes = Scenes {
         references: open_all(&args.scenes, args)?,
         queries: open_all(&args.queries, args)?,

@@ -5,14 +5,13 @@ use posescope::scene::{self, IndexOptions, NoIndex, Retriever};
 
 use super::args::IndexArgs;
 use super::failure::CliError;
-use super::params;
 use super::run::use_threads;
 use super::terminal::Terminal;
 
 /// Runs the command. An index that is there and what is asked for is left as it is.
 pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     use_threads(args.threads)?;
-    let params = params::resolve(&args.config)?;
+    let params = args.config.resolve()?;
     let scene = scene::open(&args.scene, args.format.as_deref())?;
     let path = match &args.output {
         Some(path) => path.clone(),

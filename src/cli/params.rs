@@ -7,27 +7,9 @@ use super::args::ConfigArgs;
 use super::failure::CliError;
 use super::output;
 
-/// The parameters that the arguments describe.
-pub fn resolve(config: &ConfigArgs) -> Result<Params, CliError> {
-    let mut params = Params::default();
-    if let Some(path) = &config.config {
-        let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;
-        params
-            .merge_toml(&text)
-            .map_err(|source| CliError::Config {
-                path: path.clone(),
-                source,
-            })?;
-    }
-    for assignment in &config.assignments {
-        params.assign(assignment)?;
-    }
-    Ok(params)
-}
-
 /// Prints all parameters; those that differ from their default are marked.
 pub fn print(config: &ConfigArgs) -> Result<(), CliError> {
-    let params = resolve(config)?;
+    let params = config.resolve()?;
     let mut table = Table::new();
     table
         .load_preset(presets::NOTHING)

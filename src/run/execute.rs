@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::run_file::{Item, Pair, RunFile};
+use super::pair::Pair;
+use super::run_file::{Item, RunFile};
 use super::run_folder::{FolderError, RunFolder};
 use crate::estimator::Failure;
 use crate::fusion::Fusion;

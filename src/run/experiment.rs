@@ -8,8 +8,8 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
+use super::pair::{Pair, cameras_of, times_of};
 use super::protocol::Protocol;
-use super::run_file::{Pair, cameras_of, times_of};
 use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;

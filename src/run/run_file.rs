@@ -4,12 +4,11 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::experiment::Experiment;
+use super::pair::{Camera, Pair};
 use super::protocol::Protocol;
-use crate::camera::Intrinsics;
 use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
-use crate::scene::Scene;
 
 /// The version of the file's form.
 pub const RUN_SCHEMA: &str = "posescope.run/1";
@@ -216,66 +215,6 @@ impl Places {
     }
 }
 
-/// A scene of references with one of queries, perhaps the same.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Pair {
-    /// Position of the references' scene among the scenes.
-    pub scene_index: usize,
-    /// The name of the references' scene.
-    pub scene: String,
-    /// The name of the queries' scene.
-    pub query_scene: String,
-    /// The camera of the queries; the first one's where they have several.
-    pub camera: Camera,
-    /// The camera of each query, where they have several.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cameras: Vec<Camera>,
-    /// Frames that were drawn as queries; where the scenes are the same, none is a reference.
-    pub drawn: Vec<String>,
-    /// The queries: all that were drawn, or those of them that were named.
-    pub queries: Vec<String>,
-    /// When they were taken \[s\], where that is known of all.
-    pub times_s: Vec<f64>,
-}
-
-/// Intrinsics \[px\], with the centre of the top-left pixel at (0, 0).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Camera {
-    /// Image width.
-    pub width: u32,
-    /// Image height.
-    pub height: u32,
-    /// Focal length, horizontally.
-    pub fx: f64,
-    /// Focal length, vertically.
-    pub fy: f64,
-    /// Principal point, horizontally.
-    pub cx: f64,
-    /// Principal point, vertically.
-    pub cy: f64,
-}
-
-impl From<Intrinsics> for Camera {
-    fn from(intrinsics: Intrinsics) -> Self {
-        let Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = intrinsics;
-        Self {
-            width,
-            height,
-            fx,
-            fy,
-            cx,
-            cy,
-        }
-    }
-}
-
 /// One query of a pair: what is done, written and spread as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Item<'a> {
@@ -375,23 +314,6 @@ impl RunFile {
             shard: None,
             ..self.clone()
         }
-    }
-}
-
-/// When the queries of a scene were taken, if that is known of all.
-pub(super) fn times_of(scene: &dyn Scene, queries: &[usize]) -> Vec<f64> {
-    let times: Option<Vec<f64>> = queries.iter().map(|&frame| scene.time_s(frame)).collect();
-    times.unwrap_or_default()
-}
-
-/// The camera of the first of some frames, and that of each where they have several.
-pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (Camera, Vec<Camera>) {
-    let camera = |frame: usize| Camera::from(scene.intrinsics(frame));
-    let first = camera(frames.first().copied().unwrap_or(0));
-    let cameras: Vec<Camera> = frames.iter().map(|&frame| camera(frame)).collect();
-    match cameras.iter().all(|camera| *camera == first) {
-        true => (first, Vec::new()),
-        false => (first, cameras),
     }
 }
 

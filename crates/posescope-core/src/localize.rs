@@ -1,6 +1,7 @@
 //! Localising queries: choosing references, estimating, fusing, and measuring the outcome against the
 //! ground truth, which no problem and no estimator sees.
 
+mod choose;
 mod localizer;
 mod result;
 mod select;
@@ -9,13 +10,13 @@ mod timing;
 mod verdict;
 mod watch;
 
+pub use choose::Chooser;
 pub use localizer::{LocalizeError, Localizer, Request};
 pub use result::{
     CostReport, Diagnosis, PoseReport, QueryResult, Reason, SCHEMA, Setting, Status, evaluate,
 };
 pub use select::{
-    ByMatches, ChoiceError, Chooser, Ranking, References, Selection, draw, frames_within,
-    tell_ranking,
+    ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, tell_ranking,
 };
 pub use single::{localize, localize_by, localize_traced, words_of};
 pub use timing::{StageTimes, StageTimings};

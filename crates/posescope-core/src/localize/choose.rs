@@ -1,0 +1,115 @@
+//! Choosing the references of a query.
+
+use std::sync::Arc;
+
+use super::select::{ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within};
+use super::watch::checkpoint;
+use super::{Localizer, Watch};
+use crate::params::Params;
+use crate::retrieval::{RankedReference, ReferenceRanking};
+
+/// Chooses references for queries.
+pub struct Chooser<'a> {
+    /// Whose frames are ranked, and what is known about them.
+    pub localizer: &'a Localizer<'a>,
+    /// Parameters of features and matching.
+    pub params: &'a Params,
+    /// How.
+    pub selection: Selection,
+    /// How far from the query's known position a reference may be \[m\].
+    pub radius_m: f64,
+    /// Seed of the draw.
+    pub seed: u64,
+    /// What [`Selection::Retrieved`] asks.
+    pub index: Option<&'a dyn Ranking>,
+}
+
+impl Chooser<'_> {
+    /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
+    /// that it must not be one; the query itself never is. `watch` hears nothing, but can stop it.
+    ///
+    /// # Errors
+    /// [`ChoiceError`].
+    pub fn choose(
+        &self,
+        query: usize,
+        left_out: &dyn Fn(usize) -> bool,
+        watch: &mut dyn Watch,
+    ) -> Result<References, ChoiceError> {
+        let (references, queries) = (self.localizer.references(), self.localizer.queries());
+        let name = &queries.frames()[query];
+        let place = queries.pose(query);
+        let is_same_scene = references.name() == queries.name();
+        let excluded = |frame| is_same_scene && frame == query || left_out(frame);
+        let mut within = match (place, self.selection) {
+            (Some(place), _) => frames_within(references, &place, self.radius_m, &excluded),
+            // What a place looks like is known even where nobody knows where it is.
+            (None, Selection::Retrieved(_)) => (0..references.frames().len())
+                .filter(|&frame| !excluded(frame) && references.has_cloud(frame))
+                .filter(|&frame| references.pose(frame).is_some())
+                .collect(),
+            (None, _) => {
+                return Err(ChoiceError::UnknownPosition {
+                    query: name.clone(),
+                });
+            }
+        };
+        let count = self.selection.count();
+        let chosen = match self.selection {
+            Selection::Random(_) => draw(within, count, name, self.seed).into(),
+            Selection::Nearest(_) => {
+                within.truncate(count);
+                within.into()
+            }
+            Selection::Matched(_) => {
+                let by_matches = ByMatches {
+                    scene: references,
+                    params: self.params,
+                };
+                self.ranked(query, &within, &by_matches, watch)?
+            }
+            Selection::Retrieved(_) => {
+                let index = self.index.ok_or(ChoiceError::NoIndex)?;
+                self.ranked(query, &within, index, watch)?
+            }
+        };
+        Ok(References {
+            within_m: place.map(|_| self.radius_m),
+            ..chosen
+        })
+    }
+
+    fn ranked(
+        &self,
+        query: usize,
+        candidates: &[usize],
+        by: &dyn Ranking,
+        watch: &mut dyn Watch,
+    ) -> Result<References, ChoiceError> {
+        let (references, queries) = (self.localizer.references(), self.localizer.queries());
+        let count = self.selection.count();
+        let depth = ReferenceRanking::depth(count);
+        let frames: Vec<RankedReference> = by
+            .rank(&*queries.query(query)?, candidates, depth, &mut || {
+                checkpoint(watch)
+            })?
+            .into_iter()
+            .map(|ranked| RankedReference {
+                name: references.frames()[ranked.frame].clone(),
+                world_from_camera: references.pose(ranked.frame),
+                ranked,
+            })
+            .collect();
+        let chosen = frames.iter().take(count);
+        Ok(References {
+            frames: chosen.map(|reference| reference.ranked.frame).collect(),
+            ranking: Some(Arc::new(ReferenceRanking {
+                criterion: by.criterion(),
+                candidates: candidates.len(),
+                chosen: count.min(frames.len()),
+                frames,
+            })),
+            within_m: None,
+        })
+    }
+}
