@@ -147,7 +147,7 @@ mod tests {
         let error = PoseError::between(&Pose::identity(), &estimate);
         assert!((error.max_euler_deg - 0.07_f64.to_degrees()).abs() < 1e-9);
         assert!(error.rotation_deg > error.max_euler_deg);
-        assert_eq!(error.to_string(), "0.000 m, 5.97° (max Euler 4.01°)");
+        assert_eq!(error.to_string(), "0.000 m, 6.07° (max Euler 4.01°)");
     }
 
     #[test]

@@ -226,11 +226,13 @@ fn plot(
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
     let forward = narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, "forward [m]"));
     let bounds = whole(shown.search);
-    let answer = Plot::new(map.name())
+    // Another extent, as the search goes on, is another plot: one that is there keeps its bounds.
+    let extent = bounds.width().to_bits();
+    let answer = Plot::new((map.name(), extent))
         .width(side + if is_first { LEFT_AXIS } else { 0.0 })
         .height(side + LOWER_AXIS)
         .data_aspect(1.0)
-        .link_axis(group, true)
+        .link_axis(group.with(extent), true)
         .show_x(false)
         .show_y(false)
         .show_grid(false)
