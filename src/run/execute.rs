@@ -95,7 +95,7 @@ pub struct Execution<'a> {
     pub scenes: &'a Scenes,
     /// Its parameters, as in the description.
     pub params: &'a Params,
-    /// What [`Selection::Retrieved`](super::Selection::Retrieved) asks, by the position of the references' scene.
+    /// What [`Selection::Retrieved`](crate::localize::Selection::Retrieved) asks, by the position of the references' scene.
     pub indices: &'a [Box<dyn Ranking>],
 }
 

@@ -588,3 +588,16 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     press(&mut window, Modifiers::NONE, Key::Escape);
     assert_eq!(window.state().desk().camera, None);
 }
+
+/// Whatever is registered is shown as the paper's methods are, in glyphs that the fonts have.
+#[test]
+fn a_method_beyond_the_paper_has_its_place_in_every_view() {
+    let mut asked = setup();
+    asked.task.protocol.methods = vec!["nid".parse().expect("is registered"), Method::FB];
+    let mut window = finished(asked);
+    for view in posescope::app::views::ALL {
+        window.state_mut().send(Command::Maximize(Some(view.name)));
+        window.run_steps(3);
+    }
+    assert!(is_said(&window, "NID"));
+}

@@ -14,7 +14,7 @@
 //! | `index` | from the features of a query to ranked frames | |
 //! | `ranking` | what is told of ranked frames | |
 //!
-//! Nothing in here knows scenes or photos; [`crate::scene::Retriever`] does.
+//! Nothing in here knows scenes or photos; whoever calls it does.
 
 mod affine;
 mod build;

@@ -55,7 +55,7 @@ impl Who {
             Self::Reference => "○",
             Self::Truth => "×",
             Self::Estimate(method) | Self::BestSoFar(method) => {
-                const SHAPES: [&str; 6] = ["●", "▲", "■", "◆", "★", "▼"];
+                const SHAPES: [&str; 6] = ["●", "▲", "■", "◆", "◇", "□"];
                 SHAPES[place(method) % SHAPES.len()]
             }
             Self::Hand => "▶",
