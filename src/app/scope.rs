@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::command::{Command, Queue};
 use super::desk::Desk;
 use super::shown::{Shown, ShownAt};
-use crate::estimator;
+use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -120,7 +120,7 @@ impl<'a> Scope<'a> {
     pub fn direct_method(&self) -> Method {
         let direct = self.direct_methods();
         let here = self.method();
-        let inside = here.and_then(|here| estimator::entry(here).hybrid());
+        let inside = here.and_then(estimator::find).and_then(Entry::hybrid);
         [here, inside.map(|parts| parts.second), Some(Method::MI)]
             .into_iter()
             .flatten()
@@ -133,13 +133,13 @@ impl<'a> Scope<'a> {
     /// the cursor is in one.
     pub fn searching_method(&self) -> Method {
         self.method()
-            .filter(|&here| estimator::entry(here).hybrid().is_some())
+            .filter(|&here| estimator::find(here).and_then(Entry::hybrid).is_some())
             .unwrap_or_else(|| self.direct_method())
     }
 
     /// Whether the cursor is in a hybrid that runs this method inside itself.
     pub fn is_inside_hybrid(&self, method: Method) -> bool {
-        let here = self.method().map(estimator::entry);
+        let here = self.method().and_then(estimator::find);
         here.and_then(|entry| entry.hybrid())
             .is_some_and(|parts| parts.first == method || parts.second == method)
     }

@@ -93,3 +93,10 @@ fn a_panic_in_a_cost_is_an_outcome() {
     let message = "no idea".to_owned();
     assert_eq!(panicking.pose, Err(Failure::Internal { message }));
 }
+
+#[test]
+fn a_method_that_nobody_registered_is_an_outcome() {
+    let outcome = localize(&solvable(), Method::named("mine"), &Params::default());
+    let message = "the method mine is in no registry".to_owned();
+    assert_eq!(outcome.pose, Err(Failure::Internal { message }));
+}

@@ -6,11 +6,12 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use posescope::estimator;
+use posescope::cost;
+use posescope::estimator::{self, Direct};
 use posescope::event::{Kind, KindSet, ReferencesRanked, Stage};
 use posescope::features::FeatureState;
 use posescope::geometry::Pose;
-use posescope::localize::{StageTimes, Watch as _, evaluate};
+use posescope::localize::{StageTimes, Watch as _, evaluate, localize_by};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
@@ -451,4 +452,28 @@ fn a_ranking_has_a_place_in_the_layout_only_where_there_is_one() {
         is_laid_out("with.rrd", Some(&ranking_of_twelve())),
         (true, 10)
     );
+}
+
+#[test]
+fn any_method_is_recorded_be_it_registered_or_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nid: Method = "nid".parse().expect("is registered");
+    let path = recorded(&folder, "nid.rrd", &[nid], &Params::default());
+    let registered = timelines(&chunks(&path));
+    assert!(registered.contains_key(&entities::direct(nid, "joint_histogram")));
+
+    let (mine, path) = (Method::named("mine"), folder.path().join("mine.rrd"));
+    let problem = solvable();
+    let mut recorder = open(&path, &[mine]);
+    recorder.begin_query(0, std::slice::from_ref(&problem), None);
+    recorder.begin_method(0, mine);
+    let cost = cost::ALL[0].params;
+    let estimator = Direct::searching("mine", cost().cost(), &Params::default());
+    localize_by(&estimator, &problem, &mut Trace::to(&mut recorder))
+        .expect("a recorder never cancels")
+        .pose
+        .expect("the walls have texture");
+    recorder.close().expect("a whole recording");
+    let unregistered = timelines(&chunks(&path));
+    assert!(unregistered.contains_key(&entities::direct(mine, "synthetic")));
 }

@@ -22,7 +22,7 @@ pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
 
 use crate::describe::Describe;
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
-use crate::memo::Key;
+use crate::memo::{Bits, Exact, Key};
 
 /// What the query and the synthetic view show at one covered pixel, each 0 … 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,16 +86,36 @@ pub enum ExplanationKind {
     JointHistogram,
 }
 
-/// The parameters of a cost: they describe themselves, and make the cost.
+/// Parameters that make a cost.
+pub trait MakesCost: Describe + Bits + Clone + fmt::Debug + Send + Sync + 'static {
+    /// The cost with these parameters.
+    fn make(&self) -> Box<dyn Cost>;
+}
+
+/// The parameters of any cost: they describe themselves, and make the cost.
 pub trait CostParams: Describe + fmt::Debug + Send + Sync {
     /// The cost with these parameters.
     fn cost(&self) -> Box<dyn Cost>;
 
+    /// A key that is equal for equal parameters of the same cost, and only for those.
+    fn key(&self) -> Key;
+
     /// The same parameters.
     fn boxed(&self) -> Box<dyn CostParams>;
+}
 
-    /// The parameters to the last bit, as a key of what depends on them.
-    fn key(&self) -> Key;
+impl<P: MakesCost> CostParams for P {
+    fn cost(&self) -> Box<dyn Cost> {
+        self.make()
+    }
+
+    fn key(&self) -> Key {
+        Key::new(Exact::of(self))
+    }
+
+    fn boxed(&self) -> Box<dyn CostParams> {
+        Box::new(self.clone())
+    }
 }
 
 /// What two images share, as a number 0 … 1.

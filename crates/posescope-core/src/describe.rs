@@ -176,7 +176,8 @@ fn hint(nearest: &Option<String>) -> String {
 /// }
 /// ```
 ///
-/// A field without a description does not compile, so that none can be lost.
+/// A field without a description does not compile, so that none can be lost. What is remembered under
+/// the parameters is told apart by all of them ([`crate::memo::Bits`]).
 macro_rules! parameters {
     (
         $(#[$attribute:meta])*
@@ -203,6 +204,12 @@ macro_rules! parameters {
                         @show $kind $said, visitor, &mut self.$field, concat!($($doc, "\n"),*)
                     );
                 )*
+            }
+        }
+
+        impl $crate::memo::Bits for $name {
+            fn write(&self, words: &mut Vec<u64>) {
+                $($crate::memo::Bits::write(&self.$field, words);)*
             }
         }
     };
@@ -248,6 +255,12 @@ macro_rules! choice {
             }
             fn choose(&mut self, index: usize) {
                 *self = [$(Self::$variant),+][index];
+            }
+        }
+
+        impl $crate::memo::Bits for $type {
+            fn write(&self, words: &mut Vec<u64>) {
+                words.push($crate::describe::Choice::index(self) as u64);
             }
         }
     };

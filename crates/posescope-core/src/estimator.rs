@@ -195,7 +195,7 @@ pub fn methods() -> impl Iterator<Item = Method> {
 pub fn direct_methods(methods: &[Method]) -> Vec<Method> {
     let runs = |method: Method| {
         methods.iter().any(|&asked| {
-            let parts = entry(asked).hybrid();
+            let parts = find(asked).and_then(Entry::hybrid);
             asked == method
                 || parts.is_some_and(|parts| parts.first == method || parts.second == method)
         })
@@ -207,15 +207,18 @@ pub fn direct_methods(methods: &[Method]) -> Vec<Method> {
         .collect()
 }
 
-/// The registry's entry of a method.
+/// The registry's entry of a method; `None` for one that is in none, such as that of a cost of one's
+/// own ([`Direct::searching`]).
+pub fn find(method: Method) -> Option<&'static Entry> {
+    all().iter().find(|entry| entry.method == method)
+}
+
+/// As [`find`], for a method that is registered: read from text, or named in [`Method`].
 ///
 /// # Panics
-/// For a name that no registry gave ([`Method::named`]).
+/// For any other.
 pub fn entry(method: Method) -> &'static Entry {
-    all()
-        .iter()
-        .find(|entry| entry.method == method)
-        .unwrap_or_else(|| panic!("{method} is in no registry"))
+    find(method).unwrap_or_else(|| panic!("{method} is in no registry"))
 }
 
 impl FromStr for Method {

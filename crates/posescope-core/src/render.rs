@@ -10,7 +10,6 @@ pub use score::{Comparison, MOST_AT_A_TIME, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
 use crate::describe::parameters;
-use crate::memo::bits_of_fields;
 
 parameters! {
     /// How the cloud is coloured and splatted.
@@ -30,13 +29,6 @@ parameters! {
         pub visibility_window_px: usize = count("visibility_window_px", "px", 1..=31),
     }
 }
-
-bits_of_fields!(RenderParams {
-    splat_px,
-    visibility,
-    visibility_margin,
-    visibility_window_px,
-});
 
 impl Default for RenderParams {
     fn default() -> Self {

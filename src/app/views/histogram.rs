@@ -10,7 +10,7 @@ use super::View;
 use crate::app::{Scope, Shown};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
-use crate::estimator;
+use crate::estimator::{self, Entry};
 use crate::grid::Offset;
 use crate::method::Method;
 
@@ -76,7 +76,8 @@ impl Histogram {
 
 /// How a method's cost explains itself, if it has one.
 pub(super) fn explains(method: Method) -> Option<ExplanationKind> {
-    estimator::entry(method).cost().map(|cost| cost.explains)
+    let cost = estimator::find(method).and_then(Entry::cost);
+    cost.map(|cost| cost.explains)
 }
 
 /// Why this view is shown, and where its camera is.

@@ -8,7 +8,7 @@ use super::entities;
 use super::layout::{self, Node, View};
 use super::stream::Stream;
 use crate::cost::ExplanationKind;
-use crate::estimator;
+use crate::estimator::{self, Entry};
 use crate::features::FeatureState;
 use crate::method::Method;
 use crate::palette;
@@ -56,14 +56,14 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
 /// Whether anything of FB can be in the recording; a hybrid tells the stories of its methods.
 fn shows_features(methods: &[Method]) -> bool {
     methods.iter().any(|&method| {
-        let parts = estimator::entry(method).hybrid();
+        let parts = estimator::find(method).and_then(Entry::hybrid);
         method == Method::FB || parts.is_some_and(|parts| parts.first == Method::FB)
     })
 }
 
 /// Whether a method's cost is made of a joint histogram.
 fn has_histogram(method: Method) -> bool {
-    let cost = estimator::entry(method).cost();
+    let cost = estimator::find(method).and_then(Entry::cost);
     cost.is_some_and(|cost| cost.explains == ExplanationKind::JointHistogram)
 }
 

@@ -336,7 +336,7 @@ impl Query {
     /// Whether the hybrid that runs now can only repeat what was told before.
     fn is_repeated_hybrid(&self) -> bool {
         let was_told = |method| self.told.contains(&(self.reference, method));
-        let here = self.method.map(estimator::entry);
+        let here = self.method.and_then(estimator::find);
         let parts = here.and_then(|entry| entry.hybrid());
         parts.is_some_and(|parts| was_told(parts.first) && was_told(parts.second))
     }

@@ -1,12 +1,11 @@
 //! 1 − normalised mutual information, the cost of MI (paper, section 2.4).
 
 use super::{
-    Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    Similarity,
+    Cost, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram, MakesCost, Similarity,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key, bits_of_fields};
+use crate::memo::{Exact, Key};
 
 /// MI's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -34,8 +33,6 @@ parameters! {
     }
 }
 
-bits_of_fields!(MutualInformationParams { sigma_px, bins });
-
 impl Default for MutualInformationParams {
     fn default() -> Self {
         Self {
@@ -45,17 +42,9 @@ impl Default for MutualInformationParams {
     }
 }
 
-impl CostParams for MutualInformationParams {
-    fn cost(&self) -> Box<dyn Cost> {
+impl MakesCost for MutualInformationParams {
+    fn make(&self) -> Box<dyn Cost> {
         Box::new(MutualInformation::new(self))
-    }
-
-    fn boxed(&self) -> Box<dyn CostParams> {
-        Box::new(self.clone())
-    }
-
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
     }
 }
 

@@ -10,12 +10,11 @@ use std::f32::consts::PI;
 use image::Luma;
 
 use super::{
-    Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    Similarity,
+    Cost, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram, MakesCost, Similarity,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key, bits_of_fields};
+use crate::memo::{Exact, Key};
 
 /// NID among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -44,12 +43,6 @@ parameters! {
     }
 }
 
-bits_of_fields!(OrientationParams {
-    sigma_px,
-    bins,
-    least_gradient,
-});
-
 impl Default for OrientationParams {
     fn default() -> Self {
         Self {
@@ -60,17 +53,9 @@ impl Default for OrientationParams {
     }
 }
 
-impl CostParams for OrientationParams {
-    fn cost(&self) -> Box<dyn Cost> {
+impl MakesCost for OrientationParams {
+    fn make(&self) -> Box<dyn Cost> {
         Box::new(Orientation::new(self))
-    }
-
-    fn boxed(&self) -> Box<dyn CostParams> {
-        Box::new(self.clone())
-    }
-
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
     }
 }
 
@@ -133,7 +118,7 @@ impl Cost for Orientation {
     }
 
     fn reference_channel_key(&self) -> Key {
-        self.params.key()
+        Key::new(Exact::of(&self.params))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

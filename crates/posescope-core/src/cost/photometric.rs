@@ -1,9 +1,9 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
-use super::{Cost, CostParams, Entry, Explanation, ExplanationKind, IntensityPair};
+use super::{Cost, Entry, Explanation, ExplanationKind, IntensityPair, MakesCost};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key, bits_of_fields};
+use crate::memo::{Exact, Key};
 
 /// PM's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -27,8 +27,6 @@ parameters! {
     }
 }
 
-bits_of_fields!(PhotometricParams { sigma_px, power });
-
 impl Default for PhotometricParams {
     fn default() -> Self {
         Self {
@@ -38,17 +36,9 @@ impl Default for PhotometricParams {
     }
 }
 
-impl CostParams for PhotometricParams {
-    fn cost(&self) -> Box<dyn Cost> {
+impl MakesCost for PhotometricParams {
+    fn make(&self) -> Box<dyn Cost> {
         Box::new(Photometric::new(self))
-    }
-
-    fn boxed(&self) -> Box<dyn CostParams> {
-        Box::new(self.clone())
-    }
-
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
     }
 }
 

@@ -3,16 +3,7 @@
 use image::GrayImage;
 
 use super::{Features, SurfParams, surf, surf_interruptible};
-use crate::memo::{Exact, Memo, Recalled, Remembered, bits_of_fields};
-
-bits_of_fields!(SurfParams {
-    threshold,
-    octaves,
-    intervals,
-    upright,
-    initial_step,
-    max_keypoints,
-});
+use crate::memo::{Exact, Memo, Recalled, Remembered};
 
 impl Remembered for Features {
     fn heap_bytes(&self) -> usize {

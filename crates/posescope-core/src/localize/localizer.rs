@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::watch::checkpoint;
 use super::{
-    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, localize_by,
+    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, localize_traced,
     tell_ranking,
 };
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
@@ -296,14 +296,13 @@ impl<'a> Localizer<'a> {
     ) -> Result<Candidate, Cancelled> {
         let mut timings = StageTimings::default();
         let attention = watch.attention();
-        let estimator = estimator::entry(method).make(self.params);
         let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
         let mut fanout = Fanout::new(sinks);
         let mut trace = match &attention {
             Some(flag) => Trace::watched(&mut fanout, flag),
             None => Trace::to(&mut fanout),
         };
-        let outcome = localize_by(estimator.as_ref(), &work.problems[problem], &mut trace)?;
+        let outcome = localize_traced(&work.problems[problem], method, self.params, &mut trace)?;
         Ok(self.judged(work, problem, method, outcome, timings.into_times()))
     }
 
@@ -430,7 +429,7 @@ impl Work<'_> {
 
     /// The candidates of a hybrid's methods, where it can be made of them.
     fn hybrid_parts(&self, problem: usize, method: Method) -> Option<(&Candidate, &Candidate)> {
-        let parts = estimator::entry(method).hybrid()?;
+        let parts = estimator::find(method)?.hybrid()?;
         let first = self.candidate(problem, parts.first)?;
         let second = self.candidate(problem, parts.second)?;
         let panicked =

@@ -210,7 +210,7 @@ pub fn evaluate(
     truth: Option<&Pose>,
 ) -> QueryResult {
     let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth| {
-        let estimator = estimator::entry(method).make(params);
+        let estimator = estimator::find(method)?.make(params);
         estimator.score_at(problem, truth)?.cost
     });
     QueryResult {

@@ -12,9 +12,8 @@ use crate::trace::{Cancelled, Trace};
 /// Localises the query of a problem. A query without a pose is an outcome too, which says why.
 ///
 /// The answer depends on the problem, the method and the parameters, never on the number of threads.
-///
-/// # Panics
-/// For a method that is in no registry ([`Method::named`]).
+/// For a method that is in no registry it is a [`Failure::Internal`]: a cost of one's own is searched
+/// by [`localize_by`].
 pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
     localize_traced(problem, method, params, &mut Trace::off())
         .unwrap_or_else(|Cancelled| unreachable!("a trace that is off cancels nothing"))
@@ -24,17 +23,18 @@ pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
 ///
 /// # Errors
 /// [`Cancelled`] when whoever listens asks the run to stop.
-///
-/// # Panics
-/// For a method that is in no registry ([`Method::named`]).
 pub fn localize_traced(
     problem: &Problem,
     method: Method,
     params: &Params,
     trace: &mut Trace<'_>,
 ) -> Result<Outcome, Cancelled> {
-    let estimator = estimator::entry(method).make(params);
-    localize_by(estimator.as_ref(), problem, trace)
+    match estimator::find(method) {
+        Some(entry) => localize_by(entry.make(params).as_ref(), problem, trace),
+        None => Ok(Outcome::failed(Failure::Internal {
+            message: format!("the method {method} is in no registry"),
+        })),
+    }
 }
 
 /// As [`localize_traced`], by an estimator that somebody made. A panic in it is an outcome,

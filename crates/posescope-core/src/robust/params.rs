@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::describe::parameters;
-use crate::memo::bits_of_fields;
 use crate::solver::{Loss, LossShape};
 
 /// Correspondences in a sample: as many as the minimal solver takes.
@@ -36,17 +35,6 @@ parameters! {
         pub loss_scale_px: f64 = number("loss_scale", "px", 0.05..=50.0),
     }
 }
-
-bits_of_fields!(MlesacParams {
-    sigma_px,
-    inlier_threshold_px,
-    confidence,
-    max_trials,
-    min_trials,
-    em_iterations,
-    loss,
-    loss_scale_px,
-});
 
 /// The trials are capped at what 7 % true matches need. The others were tried on synthetic scenes
 /// with 1 px of noise and 10 to 70 % true matches out of 200 and 1,000: fewer than 100 trials at

@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::describe::choice;
-use crate::memo::Bits;
 
 /// A loss `ρ(r²)` on the squared length of a residual, about `r²` for small residuals.
 ///
@@ -31,12 +30,6 @@ pub enum LossShape {
     Huber,
     /// [`Loss::Cauchy`].
     Cauchy,
-}
-
-impl Bits for LossShape {
-    fn write(&self, words: &mut Vec<u64>) {
-        words.push(*self as u64);
-    }
 }
 
 choice!(LossShape: Squared = "squared", Huber = "huber", Cauchy = "cauchy");

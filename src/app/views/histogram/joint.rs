@@ -10,7 +10,7 @@ use crate::app::views::readout::Readout;
 use crate::app::{Scope, theme};
 use crate::cost::JointHistogram;
 use crate::cost::Similarity;
-use crate::estimator;
+use crate::estimator::{self, Entry};
 use crate::method::Method;
 use crate::picture;
 use crate::render::Comparison;
@@ -29,7 +29,7 @@ pub(super) fn ui(
     shown: &Arc<Comparison>,
     histogram: &JointHistogram,
 ) {
-    let cost = estimator::entry(method).cost();
+    let cost = estimator::find(method).and_then(Entry::cost);
     let sees = cost.map_or("value", |cost| cost.sees);
     let margins = Margins::of(histogram);
     let texture = scope
@@ -239,7 +239,7 @@ fn numbers(
     shown: &Comparison,
     histogram: &JointHistogram,
 ) {
-    let cost = estimator::entry(method).cost();
+    let cost = estimator::find(method).and_then(Entry::cost);
     // The histogram's entropies are natural ones.
     let bits = |nats: f64| nats / std::f64::consts::LN_2;
     let query = bits(histogram.query_entropy);

@@ -42,7 +42,9 @@ impl<'a> Story<'a> {
     /// not asked to run.
     pub(super) fn at(scope: &Scope<'a>) -> Self {
         let with_features = |method: Method| {
-            let entry = estimator::entry(method);
+            let Some(entry) = estimator::find(method) else {
+                return false;
+            };
             let inside = entry
                 .hybrid()
                 .is_some_and(|parts| parts.first == Method::FB);

@@ -231,10 +231,10 @@ fn best_so_far(
     }
     let by_search = search.path.last().map(|best| best.reference_from_camera());
     let method = span.part.method()?;
-    let best = match estimator::entry(method).parts {
-        Parts::Features => features.reference_from_query,
-        Parts::Cost(_) => by_search,
-        Parts::Hybrid(_) => by_search.or(features.reference_from_query),
+    let best = match estimator::find(method).map(|entry| &entry.parts) {
+        Some(Parts::Features) => features.reference_from_query,
+        Some(Parts::Hybrid(_)) => by_search.or(features.reference_from_query),
+        Some(Parts::Cost(_)) | None => by_search,
     };
     Some((method, best?))
 }
