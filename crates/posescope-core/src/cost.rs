@@ -8,14 +8,17 @@
 //! the same name, reachable from the command line, the window and the recordings: a direct estimator
 //! is a cost with a search.
 
+mod evaluator;
 mod joint_histogram;
+mod median;
 mod mutual_information;
 mod orientation;
 mod photometric;
 
 use std::fmt;
 
-pub use joint_histogram::JointHistogram;
+pub use evaluator::{CostOf, Evaluator};
+pub use joint_histogram::{Entropies, JointHistogram, bin, count_pairs};
 pub use mutual_information::{MutualInformation, MutualInformationParams};
 pub use orientation::{Orientation, OrientationParams};
 pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
@@ -24,14 +27,20 @@ use crate::describe::Describe;
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
 use crate::memo::{Bits, Exact, Key};
 
-/// What the query and the synthetic view show at one covered pixel, each 0 … 255.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IntensityPair {
+/// What the query and the synthetic view show at one covered pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pair<T> {
     /// The query I_Q, in the cost's channel.
-    pub query: f32,
+    pub query: T,
     /// The synthetic view I_S.
-    pub synthetic: f32,
+    pub synthetic: T,
 }
+
+/// The values of both images, each 0 … 255.
+pub type IntensityPair = Pair<f32>;
+
+/// The bins of a joint histogram that both values fall into.
+pub type BinPair = Pair<u8>;
 
 /// A robust dissimilarity of two images over the pixels they share.
 pub trait Cost: Send + Sync {
@@ -59,6 +68,12 @@ pub trait Cost: Send + Sync {
 
     /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64>;
+
+    /// The same cost for one hypothesis after another. One that needs less than all pairs, or memory
+    /// of its own, says so here; the answers are those of [`Self::evaluate`], bit for bit.
+    fn evaluator(&self) -> Evaluator<'_> {
+        Evaluator::Pairs(Box::new(|pairs| self.evaluate(pairs)))
+    }
 
     /// Why the cost of these pairs is what it is; `None` where there is no cost, and for a cost that
     /// has nothing of the kind to show.
@@ -204,6 +219,21 @@ mod tests {
             .collect()
     }
 
+    /// The cost of the pairs as the grid search asks for it, after that of other pairs.
+    fn by_evaluator(cost: &dyn Cost, pairs: &[IntensityPair]) -> Option<f64> {
+        let before = &pairs[..pairs.len() / 2];
+        match cost.evaluator() {
+            Evaluator::Pairs(mut cost) => {
+                cost(before);
+                cost(pairs)
+            }
+            Evaluator::Counts { bins, mut cost } => {
+                cost(&JointHistogram::of(before, bins).counts);
+                cost(&JointHistogram::of(pairs, bins).counts)
+            }
+        }
+    }
+
     #[test]
     fn names_are_unique_and_settings_are_equal_to_their_copies() {
         let mut names: Vec<_> = ALL.iter().map(|entry| entry.name).collect();
@@ -256,6 +286,7 @@ mod tests {
                 let pairs = pairs(&values);
                 let value = cost.evaluate(&pairs);
                 prop_assert_eq!(value.is_some(), cost.explain(&pairs).is_some());
+                prop_assert_eq!(value, by_evaluator(cost.as_ref(), &pairs));
                 if let Some(value) = value {
                     prop_assert!(value.is_finite() && value >= 0.0, "{} {}", entry.name, value);
                 }

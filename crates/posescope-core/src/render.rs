@@ -1,10 +1,14 @@
 //! Synthetic views: the reference cloud, coloured by the reference photo and splatted into a camera
 //! elsewhere (paper, appendix B, "generation of synthetic views").
 
+mod canvas;
 mod color;
+mod projection;
 mod score;
 mod splat;
+mod worker;
 
+pub use canvas::{Canvas, PointArrays, Values};
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
 pub use score::{Comparison, MOST_AT_A_TIME, Score, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};

@@ -1,6 +1,8 @@
 //! How the values of two images fall together: counts, entropies, and what they share.
 
-use super::IntensityPair;
+use std::sync::LazyLock;
+
+use super::{BinPair, IntensityPair};
 
 /// How often each pair of grey values occurs, and the entropies that follow \[nat\].
 #[derive(Clone, Debug, PartialEq)]
@@ -24,14 +26,26 @@ impl JointHistogram {
         for pair in pairs {
             counts[cell(pair, bins)] += 1;
         }
-        let rows = counts.chunks(bins).map(|row| row.iter().sum());
-        let columns = (0..bins).map(|column| counts.iter().skip(column).step_by(bins).sum());
+        let Entropies {
+            query,
+            synthetic,
+            joint,
+        } = Entropies::of(&counts, bins);
         Self {
             bins,
-            query_entropy: entropy(rows, pairs.len()),
-            synthetic_entropy: entropy(columns, pairs.len()),
-            joint_entropy: entropy(counts.iter().copied(), pairs.len()),
             counts,
+            query_entropy: query,
+            synthetic_entropy: synthetic,
+            joint_entropy: joint,
+        }
+    }
+
+    /// The three entropies.
+    pub fn entropies(&self) -> Entropies {
+        Entropies {
+            query: self.query_entropy,
+            synthetic: self.synthetic_entropy,
+            joint: self.joint_entropy,
         }
     }
 
@@ -62,34 +76,152 @@ impl JointHistogram {
             })
             .collect()
     }
+}
+
+/// The entropies of two images and of both together \[nat\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entropies {
+    /// H(I_Q).
+    pub query: f64,
+    /// H(I_S).
+    pub synthetic: f64,
+    /// H(I_S, I_Q).
+    pub joint: f64,
+}
+
+impl Entropies {
+    /// Those of the counts of a joint histogram, `bins` × `bins`.
+    pub fn of(counts: &[u32], bins: usize) -> Self {
+        let total = counts.iter().sum();
+        let rows = counts.chunks(bins).map(|row| row.iter().sum());
+        let columns = (0..bins).map(|column| counts.iter().skip(column).step_by(bins).sum());
+        Self {
+            query: entropy(rows, total),
+            synthetic: entropy(columns, total),
+            joint: entropy(counts.iter().copied(), total),
+        }
+    }
 
     /// NMI in 0 … 1, normalised by the larger entropy; `None` where both images are constant.
     pub fn normalized_mutual_information(&self) -> Option<f64> {
-        let larger = self.query_entropy.max(self.synthetic_entropy);
+        let larger = self.query.max(self.synthetic);
         (larger > 0.0).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
     }
 
     /// I(Q, S) = H(Q) + H(S) − H(S, Q) \[nat\].
     pub fn mutual_information(&self) -> f64 {
-        self.query_entropy + self.synthetic_entropy - self.joint_entropy
+        self.query + self.synthetic - self.joint
     }
+}
+
+/// The one of `bins` equal intervals of 0 … 255 that a value falls into; the last one takes 255.
+#[inline]
+pub fn bin(value: f32, bins: usize) -> usize {
+    let scale = bins as f32 / 256.0;
+    ((value * scale) as usize).min(bins - 1)
+}
+
+/// Counts the pairs of bins, in the place of what `counts` held: `bins` × `bins`, rows are the query's.
+pub fn count_pairs(pairs: &[BinPair], bins: usize, counts: &mut Vec<u32>) {
+    // Neighbours often fall into the same cell. Counted apart, no count waits for the last one. Of
+    // large tables, adding up several would take longer than that saves.
+    const TABLES: usize = 4;
+    const MOST_CELLS_COUNTED_APART: usize = 1024;
+    let cells = bins * bins;
+    let apart = cells <= MOST_CELLS_COUNTED_APART;
+    counts.clear();
+    counts.resize(if apart { TABLES * cells } else { cells }, 0);
+    let cell = |pair: &BinPair| usize::from(pair.query) * bins + usize::from(pair.synthetic);
+    if !apart {
+        for pair in pairs {
+            counts[cell(pair)] += 1;
+        }
+        return;
+    }
+    let (first, others) = counts.split_at_mut(cells);
+    let (second, others) = others.split_at_mut(cells);
+    let (third, fourth) = others.split_at_mut(cells);
+    let fours = pairs.chunks_exact(TABLES);
+    for pair in fours.remainder() {
+        first[cell(pair)] += 1;
+    }
+    for four in fours {
+        first[cell(&four[0])] += 1;
+        second[cell(&four[1])] += 1;
+        third[cell(&four[2])] += 1;
+        fourth[cell(&four[3])] += 1;
+    }
+    for table in [second, third, fourth] {
+        for (sum, count) in first.iter_mut().zip(table) {
+            *sum += *count;
+        }
+    }
+    counts.truncate(cells);
 }
 
 fn cell(pair: &IntensityPair, bins: usize) -> usize {
-    let scale = bins as f32 / 256.0;
-    let bin = |value: f32| ((value * scale) as usize).min(bins - 1);
-    bin(pair.query) * bins + bin(pair.synthetic)
+    bin(pair.query, bins) * bins + bin(pair.synthetic, bins)
 }
 
 /// H = log n − (Σ c log c) / n, with n = Σ c \[nat\].
-fn entropy(counts: impl Iterator<Item = u32>, total: usize) -> f64 {
+fn entropy(counts: impl Iterator<Item = u32>, total: u32) -> f64 {
     if total == 0 {
         return 0.0;
     }
-    let sum: f64 = counts
-        .filter(|&count| count > 1)
-        .map(|count| f64::from(count) * f64::from(count).ln())
-        .sum();
-    let total = total as f64;
+    let sum: f64 = counts.map(count_log_count).sum();
+    let total = f64::from(total);
     (total.ln() - sum / total).max(0.0)
+}
+
+/// c log c, from a table for the counts that most cells have.
+#[inline]
+fn count_log_count(count: u32) -> f64 {
+    static TABLE: LazyLock<Vec<f64>> = LazyLock::new(|| (0..4096).map(calculated).collect());
+    fn calculated(count: u32) -> f64 {
+        match count {
+            0 => 0.0,
+            _ => f64::from(count) * f64::from(count).ln(),
+        }
+    }
+    let known = TABLE.get(count as usize);
+    known.copied().unwrap_or_else(|| calculated(count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn bins_are_counted_as_the_values_that_fell_into_them(
+            values in prop::collection::vec((0.0_f32..=255.0, 0.0_f32..=255.0), 0..200),
+            bins in prop_oneof![Just(2_usize), Just(16), Just(32), Just(33), Just(256)],
+        ) {
+            let pairs: Vec<_> = values
+                .iter()
+                .map(|&(query, synthetic)| IntensityPair { query, synthetic })
+                .collect();
+            let binned: Vec<_> = pairs
+                .iter()
+                .map(|pair| BinPair {
+                    query: bin(pair.query, bins) as u8,
+                    synthetic: bin(pair.synthetic, bins) as u8,
+                })
+                .collect();
+            let mut counts = vec![7; 3];
+            count_pairs(&binned, bins, &mut counts);
+            prop_assert_eq!(counts, JointHistogram::of(&pairs, bins).counts);
+        }
+    }
+
+    #[test]
+    fn a_count_has_one_logarithm_be_it_in_the_table_or_not() {
+        for count in [2_u32, 4095, 4096, 1 << 20] {
+            let count_as_real = f64::from(count);
+            assert_eq!(count_log_count(count), count_as_real * count_as_real.ln());
+        }
+        assert_eq!(count_log_count(0), 0.0);
+        assert_eq!(count_log_count(1), 0.0);
+    }
 }

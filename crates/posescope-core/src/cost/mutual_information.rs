@@ -1,7 +1,8 @@
 //! 1 − normalised mutual information, the cost of MI (paper, section 2.4).
 
 use super::{
-    Cost, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram, MakesCost, Similarity,
+    Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
+    MakesCost, Similarity,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -73,15 +74,27 @@ impl Cost for MutualInformation {
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let histogram = JointHistogram::of(pairs, self.params.bins);
-        Some(1.0 - histogram.normalized_mutual_information()?)
+        distance(&JointHistogram::of(pairs, self.params.bins).entropies())
+    }
+
+    fn evaluator(&self) -> Evaluator<'_> {
+        let bins = self.params.bins;
+        Evaluator::Counts {
+            bins,
+            cost: Box::new(move |counts| distance(&Entropies::of(counts, bins))),
+        }
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
         let histogram = JointHistogram::of(pairs, self.params.bins);
-        histogram.normalized_mutual_information()?;
+        distance(&histogram.entropies())?;
         Some(Explanation::JointHistogram(histogram))
     }
+}
+
+/// 1 − NMI; `None` where both images are constant.
+fn distance(entropies: &Entropies) -> Option<f64> {
+    Some(1.0 - entropies.normalized_mutual_information()?)
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use std::f32::consts::PI;
 use image::Luma;
 
 use super::{
-    Cost, Entry, Explanation, ExplanationKind, IntensityPair, JointHistogram, MakesCost, Similarity,
+    Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
+    MakesCost, Similarity,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -122,20 +123,28 @@ impl Cost for Orientation {
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        distance(&JointHistogram::of(pairs, self.params.bins))
+        distance(&JointHistogram::of(pairs, self.params.bins).entropies())
+    }
+
+    fn evaluator(&self) -> Evaluator<'_> {
+        let bins = self.params.bins;
+        Evaluator::Counts {
+            bins,
+            cost: Box::new(move |counts| distance(&Entropies::of(counts, bins))),
+        }
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
         let histogram = JointHistogram::of(pairs, self.params.bins);
-        distance(&histogram)?;
+        distance(&histogram.entropies())?;
         Some(Explanation::JointHistogram(histogram))
     }
 }
 
 /// NID in 0 … 1; `None` where both images are constant.
-fn distance(histogram: &JointHistogram) -> Option<f64> {
-    let joint = histogram.joint_entropy;
-    let share = histogram.mutual_information() / joint;
+fn distance(entropies: &Entropies) -> Option<f64> {
+    let joint = entropies.joint;
+    let share = entropies.mutual_information() / joint;
     (joint > 0.0).then(|| 1.0 - share.clamp(0.0, 1.0))
 }
 

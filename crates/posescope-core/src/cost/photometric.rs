@@ -1,6 +1,7 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
-use super::{Cost, Entry, Explanation, ExplanationKind, IntensityPair, MakesCost};
+use super::median::MedianFinder;
+use super::{Cost, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, MakesCost};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Exact, Key};
@@ -68,6 +69,28 @@ impl Photometric {
     }
 }
 
+impl Photometric {
+    /// The mean of E^power over the errors E ≤ θ, of which there is one at least.
+    ///
+    /// Eight sums are added at once, each of every eighth error: what is added to what depends on
+    /// nothing but the errors, and no addition waits for the last.
+    fn mean_up_to(&self, threshold: f32, errors: &[f32]) -> f64 {
+        const SUMS: usize = 8;
+        let squared_again = self.params.power == 2;
+        let mut sums = [0.0_f64; SUMS];
+        let mut counted = [0_u32; SUMS];
+        for some in errors.chunks(SUMS) {
+            for ((&error, sum), counted) in some.iter().zip(&mut sums).zip(&mut counted) {
+                let counts = error <= threshold;
+                let error = f64::from(if counts { error } else { 0.0 });
+                *sum += if squared_again { error * error } else { error };
+                *counted += u32::from(counts);
+            }
+        }
+        sums.iter().sum::<f64>() / f64::from(counted.iter().sum::<u32>())
+    }
+}
+
 fn squared_difference(pair: &IntensityPair) -> f32 {
     let difference = pair.query - pair.synthetic;
     difference * difference
@@ -91,17 +114,20 @@ impl Cost for Photometric {
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let mut errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
-        let threshold = median(&mut errors)?;
-        let mut sum = 0.0;
-        let mut counted = 0_u32;
-        for error in pairs.iter().map(squared_difference) {
-            if error <= threshold {
-                sum += f64::from(error).powi(self.params.power as i32);
-                counted += 1;
-            }
-        }
-        Some(sum / f64::from(counted))
+        let errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
+        let threshold = median(&mut errors.clone())?;
+        Some(self.mean_up_to(threshold, &errors))
+    }
+
+    fn evaluator(&self) -> Evaluator<'_> {
+        let mut errors = Vec::new();
+        let mut medians = MedianFinder::new();
+        Evaluator::Pairs(Box::new(move |pairs| {
+            errors.clear();
+            errors.extend(pairs.iter().map(squared_difference));
+            let threshold = medians.lower_median(&errors)?;
+            Some(self.mean_up_to(threshold, &errors))
+        }))
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {

@@ -271,8 +271,8 @@ impl Memory<'_> {
 }
 
 /// The state of a search: where it stands and what it has seen.
-struct Search<'a> {
-    scorer: &'a Scorer<'a>,
+struct Search<'a, 'cost> {
+    scorer: &'a Scorer<'cost>,
     memory: Memory<'a>,
     covered_at_reference: u32,
     least_covered: u32,
@@ -281,7 +281,7 @@ struct Search<'a> {
     best_score: Score,
 }
 
-impl Search<'_> {
+impl Search<'_, '_> {
     /// Scores a lattice, some hypotheses at a time, tells the scores in scan order, and moves to its
     /// minimum.
     ///

@@ -1,9 +1,10 @@
 //! Scoring many hypotheses of the direct methods at once.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
+use super::worker::{Prepared, Worker};
 use super::{ColoredPoint, Rasterizer, SplattedPixel, SyntheticView};
 use crate::camera::Intrinsics;
 use crate::cost::{Cost, Explanation, IntensityPair};
@@ -41,12 +42,12 @@ pub struct Comparison {
     pub explanation: Option<Explanation>,
 }
 
-/// Hypotheses that are scored between two checkpoints, at most: enough to keep sixteen threads busy.
+/// Hypotheses that are scored between two checkpoints, at most: enough to keep eight threads busy.
 pub const MOST_AT_A_TIME: usize = 256;
 
 /// Hypotheses that a thread scores between two checkpoints. Of a street photo of 1241 × 376 px one
-/// takes half a millisecond, so that whoever wants to stop waits a few.
-const PER_THREAD: usize = 16;
+/// takes some 50 µs, so that whoever wants to stop waits a few milliseconds.
+const PER_THREAD: usize = 32;
 
 /// Hypotheses that a thread takes at once.
 const PER_JOB: usize = 4;
@@ -58,14 +59,9 @@ pub struct Scorer<'a> {
     intrinsics: Intrinsics,
     splat_px: usize,
     cost: &'a dyn Cost,
-    /// Those that no thread draws on at present. Clearing a new one takes as long as drawing.
-    canvases: Mutex<Vec<Canvas>>,
-}
-
-/// What a thread needs to score a hypothesis.
-struct Canvas {
-    rasterizer: Rasterizer,
-    pairs: Vec<IntensityPair>,
+    prepared: OnceLock<Prepared>,
+    /// Those that no thread works with at present.
+    idle: Mutex<Vec<Worker<'a>>>,
 }
 
 impl<'a> Scorer<'a> {
@@ -84,7 +80,8 @@ impl<'a> Scorer<'a> {
             intrinsics: *intrinsics,
             splat_px,
             cost,
-            canvases: Mutex::default(),
+            prepared: OnceLock::new(),
+            idle: Mutex::default(),
         }
     }
 
@@ -96,37 +93,29 @@ impl<'a> Scorer<'a> {
 
     /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
     pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+        let prepared = self
+            .prepared
+            .get_or_init(|| Prepared::new(self.points, &self.query, self.cost));
+        let score = |worker: &mut Option<Worker<'_>>, pose: &Pose| match worker {
+            Some(worker) => worker.score(prepared, &self.query, &pose.inverse()),
+            None => self.compare(pose).score,
+        };
         reference_from_camera
             .par_chunks(PER_JOB)
             .flat_map_iter(|poses| {
-                let spare = self.canvases().pop();
-                let mut canvas = spare.unwrap_or_else(|| Canvas {
-                    rasterizer: self.rasterizer(),
-                    pairs: Vec::new(),
-                });
-                let scores: Vec<Score> = poses
-                    .iter()
-                    .map(|pose| self.score_on(&mut canvas, pose))
-                    .collect();
-                self.canvases().push(canvas);
+                let idle = self.idle().pop();
+                let mut worker = idle
+                    .or_else(|| Worker::new(self.cost, prepared, &self.intrinsics, self.splat_px));
+                let scores: Vec<Score> =
+                    poses.iter().map(|pose| score(&mut worker, pose)).collect();
+                self.idle().extend(worker);
                 scores
             })
             .collect()
     }
 
-    fn score_on(&self, canvas: &mut Canvas, reference_from_camera: &Pose) -> Score {
-        let Canvas { rasterizer, pairs } = canvas;
-        let pixels = rasterizer.splat(self.points, &reference_from_camera.inverse());
-        pairs.clear();
-        pairs.extend(self.pair_up(pixels));
-        Score {
-            cost: self.cost.evaluate(pairs),
-            covered: pairs.len() as u32,
-        }
-    }
-
-    fn canvases(&self) -> MutexGuard<'_, Vec<Canvas>> {
-        self.canvases.lock().unwrap_or_else(PoisonError::into_inner)
+    fn idle(&self) -> MutexGuard<'_, Vec<Worker<'a>>> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The synthetic view of one camera beside the query.

@@ -1,6 +1,7 @@
 //! Splatting the coloured cloud with a depth test.
 
 use super::ColoredPoint;
+use super::projection::Projection;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
@@ -28,7 +29,8 @@ pub struct SyntheticView {
 
 const EMPTY: u32 = u32::MAX;
 
-/// Draws synthetic views of one camera, one after the other, reusing its buffers.
+/// Draws synthetic views of one camera, one after the other, reusing its buffers, in the plain way
+/// that [`Canvas`](super::Canvas) is measured by.
 ///
 /// A view covers a few per cent of the image, so the cost of a view must not depend on the size of
 /// the image: only the pixels that the last view touched are cleared.
@@ -62,7 +64,7 @@ impl Rasterizer {
         for pixel in self.pixels.drain(..) {
             self.slots[pixel.index as usize] = EMPTY;
         }
-        let projection = Projection::new(&self.intrinsics, camera_from_points);
+        let projection = Projection::new(&self.intrinsics, self.reach, camera_from_points);
         let (width, height) = (self.intrinsics.width as i32, self.intrinsics.height as i32);
         for point in points {
             let Some((u, v, depth)) = projection.pixel_and_depth(point) else {
@@ -112,51 +114,6 @@ impl Rasterizer {
             }
         }
     }
-}
-
-/// Pose and intrinsics in single precision: half the memory traffic of the inner loop, and exact to
-/// 1/1000 px at the ranges of a scanner.
-struct Projection {
-    rows: [[f32; 4]; 3],
-}
-
-impl Projection {
-    fn new(intrinsics: &Intrinsics, camera_from_points: &Pose) -> Self {
-        let m = camera_from_points.to_homogeneous();
-        let row = |focal: f64, centre: f64, axis: usize| {
-            std::array::from_fn(|c| (focal * m[(axis, c)] + centre * m[(2, c)]) as f32)
-        };
-        Self {
-            rows: [
-                row(intrinsics.fx, intrinsics.cx, 0),
-                row(intrinsics.fy, intrinsics.cy, 1),
-                std::array::from_fn(|c| m[(2, c)] as f32),
-            ],
-        }
-    }
-
-    /// Nearest pixel and depth \[m\]; `None` behind the camera or nearer than 10 cm.
-    #[inline]
-    fn pixel_and_depth(&self, point: &ColoredPoint) -> Option<(i32, i32, f32)> {
-        let p = &point.position;
-        let along = |row: &[f32; 4]| row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3];
-        let depth = along(&self.rows[2]);
-        if depth.is_nan() || depth <= 0.1 {
-            return None;
-        }
-        let inverse = depth.recip();
-        let u = along(&self.rows[0]) * inverse;
-        let v = along(&self.rows[1]) * inverse;
-        Some((floor(u + 0.5), floor(v + 0.5), depth))
-    }
-}
-
-/// [`f32::floor`] as a whole number. That of the standard library is a call for every point, unless
-/// it is compiled for processors with SSE4.1 alone.
-#[inline]
-fn floor(value: f32) -> i32 {
-    let truncated = value as i32;
-    truncated.saturating_sub(i32::from(truncated as f32 > value))
 }
 
 #[cfg(test)]
@@ -244,12 +201,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn floor_is_that_of_the_standard_library(bits: u32) {
-            let value = f32::from_bits(bits);
-            prop_assert_eq!(floor(value), value.floor() as i32);
-        }
-
         #[test]
         fn a_reused_rasterizer_draws_as_a_new_one(
             xs in prop::collection::vec((-2.0_f32..2.0, -2.0_f32..2.0, -1.0_f32..6.0), 0..60),

@@ -1,27 +1,31 @@
-//! How long the stages take, on one pair of frames of the street.
+//! How long the stages take, on one pair of frames.
 //!
-//! `cargo bench --no-default-features` spares building Rerun in release.
+//! `cargo bench -p posescope-stages -- NAME …` builds what they need and runs those of the names.
 //!
-//! With `POSESCOPE_THREADS=1` in the environment everything runs on one thread.
+//! With `POSESCOPE_THREADS=1` in the environment everything runs on one thread. The pair is one of the
+//! street, or with `POSESCOPE_SCENE=PATH` and `POSESCOPE_PAIR=QUERY,REFERENCE`, the indices of two of its
+//! frames, one of any scene.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::thread;
 use std::time::Instant;
 
+use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use nalgebra::{Point2, Point3, Unit, Vector3};
 use posescope::camera::Intrinsics;
-use posescope::cost::{self, Cost};
+use posescope::cost::{self, Cost, Evaluator, Pair};
 use posescope::estimator;
 use posescope::event::KindSet;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
-use posescope::grid::Offset;
+use posescope::grid::{GridParams, Lattice, Offset, Phase};
+use posescope::image::FloatImage;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::render::{ColoredCloud, Scorer, color_cloud_by};
+use posescope::render::{Canvas, ColoredCloud, PointArrays, Scorer, Values, color_cloud_by};
 use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
@@ -44,12 +48,24 @@ fn main() {
     divan::main();
 }
 
-/// Two frames of the street, 8 m apart.
+/// Two frames of the street, 8 m apart, or those that the environment names.
 static PAIR: LazyLock<Problem> = LazyLock::new(|| {
-    let street = scene::open("street", None).expect("is built in");
+    let named = |name: &str, otherwise: &str| std::env::var(name).unwrap_or(otherwise.to_owned());
+    let scene = named("POSESCOPE_SCENE", "street");
+    let pair = named("POSESCOPE_PAIR", "70,62");
+    let scene = scene::open(&scene, None).expect("a scene that can be opened");
+    let indices = pair
+        .split(',')
+        .map(|index| index.parse().expect("a frame's index"));
+    let [query, reference]: [usize; 2] = indices
+        .collect::<Vec<_>>()
+        .try_into()
+        .expect("indices of a query and a reference");
     Problem {
-        query: street.query(70).expect("is made on demand"),
-        reference: street.reference(62).expect("is made on demand"),
+        query: scene.query(query).expect("a query that can be read"),
+        reference: scene
+            .reference(reference)
+            .expect("a reference that can be read"),
         uncertainty_radius_m: 15.0,
         seed: 0,
     }
@@ -78,7 +94,7 @@ fn match_one_way(bencher: Bencher) {
     let (query, reference) = &*FEATURES;
     let pairs = query.descriptors.len() * reference.descriptors.len();
     bencher
-        .counter(divan::counter::ItemsCount::new(pairs))
+        .counter(ItemsCount::new(pairs))
         .bench(|| nearest_neighbours(black_box(&query.descriptors), &reference.descriptors));
 }
 
@@ -118,14 +134,12 @@ fn random_pose(rng: &mut Pcg64) -> Pose {
 #[divan::bench]
 fn p3p_thousand_problems(bencher: Bencher) {
     let problems = p3p_problems(1000);
-    bencher
-        .counter(divan::counter::ItemsCount::new(problems.len()))
-        .bench(|| {
-            problems
-                .iter()
-                .map(|(bearings, points)| p3p(black_box(bearings), points).len())
-                .sum::<usize>()
-        });
+    bencher.counter(ItemsCount::new(problems.len())).bench(|| {
+        problems
+            .iter()
+            .map(|(bearings, points)| p3p(black_box(bearings), points).len())
+            .sum::<usize>()
+    });
 }
 
 /// 600 correspondences with 1 px of noise, of which a share is false.
@@ -158,41 +172,83 @@ fn mlesac_percent_outliers(bencher: Bencher, percent: usize) {
     });
 }
 
-/// Rendering and judging one hypothesis; 64 at a time, as the grid search does.
+/// Rendering and judging the hypotheses of a coarse search.
 #[divan::bench(args = cost::ALL.iter().map(|entry| entry.name), consts = [1, 3])]
 fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
-    const HYPOTHESES: usize = 64;
-    let mut params = Params::default();
-    params.render.splat_px = SPLAT_PX;
+    let cost = registered_cost(name);
+    let (query, cloud) = seen_by(cost.as_ref());
+    let intrinsics = &PAIR.query.intrinsics;
+    let scorer = Scorer::new(&cloud.points, query, intrinsics, SPLAT_PX, cost.as_ref());
+    let poses = poses_of_a_disc();
+    bencher
+        .counter(ItemsCount::new(poses.len()))
+        .bench(|| scorer.score(black_box(&poses)));
+}
+
+/// Rendering a hypothesis once and judging it by PM's cost and MI's, on one thread.
+#[divan::bench(consts = [1, 3])]
+fn hypothesis_by_both_costs<const SPLAT_PX: usize>(bencher: Bencher) {
+    let [photometric, information] = ["pm", "mi"].map(registered_cost);
+    let (query, cloud) = seen_by(information.as_ref());
+    let (Evaluator::Pairs(mut error), Evaluator::Counts { bins, mut cost }) =
+        (photometric.evaluator(), information.evaluator())
+    else {
+        unreachable!("PM looks at pairs, MI at their histogram");
+    };
+    let of_points: Vec<f32> = cloud.points.iter().map(|point| point.intensity).collect();
+    let values = Values {
+        query: &query,
+        points: &of_points,
+    };
+    let points = PointArrays::new(&cloud.points);
+    let mut canvas = Canvas::new(&PAIR.query.intrinsics, SPLAT_PX).expect("a photo of usual size");
+    let (mut bin_pairs, mut counts) = (Vec::new(), Vec::new());
+    let bin = |value: f32| cost::bin(value, bins) as u8;
+    let poses = poses_of_a_disc();
+    bencher
+        .counter(ItemsCount::new(poses.len()))
+        .bench_local(|| {
+            let mut sum = 0.0;
+            for pose in black_box(&poses) {
+                let pairs = canvas.draw(&points, values, &pose.inverse());
+                bin_pairs.clear();
+                bin_pairs.extend(pairs.iter().map(|pair| Pair {
+                    query: bin(pair.query),
+                    synthetic: bin(pair.synthetic),
+                }));
+                cost::count_pairs(&bin_pairs, bins, &mut counts);
+                sum += error(pairs).unwrap_or_default() + cost(&counts).unwrap_or_default();
+            }
+            sum
+        });
+}
+
+fn registered_cost(name: &str) -> Box<dyn Cost> {
     let entry = cost::ALL.iter().find(|entry| entry.name == name);
-    let cost: Box<dyn Cost> = (entry.expect("is listed").params)().cost();
+    (entry.expect("is listed").params)().cost()
+}
+
+/// The query of the pair and the cloud of its reference, as a cost looks at them.
+fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, ColoredCloud) {
     let (query, reference) = (&PAIR.query, &PAIR.reference);
-    let cloud: ColoredCloud = color_cloud_by(
+    let cloud = color_cloud_by(
         &reference.cloud,
         &reference.intrinsics,
-        &params.render,
+        &Params::default().render,
         cost.reference_channel(&reference.photo.gray),
     );
-    let scorer = Scorer::new(
-        &cloud.points,
-        Arc::new(cost.query_channel(&query.photo.gray)),
-        &query.intrinsics,
-        SPLAT_PX,
-        cost.as_ref(),
-    );
-    let poses: Vec<Pose> = (0..HYPOTHESES)
-        .map(|i| {
-            let offset = Offset {
-                right_m: (i % 8) as f64 - 3.5,
-                forward_m: (i / 8) as f64,
-                yaw_rad: 0.0,
-            };
-            offset.reference_from_camera()
-        })
-        .collect();
-    bencher
-        .counter(divan::counter::ItemsCount::new(HYPOTHESES))
-        .bench(|| scorer.score(black_box(&poses)));
+    (Arc::new(cost.query_channel(&query.photo.gray)), cloud)
+}
+
+/// The cameras of the coarse search in a disc of 10 m.
+fn poses_of_a_disc() -> Vec<Pose> {
+    let centre = Offset::default();
+    let lattice = Lattice::new(Phase::PositionCoarse, centre, 10.0, &GridParams::default());
+    let hypotheses = lattice.expect("a small lattice");
+    let hypotheses = hypotheses.hypotheses();
+    hypotheses
+        .map(|(_, offset)| offset.reference_from_camera())
+        .collect()
 }
 
 #[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 10)]
@@ -305,7 +361,7 @@ fn nearest_words_by_checks(bencher: Bencher, checks: usize) {
     let (words, descriptors) = words_and_descriptors(10_000);
     let vocabulary = Vocabulary::new(words, RetrievalParams::default().trees, checks, 0);
     bencher
-        .counter(divan::counter::ItemsCount::new(1000_usize))
+        .counter(ItemsCount::new(1000_usize))
         .bench(|| vocabulary.quantize(black_box(&descriptors[..1000])));
 }
 

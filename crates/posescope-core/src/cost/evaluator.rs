@@ -1,0 +1,21 @@
+//! How a cost is found for one hypothesis after another.
+
+use super::IntensityPair;
+
+/// The cost of one hypothesis: of its pairs, or of their counts.
+pub type CostOf<'a, T> = Box<dyn FnMut(&[T]) -> Option<f64> + Send + 'a>;
+
+/// A cost as the grid search asks for it, some ten thousand times in a row: what it needs to know of
+/// the pixels, and the cost of that. It keeps its memory from one hypothesis to the next, and answers
+/// what [`Cost::evaluate`](super::Cost::evaluate) answers, bit for bit.
+pub enum Evaluator<'a> {
+    /// The cost looks at every pair.
+    Pairs(CostOf<'a, IntensityPair>),
+    /// The cost is one of the joint histogram alone.
+    Counts {
+        /// Bins per axis, as in [`JointHistogram::of`](super::JointHistogram::of).
+        bins: usize,
+        /// The cost of the counts, `bins` × `bins`; rows are the query's bins.
+        cost: CostOf<'a, u32>,
+    },
+}
