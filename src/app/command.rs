@@ -5,8 +5,8 @@ use std::cell::RefCell;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 use super::camera::{Nudge, Place};
-use super::desk::Comparing;
 use super::setup::ReferencePick;
+use super::state::CompareMode;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -80,7 +80,7 @@ pub enum Command {
     /// Forget A.
     Unpin,
     /// Show another of the two runs.
-    Compare(Comparing),
+    Compare(CompareMode),
     /// Show A instead of B, or the other way round.
     Flip,
     /// Blink between query and synthetic view.

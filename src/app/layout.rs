@@ -6,8 +6,8 @@ use eframe::egui_wgpu::RenderState;
 use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
 
 use super::command::{Command, Queue};
-use super::desk::{Comparing, Desk};
-use super::scope::Scope;
+use super::state::{AppState, CompareMode};
+use super::view_context::ViewContext;
 use super::views::{self, View};
 
 /// The tree of views, and the views themselves.
@@ -92,10 +92,10 @@ impl Layout {
         self.tree.make_active(|tile, _| tile == id);
     }
 
-    pub(super) fn ui(&mut self, ui: &mut egui::Ui, desk: &Desk, commands: &Queue) {
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, state: &AppState, commands: &Queue) {
         let mut panes = Panes {
             views: &mut self.views,
-            desk,
+            state,
             commands,
         };
         if let Some(name) = &mut self.alone {
@@ -178,7 +178,7 @@ fn first_tree() -> Tree<String> {
 /// What the tree draws its panes with.
 struct Panes<'a> {
     views: &'a mut BTreeMap<&'static str, Panel>,
-    desk: &'a Desk,
+    state: &'a AppState,
     commands: &'a Queue,
 }
 
@@ -194,11 +194,11 @@ impl Panes<'_> {
             return;
         };
         egui::Frame::NONE.inner_margin(6.0).show(ui, |ui| {
-            let present = Scope::present(self.desk, self.commands);
-            let kept = Scope::kept(self.desk, self.commands);
-            match (self.desk.comparing, kept) {
-                (Comparing::Kept, Some(kept)) => draw(ui, "A", &mut panel.kept, &kept),
-                (Comparing::SideBySide, Some(kept)) => ui.columns(2, |columns| {
+            let present = ViewContext::present(self.state, self.commands);
+            let kept = ViewContext::kept(self.state, self.commands);
+            match (self.state.compare_mode, kept) {
+                (CompareMode::Kept, Some(kept)) => draw(ui, "A", &mut panel.kept, &kept),
+                (CompareMode::SideBySide, Some(kept)) => ui.columns(2, |columns| {
                     draw(&mut columns[0], "A", &mut panel.kept, &kept);
                     draw(&mut columns[1], "B", &mut panel.present, &present);
                 }),
@@ -249,14 +249,14 @@ impl Behavior<String> for Panes<'_> {
     }
 }
 
-fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, scope: &Scope<'_>) {
+fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, context: &ViewContext<'_>) {
     ui.push_id(run, |ui| {
-        if scope.desk.kept.is_some() {
+        if context.state.kept.is_some() {
             ui.weak(match run {
                 "A" => "A, kept",
                 _ => "B, present",
             });
         }
-        view.ui(ui, scope);
+        view.ui(ui, context);
     });
 }

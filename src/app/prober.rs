@@ -94,7 +94,7 @@ impl Prober {
     }
 
     /// Takes in answers. An error is a fault of ours.
-    pub(super) fn attend(&mut self) -> Result<(), String> {
+    pub(super) fn poll(&mut self) -> Result<(), String> {
         while let Ok(answer) = self.answers.try_recv() {
             self.latest = Some(answer?);
         }

@@ -160,7 +160,7 @@ impl Queries {
     }
 
     /// Takes in what was made; has what is wanted made.
-    pub(super) fn attend(&mut self) -> Vec<Outcome> {
+    pub(super) fn poll(&mut self) -> Vec<Outcome> {
         while let Ok(picture) = self.pictures.1.try_recv() {
             match picture {
                 Picture::Thumbnail(frame, image) => {

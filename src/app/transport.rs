@@ -3,26 +3,26 @@
 use egui::{Button, RichText, Ui};
 
 use super::command::{Command, Queue};
-use super::desk::{Comparing, Desk};
 use super::setup::ReferencePick;
+use super::state::{AppState, CompareMode};
 use super::theme;
 use crate::localize::Selection;
 use crate::method::Method;
 use crate::session::State;
 
-pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.horizontal_wrapped(|ui| {
-        run_buttons(ui, desk, commands);
+        run_buttons(ui, state, commands);
         ui.separator();
-        query(ui, desk, commands);
+        query(ui, state, commands);
         ui.separator();
-        methods(ui, desk, commands);
+        methods(ui, state, commands);
         ui.separator();
-        switches(ui, desk, commands);
-        compared(ui, desk, commands);
-        menus(ui, desk, commands);
+        switches(ui, state, commands);
+        compared(ui, state, commands);
+        menus(ui, state, commands);
     });
-    notes(ui, desk, commands);
+    notes(ui, state, commands);
 }
 
 fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Command) {
@@ -31,15 +31,15 @@ fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Comman
     }
 }
 
-fn run_buttons(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let is_running = matches!(desk.state(), State::Running | State::Loading);
+fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let is_running = matches!(state.run_state(), State::Running | State::Loading);
     let (text, help) = if is_running {
         ("Pause", "Pause behind the next event (Space)")
     } else {
         ("▶ Run", "Run to the next breakpoint or the end (Space, F5)")
     };
     button(ui, commands, text, help, Command::RunOrPause);
-    let is_paused = matches!(desk.state(), State::Paused { .. });
+    let is_paused = matches!(state.run_state(), State::Paused { .. });
     ui.add_enabled_ui(is_paused || is_running, |ui| {
         button(
             ui,
@@ -57,7 +57,7 @@ fn run_buttons(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     });
     let help = "Begin again and wait at the first step (Shift+F5)";
     button(ui, commands, "Restart", help, Command::Restart);
-    match desk.state() {
+    match state.run_state() {
         State::Loading => {
             ui.spinner();
             ui.label("Loading");
@@ -88,8 +88,8 @@ fn run_buttons(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     }
 }
 
-fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let setup = &desk.setup;
+fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let setup = &state.setup;
     let frame = |scene: &std::sync::Arc<dyn crate::scene::Scene>, index: usize| {
         scene.frames()[index].clone()
     };
@@ -156,12 +156,12 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     });
 }
 
-fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let here = desk
+fn methods(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let here = state
         .run()
-        .span_at(desk.cursor)
+        .span_at(state.cursor)
         .and_then(|span| span.part.method());
-    let asked = desk.setup.task.protocol.methods.iter().copied();
+    let asked = state.setup.task.protocol.methods.iter().copied();
     let others = asked.filter(|method| !Method::PAPER.contains(method));
     for method in Method::PAPER.into_iter().chain(others) {
         let is_here = here == Some(method);
@@ -178,7 +178,7 @@ fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     }
 }
 
-fn switches(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+fn switches(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let switch = |ui: &mut Ui, is_on: bool, text: &str, help: &str, command: Command| {
         let mut state = is_on;
         if ui
@@ -190,22 +190,22 @@ fn switches(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         }
     };
     let help = "Show the ground truth (G)";
-    switch(ui, desk.shows_truth, "Truth", help, Command::ShowTruth);
+    switch(ui, state.shows_truth, "Truth", help, Command::ShowTruth);
     let help = "Show only what differs (D)";
     switch(
         ui,
-        desk.only_differences,
+        state.only_differences,
         "Differences",
         help,
         Command::OnlyDifferences,
     );
     let help = "Blink between query and synthetic view (B)";
-    switch(ui, desk.blinking, "Blink", help, Command::Blink);
+    switch(ui, state.blinking, "Blink", help, Command::Blink);
 }
 
-fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.separator();
-    if desk.kept.is_none() {
+    if state.kept.is_none() {
         button(
             ui,
             commands,
@@ -215,18 +215,18 @@ fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         );
         return;
     }
-    for (comparing, text, help) in [
-        (Comparing::Kept, "A", "Show the run that was kept (X)"),
-        (Comparing::Present, "B", "Show the present run (X)"),
+    for (compare_mode, text, help) in [
+        (CompareMode::Kept, "A", "Show the run that was kept (X)"),
+        (CompareMode::Present, "B", "Show the present run (X)"),
         (
-            Comparing::SideBySide,
+            CompareMode::SideBySide,
             "A | B",
             "Show both beside each other",
         ),
     ] {
-        let response = ui.selectable_label(desk.comparing == comparing, text);
+        let response = ui.selectable_label(state.compare_mode == compare_mode, text);
         if response.on_hover_text(help).clicked() {
-            commands.send(Command::Compare(comparing));
+            commands.send(Command::Compare(compare_mode));
         }
     }
     button(
@@ -238,7 +238,7 @@ fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     );
 }
 
-fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.separator();
     ui.menu_button("Views", |ui| {
         for entry in super::views::ALL {
@@ -251,7 +251,7 @@ fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
             commands.send(Command::ResetLayout);
         }
     });
-    super::save::menu(ui, desk, commands);
+    super::save::menu(ui, state, commands);
     button(
         ui,
         commands,
@@ -262,8 +262,8 @@ fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     button(ui, commands, "?", "All keys (?)", Command::Help);
 }
 
-fn notes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    for (index, note) in desk.notes.iter().enumerate() {
+fn notes(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    for (index, note) in state.notes.iter().enumerate() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Dismiss").clicked() {
                 commands.send(Command::Dismiss(index));

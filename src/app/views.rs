@@ -1,6 +1,6 @@
 //! The views: each one file and one entry in [`ALL`].
 //!
-//! A view draws from the [`Scope`] that it is handed and keeps nothing of the run. What it does keep
+//! A view draws from the [`ViewContext`] that it is handed and keeps nothing of the run. What it does keep
 //! is how a person looks at it: a zoom, a filter.
 
 mod breakpoints;
@@ -25,15 +25,15 @@ mod thumbnail;
 
 use eframe::egui_wgpu::RenderState;
 
-use super::scope::Scope;
+use super::view_context::ViewContext;
 
 /// A part of the window.
 pub trait View {
     /// Draws the view. It must bear any moment of any run, and none.
-    fn ui(&mut self, ui: &mut egui::Ui, scope: &Scope<'_>);
+    fn ui(&mut self, ui: &mut egui::Ui, context: &ViewContext<'_>);
 }
 
-/// A view's place in the registry.
+/// A view as the registry has it.
 pub struct Entry {
     /// The name in saved layouts.
     pub name: &'static str,

@@ -25,7 +25,7 @@ fn show(window: &mut Harness<'_, App>, view: &'static str) {
     // What is in sight asks for its thumbnails.
     window.run_steps(2);
     wait(window, |app| {
-        !app.desk().is_probing() && !app.desk().queries.is_painting()
+        !app.app_state().is_probing() && !app.app_state().queries.is_painting()
     });
     window.run_steps(4);
 }
@@ -38,7 +38,9 @@ fn at_every_moment(
     settle(window);
     see(window, "waiting", &[]);
     window.state_mut().send(Command::Run);
-    wait(window, |app| *app.desk().state() == State::Finished);
+    wait(window, |app| {
+        *app.app_state().run_state() == State::Finished
+    });
     window.state_mut().send(Command::SelectMethod(Method::FB));
     see(window, "features", &[]);
     window.state_mut().send(Command::SelectMethod(Method::MI));
@@ -49,7 +51,9 @@ fn at_every_moment(
     let all = posescope::fusion::Fusion::all().collect();
     window.state_mut().send(Command::SetFusions(all));
     window.run_steps(2);
-    wait(window, |app| *app.desk().state() == State::Finished);
+    wait(window, |app| {
+        *app.app_state().run_state() == State::Finished
+    });
     window.state_mut().send(Command::Last);
     see(
         window,
@@ -163,5 +167,5 @@ fn every_view_bears_a_run_that_never_began() {
         window.state_mut().send(Command::Maximize(Some(entry.name)));
         window.run_steps(3);
     }
-    assert!(window.state().desk().run().is_empty());
+    assert!(window.state().app_state().run().is_empty());
 }

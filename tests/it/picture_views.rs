@@ -36,14 +36,14 @@ fn order(window: &mut Harness<'_, App>, command: Command) {
 }
 
 fn latest<E: DebugEvent + Clone + 'static>(window: &Harness<'_, App>) -> E {
-    let desk = window.state().desk();
-    let event: Option<&E> = desk.run().latest(desk.cursor);
+    let state = window.state().app_state();
+    let event: Option<&E> = state.run().latest(state.cursor);
     event.expect("it was told").clone()
 }
 
 fn query_features(window: &Harness<'_, App>) -> Arc<Features> {
-    let desk = window.state().desk();
-    let mut events = desk.run().all_until::<FeaturesDetected>(desk.cursor);
+    let state = window.state().app_state();
+    let mut events = state.run().all_until::<FeaturesDetected>(state.cursor);
     let event = events.find(|(_, event)| event.side == Side::Query);
     Arc::clone(&event.expect("detected").1.features)
 }
@@ -114,7 +114,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
     window.step();
     window.get_by_label(&format!("inlier: {inliers}, hidden"));
     click(&mut window, place);
-    let selected = window.state().desk().selected_feature;
+    let selected = window.state().app_state().selected_feature;
     let is_inlier = |i: usize| matches!(states[i], FeatureState::Inlier { .. });
     assert!(!selected.is_some_and(is_inlier), "it is hidden");
 
@@ -132,7 +132,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     let mut window = finished(Method::FB, "images");
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
-    assert_eq!(window.state().desk().selected_feature, Some(feature));
+    assert_eq!(window.state().app_state().selected_feature, Some(feature));
     window.get_by_label(&format!("query feature {feature}: inlier"));
 
     let decisions = latest::<MatchesDecided>(&window).decisions;
@@ -157,7 +157,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     window.get_by_label("Close feature").click();
     window.step();
     window.step();
-    assert_eq!(window.state().desk().selected_feature, None);
+    assert_eq!(window.state().app_state().selected_feature, None);
 }
 
 #[test]
@@ -247,7 +247,7 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
             assessed.shuffled.expect("a cost")
         ));
         window.get_by_label(&format!("best {:.4}", assessed.best));
-        let results = window.state().desk().run().results();
+        let results = window.state().app_state().run().results();
         let mut costs = results.filter(|result| result.method == method);
         let cost = costs
             .find_map(|result| result.cost.clone())
@@ -261,7 +261,7 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
     let mut window = finished(Method::MI, "synthetic");
     let truth = window
         .state()
-        .desk()
+        .app_state()
         .run()
         .loaded
         .as_ref()
@@ -269,14 +269,19 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
         .truth;
     order(&mut window, Command::TakeCamera(truth));
     let begun = std::time::Instant::now();
-    while window.state().desk().probe().is_none() {
+    while window.state().app_state().probe().is_none() {
         assert!(begun.elapsed().as_secs() < 60, "it hangs");
         std::thread::sleep(std::time::Duration::from_millis(5));
         window.step();
     }
     window.step();
     window.get_by_label("MI, camera in hand");
-    let probe = window.state().desk().probe().expect("an answer").clone();
+    let probe = window
+        .state()
+        .app_state()
+        .probe()
+        .expect("an answer")
+        .clone();
     for (_, comparison) in &probe.comparisons {
         let cost = comparison.score.cost.expect("a cost");
         window.get_by_label(&format!("present {cost:.4}"));
@@ -323,7 +328,7 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 fn both_views_draw_at_every_moment_of_a_run() {
     let mut window = finished(Method::FB, "images");
     order(&mut window, Command::SelectFeature(Some(0)));
-    let len = window.state().desk().run().len();
+    let len = window.state().app_state().run().len();
     // Every moment of FB's story, and some of the long searches.
     let mut cursor = 0;
     while cursor < len {

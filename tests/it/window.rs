@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, Comparing, Setup};
+use posescope::app::{App, Command, CompareMode, Setup};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, QueryResult, Request, Unwatched};
 use posescope::method::Method;
@@ -55,10 +55,10 @@ pub fn window(setup: Setup) -> Harness<'static, App> {
 /// Draws frames until the worker needs somebody.
 pub fn settle(window: &mut Harness<'_, App>) -> State {
     wait(window, |app| {
-        !matches!(app.desk().state(), State::Loading | State::Running)
+        !matches!(app.app_state().run_state(), State::Loading | State::Running)
     });
     window.step();
-    window.state().desk().state().clone()
+    window.state().app_state().run_state().clone()
 }
 
 /// Draws frames until something is the case.
@@ -92,14 +92,15 @@ fn press(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) {
 
 /// Gives an order by a key, and waits for what comes of it.
 fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event {
-    let before = window.state().desk().run().len();
+    let before = window.state().app_state().run().len();
     press(window, modifiers, key);
     wait(window, |app| {
-        app.desk().run().len() > before || matches!(app.desk().state(), State::Finished)
+        app.app_state().run().len() > before
+            || matches!(app.app_state().run_state(), State::Finished)
     });
     settle(window);
-    let desk = window.state().desk();
-    desk.run().records()[desk.cursor].event.clone()
+    let state = window.state().app_state();
+    state.run().records()[state.cursor].event.clone()
 }
 
 /// Whether some label of the window holds these words.
@@ -116,7 +117,13 @@ fn stage(event: &Event) -> Option<(Stage, bool)> {
 }
 
 pub fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
-    window.state().desk().run().results().cloned().collect()
+    window
+        .state()
+        .app_state()
+        .run()
+        .results()
+        .cloned()
+        .collect()
 }
 
 /// The same without a window.
@@ -149,9 +156,9 @@ fn headless(params: &Params) -> Vec<QueryResult> {
 fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let mut window = window(setup());
     assert_eq!(settle(&mut window), State::Paused { breakpoint: None });
-    assert_eq!(window.state().desk().run().len(), 1);
+    assert_eq!(window.state().app_state().run().len(), 1);
     window.get_by_label("Into").click();
-    wait(&mut window, |app| app.desk().run().len() == 2);
+    wait(&mut window, |app| app.app_state().run().len() == 2);
     settle(&mut window);
     let event = order(&mut window, Modifiers::NONE, Key::F10);
     assert_eq!(stage(&event), Some((Stage::Detect, false)));
@@ -169,23 +176,23 @@ fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
 #[test]
 fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     let mut window = finished(setup());
-    let last = window.state().desk().run().len() - 1;
+    let last = window.state().app_state().run().len() - 1;
     for cursor in (0..=last).step_by(7).chain([last]) {
         window.state_mut().send(Command::MoveCursor(cursor));
         window.step();
         window.step();
-        assert_eq!(window.state().desk().cursor, cursor);
+        assert_eq!(window.state().app_state().cursor, cursor);
     }
-    assert_eq!(window.state().desk().run().len(), last + 1);
+    assert_eq!(window.state().app_state().run().len(), last + 1);
     press(&mut window, Modifiers::NONE, Key::Home);
-    assert_eq!(window.state().desk().cursor, 0);
+    assert_eq!(window.state().app_state().cursor, 0);
     press(&mut window, Modifiers::SHIFT, Key::ArrowRight);
-    assert_eq!(window.state().desk().cursor, 10);
+    assert_eq!(window.state().app_state().cursor, 10);
     press(&mut window, Modifiers::NONE, Key::ArrowLeft);
-    assert_eq!(window.state().desk().cursor, 9);
+    assert_eq!(window.state().app_state().cursor, 9);
     press(&mut window, Modifiers::NONE, Key::Num3);
-    let desk = window.state().desk();
-    let span = desk.run().span_at(desk.cursor).expect("in a span");
+    let state = window.state().app_state();
+    let span = state.run().span_at(state.cursor).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
 }
 
@@ -205,11 +212,11 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     window.get_by_label("Add").click();
     window.step();
     window.step();
-    let breakpoints = &window.state().desk().setup.task.breakpoints;
+    let breakpoints = &window.state().app_state().setup.task.breakpoints;
     assert_eq!(breakpoints[0].to_string(), "mi.yaw_coarse");
     assert_eq!(breakpoints.len(), 1);
     press(&mut window, Modifiers::NONE, Key::F5);
-    wait(&mut window, |app| app.desk().run().len() > 10);
+    wait(&mut window, |app| app.app_state().run().len() > 10);
     let stopped = State::Paused {
         breakpoint: Some("mi.yaw_coarse".to_owned()),
     };
@@ -240,12 +247,12 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     });
     window.step();
     assert_eq!(settle(&mut window), State::Finished);
-    let desk = window.state().desk();
-    let span = desk.run().span_at(desk.cursor).expect("in a span");
+    let state = window.state().app_state();
+    let span = state.run().span_at(state.cursor).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
-    assert_eq!(desk.cursor + 1, span.records.end);
+    assert_eq!(state.cursor + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
-        let bars = desk.run().stages().iter();
+        let bars = state.run().stages().iter();
         bars.filter(|bar| bar.stage.name() == name)
             .map(|bar| bar.reused)
             .collect()
@@ -274,10 +281,10 @@ fn two_settings_are_compared_and_their_differences_marked() {
     window.step();
     assert!(window.query_all_by_label_contains("≠").next().is_some());
     press(&mut window, Modifiers::NONE, Key::X);
-    assert_eq!(window.state().desk().comparing, Comparing::Kept);
+    assert_eq!(window.state().app_state().compare_mode, CompareMode::Kept);
     window
         .state_mut()
-        .send(Command::Compare(Comparing::SideBySide));
+        .send(Command::Compare(CompareMode::SideBySide));
     window.step();
     window.step();
     assert!(is_said(&window, "A, kept"));
@@ -292,14 +299,14 @@ fn two_settings_are_compared_and_their_differences_marked() {
 fn the_next_failure_is_found_once_all_queries_were_run() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::N);
-    assert_eq!(window.state().desk().setup.query, 1);
+    assert_eq!(window.state().app_state().setup.query, 1);
     window.get_by_label("Run all").click();
-    wait(&mut window, |app| app.desk().results.len() == 3);
+    wait(&mut window, |app| app.app_state().results.len() == 3);
     press(&mut window, Modifiers::NONE, Key::N);
-    assert_eq!(window.state().desk().setup.query, GREY);
+    assert_eq!(window.state().app_state().setup.query, GREY);
     settle(&mut window);
     press(&mut window, Modifiers::NONE, Key::K);
-    assert_eq!(window.state().desk().setup.query, 2);
+    assert_eq!(window.state().app_state().setup.query, 2);
 }
 
 #[test]
@@ -317,7 +324,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     }
     let mut window = window(setup);
     settle(&mut window);
-    wait(&mut window, |app| !app.desk().queries.is_painting());
+    wait(&mut window, |app| !app.app_state().queries.is_painting());
     std::thread::sleep(Duration::from_millis(100));
     // Every worker has its handles on the scene.
     let alone = Arc::strong_count(&scene);
@@ -326,7 +333,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         let begun = Instant::now();
         window.state_mut().send(command);
         window.step();
-        assert_eq!(window.state().desk().queries.progress(), None);
+        assert_eq!(window.state().app_state().queries.progress(), None);
         wait(&mut window, is_alone);
         assert!(begun.elapsed() < Duration::from_secs(20));
         let running = Instant::now();
@@ -335,7 +342,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         }
         window.state_mut().send(Command::RunAllQueries);
         window.step();
-        assert_eq!(window.state().desk().queries.progress(), Some((0, 3)));
+        assert_eq!(window.state().app_state().queries.progress(), Some((0, 3)));
         wait(&mut window, |app| !is_alone(app));
     };
     // The first time there is nothing to stop but the session, which waits at its first event.
@@ -392,10 +399,10 @@ fn a_session_is_saved_and_restored() {
         .send(Command::RestoreSession(path.clone()));
     window.step();
     settle(&mut window);
-    let desk = window.state().desk();
-    assert_eq!(desk.setup.query, 1);
-    assert_eq!(desk.setup.task.params.changes(), ["fb.ratio=0.8"]);
-    assert_eq!(desk.cursor, 40);
+    let state = window.state().app_state();
+    assert_eq!(state.setup.query, 1);
+    assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
+    assert_eq!(state.cursor, 40);
     std::fs::write(&path, "{}").expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();
@@ -421,7 +428,7 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     window.step();
     assert_eq!(settle(&mut window), State::Finished);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
-    let loaded = window.state().desk().run().loaded.clone();
+    let loaded = window.state().app_state().run().loaded.clone();
     let problem = &loaded.expect("it ran").problems[0];
     assert_eq!(problem.query.photo.gray, photo.expect("readable").gray);
 }
@@ -436,7 +443,7 @@ fn a_session_of_an_earlier_program_is_restored() {
     window.state_mut().send(restore);
     window.step();
     settle(&mut window);
-    let setup = &window.state().desk().setup;
+    let setup = &window.state().app_state().setup;
     let task = &setup.task;
     assert_eq!(setup.pick().to_string(), "maxf:2");
     assert_eq!(setup.chosen.frames, [0, 2]);
@@ -489,7 +496,7 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
         window.step();
         window.step();
         let place = format!("session.json:{line}: ");
-        let note = window.state().desk().notes.last().expect("it is said");
+        let note = window.state().app_state().notes.last().expect("it is said");
         let said = &note.text;
         assert!(said.contains(&place) && said.contains(words), "{said}");
         assert!(!said.contains('\n') && note.is_error, "{said}");
@@ -516,8 +523,8 @@ fn a_session_keeps_the_format_and_the_index() {
     here.state_mut().send(Command::RestoreSession(path.clone()));
     here.step();
     settle(&mut here);
-    let restored = &here.state().desk().setup;
-    assert_eq!(restored.task, there.state().desk().setup.task);
+    let restored = &here.state().app_state().setup;
+    assert_eq!(restored.task, there.state().app_state().setup.task);
     let index = restored.index.file().and_then(|file| file.to_str());
     assert_eq!(index, Some("an.index"));
     // A format that does not fit is refused as it would be on the command line.
@@ -541,7 +548,7 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     window.step();
     assert!(path.metadata().expect("written").len() > 10_000);
     assert_eq!(
-        window.state().desk().setup.command_line(),
+        window.state().app_state().setup.command_line(),
         "posescope run walls --query 000001 --reference 000000 --radius 3 --seed 7"
     );
 }
@@ -570,10 +577,10 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::Num9);
     let truth = Walls::new().pose(1).expect("known");
-    assert_eq!(window.state().desk().camera, Some(truth));
-    wait(&mut window, |app| !app.desk().is_probing());
-    let desk = window.state().desk();
-    let probe = desk.probe().expect("answered");
+    assert_eq!(window.state().app_state().camera, Some(truth));
+    wait(&mut window, |app| !app.app_state().is_probing());
+    let state = window.state().app_state();
+    let probe = state.probe().expect("answered");
     for (method, comparison) in &probe.comparisons {
         let results = results(&window);
         let result = results.iter().find(|result| result.method == *method);
@@ -583,10 +590,10 @@ fn the_camera_in_hand_has_costs_of_its_own() {
         assert_eq!(comparison.score.cost, report.truth);
     }
     press(&mut window, Modifiers::ALT, Key::ArrowUp);
-    let moved = window.state().desk().camera.expect("in hand");
+    let moved = window.state().app_state().camera.expect("in hand");
     assert!((moved.translation.z - truth.translation.z - 0.2).abs() < 1e-9);
     press(&mut window, Modifiers::NONE, Key::Escape);
-    assert_eq!(window.state().desk().camera, None);
+    assert_eq!(window.state().app_state().camera, None);
 }
 
 /// Whatever is registered is shown as the paper's methods are, in glyphs that the fonts have.

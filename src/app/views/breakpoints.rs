@@ -3,7 +3,7 @@
 use egui::{ScrollArea, TextEdit, Ui};
 
 use super::View;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::session::Breakpoint;
 
 /// The list of breakpoints, and a line to write a new one.
@@ -13,8 +13,8 @@ pub struct BreakpointList {
 }
 
 impl View for BreakpointList {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let breakpoints = scope.desk.setup.task.breakpoints.iter();
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let breakpoints = context.state.setup.task.breakpoints.iter();
         let breakpoints: Vec<String> = breakpoints.map(ToString::to_string).collect();
         let parsed = self.text.parse::<Breakpoint>();
         let mut is_added = false;
@@ -32,7 +32,7 @@ impl View for BreakpointList {
         if is_added {
             let mut all = breakpoints.clone();
             all.push(std::mem::take(&mut self.text).trim().to_owned());
-            scope.send(Command::SetBreakpoints(all));
+            context.send(Command::SetBreakpoints(all));
         } else if let (Err(error), false) = (&parsed, self.text.trim().is_empty()) {
             ui.weak(error.to_string());
         }
@@ -46,7 +46,7 @@ impl View for BreakpointList {
                     if remove.clicked() {
                         let mut all = breakpoints.clone();
                         all.remove(index);
-                        scope.send(Command::SetBreakpoints(all));
+                        context.send(Command::SetBreakpoints(all));
                     }
                     ui.monospace(breakpoint);
                 });
@@ -65,7 +65,7 @@ impl View for BreakpointList {
                             true => all.retain(|text| text != stage),
                             false => all.push(stage.to_owned()),
                         }
-                        scope.send(Command::SetBreakpoints(all));
+                        context.send(Command::SetBreakpoints(all));
                     }
                 }
             });

@@ -50,7 +50,7 @@ impl Lens {
 
     /// Zooms by wheel and pinch about the pointer, moves by dragging, and goes back to the whole
     /// picture on a double click. Whether anything has changed.
-    pub(super) fn obey(&mut self, ui: &Ui, response: &Response, at: &Placement) -> bool {
+    pub(super) fn handle_input(&mut self, ui: &Ui, response: &Response, at: &Placement) -> bool {
         let before = *self;
         if response.dragged() {
             self.centre = at.centre() - response.drag_delta() / at.picture.size();

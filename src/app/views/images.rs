@@ -21,7 +21,7 @@ use self::story::{KINDS, Story};
 use self::truth::TrueMatch;
 use super::View;
 use super::ink::Ink;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::Run;
@@ -51,16 +51,16 @@ impl Default for Images {
 }
 
 impl View for Images {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(problem) = scope.problem() else {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(problem) = context.problem() else {
             ui.weak("The photos are being read");
             return;
         };
-        let photos = Photos::of(ui, scope, problem);
-        let story = Story::at(scope);
+        let photos = Photos::of(ui, context, problem);
+        let story = Story::at(context);
         let kinds = story.kinds();
-        let differing = differing(scope, &story);
-        self.toolbar(ui, scope, &story, differing.as_deref());
+        let differing = differing(context, &story);
+        self.toolbar(ui, context, &story, differing.as_deref());
         if !kinds.is_empty() {
             let mut counts = [0; KINDS];
             for &kind in &kinds {
@@ -69,7 +69,7 @@ impl View for Images {
             funnel::ui(ui, &counts, &mut self.shown);
         }
 
-        let selected = scope.desk.selected_feature.filter(|&i| i < kinds.len());
+        let selected = context.state.selected_feature.filter(|&i| i < kinds.len());
         let area = ui.available_rect_before_wrap();
         let (pictures, panel) = match selected {
             Some(_) => {
@@ -86,8 +86,8 @@ impl View for Images {
         };
         let is_shown = |feature: usize| selected == Some(feature) || is_wanted(feature);
         let sights = Sights::new(&story, &kinds, &query.at, &reference.at, is_shown);
-        let hovered = point_at(ui, scope, &sights, &story, [&query, &reference]);
-        let truth = selected.and_then(|feature| true_match(scope, &story, problem, feature));
+        let hovered = point_at(ui, context, &sights, &story, [&query, &reference]);
+        let truth = selected.and_then(|feature| true_match(context, &story, problem, feature));
 
         let mut ink = Ink::new(ui.pixels_per_point());
         let strength = if hovered.is_some() { PALE } else { 1.0 };
@@ -108,7 +108,7 @@ impl View for Images {
         photos::name(ui, problem, &query.at, &reference.at);
 
         if let (Some(feature), Some(panel)) = (selected, panel) {
-            let params = &scope.run.params.fb;
+            let params = &context.run.params.fb;
             let subject = Subject {
                 feature,
                 story: &story,
@@ -120,7 +120,7 @@ impl View for Images {
             };
             ui.scope_builder(UiBuilder::new().max_rect(panel.area), |ui| {
                 ui.shrink_clip_rect(panel.area);
-                self.detail.ui(ui, scope, &subject, panel.is_wide);
+                self.detail.ui(ui, context, &subject, panel.is_wide);
             });
         }
         ui.advance_cursor_after_rect(area);
@@ -131,14 +131,14 @@ impl Images {
     fn toolbar(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         story: &Story<'_>,
         differing: Option<&[bool]>,
     ) {
         ui.horizontal_wrapped(|ui| {
             ui.label(summary(story));
             self.lenses.ui(ui);
-            if scope.desk.only_differences {
+            if context.state.only_differences {
                 ui.weak(match differing {
                     Some(differing) => {
                         let count = differing.iter().filter(|differs| **differs).count();
@@ -165,27 +165,27 @@ fn summary(story: &Story<'_>) -> String {
 }
 
 /// The run that this one is compared with.
-fn other_run<'a>(scope: &Scope<'a>) -> Option<&'a Run> {
-    let desk = scope.desk;
-    let kept = &desk.kept.as_ref()?.run;
-    Some(if std::ptr::eq(scope.run, desk.run()) {
+fn other_run<'a>(context: &ViewContext<'a>) -> Option<&'a Run> {
+    let state = context.state;
+    let kept = &state.kept.as_ref()?.run;
+    Some(if std::ptr::eq(context.run, state.run()) {
         kept
     } else {
-        desk.run()
+        state.run()
     })
 }
 
 /// Which features differ from the other run, where only those are wanted.
-fn differing(scope: &Scope<'_>, story: &Story<'_>) -> Option<Vec<bool>> {
-    let wanted = scope.desk.only_differences;
-    let other = other_run(scope).filter(|_| wanted)?;
-    let other = Story::counterpart(scope, story.method?, other)?;
+fn differing(context: &ViewContext<'_>, story: &Story<'_>) -> Option<Vec<bool>> {
+    let wanted = context.state.only_differences;
+    let other = other_run(context).filter(|_| wanted)?;
+    let other = Story::counterpart(context, story.method?, other)?;
     Some(story.differing(&other))
 }
 
 /// What the ground truth says about a feature's match, if it is shown.
 fn true_match(
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     story: &Story<'_>,
     problem: &Problem,
     feature: usize,
@@ -194,7 +194,7 @@ fn true_match(
     let lifted = story.lifted(feature);
     Some(TrueMatch::of(
         problem,
-        scope.truth()?,
+        context.truth()?,
         &story.query().get(feature)?.pixel(),
         &story.reference().get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
@@ -204,15 +204,15 @@ fn true_match(
 /// The feature under the pointer; a click selects it.
 fn point_at(
     ui: &Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     sights: &Sights,
     story: &Story<'_>,
     photos: [&Shown; 2],
 ) -> Option<usize> {
     let over = photos.into_iter().find(|photo| photo.response.hovered())?;
     let hovered = sights.nearest(over.response.hover_pos()?);
-    if over.response.clicked() && scope.desk.selected_feature != hovered {
-        scope.send(Command::SelectFeature(hovered));
+    if over.response.clicked() && context.state.selected_feature != hovered {
+        context.send(Command::SelectFeature(hovered));
     }
     if let Some(feature) = hovered {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);

@@ -3,7 +3,7 @@
 use egui::{RichText, ScrollArea, TextStyle, Ui};
 
 use super::View;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::event::Event;
 use crate::narration;
 
@@ -17,8 +17,8 @@ pub struct Log {
 }
 
 impl Log {
-    fn take_in(&mut self, scope: &Scope<'_>) {
-        let records = scope.run.records();
+    fn take_in(&mut self, context: &ViewContext<'_>) {
+        let records = context.run.records();
         if records.len() < self.told {
             *self = Self::default();
         }
@@ -40,17 +40,17 @@ impl Log {
 }
 
 impl View for Log {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        self.take_in(scope);
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        self.take_in(context);
         if self.lines.is_empty() {
             ui.weak("Nothing was told yet");
             return;
         }
-        let here = self.lines.partition_point(|(at, _)| *at <= scope.cursor);
+        let here = self.lines.partition_point(|(at, _)| *at <= context.cursor);
         let height = ui.text_style_height(&TextStyle::Monospace);
         let mut area = ScrollArea::both().auto_shrink(false);
-        if self.cursor_shown != Some(scope.cursor) {
-            self.cursor_shown = Some(scope.cursor);
+        if self.cursor_shown != Some(context.cursor) {
+            self.cursor_shown = Some(context.cursor);
             let spacing = ui.spacing().item_spacing.y;
             let above = (here as f32 * (height + spacing) - 0.5 * ui.available_height()).max(0.0);
             area = area.vertical_scroll_offset(above);
@@ -66,7 +66,7 @@ impl View for Log {
                 }
                 let label = egui::Label::new(text).sense(egui::Sense::click()).extend();
                 if ui.add(label).on_hover_text(format!("step {at}")).clicked() {
-                    scope.send(Command::MoveCursor(*at));
+                    context.send(Command::MoveCursor(*at));
                 }
             }
         });

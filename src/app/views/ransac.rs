@@ -10,7 +10,7 @@ use egui::{Color32, Ui};
 use egui_plot::{GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
 
 use super::View;
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::event::HypothesisTried;
 use crate::method::Method;
 use crate::session::{Loaded, Span};
@@ -51,40 +51,40 @@ impl Shows {
 }
 
 impl View for Ransac {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         egui::ScrollArea::vertical()
             .auto_shrink(false)
             .show(ui, |ui| {
-                let source = source(scope);
+                let source = source(context);
                 let trials =
-                    source.and_then(|(span, end)| self.read(scope, span.records.start..end));
+                    source.and_then(|(span, end)| self.read(context, span.records.start..end));
                 let (Some((span, end)), Some(trials)) = (source, trials) else {
                     ui.weak("No hypothesis yet: FB (1) tries some in its stage ransac");
                     return;
                 };
-                head(ui, scope, span, trials);
-                plots(ui, scope, trials);
-                verdict::ui(ui, scope, span, end, trials);
+                head(ui, context, span, trials);
+                plots(ui, context, trials);
+                verdict::ui(ui, context, span, end, trials);
             });
     }
 }
 
 /// Where the trials of the cursor are: the part of the run, and behind its last record to show. That
 /// of FB, unless the cursor is in the hybrid, which runs FB inside itself.
-fn source<'a>(scope: &Scope<'a>) -> Option<(&'a Span, usize)> {
+fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
     let is_inside =
-        scope.is_inside_hybrid(Method::FB) && scope.latest::<HypothesisTried>().is_some();
+        context.is_inside_hybrid(Method::FB) && context.latest::<HypothesisTried>().is_some();
     let (span, cursor) = match is_inside {
-        true => (scope.span()?, scope.cursor),
-        false => scope.of(Method::FB)?,
+        true => (context.span()?, context.cursor),
+        false => context.of(Method::FB)?,
     };
     Some((span, span.records.end.min(cursor + 1)))
 }
 
 impl Ransac {
     /// The trials among some records. They are read once as long as the cursor stays.
-    fn read(&mut self, scope: &Scope<'_>, records: Range<usize>) -> Option<&Trials> {
-        let loaded = scope.run.loaded.as_ref()?;
+    fn read(&mut self, context: &ViewContext<'_>, records: Range<usize>) -> Option<&Trials> {
+        let loaded = context.run.loaded.as_ref()?;
         let is_known = self
             .known
             .as_ref()
@@ -94,7 +94,7 @@ impl Ransac {
                 loaded: Arc::clone(loaded),
                 records: records.clone(),
             };
-            let trials = Trials::read(scope.run.records().get(records.clone())?, records.start);
+            let trials = Trials::read(context.run.records().get(records.clone())?, records.start);
             self.known = Some((key, trials));
         }
         let (_, trials) = self.known.as_ref()?;
@@ -102,14 +102,14 @@ impl Ransac {
     }
 }
 
-fn head(ui: &mut Ui, scope: &Scope<'_>, span: &Span, trials: &Trials) {
+fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
     ui.horizontal_wrapped(|ui| {
         if let Some(method) = span.part.method().filter(|method| *method != Method::FB) {
             ui.weak(format!("inside {}", method.label()));
         }
         let needed = trials
             .needed()
-            .unwrap_or(scope.run.params.fb.mlesac.max_trials);
+            .unwrap_or(context.run.params.fb.mlesac.max_trials);
         ui.label(format!("{} trials made, {needed} needed", trials.made()));
         if trials.without_pose > 0 {
             ui.weak(format!("{} samples have no pose", trials.without_pose));
@@ -132,7 +132,7 @@ fn hypothesis_color() -> Color32 {
     theme::method(Method::FB)
 }
 
-fn plots(ui: &mut Ui, scope: &Scope<'_>, trials: &Trials) {
+fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
     let group = ui.make_persistent_id("trials");
     for shows in Shows::ALL {
         let height = if shows == Shows::Needed { 110.0 } else { 130.0 };
@@ -165,7 +165,7 @@ fn plots(ui: &mut Ui, scope: &Scope<'_>, trials: &Trials) {
                 answer.transform.position_from_point(&point).distance_sq(at)
             };
             if let Some(record) = trials.nearest(points_of(trials, shows), distance) {
-                scope.send(Command::MoveCursor(record));
+                context.send(Command::MoveCursor(record));
             }
         }
     }

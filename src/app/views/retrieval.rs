@@ -7,7 +7,7 @@ use super::canvas::{Lens, Placement, tag};
 use super::images::Arrangement;
 use super::ink::{Ink, Mark};
 use crate::app::textures::color_image;
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesRanked};
 use crate::geometry::PoseError;
 use crate::picture;
@@ -24,8 +24,8 @@ pub struct Retrieval {
 }
 
 impl View for Retrieval {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(event) = told(scope) else {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(event) = told(context) else {
             ui.weak(
                 "The references were not chosen by what they look like. Choose those with the most \
                  matches, or those that the index ranks, in the view References.",
@@ -45,19 +45,19 @@ impl View for Retrieval {
         ScrollArea::both()
             .auto_shrink([false, true])
             .max_height(TABLE_HEIGHT)
-            .show(ui, |ui| self.table(ui, scope, event));
+            .show(ui, |ui| self.table(ui, context, event));
         ui.separator();
         if let Some(frame) = ranking.frames.get(self.looked_at) {
-            photos(ui, scope, event, self.looked_at, frame);
+            photos(ui, context, event, self.looked_at, frame);
         }
     }
 }
 
 /// The ranking of the run, once the cursor has come so far.
-fn told<'a>(scope: &Scope<'a>) -> Option<&'a ReferencesRanked> {
-    let span = scope.run.span_of(Part::Retrieval)?;
-    let end = span.records.end.min(scope.cursor + 1);
-    let records = &scope.run.records()[span.records.start.min(end)..end];
+fn told<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
+    let span = context.run.span_of(Part::Retrieval)?;
+    let end = span.records.end.min(context.cursor + 1);
+    let records = &context.run.records()[span.records.start.min(end)..end];
     records.iter().find_map(|record| match &record.event {
         Event::ReferencesRanked(event) => Some(event),
         _ => None,
@@ -65,7 +65,7 @@ fn told<'a>(scope: &Scope<'a>) -> Option<&'a ReferencesRanked> {
 }
 
 impl Retrieval {
-    fn table(&mut self, ui: &mut Ui, scope: &Scope<'_>, event: &ReferencesRanked) {
+    fn table(&mut self, ui: &mut Ui, context: &ViewContext<'_>, event: &ReferencesRanked) {
         let ranking = &event.ranking;
         let score = match ranking.criterion {
             Criterion::Words => "score",
@@ -92,7 +92,7 @@ impl Retrieval {
                     Criterion::Matches => format!("{:.0}", frame.ranked.score),
                 });
                 ui.label(geometry(frame));
-                ui.label(distance(scope, frame));
+                ui.label(distance(context, frame));
                 ui.end_row();
             }
         });
@@ -107,8 +107,8 @@ fn geometry(frame: &RankedReference) -> String {
     }
 }
 
-fn distance(scope: &Scope<'_>, frame: &RankedReference) -> String {
-    match (scope.truth(), &frame.world_from_camera) {
+fn distance(context: &ViewContext<'_>, frame: &RankedReference) -> String {
+    match (context.truth(), &frame.world_from_camera) {
         (Some(truth), Some(pose)) => {
             let error = PoseError::between(truth, pose);
             format!("{}, {}", error.translation(), error.rotation())
@@ -120,12 +120,12 @@ fn distance(scope: &Scope<'_>, frame: &RankedReference) -> String {
 /// The query and a ranked frame, with lines between what lies alike.
 fn photos(
     ui: &mut Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     event: &ReferencesRanked,
     index: usize,
     frame: &RankedReference,
 ) {
-    let loaded = scope.run.loaded.as_deref();
+    let loaded = context.run.loaded.as_deref();
     let Some(problem) = loaded.and_then(|loaded| loaded.problems.first()) else {
         return;
     };
@@ -133,7 +133,7 @@ fn photos(
         ui.weak("There is no picture of this frame");
         return;
     };
-    let (ctx, textures) = (ui.ctx(), &scope.desk.textures);
+    let (ctx, textures) = (ui.ctx(), &context.state.textures);
     let query = textures.of(ctx, "photo", &problem.query, |query| {
         color_image(&picture::photo(&query.photo))
     });

@@ -23,7 +23,7 @@ use nalgebra::Point2;
 use super::View;
 use crate::app::camera::Place;
 use crate::app::textures::color_image;
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::picture;
 use cameras::{Camera, Who};
 use cloud::{Cloud, Coloring};
@@ -89,46 +89,46 @@ impl Space {
 }
 
 impl View for Space {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(site) = Site::of(scope) else {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(site) = Site::of(context) else {
             ui.weak("There is no scene before the query and its reference are read");
             return;
         };
-        let content = self.content(scope, &site);
+        let content = self.content(context, &site);
         let through = self.through.map(|through| through.who);
         let looks = ui.horizontal_wrapped(|ui| {
             controls::looks(
                 ui,
-                &scope.desk.setup.task.protocol.methods,
+                &context.state.setup.task.protocol.methods,
                 &mut self.layers,
                 &content.cameras,
                 through,
             )
         });
         let jumps =
-            ui.horizontal_wrapped(|ui| controls::jumps(ui, scope, self.next_flip.is_some()));
+            ui.horizontal_wrapped(|ui| controls::jumps(ui, context, self.next_flip.is_some()));
         if let Some(wish) = looks.inner.or(jumps.inner) {
             self.grant(wish, &site);
         }
-        self.blink(ui, scope);
+        self.blink(ui, context);
         self.say_trouble(ui);
-        self.pane(ui, scope, &site, &content);
+        self.pane(ui, context, &site, &content);
     }
 }
 
 impl Space {
-    fn content(&self, scope: &Scope<'_>, site: &Site) -> Content {
-        let features = FeatureStory::at(scope);
-        let search = SearchStory::at(scope);
+    fn content(&self, context: &ViewContext<'_>, site: &Site) -> Content {
+        let features = FeatureStory::at(context);
+        let search = SearchStory::at(context);
         let relief_m = if self.layers.relief {
             0.2 * site.radius_m
         } else {
             0.0
         };
         Content {
-            cameras: cameras::cameras(scope, site, &features, &search),
-            rays: rays::rays(site, &features, scope.desk.selected_feature),
-            search: CostGround::new(&search, &scope.run.params.grid).with_relief(relief_m),
+            cameras: cameras::cameras(context, site, &features, &search),
+            rays: rays::rays(site, &features, context.state.selected_feature),
+            search: CostGround::new(&search, &context.run.params.grid).with_relief(relief_m),
             path: search.path,
         }
     }
@@ -161,15 +161,15 @@ impl Space {
         }
     }
 
-    fn blink(&mut self, ui: &Ui, scope: &Scope<'_>) {
+    fn blink(&mut self, ui: &Ui, context: &ViewContext<'_>) {
         let Some(next) = self.next_flip else { return };
-        if scope.desk.camera.is_none() || scope.desk.place(Place::Last).is_none() {
+        if context.state.camera.is_none() || context.state.place(Place::Last).is_none() {
             self.next_flip = None;
             return;
         }
         let now = ui.input(|input| input.time);
         if now >= next {
-            scope.send(Command::JumpCamera(Place::Last));
+            context.send(Command::JumpCamera(Place::Last));
             self.next_flip = Some(now + BLINK.as_secs_f64());
         }
         ui.ctx().request_repaint_after(BLINK);
@@ -190,21 +190,21 @@ impl Space {
         }
     }
 
-    fn pane(&mut self, ui: &mut Ui, scope: &Scope<'_>, site: &Site, content: &Content) {
+    fn pane(&mut self, ui: &mut Ui, context: &ViewContext<'_>, site: &Site, content: &Content) {
         let size = ui.available_size().max(Vec2::splat(60.0));
         let (pane, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         self.steer(ui, site, &response, &content.cameras);
         let lens = self.lens(site, size, &content.cameras);
 
-        let points = self.points(scope, site);
+        let points = self.points(context, site);
         let count = points.len();
         let marks = self.draw(ui, pane, site, content, &lens, points);
         let through = self.looked_through(&content.cameras);
         if let Some(camera) = through {
-            self.photo(ui, scope, pane, &lens, camera);
+            self.photo(ui, context, pane, &lens, camera);
         }
         labels::marks(ui, pane, &lens, &marks);
-        self.legend(ui, pane, scope, content);
+        self.legend(ui, pane, context, content);
         let headline = self.headline(&lens, &response, site, content);
         labels::headline(ui, pane, &headline);
 
@@ -214,7 +214,7 @@ impl Space {
             .find(|camera| camera.who == Who::Hand);
         let held = hand.and_then(|camera| self.hand.ui(ui, pane, &lens, site, camera));
         if let Some(pose) = held {
-            scope.send(Command::TakeCamera(Some(pose)));
+            context.send(Command::TakeCamera(Some(pose)));
         }
         if let Some(who) = labels::cameras(ui, pane, &lens, &content.cameras) {
             self.grant(Wish::Through(who), site);
@@ -296,10 +296,10 @@ impl Space {
     }
 
     /// The cloud's points, made ready once.
-    fn points(&mut self, scope: &Scope<'_>, site: &Site) -> Arc<Points> {
-        self.cloud = match scope.problem().filter(|_| self.layers.cloud) {
+    fn points(&mut self, context: &ViewContext<'_>, site: &Site) -> Arc<Points> {
+        self.cloud = match context.problem().filter(|_| self.layers.cloud) {
             Some(problem) => {
-                let (reference, colored) = (&problem.reference, story::colored(scope));
+                let (reference, colored) = (&problem.reference, story::colored(context));
                 let wanted = self.layers.coloring;
                 let is_current = |cloud: &Cloud| cloud.is(site, reference, colored, wanted);
                 let made = || Cloud::new(site, reference, colored, wanted);
@@ -370,11 +370,11 @@ impl Space {
     }
 
     /// The photo over what its camera sees, and the border of its image.
-    fn photo(&self, ui: &Ui, scope: &Scope<'_>, pane: Rect, lens: &Lens, camera: &Camera) {
-        let Some(problem) = scope.problem() else {
+    fn photo(&self, ui: &Ui, context: &ViewContext<'_>, pane: Rect, lens: &Lens, camera: &Camera) {
+        let Some(problem) = context.problem() else {
             return;
         };
-        let (ctx, textures) = (ui.ctx(), &scope.desk.textures);
+        let (ctx, textures) = (ui.ctx(), &context.state.textures);
         let texture = match camera.who.is_query() {
             true => textures.of(ctx, "photo in space", &problem.query, |query| {
                 color_image(&picture::photo(&query.photo))
@@ -396,7 +396,7 @@ impl Space {
         painter.rect_stroke(image, 0.0, border, StrokeKind::Outside);
     }
 
-    fn legend(&self, ui: &Ui, pane: Rect, scope: &Scope<'_>, content: &Content) {
+    fn legend(&self, ui: &Ui, pane: Rect, context: &ViewContext<'_>, content: &Content) {
         let mut bars = Vec::new();
         if let Some(cloud) = &self.cloud
             && cloud.coloring != Coloring::Photo
@@ -414,7 +414,7 @@ impl Space {
             });
         }
         if let Some((least, greatest)) = content.search.costs().filter(|_| self.layers.cost) {
-            let method = scope.searching_method();
+            let method = context.searching_method();
             bars.push(Bar {
                 title: format!("cost of {}; grey: no say", method.name().to_uppercase()),
                 ends: [format!("{greatest:.4}"), format!("{least:.4}")],

@@ -14,7 +14,7 @@ use super::truth::TrueMatch;
 use crate::app::views::canvas::Placement;
 use crate::app::views::ink::Ink;
 use crate::app::views::legend;
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::features::FeatureState;
 use crate::features::Keypoint;
 use crate::palette;
@@ -125,13 +125,13 @@ impl Detail {
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         subject: &Subject<'_>,
         is_wide: bool,
     ) {
         const LEGEND: f32 = 190.0;
         ui.horizontal(|ui| {
-            heading(ui, scope, subject);
+            heading(ui, context, subject);
             if is_wide {
                 legend::depth_bar(ui, LEGEND);
                 ui.weak("LiDAR depth");
@@ -140,12 +140,12 @@ impl Detail {
         if is_wide {
             ui.horizontal_top(|ui| {
                 self.patches(ui, subject);
-                ui.vertical(|ui| words(ui, scope, subject));
+                ui.vertical(|ui| words(ui, context, subject));
             });
         } else {
             ui.horizontal_top(|ui| self.patches(ui, subject));
             legend::depth_bar(ui, LEGEND.min(ui.available_width()));
-            words(ui, scope, subject);
+            words(ui, context, subject);
         }
     }
 
@@ -211,7 +211,7 @@ impl Detail {
     }
 }
 
-fn heading(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
+fn heading(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     let kind = subject.kind();
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
     let mut ink = Ink::new(ui.pixels_per_point());
@@ -220,11 +220,11 @@ fn heading(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
     ui.strong(format!("query feature {}: {}", subject.feature, name(kind)));
     let close = ui.add(Button::new("×").small()).on_hover_text("Close");
     if close.accessible_name("Close feature").clicked() {
-        scope.send(Command::SelectFeature(None));
+        context.send(Command::SelectFeature(None));
     }
 }
 
-fn words(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
+fn words(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     let area = ScrollArea::vertical().id_salt("facts").auto_shrink(false);
     area.show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 2.0;
@@ -232,7 +232,7 @@ fn words(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
         ui.horizontal_top(|ui| {
             ui.vertical(|ui| {
                 group(ui, &matching);
-                rival(ui, scope, subject);
+                rival(ui, context, subject);
             });
             ui.add_space(8.0);
             ui.vertical(|ui| group(ui, &depth));
@@ -252,14 +252,14 @@ fn group(ui: &mut Ui, (title, facts): &(&str, Vec<String>)) {
 }
 
 /// The query feature that the nearest reference feature resembles more.
-fn rival(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
+fn rival(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     let Some(FeatureState::NotUnique { rival }) = subject.story.state(subject.feature) else {
         return;
     };
     let help = "The reference feature resembles this query feature more; click to look at it";
     let link = ui.link(format!("rival: query feature {rival}"));
     if link.on_hover_text(help).clicked() {
-        scope.send(Command::SelectFeature(Some(rival)));
+        context.send(Command::SelectFeature(Some(rival)));
     }
 }
 

@@ -3,7 +3,7 @@
 use egui::{Color32, Rect, Response, Role, Sense, TextureHandle, TextureId, Ui, Vec2, WidgetInfo};
 
 use super::arrangement::Arrangement;
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::app::textures::color_image;
 use crate::app::views::canvas::{self, Lens, Placement};
 use crate::image::Photo;
@@ -29,9 +29,9 @@ pub(super) struct Photos {
 }
 
 impl Photos {
-    pub(super) fn of(ui: &Ui, scope: &Scope<'_>, problem: &Problem) -> Self {
+    pub(super) fn of(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> Self {
         let image = |photo: &Photo| color_image(&picture::photo(photo));
-        let (ctx, textures) = (ui.ctx(), &scope.desk.textures);
+        let (ctx, textures) = (ui.ctx(), &context.state.textures);
         let query = textures.of(ctx, "photo", &problem.query, |query| image(&query.photo));
         let reference = textures.of(ctx, "photo", &problem.reference, |tuple| {
             image(&tuple.photo)
@@ -93,18 +93,18 @@ impl Lenses {
     ) -> (Shown, Shown) {
         let sizes = [photos.query.size(), photos.reference.size()];
         let arrangement = Arrangement::new(area, sizes[0], sizes[1]);
-        let attend = |lens: &mut Lens, photo: usize, name: String| {
+        let interact = |lens: &mut Lens, photo: usize, name: String| {
             let before = arrangement.place(photo, lens, sizes[photo]);
             let id = ui.scope_id().with(photo);
             let response = ui.interact(before.visible(), id, Sense::click_and_drag());
             response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
-            let has_moved = lens.obey(ui, &response, &before);
+            let has_moved = lens.handle_input(ui, &response, &before);
             (response, has_moved)
         };
         let name = format!("query photo {}", problem.query.name);
-        let (over_query, _) = attend(&mut self.query, 0, name);
+        let (over_query, _) = interact(&mut self.query, 0, name);
         let name = format!("reference photo {}", problem.reference.name);
-        let (over_reference, reference_has_moved) = attend(&mut self.reference, 1, name);
+        let (over_reference, reference_has_moved) = interact(&mut self.reference, 1, name);
         if self.are_linked && reference_has_moved {
             self.query = self.reference;
         } else if self.are_linked {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::depth::LiftedMatch;
 use crate::estimator::{self, Parts};
 use crate::event::{Event, Side};
@@ -40,7 +40,7 @@ pub(super) struct Story<'a> {
 impl<'a> Story<'a> {
     /// The story at the cursor; for the direct methods that of FB, or of the hybrid where FB was
     /// not asked to run.
-    pub(super) fn at(scope: &Scope<'a>) -> Self {
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
         let with_features = |method: Method| {
             let Some(entry) = estimator::find(method) else {
                 return false;
@@ -50,21 +50,25 @@ impl<'a> Story<'a> {
                 .is_some_and(|parts| parts.first == Method::FB);
             inside || matches!(entry.parts, Parts::Features)
         };
-        let part = match scope.method().filter(|&here| with_features(here)) {
-            Some(here) => scope.of(here),
+        let part = match context.method().filter(|&here| with_features(here)) {
+            Some(here) => context.of(here),
             None => {
-                let mut asked = scope.desk.setup.task.protocol.methods.iter().copied();
-                asked.find_map(|method| with_features(method).then(|| scope.of(method))?)
+                let mut asked = context.state.setup.task.protocol.methods.iter().copied();
+                asked.find_map(|method| with_features(method).then(|| context.of(method))?)
             }
         };
         part.map_or_else(Self::default, |(span, cursor)| {
-            Self::until(scope.run, span, cursor)
+            Self::until(context.run, span, cursor)
         })
     }
 
     /// The whole story of the same estimator and reference in another run.
-    pub(super) fn counterpart(scope: &Scope<'_>, method: Method, other: &'a Run) -> Option<Self> {
-        let span = other.span_of(Part::Reference(method, scope.reference()))?;
+    pub(super) fn counterpart(
+        context: &ViewContext<'_>,
+        method: Method,
+        other: &'a Run,
+    ) -> Option<Self> {
+        let span = other.span_of(Part::Reference(method, context.reference()))?;
         Some(Self::until(other, span, span.records.end.checked_sub(1)?))
     }
 

@@ -6,7 +6,7 @@ use nalgebra::{Point2, Point3};
 use super::gpu::Line;
 use super::site::{Site, spot};
 use super::story::{FeatureStory, SearchStory};
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
 use crate::estimator::{self, Parts};
 use crate::geometry::{Pose, PoseError};
@@ -158,15 +158,15 @@ impl Camera {
 
 /// Every camera there is at the cursor.
 pub(super) fn cameras(
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     site: &Site,
     features: &FeatureStory<'_>,
     search: &SearchStory<'_>,
 ) -> Vec<Camera> {
-    let Some(problem) = scope.problem() else {
+    let Some(problem) = context.problem() else {
         return Vec::new();
     };
-    let truth = scope.truth();
+    let truth = context.truth();
     let camera = |who: Who, world: Pose| {
         let offset = site.offset(&world);
         let mut about = format!(
@@ -195,38 +195,38 @@ pub(super) fn cameras(
     };
     let mut all = vec![camera(Who::Reference, problem.reference.world_from_camera)];
     all.extend(truth.map(|pose| camera(Who::Truth, *pose)));
-    for &method in &scope.desk.setup.task.protocol.methods {
-        if let Some(pose) = estimate(scope, method) {
+    for &method in &context.state.setup.task.protocol.methods {
+        if let Some(pose) = estimate(context, method) {
             all.push(camera(Who::Estimate(method), pose));
         }
     }
     all.extend(
-        best_so_far(scope, features, search).map(|(method, reference_from_query)| {
+        best_so_far(context, features, search).map(|(method, reference_from_query)| {
             let pose = problem.world_from_query(&reference_from_query);
             camera(Who::BestSoFar(method), pose)
         }),
     );
-    all.extend(scope.desk.hovered.map(|pose| camera(Who::Pointer, pose)));
-    all.extend(scope.desk.camera.map(|pose| camera(Who::Hand, pose)));
+    all.extend(context.state.hovered.map(|pose| camera(Who::Pointer, pose)));
+    all.extend(context.state.camera.map(|pose| camera(Who::Hand, pose)));
     all
 }
 
 /// The estimate of a method: of that at the cursor only once the cursor has come to its end.
-fn estimate(scope: &Scope<'_>, method: Method) -> Option<Pose> {
-    let (span, cursor) = scope.of(method)?;
+fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
+    let (span, cursor) = context.of(method)?;
     (cursor + 1 >= span.records.end)
-        .then(|| scope.estimate(method))
+        .then(|| context.estimate(method))
         .flatten()
 }
 
 /// Where the estimator at the cursor stands, in the reference camera's frame, until it has ended.
 fn best_so_far(
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     features: &FeatureStory<'_>,
     search: &SearchStory<'_>,
 ) -> Option<(Method, Pose)> {
-    let span = scope.span()?;
-    if span.result.is_some() && scope.cursor + 1 >= span.records.end {
+    let span = context.span()?;
+    if span.result.is_some() && context.cursor + 1 >= span.records.end {
         return None;
     }
     let by_search = search.path.last().map(|best| best.reference_from_camera());

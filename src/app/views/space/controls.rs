@@ -6,7 +6,7 @@ use egui::{PopupCloseBehavior, RichText, Slider, Ui};
 use super::cameras::{Camera, Who};
 use super::cloud::Coloring;
 use crate::app::camera::Place;
-use crate::app::{Command, Scope, shortcuts};
+use crate::app::{Command, ViewContext, shortcuts};
 use crate::method::Method;
 
 /// What is shown.
@@ -120,7 +120,7 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
 }
 
 /// Where the camera in hand goes.
-pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish> {
+pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<Wish> {
     let keys = shortcuts();
     ui.weak("camera to");
     for place in Place::ALL {
@@ -129,8 +129,8 @@ pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish
         let key = key.map_or(String::new(), |shortcut| {
             ui.ctx().format_shortcut(&shortcut.keys)
         });
-        let is_there =
-            scope.desk.place(place).is_some() && (place != Place::Truth || scope.desk.shows_truth);
+        let is_there = context.state.place(place).is_some()
+            && (place != Place::Truth || context.state.shows_truth);
         let mut text = egui::text::LayoutJob::default();
         let style = ui.style();
         RichText::new(place.name()).append_to(
@@ -148,11 +148,11 @@ pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish
         let response = ui.add_enabled(is_there, egui::Button::new(text));
         let response = response.on_disabled_hover_text("There is no such pose at this step");
         if response.clicked() {
-            scope.send(command);
+            context.send(command);
         }
     }
     let mut wish = None;
-    let can_blink = scope.desk.camera.is_some() && scope.desk.place(Place::Last).is_some();
+    let can_blink = context.state.camera.is_some() && context.state.place(Place::Last).is_some();
     let response = ui.add_enabled(
         can_blink || blinks,
         egui::Button::selectable(blinks, "Blink poses"),
@@ -165,10 +165,10 @@ pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish
     {
         wish = Some(Wish::Blink);
     }
-    let release = ui.add_enabled(scope.desk.camera.is_some(), egui::Button::new("Let go"));
+    let release = ui.add_enabled(context.state.camera.is_some(), egui::Button::new("Let go"));
     let release = release.on_hover_text("Put the camera in hand away (Esc)");
     if release.clicked() {
-        scope.send(Command::TakeCamera(None));
+        context.send(Command::TakeCamera(None));
     }
     wish
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::geometry::Pose;
 use crate::grid::Offset;
 
@@ -23,9 +23,9 @@ pub(super) struct Site {
 
 impl Site {
     /// The site of a run; `None` before its frames are read.
-    pub(super) fn of(scope: &Scope<'_>) -> Option<Self> {
-        let first = scope.run.loaded.as_deref()?.problems.first()?;
-        let here = scope.problem()?;
+    pub(super) fn of(context: &ViewContext<'_>) -> Option<Self> {
+        let first = context.run.loaded.as_deref()?.problems.first()?;
+        let here = context.problem()?;
         let scene_from_world = first.reference.world_from_camera.inverse();
         Some(Self {
             scene_from_world,

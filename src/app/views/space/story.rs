@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::depth::LiftedMatch;
 use crate::event::{CloudColored, Event, PoseScored};
 use crate::features::FeatureState;
@@ -35,16 +35,16 @@ pub(super) struct Ray {
 
 impl<'a> FeatureStory<'a> {
     /// From the estimator at the cursor, if it lifts matches; else from FB's part.
-    pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let here = match scope.is_inside_hybrid(Method::FB) {
-            true => Self::told(scope.run, scope.cursor),
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
+        let here = match context.is_inside_hybrid(Method::FB) {
+            true => Self::told(context.run, context.cursor),
             false => Self::default(),
         };
         if !here.lifted.is_empty() {
             return here;
         }
-        match scope.of(Method::FB) {
-            Some((_, cursor)) => Self::told(scope.run, cursor),
+        match context.of(Method::FB) {
+            Some((_, cursor)) => Self::told(context.run, cursor),
             None => here,
         }
     }
@@ -96,13 +96,13 @@ pub(super) struct SearchStory<'a> {
 
 impl<'a> SearchStory<'a> {
     /// From the direct method whose pictures are shown.
-    pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let method = scope.searching_method();
-        let Some((span, cursor)) = scope.of(method) else {
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
+        let method = context.searching_method();
+        let Some((span, cursor)) = context.of(method) else {
             return Self::default();
         };
         let mut story = Self::default();
-        for event in events(scope.run, cursor) {
+        for event in events(context.run, cursor) {
             match event {
                 Event::ViewRendered(event) => story.path.push(event.offset),
                 Event::PoseScored(event) => story.scored.push(event),
@@ -114,7 +114,7 @@ impl<'a> SearchStory<'a> {
             }
         }
         let last = span.records.end.saturating_sub(1);
-        let first_surface = events(scope.run, last).find_map(|event| match event {
+        let first_surface = events(context.run, last).find_map(|event| match event {
             Event::PhaseSearched(event) => Some(&event.surface),
             _ => None,
         });
@@ -129,13 +129,13 @@ impl<'a> SearchStory<'a> {
 }
 
 /// The reference's cloud in the photo's grey values, if a direct method has coloured it.
-pub(super) fn colored<'a>(scope: &Scope<'a>) -> Option<&'a Arc<ColoredCloud>> {
-    let here = scope.latest::<CloudColored>();
+pub(super) fn colored<'a>(context: &ViewContext<'a>) -> Option<&'a Arc<ColoredCloud>> {
+    let here = context.latest::<CloudColored>();
     let other = || {
-        let methods = scope.desk.setup.task.protocol.methods.iter();
+        let methods = context.state.setup.task.protocol.methods.iter();
         methods
             .copied()
-            .find_map(|method| scope.latest_of::<CloudColored>(method))
+            .find_map(|method| context.latest_of::<CloudColored>(method))
     };
     here.or_else(other).map(|event| &event.cloud)
 }

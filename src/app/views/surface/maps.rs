@@ -7,7 +7,7 @@ use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform
 use super::marks::{Mark, place};
 use super::scale::{NO_SAY, Scale, bar, number};
 use super::search::{Search, Searched};
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset};
 use crate::render::Score;
@@ -75,7 +75,7 @@ impl Maps {
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         shown: &Shown<'_>,
     ) -> Option<(Pose, String)> {
         let gap = ui.spacing().item_spacing.x;
@@ -125,8 +125,8 @@ impl Maps {
             offset,
         } = pointed_at?;
         let pose = shown.search.pose(&offset);
-        if takes_camera && scope.desk.camera != Some(pose) {
-            scope.send(Command::TakeCamera(Some(pose)));
+        if takes_camera && context.state.camera != Some(pose) {
+            context.send(Command::TakeCamera(Some(pose)));
         }
         let searched = shown.search.positions().nth(lattice)?;
         let least_covered = shown.search.least_covered(shown.floor);

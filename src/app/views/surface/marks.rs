@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec
 
 use super::scale::number;
 use super::search::{Minimum, Search};
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase};
 use crate::method::Method;
@@ -39,7 +39,7 @@ pub(super) struct Mark {
 
 impl Mark {
     /// Everything that is to be marked, what matters most last. `floor` is what the slider says.
-    pub(super) fn all(scope: &Scope<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
+    pub(super) fn all(context: &ViewContext<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
         let mut marks = Vec::new();
         let mut add = |kind, offset, pose, name: &str, note: String| {
             marks.push(Self {
@@ -57,7 +57,7 @@ impl Mark {
             "start",
             String::new(),
         );
-        let own_floor = search.least_covered(scope.run.params.grid.coverage_floor);
+        let own_floor = search.least_covered(context.run.params.grid.coverage_floor);
         for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
             let note = format!(", +{}", number(margin));
             let pose = search.pose(&minimum.offset);
@@ -94,9 +94,9 @@ impl Mark {
             );
         }
         let cameras = [
-            (Kind::Feature, scope.estimate(Method::FB), "FB's estimate"),
-            (Kind::Truth, scope.truth().copied(), "truth"),
-            (Kind::Camera, scope.desk.camera, "camera in hand"),
+            (Kind::Feature, context.estimate(Method::FB), "FB's estimate"),
+            (Kind::Truth, context.truth().copied(), "truth"),
+            (Kind::Camera, context.state.camera, "camera in hand"),
         ];
         for (kind, pose, name) in cameras {
             if let Some(pose) = pose {
@@ -229,7 +229,7 @@ impl Kind {
 
 /// The marks in words. Pointing at one looks at its pose, which is answered; a click takes the
 /// camera there.
-pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<Pose> {
+pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[Mark]) -> Option<Pose> {
     let mut pointed_at = None;
     ui.horizontal_wrapped(|ui| {
         // The room for the mark is part of the button, so that both wrap together.
@@ -248,7 +248,7 @@ pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<P
                 pointed_at = Some(mark.pose);
             }
             if response.clicked() {
-                scope.send(Command::TakeCamera(Some(mark.pose)));
+                context.send(Command::TakeCamera(Some(mark.pose)));
             }
         }
     });

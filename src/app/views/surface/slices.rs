@@ -5,7 +5,7 @@ use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotUi, VLine};
 
 use super::scale::number;
 use super::search::{Search, Searched};
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::grid::{Lattice, Offset, Phase};
 use crate::method::Method;
 
@@ -126,8 +126,8 @@ struct Curve<'a> {
 }
 
 impl<'a> Curve<'a> {
-    fn of(scope: &Scope<'a>, method: Method, floor: f64) -> Option<Self> {
-        let search = Search::at(scope, method)?;
+    fn of(context: &ViewContext<'a>, method: Method, floor: f64) -> Option<Self> {
+        let search = Search::at(context, method)?;
         let least_covered = search.least_covered(floor);
         let assessed = search
             .assessed
@@ -179,11 +179,17 @@ impl<'a> Curve<'a> {
 
 /// Draws the slices. `shown` is the method of the maps, whose minimum is marked; the floor is that
 /// of the slider.
-pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64, width: f32) {
-    let methods = scope.direct_methods();
+pub(super) fn ui(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    shown: &Search<'_>,
+    floor: f64,
+    width: f32,
+) {
+    let methods = context.direct_methods();
     let curves: Vec<Curve<'_>> = methods
         .into_iter()
-        .filter_map(|method| Curve::of(scope, method, floor))
+        .filter_map(|method| Curve::of(context, method, floor))
         .collect();
     ui.label("Slices through each minimum");
     for curve in &curves {
@@ -195,7 +201,7 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64,
             ui.weak(curve.range.words());
         });
     }
-    let marks = marks(ui, scope, shown, floor);
+    let marks = marks(ui, context, shown, floor);
     let gap = ui.spacing().item_spacing.x;
     let width = ((width - 2.0 * gap - 2.0) / 3.0).max(60.0);
     ui.horizontal_top(|ui| {
@@ -214,7 +220,7 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64,
 
 type LineMark = (&'static str, Color32, LineStyle, Offset);
 
-fn marks(ui: &Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) -> Vec<LineMark> {
+fn marks(ui: &Ui, context: &ViewContext<'_>, shown: &Search<'_>, floor: f64) -> Vec<LineMark> {
     let least_covered = shown.least_covered(floor);
     let minimum = |phases: [Phase; 2]| {
         let searched = phases.into_iter().find_map(|phase| shown.last(phase))?;
@@ -226,9 +232,9 @@ fn marks(ui: &Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) -> Vec<Line
         yaw_rad: yaw.map_or(position.yaw_rad, |yaw| yaw.yaw_rad),
         ..position
     });
-    let truth = scope.truth().map(|pose| shown.offset(pose));
+    let truth = context.truth().map(|pose| shown.offset(pose));
     let hypothesis = shown.hypothesis.map(|scored| scored.offset);
-    let camera = scope.desk.camera.map(|pose| shown.offset(&pose));
+    let camera = context.state.camera.map(|pose| shown.offset(&pose));
     let strong = ui.visuals().strong_text_color();
     let dashed = LineStyle::dashed_loose();
     [

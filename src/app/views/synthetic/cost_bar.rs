@@ -2,8 +2,8 @@
 
 use egui::{Color32, Mesh, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 
-use crate::app::scope::CostBounds;
 use crate::app::theme;
+use crate::app::view_context::CostBounds;
 use crate::app::views::ink::{Ink, Mark};
 use crate::method::Method;
 

@@ -8,7 +8,7 @@ use image::DynamicImage;
 use crate::app::textures::color_image;
 use crate::app::views::histogram::explains;
 use crate::app::views::legend;
-use crate::app::{Scope, Shown, theme};
+use crate::app::{Shown, ViewContext, theme};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::method::Method;
@@ -79,12 +79,12 @@ impl Mode {
     pub(super) fn texture(
         self,
         ui: &Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         problem: &Problem,
         shown: &Shown,
     ) -> Option<TextureHandle> {
         let of = |what, make: &dyn Fn(&Comparison) -> DynamicImage| {
-            let textures = &scope.desk.textures;
+            let textures = &context.state.textures;
             let made = |comparison: &Comparison| color_image(&make(comparison));
             textures.of(ui.ctx(), what, &shown.comparison, made)
         };

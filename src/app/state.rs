@@ -1,4 +1,4 @@
-//! What lies on the desk: the run, where a person looks at it, what is switched on.
+//! The application's state: the run, the cursor in it, the camera in hand, what is switched on.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Comparing {
+pub enum CompareMode {
     /// The present run, B.
     #[default]
     Present,
@@ -36,15 +36,15 @@ pub struct Note {
 }
 
 /// A run that was kept to be compared with.
-pub struct Kept {
+pub struct KeptRun {
     /// The run as it was kept.
     pub run: Run,
     /// Where the cursor was.
     pub cursor: usize,
 }
 
-/// Everything that the views draw from.
-pub struct Desk {
+/// The state of the application: everything that the views draw from.
+pub struct AppState {
     /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
     /// The parameters of the setup, shared with the prober.
@@ -60,9 +60,9 @@ pub struct Desk {
     /// Where the cursor is to be once the new run has come so far.
     pub(super) anchor: Option<Anchor>,
     /// The run A, if one was kept.
-    pub kept: Option<Kept>,
+    pub kept: Option<KeptRun>,
     /// Which of the runs is shown.
-    pub comparing: Comparing,
+    pub compare_mode: CompareMode,
     /// Whether the ground truth is shown.
     pub shows_truth: bool,
     /// Whether only what differs is shown.
@@ -90,11 +90,11 @@ pub struct Desk {
     pub results: BTreeMap<usize, Vec<QueryResult>>,
 }
 
-/// A place in a run that can be found again in another one.
+/// A place in a run for the cursor, which can be found again in another run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Anchor {
-    /// The place by what it means to the estimator.
-    Meaning(Meaning),
+    /// The place by what the estimator was doing there.
+    Stage(StagePosition),
     /// The place by the number of its record.
     Record(usize),
 }
@@ -102,7 +102,7 @@ pub(super) enum Anchor {
 impl Anchor {
     fn find(&self, run: &Run) -> Option<usize> {
         match self {
-            Self::Meaning(meaning) => meaning.find(run),
+            Self::Stage(position) => position.find(run),
             Self::Record(record) => (*record < run.len()).then_some(*record),
         }
     }
@@ -110,7 +110,7 @@ impl Anchor {
 
 /// What an estimator was doing at a record.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Meaning {
+pub(super) struct StagePosition {
     part: Part,
     /// The stages around it, by name, the outermost first.
     stages: Vec<&'static str>,
@@ -120,7 +120,7 @@ pub(super) struct Meaning {
     is_end: bool,
 }
 
-impl Meaning {
+impl StagePosition {
     fn of(run: &Run, cursor: usize) -> Option<Self> {
         let span = run.span_at(cursor)?;
         let stages: Vec<_> = run.stages_at(cursor).collect();
@@ -164,7 +164,7 @@ impl Meaning {
     }
 }
 
-impl Desk {
+impl AppState {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
         let params = Arc::new(setup.task.params.clone());
         let frames = Arc::default();
@@ -180,7 +180,7 @@ impl Desk {
             follows: true,
             anchor: None,
             kept: None,
-            comparing: Comparing::default(),
+            compare_mode: CompareMode::default(),
             shows_truth: true,
             only_differences: false,
             blinking: false,
@@ -202,14 +202,14 @@ impl Desk {
     }
 
     /// What the present run is doing.
-    pub fn state(&self) -> &State {
+    pub fn run_state(&self) -> &State {
         self.session.state()
     }
 
     /// The place in the kept run that corresponds to the cursor.
     pub(super) fn kept_cursor(&self) -> Option<usize> {
         let kept = self.kept.as_ref()?;
-        let same = Meaning::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
+        let same = StagePosition::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
         Some(same.unwrap_or(kept.cursor))
     }
 
@@ -231,7 +231,7 @@ impl Desk {
     }
 
     /// Takes in what the threads have to say.
-    pub(super) fn attend(&mut self) {
+    pub(super) fn poll(&mut self) {
         let was_alive = self.session.is_alive();
         if self.session.drain() {
             if let Some(chosen) = self.session.chosen()
@@ -256,13 +256,13 @@ impl Desk {
                 self.cursor = last;
             }
             if was_alive && !self.session.is_alive() {
-                self.ended();
+                self.on_run_end();
             }
         }
-        if let Err(why) = self.prober.attend() {
+        if let Err(why) = self.prober.poll() {
             self.note(why, true);
         }
-        for (query, outcome) in self.queries.attend() {
+        for (query, outcome) in self.queries.poll() {
             match outcome {
                 Ok(results) => {
                     self.results.insert(query, results);
@@ -287,7 +287,7 @@ impl Desk {
         loaded.problems.get(self.run().reference_at(self.cursor))
     }
 
-    fn ended(&mut self) {
+    fn on_run_end(&mut self) {
         match self.session.state() {
             State::Finished => {
                 let results = self.session.run().results().cloned().collect();
@@ -310,7 +310,7 @@ impl Desk {
     }
 
     /// Another query, or other references: everything begins anew.
-    pub(super) fn begin(&mut self, mode: RunMode) {
+    pub(super) fn start_run(&mut self, mode: RunMode) {
         // The run before would go on beside the new one.
         self.session.cancel();
         self.session = start(&self.setup, mode, &self.frames, &self.ctx);
@@ -339,22 +339,22 @@ impl Desk {
         self.setup = setup;
         self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
-        self.comparing = Comparing::default();
+        self.compare_mode = CompareMode::default();
         // The scenes are others, even where they have the same names.
         self.frames = Arc::default();
-        self.begin(RunMode::Running);
+        self.start_run(RunMode::Running);
         self.follows = false;
         self.anchor = Some(Anchor::Record(cursor));
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
-    pub(super) fn begin_again(&mut self) {
+    pub(super) fn restart_run(&mut self) {
         self.stop_queries();
-        let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
+        let anchor = StagePosition::of(self.run(), self.cursor).map(Anchor::Stage);
         let follows = self.follows && self.session.is_alive();
         self.params = Arc::new(self.setup.task.params.clone());
-        self.begin(RunMode::Running);
+        self.start_run(RunMode::Running);
         self.follows = follows;
         self.anchor = anchor;
     }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::command::{Command, Queue};
-use super::desk::Desk;
 use super::shown::{Shown, ShownAt};
+use super::state::AppState;
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
@@ -12,35 +12,35 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::{Part, Run, Span};
 
-/// A run at a cursor, and the desk around it.
+/// A run at a cursor, with the application's state around it.
 #[derive(Clone, Copy)]
-pub struct Scope<'a> {
+pub struct ViewContext<'a> {
     /// The run that is shown: the present one, or A.
     pub run: &'a Run,
     /// Position among its records.
     pub cursor: usize,
     /// Everything else: the camera in hand, what is switched on.
-    pub desk: &'a Desk,
+    pub state: &'a AppState,
     pub(super) commands: &'a Queue,
 }
 
-impl<'a> Scope<'a> {
+impl<'a> ViewContext<'a> {
     /// The present run at the cursor.
-    pub(super) fn present(desk: &'a Desk, commands: &'a Queue) -> Self {
+    pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
         Self {
-            run: desk.run(),
-            cursor: desk.cursor,
-            desk,
+            run: state.run(),
+            cursor: state.cursor,
+            state,
             commands,
         }
     }
 
     /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept(desk: &'a Desk, commands: &'a Queue) -> Option<Self> {
+    pub(super) fn kept(state: &'a AppState, commands: &'a Queue) -> Option<Self> {
         Some(Self {
-            run: &desk.kept.as_ref()?.run,
-            cursor: desk.kept_cursor()?,
-            desk,
+            run: &state.kept.as_ref()?.run,
+            cursor: state.kept_cursor()?,
+            state,
             commands,
         })
     }
@@ -73,7 +73,7 @@ impl<'a> Scope<'a> {
 
     /// The true pose of the query, if it is known and shown.
     pub fn truth(&self) -> Option<&'a Pose> {
-        if !self.desk.shows_truth {
+        if !self.state.shows_truth {
             return None;
         }
         self.run.loaded.as_deref()?.truth.as_ref()
@@ -112,7 +112,7 @@ impl<'a> Scope<'a> {
     /// The methods whose cost can be looked at: those of this run that search one, those of the paper
     /// where there are none.
     pub fn direct_methods(&self) -> Vec<Method> {
-        self.desk.setup.direct_methods()
+        self.state.setup.direct_methods()
     }
 
     /// The direct method whose pictures are shown: that at the cursor, for the others that inside a
@@ -147,8 +147,8 @@ impl<'a> Scope<'a> {
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<Shown> {
-        if let Some((pose, at)) = self.desk.looking_at()
-            && let Some(probe) = self.desk.probe()
+        if let Some((pose, at)) = self.state.looking_at()
+            && let Some(probe) = self.state.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.
@@ -196,7 +196,7 @@ impl<'a> Scope<'a> {
             best: assessed.map(|assessed| assessed.best),
             truth: report
                 .and_then(|report| report.truth)
-                .filter(|_| self.desk.shows_truth),
+                .filter(|_| self.state.shows_truth),
         }
     }
 }
