@@ -20,7 +20,7 @@ use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::scene::{self, Scene, SceneError};
-use posescope::session::{RunMode, State, Task};
+use posescope::session::{RunMode, RunState, Task};
 
 /// Size of the window, as it opens.
 const SIZE: [f32; 2] = [1500.0, 950.0];
@@ -232,12 +232,12 @@ fn open() -> Option<Window> {
         .build_eframe(|creation| App::new(creation, setup));
     while matches!(
         window.state().app_state().run_state(),
-        State::Loading | State::Running
+        RunState::Loading | RunState::Running
     ) {
         window.step();
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    assert_eq!(window.state().app_state().run_state(), &State::Finished);
+    assert_eq!(window.state().app_state().run_state(), &RunState::Finished);
     draw(&mut window);
     Some(window)
 }

@@ -6,7 +6,7 @@ use crate::geometry::{Pose, yaw};
 
 /// A pose that the search knows by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum NamedPose {
     /// The reference's pose, where the search starts.
     Start,
     /// The minimum of the coarse positions.
@@ -21,7 +21,7 @@ pub enum Place {
     Last,
 }
 
-impl Place {
+impl NamedPose {
     /// All of them, in the order of the search.
     pub const ALL: [Self; 6] = [
         Self::Start,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::App;
-use super::camera::Place;
+use super::camera::NamedPose;
 use super::command::Command;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
@@ -13,7 +13,7 @@ use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::localize::References;
 use crate::method::Method;
-use crate::session::{Breakpoint, Breakpoints, Part, RunMode, State};
+use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 use crate::sink::rerun::Targets;
 
 impl App {
@@ -22,12 +22,12 @@ impl App {
         let state = &mut self.state;
         match command {
             Command::RunOrPause => match state.run_state() {
-                State::Running | State::Loading => state.session.set_mode(RunMode::Paused),
-                State::Paused { .. } => state.resume(RunMode::Running),
+                RunState::Running | RunState::Loading => state.session.set_mode(RunMode::Paused),
+                RunState::Paused { .. } => state.resume(RunMode::Running),
                 _ => state.start_run(RunMode::Running),
             },
             Command::Run => match state.run_state() {
-                State::Paused { .. } | State::Running | State::Loading => {
+                RunState::Paused { .. } | RunState::Running | RunState::Loading => {
                     state.resume(RunMode::Running)
                 }
                 _ => state.start_run(RunMode::Running),
@@ -115,7 +115,7 @@ impl App {
             Command::TakeCamera(pose) => state.camera = pose,
             Command::JumpCamera(place) => state.jump_camera(place),
             Command::MoveCamera(nudge) => {
-                match state.camera.or_else(|| state.place(Place::Start)) {
+                match state.camera.or_else(|| state.named_pose(NamedPose::Start)) {
                     Some(pose) => state.camera = Some(nudge.apply(&pose)),
                     None => state.note("There is no camera before the query is loaded", true),
                 }
@@ -238,7 +238,7 @@ impl AppState {
         let last = self.run().len().saturating_sub(1);
         if self.cursor < last {
             self.move_cursor(self.cursor + steps);
-        } else if matches!(self.run_state(), State::Paused { .. }) {
+        } else if matches!(self.run_state(), RunState::Paused { .. }) {
             self.resume(RunMode::StepInto);
         }
     }
@@ -339,18 +339,18 @@ impl AppState {
         }
     }
 
-    fn jump_camera(&mut self, place: Place) {
-        let Some(pose) = self.place(place) else {
+    fn jump_camera(&mut self, place: NamedPose) {
+        let Some(pose) = self.named_pose(place) else {
             let name = place.name().to_lowercase();
             self.note(format!("There is no pose for {name} here"), false);
             return;
         };
-        self.camera_before = self.camera.or_else(|| self.place(Place::Start));
+        self.camera_before = self.camera.or_else(|| self.named_pose(NamedPose::Start));
         self.camera = Some(pose);
     }
 
     /// The pose of a place of the search (`world_from_camera`).
-    pub(super) fn place(&self, place: Place) -> Option<Pose> {
+    pub(super) fn named_pose(&self, place: NamedPose) -> Option<Pose> {
         let run = self.run();
         let loaded = run.loaded.as_deref()?;
         let span = run.span_at(self.cursor);
@@ -365,12 +365,12 @@ impl AppState {
             Some(problem.world_from_query(&best.reference_from_camera()))
         };
         match place {
-            Place::Start => Some(problem.reference.world_from_camera),
-            Place::Coarse => minimum(Phase::PositionCoarse),
-            Place::Fine => minimum(Phase::PositionFine),
-            Place::Estimate => span?.result.as_ref()?.pose.as_ref()?.to_pose(),
-            Place::Truth => loaded.truth,
-            Place::Last => self.camera_before,
+            NamedPose::Start => Some(problem.reference.world_from_camera),
+            NamedPose::Coarse => minimum(Phase::PositionCoarse),
+            NamedPose::Fine => minimum(Phase::PositionFine),
+            NamedPose::Estimate => span?.result.as_ref()?.pose.as_ref()?.to_pose(),
+            NamedPose::Truth => loaded.truth,
+            NamedPose::Last => self.camera_before,
         }
     }
 }

@@ -24,7 +24,7 @@ pub struct Probe {
     pub took: Duration,
 }
 
-struct Request {
+struct ProbeRequest {
     problem: Problem,
     methods: Vec<Method>,
     params: Arc<Params>,
@@ -33,7 +33,7 @@ struct Request {
 
 /// Answers for the pose that was asked for last; older questions are dropped.
 pub struct Prober {
-    requests: Sender<Request>,
+    requests: Sender<ProbeRequest>,
     answers: Receiver<Result<Probe, String>>,
     asked: Option<Pose>,
     latest: Option<Probe>,
@@ -41,7 +41,7 @@ pub struct Prober {
 
 impl Prober {
     pub(super) fn new(ctx: egui::Context) -> Self {
-        let (requests, inbox) = mpsc::channel::<Request>();
+        let (requests, inbox) = mpsc::channel::<ProbeRequest>();
         let (outbox, answers) = mpsc::channel();
         // Without a thread the answers never come, and the send below says so.
         let _ = thread::Builder::new()
@@ -76,7 +76,7 @@ impl Prober {
         if self.asked == Some(pose) {
             return;
         }
-        let request = Request {
+        let request = ProbeRequest {
             problem: problem.clone(),
             methods: methods.to_vec(),
             params: Arc::clone(params),
@@ -112,7 +112,7 @@ impl Prober {
     }
 }
 
-impl Request {
+impl ProbeRequest {
     fn answer(&self) -> Probe {
         let begun = Instant::now();
         let comparisons = self

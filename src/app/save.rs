@@ -7,7 +7,7 @@ use egui::Ui;
 
 use super::command::{Command, Queue};
 use super::state::AppState;
-use crate::localize::Watch as _;
+use crate::localize::LocalizeObserver as _;
 use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;

@@ -12,7 +12,7 @@ use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
+use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session};
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -202,7 +202,7 @@ impl AppState {
     }
 
     /// What the present run is doing.
-    pub fn run_state(&self) -> &State {
+    pub fn run_state(&self) -> &RunState {
         self.session.state()
     }
 
@@ -271,7 +271,7 @@ impl AppState {
             }
         }
         // The query at work comes first.
-        if *self.session.state() != State::Loading {
+        if *self.session.state() != RunState::Loading {
             self.queries.paint_thumbnails(&self.setup);
         }
         if let Some((pose, _)) = self.looking_at()
@@ -289,11 +289,11 @@ impl AppState {
 
     fn on_run_end(&mut self) {
         match self.session.state() {
-            State::Finished => {
+            RunState::Finished => {
                 let results = self.session.run().results().cloned().collect();
                 self.results.insert(self.setup.query, results);
             }
-            State::Broken(why) => self.note(why.clone(), true),
+            RunState::Broken(why) => self.note(why.clone(), true),
             _ => {}
         }
     }

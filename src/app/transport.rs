@@ -8,7 +8,7 @@ use super::state::{AppState, CompareMode};
 use super::theme;
 use crate::localize::Selection;
 use crate::method::Method;
-use crate::session::State;
+use crate::session::RunState;
 
 pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.horizontal_wrapped(|ui| {
@@ -32,14 +32,14 @@ fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Comman
 }
 
 fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    let is_running = matches!(state.run_state(), State::Running | State::Loading);
+    let is_running = matches!(state.run_state(), RunState::Running | RunState::Loading);
     let (text, help) = if is_running {
         ("Pause", "Pause behind the next event (Space)")
     } else {
         ("▶ Run", "Run to the next breakpoint or the end (Space, F5)")
     };
     button(ui, commands, text, help, Command::RunOrPause);
-    let is_paused = matches!(state.run_state(), State::Paused { .. });
+    let is_paused = matches!(state.run_state(), RunState::Paused { .. });
     ui.add_enabled_ui(is_paused || is_running, |ui| {
         button(
             ui,
@@ -58,30 +58,30 @@ fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let help = "Begin again and wait at the first step (Shift+F5)";
     button(ui, commands, "Restart", help, Command::Restart);
     match state.run_state() {
-        State::Loading => {
+        RunState::Loading => {
             ui.spinner();
             ui.label("Loading");
         }
-        State::Running => {
+        RunState::Running => {
             ui.spinner();
             ui.label("Running");
         }
-        State::Paused { breakpoint: None } => {
+        RunState::Paused { breakpoint: None } => {
             ui.label("Paused");
         }
-        State::Paused {
+        RunState::Paused {
             breakpoint: Some(text),
         } => {
             ui.label(RichText::new(format!("● {text}")).color(theme::ESTIMATE))
                 .on_hover_text("The breakpoint that stopped the run");
         }
-        State::Finished => {
+        RunState::Finished => {
             ui.label("Finished");
         }
-        State::Cancelled => {
+        RunState::Cancelled => {
             ui.label("Cancelled");
         }
-        State::Broken(why) => {
+        RunState::Broken(why) => {
             ui.label(RichText::new("Stopped").color(theme::ESTIMATE))
                 .on_hover_text(why);
         }

@@ -63,7 +63,7 @@ pub struct Difference {
 
 /// All differences of two runs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Comparison {
+pub struct RunComparison {
     /// By change, then in the order of the first run.
     pub differences: Vec<Difference>,
     /// Results that both have.
@@ -74,7 +74,7 @@ pub struct Comparison {
     pub only_after: usize,
 }
 
-impl Comparison {
+impl RunComparison {
     /// Compares two runs. Each has its own failure radius \[m\].
     pub fn of(before: (&[Row], f64), after: (&[Row], f64), tolerance: &Tolerance) -> Self {
         let key = |row: &Row| format!("{:?}/{}/{}", row.group(), row.query, row.method);
@@ -140,8 +140,8 @@ mod tests {
     use super::super::metrics::tests::{row, rows};
     use super::*;
 
-    fn compare(before: &[Row], after: &[Row]) -> Comparison {
-        Comparison::of((before, 10.0), (after, 10.0), &Tolerance::default())
+    fn compare(before: &[Row], after: &[Row]) -> RunComparison {
+        RunComparison::of((before, 10.0), (after, 10.0), &Tolerance::default())
     }
 
     #[test]

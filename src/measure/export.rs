@@ -15,8 +15,8 @@ use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
-use crate::run::{Camera, Item, RunFile};
 use crate::run::{FolderError, read_results};
+use crate::run::{Item, QueryCamera, RunFile};
 
 /// A format to export to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -275,7 +275,7 @@ fn vloc(localized: &[Localized<'_>]) -> String {
 }
 
 fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
-    let mut cameras: Vec<Camera> = Vec::new();
+    let mut cameras: Vec<QueryCamera> = Vec::new();
     let mut images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points\n".to_owned();
     for (index, one) in localized.iter().enumerate() {
         let camera = one.item.camera;

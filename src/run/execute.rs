@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::pair::Pair;
 use super::run_file::{Item, RunFile};
 use super::run_folder::{FolderError, RunFolder};
+use super::scene_pair::ScenePair;
 use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
-    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes,
-    Unwatched, Watch,
+    ChoiceError, Chooser, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking,
+    References, Request, StageTimes,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -27,7 +27,7 @@ pub struct Scenes {
 
 impl Scenes {
     /// The scene that a pair takes its queries from.
-    pub fn of_queries(&self, pair: &Pair) -> &dyn Scene {
+    pub fn of_queries(&self, pair: &ScenePair) -> &dyn Scene {
         self.queries
             .iter()
             .find(|scene| scene.name() == pair.query_scene)
@@ -67,10 +67,10 @@ pub struct FailedQuery<'a> {
     pub request: &'a Request,
 }
 
-/// Whoever accompanies a run.
-pub trait Companion {
-    /// The watcher of the next query.
-    fn watch(&mut self) -> &mut dyn Watch;
+/// An observer of a run over many queries.
+pub trait RunObserver {
+    /// The observer that the next query is localised under.
+    fn query_observer(&mut self) -> &mut dyn LocalizeObserver;
 
     /// A method failed on a query whose results are about to be written.
     ///
@@ -105,10 +105,10 @@ impl Execution<'_> {
     ///
     /// # Errors
     /// [`RunError`]. What was done until then is in the folder.
-    pub fn go_on(
+    pub fn run_remaining(
         &self,
         folder: &mut RunFolder,
-        companion: &mut dyn Companion,
+        observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
         let items: Vec<Item<'_>> = self.run.items().collect();
         let mut rest = items.get(folder.done()..).unwrap_or_default();
@@ -122,9 +122,9 @@ impl Execution<'_> {
                 Localizer::new(references, queries, self.params, self.run.protocol.seed);
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
-                let results = self.results(item, &localizer, &left_out, companion)?;
+                let results = self.results(item, &localizer, &left_out, observer)?;
                 folder.append(&results)?;
-                companion.done(item);
+                observer.done(item);
             }
             rest = later;
         }
@@ -132,7 +132,11 @@ impl Execution<'_> {
     }
 
     /// Frames of the references' scene that are queries themselves.
-    fn left_out(&self, pair: &Pair, references: &dyn Scene) -> Result<BTreeSet<usize>, SceneError> {
+    fn left_out(
+        &self,
+        pair: &ScenePair,
+        references: &dyn Scene,
+    ) -> Result<BTreeSet<usize>, SceneError> {
         if pair.scene != pair.query_scene {
             return Ok(BTreeSet::new());
         }
@@ -147,7 +151,7 @@ impl Execution<'_> {
         item: &Item<'_>,
         localizer: &Localizer<'_>,
         left_out: &BTreeSet<usize>,
-        companion: &mut dyn Companion,
+        observer: &mut dyn RunObserver,
     ) -> Result<Vec<(QueryResult, StageTimes)>, RunError> {
         let frame = localizer.queries().find(item.query)?;
         let mut results = Vec::new();
@@ -158,7 +162,7 @@ impl Execution<'_> {
                 frame,
                 &requests,
                 &self.run.protocol.methods,
-                companion.watch(),
+                observer.query_observer(),
                 |result, times| {
                     results.push((result, times));
                     Ok::<(), RunError>(())
@@ -169,7 +173,7 @@ impl Execution<'_> {
         match localized {
             Ok(requests) => {
                 let requests = requests?;
-                self.tell_failures(item, localizer, frame, &requests, &results, companion)?;
+                self.tell_failures(item, localizer, frame, &requests, &results, observer)?;
             }
             Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
         }
@@ -197,7 +201,7 @@ impl Execution<'_> {
                 seed: protocol.seed,
                 index,
             };
-            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut Unwatched)
+            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut NoObserver)
         };
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;
@@ -221,7 +225,7 @@ impl Execution<'_> {
         frame: usize,
         requests: &[Request],
         results: &[(QueryResult, StageTimes)],
-        companion: &mut dyn Companion,
+        observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
         let methods = &self.run.protocol.methods;
         let per_method = (results.len() / methods.len().max(1)).max(1);
@@ -237,7 +241,7 @@ impl Execution<'_> {
             else {
                 continue;
             };
-            companion.failed(&FailedQuery {
+            observer.failed(&FailedQuery {
                 localizer,
                 item: *item,
                 frame,

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::experiment::Experiment;
-use super::pair::{Camera, Pair};
 use super::protocol::Protocol;
+use super::scene_pair::{QueryCamera, ScenePair};
 use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
@@ -79,7 +79,7 @@ pub struct RunFile {
     /// Which part of the run this is.
     pub shard: Option<Shard>,
     /// Scenes paired, with the queries.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<ScenePair>,
     /// Every parameter of the estimators, as it was written: another version may have had others.
     pub params: toml::Table,
 }
@@ -109,7 +109,7 @@ struct Form {
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
     #[serde(rename = "pair")]
-    pairs: Vec<Pair>,
+    pairs: Vec<ScenePair>,
     params: toml::Table,
 }
 
@@ -180,11 +180,11 @@ struct Places {
     schema: Spanned<String>,
     methods: Spanned<Vec<Method>>,
     radii_m: Spanned<Vec<f64>>,
-    pair: Vec<PairPlaces>,
+    pair: Vec<ScenePairPlaces>,
 }
 
 #[derive(Deserialize)]
-struct PairPlaces {
+struct ScenePairPlaces {
     scene_index: Spanned<usize>,
 }
 
@@ -221,11 +221,11 @@ pub struct Item<'a> {
     /// Its place in the plan.
     pub index: usize,
     /// Its scenes.
-    pub pair: &'a Pair,
+    pub pair: &'a ScenePair,
     /// The query frame's name.
     pub query: &'a str,
     /// The query's camera.
-    pub camera: Camera,
+    pub camera: QueryCamera,
     /// When the query was taken \[s\].
     pub time_s: Option<f64>,
 }

@@ -129,7 +129,7 @@ fn every_estimator_can_be_stopped_at_any_event() {
     }
 }
 
-/// What a run does that concerns its watcher.
+/// What a run does that concerns its observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Moment {
     /// It looks at the attention flag.
@@ -180,7 +180,7 @@ impl Sink for Attended<'_> {
     }
 }
 
-/// Everything that concerns the watcher of a run that is not stopped.
+/// Everything that concerns the observer of a run that is not stopped.
 fn moments(
     estimator: &dyn estimator::Estimator,
     problem: &Problem,

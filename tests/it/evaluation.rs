@@ -10,11 +10,11 @@ use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
-use posescope::localize::{QueryResult, Selection, Unwatched, Watch};
+use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Companion, Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, Scenes, read_results,
+    Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, RunObserver, Scenes, read_results,
 };
 use posescope::scene::{self, Scene, SceneError};
 
@@ -512,10 +512,10 @@ impl Scene for Trapped {
     }
 }
 
-struct Nobody(Unwatched);
+struct NoRunObserver(NoObserver);
 
-impl Companion for Nobody {
-    fn watch(&mut self) -> &mut dyn Watch {
+impl RunObserver for NoRunObserver {
+    fn query_observer(&mut self) -> &mut dyn LocalizeObserver {
         &mut self.0
     }
 }
@@ -565,7 +565,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         indices: &[],
     };
     execution
-        .go_on(&mut folder, &mut Nobody(Unwatched))
+        .run_remaining(&mut folder, &mut NoRunObserver(NoObserver))
         .expect("a panic is a result");
     let results: Vec<QueryResult> = read_results(&out)
         .expect("results")

@@ -9,7 +9,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command, views};
 use posescope::method::Method;
-use posescope::session::{RunMode, State};
+use posescope::session::{RunMode, RunState};
 
 use crate::painted::{Painted, painted};
 use crate::window::{settle, setup, wait};
@@ -39,7 +39,7 @@ fn at_every_moment(
     see(window, "waiting", &[]);
     window.state_mut().send(Command::Run);
     wait(window, |app| {
-        *app.app_state().run_state() == State::Finished
+        *app.app_state().run_state() == RunState::Finished
     });
     window.state_mut().send(Command::SelectMethod(Method::FB));
     see(window, "features", &[]);
@@ -52,7 +52,7 @@ fn at_every_moment(
     window.state_mut().send(Command::SetFusions(all));
     window.run_steps(2);
     wait(window, |app| {
-        *app.app_state().run_state() == State::Finished
+        *app.app_state().run_state() == RunState::Finished
     });
     window.state_mut().send(Command::Last);
     see(

@@ -10,14 +10,14 @@ use posescope::event::{Event, StageEnded};
 use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::localize::{
-    Chooser, LocalizeError, Localizer, QueryResult, References, Request, Selection, StageTimes,
-    Unwatched, Watch,
+    Chooser, LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, References,
+    Request, Selection, StageTimes,
 };
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Query, ReferenceTuple};
 use posescope::run::Draw;
-use posescope::scene::{AtHand, FrameStore, Scene, SceneError};
+use posescope::scene::{CachedScene, FrameStore, Scene, SceneError};
 use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::Walls;
@@ -97,7 +97,7 @@ impl Sink for Notebook {
     }
 }
 
-impl Watch for Notebook {}
+impl LocalizeObserver for Notebook {}
 
 fn request(references: References) -> Request {
     Request {
@@ -112,7 +112,7 @@ fn localize(
     localizer: &Localizer<'_>,
     references: References,
     methods: &[Method],
-    watch: &mut dyn Watch,
+    observer: &mut dyn LocalizeObserver,
 ) -> Vec<(QueryResult, StageTimes)> {
     let mut results = Vec::new();
     let keep = |result, times| {
@@ -120,7 +120,7 @@ fn localize(
         Ok::<(), LocalizeError>(())
     };
     localizer
-        .localize(0, 1, &[request(references)], methods, watch, keep)
+        .localize(0, 1, &[request(references)], methods, observer, keep)
         .expect("good data");
     results
 }
@@ -164,7 +164,7 @@ fn features_are_found_once_for_ranking_and_for_every_reference() {
         index: None,
     };
     let chosen = chooser
-        .choose(1, &|_| false, &mut Unwatched)
+        .choose(1, &|_| false, &mut NoObserver)
         .expect("readable");
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(scene.clouds(), [0; 5]);
@@ -182,11 +182,11 @@ fn a_hybrid_takes_as_long_whoever_watches() {
     };
     for params in [Params::default(), without_features()] {
         let scene = Walls::new();
-        let all = |watch: &mut dyn Watch| {
+        let all = |observer: &mut dyn LocalizeObserver| {
             let localizer = Localizer::new(&scene, &scene, &params, 7);
-            localize(&localizer, vec![0].into(), &Method::PAPER, watch)
+            localize(&localizer, vec![0].into(), &Method::PAPER, observer)
         };
-        let unseen = all(&mut Unwatched);
+        let unseen = all(&mut NoObserver);
         let watched = all(&mut Notebook::default());
         for ((a, a_times), (b, b_times)) in unseen.iter().zip(&watched) {
             assert_eq!(a, b);
@@ -203,8 +203,8 @@ fn a_store_keeps_to_its_frames_and_what_others_hold() {
     let counting = Arc::new(Counting::new());
     let scene: Arc<dyn Scene> = counting.clone();
     let store = Arc::new(FrameStore::new(2, usize::MAX));
-    let at_hand = store.of(&scene);
-    let look = |frame| at_hand.query(frame).expect("readable");
+    let cached = store.of(&scene);
+    let look = |frame| cached.query(frame).expect("readable");
     for frame in [0, 1, 2, 2, 1] {
         look(frame);
     }
@@ -227,10 +227,10 @@ fn a_store_keeps_to_its_frames_and_what_others_hold() {
 fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
     let scene = Counting::new();
     let params = Params::default();
-    let (references, queries) = AtHand::pair(&scene, &scene);
+    let (references, queries) = CachedScene::pair(&scene, &scene);
     let store = Arc::clone(references.store());
-    let localizer = Localizer::at_hand((references, queries), &params, 7);
-    localize(&localizer, vec![0].into(), &Method::PAPER, &mut Unwatched);
+    let localizer = Localizer::with_cached_scenes((references, queries), &params, 7);
+    localize(&localizer, vec![0].into(), &Method::PAPER, &mut NoObserver);
     let of_two = store.bytes();
     // Both photos, the cloud, and what follows from them.
     assert!(of_two > 2 * 24_000 + 12 * 12_000, "{of_two}");
@@ -240,11 +240,11 @@ fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
     for _ in 0..3 {
         for query in [1, 3] {
             let scenes = (small.of(&counting), small.of(&counting));
-            let localizer = Localizer::at_hand(scenes, &params, 7);
+            let localizer = Localizer::with_cached_scenes(scenes, &params, 7);
             let keep = |_, _| Ok::<(), LocalizeError>(());
             let requests = [request(vec![0, 2].into())];
             localizer
-                .localize(0, query, &requests, &Method::PAPER, &mut Unwatched, keep)
+                .localize(0, query, &requests, &Method::PAPER, &mut NoObserver, keep)
                 .expect("good data");
             // Nobody holds anything now: the next look makes room.
             store_is_within(&small, &counting, of_two / 2);
@@ -254,9 +254,9 @@ fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
 
 /// Asked for a frame that is small, a store lets others go.
 fn store_is_within(store: &Arc<FrameStore>, scene: &Arc<dyn Scene>, limit: usize) {
-    let at_hand = store.of(scene);
+    let cached = store.of(scene);
     for _ in 0..2 {
-        drop(at_hand.query(3).expect("readable"));
+        drop(cached.query(3).expect("readable"));
     }
     assert!(store.bytes() <= limit, "{} of {limit}", store.bytes());
 }
@@ -308,13 +308,13 @@ impl Scene for Meeting {
 #[test]
 fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
     let scene = Meeting(Walls::new(), Barrier::new(2));
-    let (at_hand, _) = AtHand::pair(&scene, &scene);
+    let (cached, _) = CachedScene::pair(&scene, &scene);
     let got: Mutex<Vec<(Arc<ReferenceTuple>, Arc<Query>)>> = Mutex::default();
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                let tuple = at_hand.reference(0).expect("readable");
-                let query = at_hand.query(0).expect("is there");
+                let tuple = cached.reference(0).expect("readable");
+                let query = cached.query(0).expect("is there");
                 got.lock().expect("whole").push((tuple, query));
             });
         }
@@ -417,16 +417,16 @@ fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
 #[test]
 fn a_scene_at_hand_says_all_that_the_scene_says() {
     let scene = Peculiar(Walls::new());
-    let (at_hand, other) = AtHand::pair(&scene, &scene);
+    let (cached, other) = CachedScene::pair(&scene, &scene);
     // Frame 0 is whole, 2 has no pose, the photo of 4 cannot be read.
     for frame in [0, 2, 4] {
         for _ in 0..2 {
-            assert_eq!(said(&at_hand, frame), said(&scene, frame));
+            assert_eq!(said(&cached, frame), said(&scene, frame));
             assert_eq!(said(&other, frame), said(&scene, frame));
         }
     }
     let cloud = |scene: &dyn Scene| scene.cloud(0).expect("has one").points;
-    assert_eq!(cloud(&at_hand), cloud(&scene));
+    assert_eq!(cloud(&cached), cloud(&scene));
 }
 
 /// Frame 1 is seen by a camera of half the size.
@@ -490,7 +490,7 @@ fn a_query_may_have_another_camera_than_its_reference() {
     let params = Params::default();
     let localizer = Localizer::new(&scene, &scene, &params, 7);
     let direct = [Method::PM, Method::MI];
-    for (result, _) in localize(&localizer, vec![0].into(), &direct, &mut Unwatched) {
+    for (result, _) in localize(&localizer, vec![0].into(), &direct, &mut NoObserver) {
         let error = result.error.expect("a pose");
         assert!(error.translation_m < 0.6, "{}: {error:?}", result.method);
     }

@@ -13,7 +13,7 @@ use posescope::event::{
 use posescope::features::FeatureState;
 use posescope::features::Features;
 use posescope::method::Method;
-use posescope::session::{RunMode, State};
+use posescope::session::{RunMode, RunState};
 
 use crate::two_walls::CAMERA;
 use crate::window::{settle, setup, window};
@@ -23,7 +23,7 @@ fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     order(&mut window, Command::SelectMethod(method));
     order(&mut window, Command::Maximize(Some(view)));
     window
@@ -188,7 +188,7 @@ fn only_differences_leaves_the_features_that_ended_in_another_state() {
     let before = latest::<FeaturesClassified>(&window).states;
     let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
     order(&mut window, Command::SetParam { key, value });
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     order(&mut window, Command::SelectMethod(Method::FB));
     let after = latest::<FeaturesClassified>(&window).states;
     let pairs = before.iter().zip(after.iter());

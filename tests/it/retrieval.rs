@@ -7,7 +7,9 @@ use std::sync::Arc;
 use assert_cmd::Command;
 use posescope::event::{Event, ReferencesRanked, Stage};
 use posescope::geometry::Pose;
-use posescope::localize::{LocalizeError, Localizer, QueryResult, References, Request, Watch};
+use posescope::localize::{
+    LocalizeError, LocalizeObserver, Localizer, QueryResult, References, Request,
+};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
@@ -225,7 +227,7 @@ impl Sink for Notebook {
     }
 }
 
-impl Watch for Notebook {
+impl LocalizeObserver for Notebook {
     fn begin_query(&mut self, _: usize, _: &[Problem], _: Option<&Pose>) {
         self.notes.push("query".to_owned());
     }
@@ -234,11 +236,11 @@ impl Watch for Notebook {
     }
 }
 
-fn localized(requests: &[Request], watch: &mut dyn Watch) -> Vec<QueryResult> {
+fn localized(requests: &[Request], observer: &mut dyn LocalizeObserver) -> Vec<QueryResult> {
     let (scene, params) = (Walls::new(), Params::default());
     let mut results = Vec::new();
     Localizer::new(&scene, &scene, &params, 7)
-        .localize(0, 1, requests, &[Method::FB], watch, |result, _| {
+        .localize(0, 1, requests, &[Method::FB], observer, |result, _| {
             results.push(result);
             Ok::<(), LocalizeError>(())
         })

@@ -9,7 +9,7 @@ use posescope::event::{
 };
 use posescope::grid::{Phase, least_covered};
 use posescope::method::Method;
-use posescope::session::{RunMode, Span, State};
+use posescope::session::{RunMode, RunState, Span};
 
 use crate::window::{settle, setup, window};
 
@@ -20,7 +20,7 @@ fn finished() -> Harness<'static, App> {
     let mut window = window(setup);
     // It shares its place with the view of the space.
     window.state_mut().send(Command::ShowView("ransac"));
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     window
 }
 
@@ -233,7 +233,7 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
 
     window.get_by_label("Run with this floor").click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     let floor = window
         .state()
         .app_state()

@@ -6,10 +6,12 @@ use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
 use posescope::fusion::Fusion;
-use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
+use posescope::localize::{
+    LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request,
+};
 use posescope::method::Method;
 use posescope::run::Protocol;
-use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State, Task};
+use posescope::session::{Breakpoints, Job, Part, RunMode, RunState, Session, Task};
 use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
@@ -41,12 +43,12 @@ fn start(job: Job, mode: RunMode, breakpoints: &[&str]) -> Session {
 }
 
 /// Waits until the session needs somebody.
-fn settle(session: &mut Session) -> State {
+fn settle(session: &mut Session) -> RunState {
     let begun = Instant::now();
     loop {
         session.drain();
         match session.state() {
-            State::Loading | State::Running => {}
+            RunState::Loading | RunState::Running => {}
             state => return state.clone(),
         }
         assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
@@ -89,7 +91,7 @@ fn results(session: &Session) -> Vec<QueryResult> {
 #[test]
 fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     let mut session = start(job(1), RunMode::Paused, &[]);
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
     assert_eq!(session.run().len(), 1);
     let first = &session.run().records()[0].event;
     assert_eq!(starts(first), Some(Stage::Estimator(Method::FB)));
@@ -106,13 +108,13 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
 }
 
 #[test]
 fn stepping_gives_the_results_of_running() {
     let mut run = start(job(1), RunMode::Running, &[]);
-    assert_eq!(settle(&mut run), State::Finished);
+    assert_eq!(settle(&mut run), RunState::Finished);
     let mut stepped = start(job(1), RunMode::Paused, &[]);
     settle(&mut stepped);
     let orders = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
@@ -134,7 +136,7 @@ fn a_breakpoint_stops_a_run_and_says_which_it_was() {
         RunMode::Running,
         &["mi.yaw_coarse", "inliers < 1000"],
     );
-    let stopped_by = |text: &str| State::Paused {
+    let stopped_by = |text: &str| RunState::Paused {
         breakpoint: Some(text.to_owned()),
     };
     assert_eq!(settle(&mut session), stopped_by("inliers < 1000"));
@@ -143,7 +145,7 @@ fn a_breakpoint_stops_a_run_and_says_which_it_was() {
     assert_eq!(session.state(), &stopped_by("mi.yaw_coarse"));
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
-    assert_eq!(settle(&mut session), State::Finished);
+    assert_eq!(settle(&mut session), RunState::Finished);
 }
 
 #[test]
@@ -162,10 +164,10 @@ fn a_running_session_pauses_and_a_paused_one_stays() {
     let mut session = Session::start(job(1), RunMode::Running, Breakpoints::default(), wake);
     arrival.recv().expect("the run has five messages");
     session.drain();
-    assert_eq!(session.state(), &State::Running);
+    assert_eq!(session.state(), &RunState::Running);
     session.set_mode(RunMode::Paused);
     release.send(()).expect("the worker waits");
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
     let told = session.run().len();
     session.set_mode(RunMode::Paused);
     std::thread::sleep(Duration::from_millis(30));
@@ -183,7 +185,7 @@ fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
         std::thread::yield_now();
         session.drain();
     }
-    assert_eq!(session.state(), &State::Cancelled);
+    assert_eq!(session.state(), &RunState::Cancelled);
 
     let scene = Arc::new(Walls::new());
     let mut dropped = start(
@@ -226,7 +228,7 @@ fn a_session_pauses_and_stops_within_a_lattice() {
     let in_the_lattice = |session: &Session| session.run().len() > 500;
     wait(&mut session, in_the_lattice);
     session.set_mode(RunMode::Paused);
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
     let told = session.run().len();
     // A million hypotheses are to come, most of which were not even scored.
     assert!(told < 500_000, "{told}");
@@ -235,7 +237,7 @@ fn a_session_pauses_and_stops_within_a_lattice() {
     let begun = Instant::now();
     session.cancel();
     wait(&mut session, |session| !session.is_alive());
-    assert_eq!(session.state(), &State::Cancelled);
+    assert_eq!(session.state(), &RunState::Cancelled);
     assert!(begun.elapsed() < Duration::from_secs(5));
 }
 
@@ -264,7 +266,7 @@ impl Sink for UntilStopped {
     }
 }
 
-impl Watch for UntilStopped {
+impl LocalizeObserver for UntilStopped {
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         Some(Arc::clone(&self.0))
     }
@@ -274,11 +276,11 @@ impl Watch for UntilStopped {
 fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
     let mut session = start(job(UNREADABLE), RunMode::Running, &[]);
     match settle(&mut session) {
-        State::Broken(why) => assert!(why.contains("000004"), "{why}"),
+        RunState::Broken(why) => assert!(why.contains("000004"), "{why}"),
         other => panic!("{other:?}"),
     }
     let mut session = start(job(GREY), RunMode::Running, &[]);
-    assert_eq!(settle(&mut session), State::Finished);
+    assert_eq!(settle(&mut session), RunState::Finished);
     let results = results(&session);
     assert_eq!(results.len(), 4);
     assert!(results[0].pose.is_none() && results[0].reason.is_some());
@@ -291,7 +293,7 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
     broken.chosen = vec![1].into();
     let mut session = start(broken, RunMode::Running, &[]);
     match settle(&mut session) {
-        State::Broken(why) => assert!(why.contains("internal error"), "{why}"),
+        RunState::Broken(why) => assert!(why.contains("internal error"), "{why}"),
         other => panic!("{other:?}"),
     }
 }
@@ -352,19 +354,19 @@ fn several_references_are_fused_as_without_a_session() {
             1,
             &[request],
             &task.protocol.methods,
-            &mut Unwatched,
+            &mut NoObserver,
             keep,
         )
         .expect("good data");
 
     let mut session = start(several, RunMode::Running, &["fusion"]);
-    let at_fusion = State::Paused {
+    let at_fusion = RunState::Paused {
         breakpoint: Some("fusion".to_owned()),
     };
     assert_eq!(settle(&mut session), at_fusion);
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
-    assert_eq!(settle(&mut session), State::Finished);
+    assert_eq!(settle(&mut session), RunState::Finished);
     let (fused, alone): (Vec<_>, Vec<_>) = results(&session)
         .into_iter()
         .partition(|result| result.fusion.is_some());

@@ -8,13 +8,13 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Command, CompareMode, Setup};
 use posescope::event::{Event, Stage};
-use posescope::localize::{Localizer, QueryResult, Request, Unwatched};
+use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::Protocol;
 use posescope::scene;
 use posescope::scene::Scene;
-use posescope::session::{RunMode, State, Task};
+use posescope::session::{RunMode, RunState, Task};
 
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
@@ -53,9 +53,12 @@ pub fn window(setup: Setup) -> Harness<'static, App> {
 }
 
 /// Draws frames until the worker needs somebody.
-pub fn settle(window: &mut Harness<'_, App>) -> State {
+pub fn settle(window: &mut Harness<'_, App>) -> RunState {
     wait(window, |app| {
-        !matches!(app.app_state().run_state(), State::Loading | State::Running)
+        !matches!(
+            app.app_state().run_state(),
+            RunState::Loading | RunState::Running
+        )
     });
     window.step();
     window.state().app_state().run_state().clone()
@@ -80,7 +83,7 @@ pub fn finished(setup: Setup) -> Harness<'static, App> {
         mode: RunMode::Running,
         ..setup
     });
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     window
 }
 
@@ -96,7 +99,7 @@ fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event
     press(window, modifiers, key);
     wait(window, |app| {
         app.app_state().run().len() > before
-            || matches!(app.app_state().run_state(), State::Finished)
+            || matches!(app.app_state().run_state(), RunState::Finished)
     });
     settle(window);
     let state = window.state().app_state();
@@ -142,7 +145,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
             1,
             &[request],
             &Method::PAPER,
-            &mut Unwatched,
+            &mut NoObserver,
             |result, _| {
                 results.push(result);
                 Ok::<(), posescope::localize::LocalizeError>(())
@@ -155,7 +158,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
 #[test]
 fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let mut window = window(setup());
-    assert_eq!(settle(&mut window), State::Paused { breakpoint: None });
+    assert_eq!(settle(&mut window), RunState::Paused { breakpoint: None });
     assert_eq!(window.state().app_state().run().len(), 1);
     window.get_by_label("Into").click();
     wait(&mut window, |app| app.app_state().run().len() == 2);
@@ -169,7 +172,7 @@ fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let event = order(&mut window, Modifiers::SHIFT, Key::F11);
     assert_eq!(stage(&event), Some((Stage::Match, false)));
     order(&mut window, Modifiers::NONE, Key::F9);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     assert_eq!(results(&window), headless(&Params::default()));
 }
 
@@ -217,7 +220,7 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     assert_eq!(breakpoints.len(), 1);
     press(&mut window, Modifiers::NONE, Key::F5);
     wait(&mut window, |app| app.app_state().run().len() > 10);
-    let stopped = State::Paused {
+    let stopped = RunState::Paused {
         breakpoint: Some("mi.yaw_coarse".to_owned()),
     };
     assert_eq!(settle(&mut window), stopped);
@@ -246,7 +249,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
         value: "2".to_owned(),
     });
     window.step();
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     let state = window.state().app_state();
     let span = state.run().span_at(state.cursor).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
@@ -363,17 +366,17 @@ fn what_goes_wrong_is_said_and_the_window_lives_on() {
     let mut window = finished(setup);
     window.state_mut().send(Command::SelectQuery(UNREADABLE));
     window.step();
-    assert!(matches!(settle(&mut window), State::Broken(_)));
+    assert!(matches!(settle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "000004"));
     // Frame 1 has no cloud, and the scene of this test panics when it is asked for it.
     window.state_mut().send(Command::SelectQuery(1));
     window.state_mut().send(Command::SetReferences(vec![1]));
     window.step();
-    assert!(matches!(settle(&mut window), State::Broken(_)));
+    assert!(matches!(settle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "internal error"));
     window.state_mut().send(Command::SetReferences(vec![0]));
     window.step();
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
 }
 
 #[test]
@@ -426,7 +429,7 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     std::fs::write(&path, elsewhere).expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(settle(&mut window), RunState::Finished);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
     let loaded = window.state().app_state().run().loaded.clone();
     let problem = &loaded.expect("it ran").problems[0];

@@ -24,7 +24,7 @@ pub enum Side {
     Reference,
 }
 
-/// A named part of an estimator, which a watcher can step over.
+/// A named part of an estimator, which an observer can step over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// A whole estimator; within the hybrid also the one it runs inside.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use xxhash_rust::xxh3::Xxh3;
 
 pub use error::SceneError;
-pub use frames::{AtHand, FrameStore};
+pub use frames::{CachedScene, FrameStore};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;

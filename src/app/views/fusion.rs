@@ -6,7 +6,7 @@ use egui_plot::{MarkerShape, Plot, PlotUi, Points};
 use super::View;
 use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesFused};
-use crate::fusion::{Fate, Share};
+use crate::fusion::{Share, ShareOutcome};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::session::Part;
@@ -116,16 +116,16 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Refer
 
 /// A bar as long as the weight; what has none says why.
 fn weight(ui: &mut Ui, share: &Share, color: Color32) {
-    match share.fate {
-        Fate::Dropped => {
+    match share.outcome {
+        ShareOutcome::Dropped => {
             ui.weak("left out")
                 .on_hover_text("The fusion gives it no weight");
         }
-        Fate::Failed => {
+        ShareOutcome::Failed => {
             ui.label(RichText::new("× failed").color(theme::ESTIMATE))
                 .on_hover_text("It had a weight, but no pose");
         }
-        Fate::Kept => {
+        ShareOutcome::Kept => {
             ui.horizontal(|ui| {
                 let size = vec2(FULL_BAR, 10.0);
                 let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
@@ -178,9 +178,11 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
             }
             for share in present.shares.iter() {
                 let Some(pose) = &share.pose else { continue };
-                let (name, shape) = match share.fate {
-                    Fate::Kept => ("alone, kept", MarkerShape::Circle),
-                    Fate::Dropped | Fate::Failed => ("alone, left out", MarkerShape::Cross),
+                let (name, shape) = match share.outcome {
+                    ShareOutcome::Kept => ("alone, kept", MarkerShape::Circle),
+                    ShareOutcome::Dropped | ShareOutcome::Failed => {
+                        ("alone, left out", MarkerShape::Cross)
+                    }
                 };
                 let radius = 3.0 + 6.0 * share.weight.sqrt() as f32;
                 mark(

@@ -21,7 +21,7 @@ use egui::{Color32, Rect, Response, Role, Sense, Stroke, StrokeKind, Ui, Vec2, W
 use nalgebra::Point2;
 
 use super::View;
-use crate::app::camera::Place;
+use crate::app::camera::NamedPose;
 use crate::app::textures::color_image;
 use crate::app::{Command, ViewContext, theme};
 use crate::picture;
@@ -163,13 +163,13 @@ impl Space {
 
     fn blink(&mut self, ui: &Ui, context: &ViewContext<'_>) {
         let Some(next) = self.next_flip else { return };
-        if context.state.camera.is_none() || context.state.place(Place::Last).is_none() {
+        if context.state.camera.is_none() || context.state.named_pose(NamedPose::Last).is_none() {
             self.next_flip = None;
             return;
         }
         let now = ui.input(|input| input.time);
         if now >= next {
-            context.send(Command::JumpCamera(Place::Last));
+            context.send(Command::JumpCamera(NamedPose::Last));
             self.next_flip = Some(now + BLINK.as_secs_f64());
         }
         ui.ctx().request_repaint_after(BLINK);

@@ -15,7 +15,7 @@ use super::{Identity, RecordError, Targets, blueprint, entities, report, retriev
 use crate::estimator;
 use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
-use crate::localize::{PoseReport, QueryResult, StageTimes, Watch};
+use crate::localize::{LocalizeObserver, PoseReport, QueryResult, StageTimes};
 use crate::method::Method;
 use crate::narration;
 use crate::palette;
@@ -342,7 +342,7 @@ impl Query {
     }
 }
 
-impl Watch for Recorder {
+impl LocalizeObserver for Recorder {
     fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
         self.query = Query {
             problems: problems.to_vec(),

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::observer::checkpoint;
 use super::select::{ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within};
-use super::watch::checkpoint;
-use super::{Localizer, Watch};
+use super::{LocalizeObserver, Localizer};
 use crate::params::Params;
 use crate::retrieval::{RankedReference, ReferenceRanking};
 
@@ -26,7 +26,7 @@ pub struct Chooser<'a> {
 
 impl Chooser<'_> {
     /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
-    /// that it must not be one; the query itself never is. `watch` hears nothing, but can stop it.
+    /// that it must not be one; the query itself never is. `observer` hears nothing, but can stop it.
     ///
     /// # Errors
     /// [`ChoiceError`].
@@ -34,7 +34,7 @@ impl Chooser<'_> {
         &self,
         query: usize,
         left_out: &dyn Fn(usize) -> bool,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
@@ -66,11 +66,11 @@ impl Chooser<'_> {
                     scene: references,
                     params: self.params,
                 };
-                self.ranked(query, &within, &by_matches, watch)?
+                self.ranked(query, &within, &by_matches, observer)?
             }
             Selection::Retrieved(_) => {
                 let index = self.index.ok_or(ChoiceError::NoIndex)?;
-                self.ranked(query, &within, index, watch)?
+                self.ranked(query, &within, index, observer)?
             }
         };
         Ok(References {
@@ -84,14 +84,14 @@ impl Chooser<'_> {
         query: usize,
         candidates: &[usize],
         by: &dyn Ranking,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let count = self.selection.count();
         let depth = ReferenceRanking::depth(count);
         let frames: Vec<RankedReference> = by
             .rank(&*queries.query(query)?, candidates, depth, &mut || {
-                checkpoint(watch)
+                checkpoint(observer)
             })?
             .into_iter()
             .map(|ranked| RankedReference {

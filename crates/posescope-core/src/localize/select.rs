@@ -204,7 +204,7 @@ pub enum ChoiceError {
     /// A frame cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The watcher asked the run to stop.
+    /// The observer asked the run to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

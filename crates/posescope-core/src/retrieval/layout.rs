@@ -51,12 +51,12 @@ pub struct Description {
     /// Of the forest.
     pub seed: u64,
     /// Numbers of records.
-    pub counts: Counts,
+    pub counts: RecordCounts,
 }
 
 /// Numbers of records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counts {
+pub struct RecordCounts {
     /// Features of all documents.
     pub features: usize,
     /// Documents.
@@ -97,12 +97,12 @@ impl IndexedFeature {
 }
 
 /// Writes an index from front to back and sums it up.
-pub struct Writer<W> {
+pub struct IndexWriter<W> {
     out: W,
     sum: Xxh3,
 }
 
-impl<W: Write> Writer<W> {
+impl<W: Write> IndexWriter<W> {
     /// Begins with the magic.
     pub fn new(out: W) -> io::Result<Self> {
         let mut writer = Self {
@@ -160,7 +160,7 @@ impl<W: Write> Writer<W> {
 }
 
 /// An index in its file, of which what is asked for comes into memory.
-pub struct Stored {
+pub struct MappedIndex {
     map: Mmap,
     description: Description,
     features: Range<usize>,
@@ -170,7 +170,7 @@ pub struct Stored {
     postings: Range<usize>,
 }
 
-impl Stored {
+impl MappedIndex {
     /// Maps a file whose every byte was checked before.
     pub fn open(path: &Path) -> Result<Self, IndexError> {
         let io = |source: io::Error| match source.kind() {

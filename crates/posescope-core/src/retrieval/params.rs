@@ -1,6 +1,6 @@
 //! The parameters of retrieval.
 
-use super::verification::Tolerance;
+use super::verification::VerificationLimits;
 use crate::describe::parameters;
 use crate::features::SurfParams;
 
@@ -48,8 +48,8 @@ impl RetrievalParams {
     pub const BUILDING: [&'static str; 5] = ["features", "sample", "iterations", "trees", "checks"];
 
     /// What verification allows.
-    pub fn tolerance(&self) -> Tolerance {
-        Tolerance {
+    pub fn tolerance(&self) -> VerificationLimits {
+        VerificationLimits {
             inlier_px: self.inlier_px,
             min_inliers: self.min_inliers,
         }

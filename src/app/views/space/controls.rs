@@ -5,7 +5,7 @@ use egui::{PopupCloseBehavior, RichText, Slider, Ui};
 
 use super::cameras::{Camera, Who};
 use super::cloud::Coloring;
-use crate::app::camera::Place;
+use crate::app::camera::NamedPose;
 use crate::app::{Command, ViewContext, shortcuts};
 use crate::method::Method;
 
@@ -123,14 +123,14 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
 pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<Wish> {
     let keys = shortcuts();
     ui.weak("camera to");
-    for place in Place::ALL {
+    for place in NamedPose::ALL {
         let command = Command::JumpCamera(place);
         let key = keys.iter().find(|shortcut| shortcut.command == command);
         let key = key.map_or(String::new(), |shortcut| {
             ui.ctx().format_shortcut(&shortcut.keys)
         });
-        let is_there = context.state.place(place).is_some()
-            && (place != Place::Truth || context.state.shows_truth);
+        let is_there = context.state.named_pose(place).is_some()
+            && (place != NamedPose::Truth || context.state.shows_truth);
         let mut text = egui::text::LayoutJob::default();
         let style = ui.style();
         RichText::new(place.name()).append_to(
@@ -152,7 +152,8 @@ pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Opt
         }
     }
     let mut wish = None;
-    let can_blink = context.state.camera.is_some() && context.state.place(Place::Last).is_some();
+    let can_blink =
+        context.state.camera.is_some() && context.state.named_pose(NamedPose::Last).is_some();
     let response = ui.add_enabled(
         can_blink || blinks,
         egui::Button::selectable(blinks, "Blink poses"),
