@@ -29,7 +29,7 @@ mod window;
 
 pub use command::{Command, Shortcut, shortcuts};
 pub use setup::{ReferencePick, Setup};
-pub use shown::{Shown, ShownAt};
+pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, CompareMode, Note};
 pub use view_context::ViewContext;
 pub use window::{WindowError, has_display, open, window_options};

@@ -13,13 +13,13 @@ use super::views::{self, View};
 /// The tree of views, and the views themselves.
 pub(super) struct Layout {
     tree: Tree<String>,
-    views: BTreeMap<&'static str, Panel>,
+    views: BTreeMap<&'static str, ViewPair>,
     /// The view that has all the room, if one has.
     alone: Option<String>,
 }
 
 /// A view has what it remembers once for each of two runs.
-struct Panel {
+struct ViewPair {
     present: Box<dyn View>,
     kept: Box<dyn View>,
 }
@@ -29,11 +29,11 @@ impl Layout {
         let views = views::ALL
             .iter()
             .map(|entry| {
-                let panel = Panel {
+                let pair = ViewPair {
                     present: (entry.new)(render_state),
                     kept: (entry.new)(render_state),
                 };
-                (entry.name, panel)
+                (entry.name, pair)
             })
             .collect();
         Self {
@@ -177,7 +177,7 @@ fn first_tree() -> Tree<String> {
 
 /// What the tree draws its panes with.
 struct Panes<'a> {
-    views: &'a mut BTreeMap<&'static str, Panel>,
+    views: &'a mut BTreeMap<&'static str, ViewPair>,
     state: &'a AppState,
     commands: &'a Queue,
 }
@@ -189,7 +189,7 @@ fn title(name: &str) -> &str {
 
 impl Panes<'_> {
     fn draw_pane(&mut self, ui: &mut egui::Ui, pane: &str) {
-        let Some(panel) = self.views.get_mut(pane) else {
+        let Some(pair) = self.views.get_mut(pane) else {
             ui.weak(format!("There is no view `{pane}`"));
             return;
         };
@@ -197,12 +197,12 @@ impl Panes<'_> {
             let present = ViewContext::present(self.state, self.commands);
             let kept = ViewContext::kept(self.state, self.commands);
             match (self.state.compare_mode, kept) {
-                (CompareMode::Kept, Some(kept)) => draw(ui, "A", &mut panel.kept, &kept),
+                (CompareMode::Kept, Some(kept)) => draw(ui, "A", &mut pair.kept, &kept),
                 (CompareMode::SideBySide, Some(kept)) => ui.columns(2, |columns| {
-                    draw(&mut columns[0], "A", &mut panel.kept, &kept);
-                    draw(&mut columns[1], "B", &mut panel.present, &present);
+                    draw(&mut columns[0], "A", &mut pair.kept, &kept);
+                    draw(&mut columns[1], "B", &mut pair.present, &present);
                 }),
-                _ => draw(ui, "B", &mut panel.present, &present),
+                _ => draw(ui, "B", &mut pair.present, &present),
             }
         });
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
 use super::setup::Setup;
-use super::shown::ShownAt;
+use super::shown::ShownReason;
 use super::textures::Textures;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
@@ -214,10 +214,10 @@ impl AppState {
     }
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
-    pub fn looking_at(&self) -> Option<(Pose, ShownAt)> {
+    pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
         self.hovered
-            .map(|pose| (pose, ShownAt::Pointer))
-            .or_else(|| self.camera.map(|pose| (pose, ShownAt::Camera)))
+            .map(|pose| (pose, ShownReason::Pointer))
+            .or_else(|| self.camera.map(|pose| (pose, ShownReason::Camera)))
     }
 
     /// What is known about the pose that was asked for last.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::command::{Command, Queue};
-use super::shown::{Shown, ShownAt};
+use super::shown::{ShownReason, ShownView};
 use super::state::AppState;
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
@@ -146,14 +146,14 @@ impl<'a> ViewContext<'a> {
 
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
-    pub fn shown(&self, method: Method) -> Option<Shown> {
+    pub fn shown(&self, method: Method) -> Option<ShownView> {
         if let Some((pose, at)) = self.state.looking_at()
             && let Some(probe) = self.state.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.
             let _ = pose;
-            return Some(Shown {
+            return Some(ShownView {
                 comparison: Arc::clone(comparison),
                 pose: probe.pose,
                 at,
@@ -167,10 +167,10 @@ impl<'a> ViewContext<'a> {
         };
         let event: &ViewRendered = within_hybrid.or_else(|| self.latest_of(method))?;
         let problem = self.problem()?;
-        Some(Shown {
+        Some(ShownView {
             comparison: Arc::clone(&event.comparison),
             pose: problem.world_from_query(&event.offset.reference_from_camera()),
-            at: ShownAt::Event(event.moment),
+            at: ShownReason::Event(event.moment),
         })
     }
 

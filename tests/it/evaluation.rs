@@ -479,12 +479,12 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
 }
 
 /// A scene whose photo of one frame makes the program panic.
-struct Trapped {
+struct PanickingScene {
     scene: Box<dyn Scene>,
     frame: usize,
 }
 
-impl Scene for Trapped {
+impl Scene for PanickingScene {
     fn name(&self) -> &str {
         self.scene.name()
     }
@@ -526,7 +526,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     let folder = sequence.folder();
     let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
     let scenes = Scenes {
-        references: vec![Box::new(Trapped { scene, frame: 1 })],
+        references: vec![Box::new(PanickingScene { scene, frame: 1 })],
         queries: Vec::new(),
     };
     let draw = Draw {

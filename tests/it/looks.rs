@@ -11,8 +11,8 @@ use posescope::app::{App, Command, views};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
 
-use crate::painted::{Painted, painted};
-use crate::window::{settle, setup, wait};
+use crate::painted::{PaintedWindow, painted};
+use crate::window::{run_until_idle, setup, wait};
 
 /// The views whose point is pixels.
 const PICTURES: [&str; 4] = ["images", "synthetic", "space", "surface"];
@@ -35,7 +35,7 @@ fn at_every_moment(
     window: &mut Harness<'_, App>,
     mut see: impl FnMut(&mut Harness<'_, App>, &str, &[&str]),
 ) {
-    settle(window);
+    run_until_idle(window);
     see(window, "waiting", &[]);
     window.state_mut().send(Command::Run);
     wait(window, |app| {
@@ -74,7 +74,7 @@ fn seen(of: &[&str], in_pictures: bool) -> impl Iterator<Item = &'static str> {
 
 #[test]
 fn every_picture_looks_as_it_did() {
-    let Some(Painted {
+    let Some(PaintedWindow {
         mut window,
         mut judge,
     }) = painted(setup(), SIZE)
@@ -162,7 +162,7 @@ fn every_view_bears_a_run_that_never_began() {
     broken.chosen = vec![1].into();
     broken.mode = RunMode::Running;
     let mut window = crate::window::window(broken);
-    settle(&mut window);
+    run_until_idle(&mut window);
     for entry in views::ALL {
         window.state_mut().send(Command::Maximize(Some(entry.name)));
         window.run_steps(3);

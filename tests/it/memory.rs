@@ -274,9 +274,9 @@ fn scenes_of_one_name_are_not_taken_for_each_other() {
 }
 
 /// Reads a photo only when two threads want it.
-struct Meeting(Walls, Barrier);
+struct RendezvousScene(Walls, Barrier);
 
-impl Scene for Meeting {
+impl Scene for RendezvousScene {
     fn name(&self) -> &str {
         "meeting"
     }
@@ -307,7 +307,7 @@ impl Scene for Meeting {
 
 #[test]
 fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
-    let scene = Meeting(Walls::new(), Barrier::new(2));
+    let scene = RendezvousScene(Walls::new(), Barrier::new(2));
     let (cached, _) = CachedScene::pair(&scene, &scene);
     let got: Mutex<Vec<(Arc<ReferenceTuple>, Arc<Query>)>> = Mutex::default();
     std::thread::scope(|scope| {
@@ -326,9 +326,9 @@ fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
 }
 
 /// A scene that answers everything in its own way.
-struct Peculiar(Walls);
+struct UnusualScene(Walls);
 
-impl Scene for Peculiar {
+impl Scene for UnusualScene {
     fn name(&self) -> &str {
         "peculiar"
     }
@@ -416,7 +416,7 @@ fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
 
 #[test]
 fn a_scene_at_hand_says_all_that_the_scene_says() {
-    let scene = Peculiar(Walls::new());
+    let scene = UnusualScene(Walls::new());
     let (cached, other) = CachedScene::pair(&scene, &scene);
     // Frame 0 is whole, 2 has no pose, the photo of 4 cannot be read.
     for frame in [0, 2, 4] {

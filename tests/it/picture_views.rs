@@ -16,14 +16,14 @@ use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
 
 use crate::two_walls::CAMERA;
-use crate::window::{settle, setup, window};
+use crate::window::{run_until_idle, setup, window};
 
 /// The small world after its run, at the end of a method, with a view in front.
 fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     order(&mut window, Command::SelectMethod(method));
     order(&mut window, Command::Maximize(Some(view)));
     window
@@ -87,7 +87,7 @@ fn lonely_inlier(window: &Harness<'_, App>) -> (usize, Pos2) {
 #[test]
 fn before_detection_there_are_just_the_photos() {
     let mut window = window(setup());
-    settle(&mut window);
+    run_until_idle(&mut window);
     order(&mut window, Command::ShowView("images"));
     window.get_by_label("No features yet: FB finds them first");
     window.get_by_label("query photo 000001");
@@ -188,7 +188,7 @@ fn only_differences_leaves_the_features_that_ended_in_another_state() {
     let before = latest::<FeaturesClassified>(&window).states;
     let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
     order(&mut window, Command::SetParam { key, value });
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     order(&mut window, Command::SelectMethod(Method::FB));
     let after = latest::<FeaturesClassified>(&window).states;
     let pairs = before.iter().zip(after.iter());

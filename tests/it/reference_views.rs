@@ -15,7 +15,7 @@ use posescope::sink::rerun::entities;
 
 use crate::recording::{chunks, timelines};
 use crate::walls_scene::Walls;
-use crate::window::{finished, is_said, results, settle, setup};
+use crate::window::{finished, is_said, results, run_until_idle, setup};
 
 fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
     window.state_mut().send(Command::Maximize(Some(view)));
@@ -26,7 +26,7 @@ fn pick(window: &mut Harness<'_, App>, selection: Selection) -> RunState {
     let pick = ReferencePick::By(selection);
     window.state_mut().send(Command::PickReferences(pick));
     window.run_steps(2);
-    settle(window)
+    run_until_idle(window)
 }
 
 fn index(file: &Path, params: &Params) {
@@ -51,7 +51,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
         .get_by_role_and_label(egui::Role::CheckBox, "000002")
         .click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     assert!(
         results(&window)
@@ -64,7 +64,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     assert!(inner.count() >= 2);
     window.get_by_label("wavg").click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let fused: Vec<_> = results(&window)
         .into_iter()
         .filter(|result| result.fusion.is_some_and(|f| f.name == "wavg"))
@@ -150,7 +150,7 @@ fn references_are_ranked_by_their_matches() {
     let value = "0.7".to_owned();
     window.state_mut().send(Command::SetParam { key, value });
     window.run_steps(2);
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let again = &window.state().app_state().run().spans()[0];
     assert_eq!(again.part, Part::Retrieval);
 }

@@ -11,7 +11,7 @@ use posescope::grid::{Phase, least_covered};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState, Span};
 
-use crate::window::{settle, setup, window};
+use crate::window::{run_until_idle, setup, window};
 
 /// The small world after all of its run.
 fn finished() -> Harness<'static, App> {
@@ -20,7 +20,7 @@ fn finished() -> Harness<'static, App> {
     let mut window = window(setup);
     // It shares its place with the view of the space.
     window.state_mut().send(Command::ShowView("ransac"));
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     window
 }
 
@@ -233,7 +233,7 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
 
     window.get_by_label("Run with this floor").click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let floor = window
         .state()
         .app_state()

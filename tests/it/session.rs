@@ -43,7 +43,7 @@ fn start(job: Job, mode: RunMode, breakpoints: &[&str]) -> Session {
 }
 
 /// Waits until the session needs somebody.
-fn settle(session: &mut Session) -> RunState {
+fn run_until_idle(session: &mut Session) -> RunState {
     let begun = Instant::now();
     loop {
         session.drain();
@@ -61,7 +61,7 @@ fn order(session: &mut Session, mode: RunMode) -> Event {
     let before = session.run().len();
     session.set_mode(mode);
     loop {
-        settle(session);
+        run_until_idle(session);
         if session.run().len() > before || !session.is_alive() {
             break;
         }
@@ -91,7 +91,10 @@ fn results(session: &Session) -> Vec<QueryResult> {
 #[test]
 fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     let mut session = start(job(1), RunMode::Paused, &[]);
-    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
     assert_eq!(session.run().len(), 1);
     let first = &session.run().records()[0].event;
     assert_eq!(starts(first), Some(Stage::Estimator(Method::FB)));
@@ -108,15 +111,18 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));
-    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
 }
 
 #[test]
 fn stepping_gives_the_results_of_running() {
     let mut run = start(job(1), RunMode::Running, &[]);
-    assert_eq!(settle(&mut run), RunState::Finished);
+    assert_eq!(run_until_idle(&mut run), RunState::Finished);
     let mut stepped = start(job(1), RunMode::Paused, &[]);
-    settle(&mut stepped);
+    run_until_idle(&mut stepped);
     let orders = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
     for mode in orders.into_iter().cycle() {
         order(&mut stepped, mode);
@@ -139,13 +145,13 @@ fn a_breakpoint_stops_a_run_and_says_which_it_was() {
     let stopped_by = |text: &str| RunState::Paused {
         breakpoint: Some(text.to_owned()),
     };
-    assert_eq!(settle(&mut session), stopped_by("inliers < 1000"));
+    assert_eq!(run_until_idle(&mut session), stopped_by("inliers < 1000"));
     let event = order(&mut session, RunMode::Running);
     assert_eq!(starts(&event).map(Stage::name), Some("yaw_coarse"));
     assert_eq!(session.state(), &stopped_by("mi.yaw_coarse"));
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
-    assert_eq!(settle(&mut session), RunState::Finished);
+    assert_eq!(run_until_idle(&mut session), RunState::Finished);
 }
 
 #[test]
@@ -167,7 +173,10 @@ fn a_running_session_pauses_and_a_paused_one_stays() {
     assert_eq!(session.state(), &RunState::Running);
     session.set_mode(RunMode::Paused);
     release.send(()).expect("the worker waits");
-    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
     let told = session.run().len();
     session.set_mode(RunMode::Paused);
     std::thread::sleep(Duration::from_millis(30));
@@ -178,10 +187,10 @@ fn a_running_session_pauses_and_a_paused_one_stays() {
 #[test]
 fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
     let mut session = start(job(1), RunMode::Paused, &[]);
-    settle(&mut session);
+    run_until_idle(&mut session);
     session.cancel();
     while session.is_alive() {
-        settle(&mut session);
+        run_until_idle(&mut session);
         std::thread::yield_now();
         session.drain();
     }
@@ -197,7 +206,7 @@ fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
         RunMode::Paused,
         &[],
     );
-    settle(&mut dropped);
+    run_until_idle(&mut dropped);
     drop(dropped);
     let begun = Instant::now();
     // The worker's handles on the scene go with it.
@@ -228,7 +237,10 @@ fn a_session_pauses_and_stops_within_a_lattice() {
     let in_the_lattice = |session: &Session| session.run().len() > 500;
     wait(&mut session, in_the_lattice);
     session.set_mode(RunMode::Paused);
-    assert_eq!(settle(&mut session), RunState::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
     let told = session.run().len();
     // A million hypotheses are to come, most of which were not even scored.
     assert!(told < 500_000, "{told}");
@@ -275,12 +287,12 @@ impl LocalizeObserver for UntilStopped {
 #[test]
 fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
     let mut session = start(job(UNREADABLE), RunMode::Running, &[]);
-    match settle(&mut session) {
+    match run_until_idle(&mut session) {
         RunState::Broken(why) => assert!(why.contains("000004"), "{why}"),
         other => panic!("{other:?}"),
     }
     let mut session = start(job(GREY), RunMode::Running, &[]);
-    assert_eq!(settle(&mut session), RunState::Finished);
+    assert_eq!(run_until_idle(&mut session), RunState::Finished);
     let results = results(&session);
     assert_eq!(results.len(), 4);
     assert!(results[0].pose.is_none() && results[0].reason.is_some());
@@ -292,7 +304,7 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
     // This frame has no cloud; the scene of this test panics when asked for one all the same.
     broken.chosen = vec![1].into();
     let mut session = start(broken, RunMode::Running, &[]);
-    match settle(&mut session) {
+    match run_until_idle(&mut session) {
         RunState::Broken(why) => assert!(why.contains("internal error"), "{why}"),
         other => panic!("{other:?}"),
     }
@@ -302,11 +314,11 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
 fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
     let mut again = job(1);
     let mut first = start(again.clone(), RunMode::Running, &[]);
-    settle(&mut first);
+    run_until_idle(&mut first);
     let params = &mut again.task.params;
     params.assign("fb.ratio=0.7").expect("a good value");
     let mut second = start(again, RunMode::Running, &[]);
-    settle(&mut second);
+    run_until_idle(&mut second);
     let reused: Vec<_> = second
         .run()
         .stages()
@@ -363,10 +375,10 @@ fn several_references_are_fused_as_without_a_session() {
     let at_fusion = RunState::Paused {
         breakpoint: Some("fusion".to_owned()),
     };
-    assert_eq!(settle(&mut session), at_fusion);
+    assert_eq!(run_until_idle(&mut session), at_fusion);
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
-    assert_eq!(settle(&mut session), RunState::Finished);
+    assert_eq!(run_until_idle(&mut session), RunState::Finished);
     let (fused, alone): (Vec<_>, Vec<_>) = results(&session)
         .into_iter()
         .partition(|result| result.fusion.is_some());

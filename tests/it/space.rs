@@ -9,14 +9,14 @@ use posescope::geometry::Pose;
 use posescope::grid::Phase;
 use posescope::session::RunMode;
 
-use crate::painted::{Painted, painted};
-use crate::window::{settle, setup, window};
+use crate::painted::{PaintedWindow, painted};
+use crate::window::{run_until_idle, setup, window};
 
 fn finished() -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::Maximize(Some("space")));
     window.run_steps(3);
     window
@@ -303,11 +303,11 @@ fn without_a_graphics_card_the_view_says_so() {
 }
 
 /// The window with its run over, drawn by any adapter there is; `None` without one.
-fn drawn() -> Option<Painted> {
+fn drawn() -> Option<PaintedWindow> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut painted = painted(setup, [1500.0, 950.0])?;
-    settle(&mut painted.window);
+    run_until_idle(&mut painted.window);
     painted.window.step();
     Some(painted)
 }

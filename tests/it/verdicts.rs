@@ -12,7 +12,7 @@ use posescope::scene::{self, Scene};
 
 use crate::binary::posescope;
 use crate::small_sequence::SmallSequence;
-use crate::window::{finished, is_said, settle, setup, window};
+use crate::window::{finished, is_said, run_until_idle, setup, window};
 
 #[test]
 fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
@@ -114,7 +114,7 @@ fn the_window_counts_the_failures_that_the_run_counts() {
         results,
         ..setup()
     });
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::Maximize(Some("queries")));
     window.run_steps(3);
     assert!(is_said(&window, &format!("{failed} of 6 failed")));

@@ -53,7 +53,7 @@ pub fn window(setup: Setup) -> Harness<'static, App> {
 }
 
 /// Draws frames until the worker needs somebody.
-pub fn settle(window: &mut Harness<'_, App>) -> RunState {
+pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
     wait(window, |app| {
         !matches!(
             app.app_state().run_state(),
@@ -83,7 +83,7 @@ pub fn finished(setup: Setup) -> Harness<'static, App> {
         mode: RunMode::Running,
         ..setup
     });
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     window
 }
 
@@ -101,7 +101,7 @@ fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event
         app.app_state().run().len() > before
             || matches!(app.app_state().run_state(), RunState::Finished)
     });
-    settle(window);
+    run_until_idle(window);
     let state = window.state().app_state();
     state.run().records()[state.cursor].event.clone()
 }
@@ -158,11 +158,14 @@ fn headless(params: &Params) -> Vec<QueryResult> {
 #[test]
 fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let mut window = window(setup());
-    assert_eq!(settle(&mut window), RunState::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut window),
+        RunState::Paused { breakpoint: None }
+    );
     assert_eq!(window.state().app_state().run().len(), 1);
     window.get_by_label("Into").click();
     wait(&mut window, |app| app.app_state().run().len() == 2);
-    settle(&mut window);
+    run_until_idle(&mut window);
     let event = order(&mut window, Modifiers::NONE, Key::F10);
     assert_eq!(stage(&event), Some((Stage::Detect, false)));
     let event = order(&mut window, Modifiers::NONE, Key::ArrowRight);
@@ -172,7 +175,7 @@ fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let event = order(&mut window, Modifiers::SHIFT, Key::F11);
     assert_eq!(stage(&event), Some((Stage::Match, false)));
     order(&mut window, Modifiers::NONE, Key::F9);
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     assert_eq!(results(&window), headless(&Params::default()));
 }
 
@@ -202,7 +205,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
 #[test]
 fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     let mut window = window(setup());
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::ShowView("breakpoints"));
     window.step();
     window.step();
@@ -223,14 +226,14 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     let stopped = RunState::Paused {
         breakpoint: Some("mi.yaw_coarse".to_owned()),
     };
-    assert_eq!(settle(&mut window), stopped);
+    assert_eq!(run_until_idle(&mut window), stopped);
     assert!(is_said(&window, "mi.yaw_coarse"));
 }
 
 #[test]
 fn a_wrong_breakpoint_is_refused_with_what_there_is() {
     let mut window = window(setup());
-    settle(&mut window);
+    run_until_idle(&mut window);
     let wrong = vec!["inlers < 3".to_owned()];
     window.state_mut().send(Command::SetBreakpoints(wrong));
     window.step();
@@ -249,7 +252,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
         value: "2".to_owned(),
     });
     window.step();
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let state = window.state().app_state();
     let span = state.run().span_at(state.cursor).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
@@ -278,7 +281,7 @@ fn two_settings_are_compared_and_their_differences_marked() {
         value: "8".to_owned(),
     });
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::ShowView("report"));
     window.step();
     window.step();
@@ -307,7 +310,7 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
     wait(&mut window, |app| app.app_state().results.len() == 3);
     press(&mut window, Modifiers::NONE, Key::N);
     assert_eq!(window.state().app_state().setup.query, GREY);
-    settle(&mut window);
+    run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::K);
     assert_eq!(window.state().app_state().setup.query, 2);
 }
@@ -326,7 +329,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         setup.task.params.assign(change).expect("a good value");
     }
     let mut window = window(setup);
-    settle(&mut window);
+    run_until_idle(&mut window);
     wait(&mut window, |app| !app.app_state().queries.is_painting());
     std::thread::sleep(Duration::from_millis(100));
     // Every worker has its handles on the scene.
@@ -366,17 +369,17 @@ fn what_goes_wrong_is_said_and_the_window_lives_on() {
     let mut window = finished(setup);
     window.state_mut().send(Command::SelectQuery(UNREADABLE));
     window.step();
-    assert!(matches!(settle(&mut window), RunState::Broken(_)));
+    assert!(matches!(run_until_idle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "000004"));
     // Frame 1 has no cloud, and the scene of this test panics when it is asked for it.
     window.state_mut().send(Command::SelectQuery(1));
     window.state_mut().send(Command::SetReferences(vec![1]));
     window.step();
-    assert!(matches!(settle(&mut window), RunState::Broken(_)));
+    assert!(matches!(run_until_idle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "internal error"));
     window.state_mut().send(Command::SetReferences(vec![0]));
     window.step();
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
 }
 
 #[test]
@@ -389,19 +392,19 @@ fn a_session_is_saved_and_restored() {
         value: "0.8".to_owned(),
     });
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::MoveCursor(40));
     window.state_mut().send(Command::SaveSession(path.clone()));
     window.step();
     window.state_mut().send(Command::ResetParams);
     window.state_mut().send(Command::SelectQuery(2));
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     window
         .state_mut()
         .send(Command::RestoreSession(path.clone()));
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     let state = window.state().app_state();
     assert_eq!(state.setup.query, 1);
     assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
@@ -429,7 +432,7 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     std::fs::write(&path, elsewhere).expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();
-    assert_eq!(settle(&mut window), RunState::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
     let loaded = window.state().app_state().run().loaded.clone();
     let problem = &loaded.expect("it ran").problems[0];
@@ -445,7 +448,7 @@ fn a_session_of_an_earlier_program_is_restored() {
     let restore = Command::RestoreSession(EARLIER_SESSION.into());
     window.state_mut().send(restore);
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     let setup = &window.state().app_state().setup;
     let task = &setup.task;
     assert_eq!(setup.pick().to_string(), "maxf:2");
@@ -525,7 +528,7 @@ fn a_session_keeps_the_format_and_the_index() {
     let mut here = finished(self::setup());
     here.state_mut().send(Command::RestoreSession(path.clone()));
     here.step();
-    settle(&mut here);
+    run_until_idle(&mut here);
     let restored = &here.state().app_state().setup;
     assert_eq!(restored.task, there.state().app_state().setup.task);
     let index = restored.index.file().and_then(|file| file.to_str());

@@ -8,11 +8,11 @@ use crate::session::Breakpoint;
 
 /// The list of breakpoints, and a line to write a new one.
 #[derive(Default)]
-pub struct BreakpointList {
+pub struct BreakpointsView {
     text: String,
 }
 
-impl View for BreakpointList {
+impl View for BreakpointsView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let breakpoints = context.state.setup.task.breakpoints.iter();
         let breakpoints: Vec<String> = breakpoints.map(ToString::to_string).collect();

@@ -18,9 +18,9 @@ const MAP_HEIGHT: f32 = 230.0;
 
 /// The fusions of a method, in a table and on a map.
 #[derive(Default)]
-pub struct Fusion {}
+pub struct FusionView {}
 
-impl View for Fusion {
+impl View for FusionView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let Some((method, fused)) = told(context) else {
             ui.weak(

@@ -7,7 +7,7 @@ mod residuals;
 use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::{Shown, ViewContext};
+use crate::app::{ShownView, ViewContext};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
@@ -16,14 +16,14 @@ use crate::method::Method;
 
 /// The joint histogram, or the residuals, of the synthetic view that is shown.
 #[derive(Default)]
-pub struct Histogram {
+pub struct HistogramView {
     /// The method that was asked for; that at the cursor otherwise.
     method: Option<Method>,
     /// The method at the cursor when `method` was asked for.
     asked_at: Option<Method>,
 }
 
-impl View for Histogram {
+impl View for HistogramView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let method = self.choose(ui, context);
@@ -50,7 +50,7 @@ impl View for Histogram {
     }
 }
 
-impl Histogram {
+impl HistogramView {
     /// What a person chose holds until the cursor comes to another method.
     fn choose(&mut self, ui: &mut Ui, context: &ViewContext<'_>) -> Method {
         if self.asked_at != context.method() {
@@ -81,7 +81,7 @@ pub(super) fn explains(method: Method) -> Option<ExplanationKind> {
 }
 
 /// Why this view is shown, and where its camera is.
-fn caption(ui: &mut Ui, context: &ViewContext<'_>, shown: &Shown) {
+fn caption(ui: &mut Ui, context: &ViewContext<'_>, shown: &ShownView) {
     ui.horizontal_wrapped(|ui| {
         let mut words = shown.at.name().to_owned();
         if let Some(problem) = context.problem() {

@@ -6,21 +6,21 @@ mod funnel;
 mod lidar;
 mod marks;
 mod photos;
-mod sight;
-mod story;
+mod progress;
 mod truth;
+mod visible;
 
 use egui::{Ui, UiBuilder};
 
 pub(super) use self::arrangement::Arrangement;
 use self::detail::{Detail, Subject};
 use self::marks::draw_truth;
-use self::photos::{Lenses, Photos, Shown};
-use self::sight::Sights;
-use self::story::{KINDS, Story};
+use self::photos::{PhotoOnScreen, PhotoPanZoom, Photos};
+use self::progress::{FeatureProgress, KINDS};
 use self::truth::TrueMatch;
+use self::visible::VisibleFeatures;
 use super::View;
-use super::ink::Ink;
+use super::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext};
 use crate::method::Method;
 use crate::problem::Problem;
@@ -30,37 +30,37 @@ use crate::session::Run;
 const PALE: f32 = 0.2;
 
 /// Query above or beside reference.
-pub struct Images {
+pub struct ImagesView {
     /// Which states are shown.
     shown: [bool; KINDS],
-    lenses: Lenses,
+    pan_zoom: PhotoPanZoom,
     detail: Detail,
 }
 
-impl Default for Images {
+impl Default for ImagesView {
     fn default() -> Self {
         let mut shown = [true; KINDS];
         // Most features fail the first two tests; their lines would bury all others.
         shown[..2].fill(false);
         Self {
             shown,
-            lenses: Lenses::default(),
+            pan_zoom: PhotoPanZoom::default(),
             detail: Detail::default(),
         }
     }
 }
 
-impl View for Images {
+impl View for ImagesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let Some(problem) = context.problem() else {
             ui.weak("The photos are being read");
             return;
         };
         let photos = Photos::of(ui, context, problem);
-        let story = Story::at(context);
-        let kinds = story.kinds();
-        let differing = differing(context, &story);
-        self.toolbar(ui, context, &story, differing.as_deref());
+        let progress = FeatureProgress::at(context);
+        let kinds = progress.kinds();
+        let differing = differing(context, &progress);
+        self.toolbar(ui, context, &progress, differing.as_deref());
         if !kinds.is_empty() {
             let mut counts = [0; KINDS];
             for &kind in &kinds {
@@ -79,31 +79,31 @@ impl View for Images {
             }
             None => (area, None),
         };
-        let (query, reference) = self.lenses.show(ui, problem, &photos, pictures);
+        let (query, reference) = self.pan_zoom.show(ui, problem, &photos, pictures);
 
         let is_wanted = |feature: usize| {
             self.shown[kinds[feature]] && differing.as_ref().is_none_or(|differ| differ[feature])
         };
         let is_shown = |feature: usize| selected == Some(feature) || is_wanted(feature);
-        let sights = Sights::new(&story, &kinds, &query.at, &reference.at, is_shown);
-        let hovered = point_at(ui, context, &sights, &story, [&query, &reference]);
-        let truth = selected.and_then(|feature| true_match(context, &story, problem, feature));
+        let visible = VisibleFeatures::new(&progress, &kinds, &query.at, &reference.at, is_shown);
+        let hovered = point_at(ui, context, &visible, &progress, [&query, &reference]);
+        let truth = selected.and_then(|feature| true_match(context, &progress, problem, feature));
 
-        let mut ink = Ink::new(ui.pixels_per_point());
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
         let strength = if hovered.is_some() { PALE } else { 1.0 };
-        if story.is_unmatched() || self.shown[0] {
-            sights.draw_unmatched(&mut ink, &story, &reference.at, strength);
+        if progress.is_unmatched() || self.shown[0] {
+            visible.draw_unmatched(&mut mesh, &progress, &reference.at, strength);
         }
-        for sight in sights.all() {
-            sight.draw(&mut ink, strength, query.at.scale);
+        for shown in visible.all() {
+            shown.draw(&mut mesh, strength, query.at.scale);
         }
         for feature in [selected, hovered].into_iter().flatten() {
-            sights.draw_accent(&mut ink, feature);
+            visible.draw_accent(&mut mesh, feature);
         }
-        ink.dry(ui.painter());
+        mesh.paint_on(ui.painter());
         if let Some(truth) = &truth {
-            draw_truth(&mut ink, &query.at, &problem.query.intrinsics, truth);
-            ink.dry(&query.at.painter(ui.painter()));
+            draw_truth(&mut mesh, &query.at, &problem.query.intrinsics, truth);
+            mesh.paint_on(&query.at.painter(ui.painter()));
         }
         photos::name(ui, problem, &query.at, &reference.at);
 
@@ -111,7 +111,7 @@ impl View for Images {
             let params = &context.run.params.fb;
             let subject = Subject {
                 feature,
-                story: &story,
+                progress: &progress,
                 problem,
                 photos: &photos,
                 truth,
@@ -127,17 +127,17 @@ impl View for Images {
     }
 }
 
-impl Images {
+impl ImagesView {
     fn toolbar(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
-        story: &Story<'_>,
+        progress: &FeatureProgress<'_>,
         differing: Option<&[bool]>,
     ) {
         ui.horizontal_wrapped(|ui| {
-            ui.label(summary(story));
-            self.lenses.ui(ui);
+            ui.label(summary(progress));
+            self.pan_zoom.ui(ui);
             if context.state.only_differences {
                 ui.weak(match differing {
                     Some(differing) => {
@@ -152,9 +152,9 @@ impl Images {
 }
 
 /// What was found, in words.
-fn summary(story: &Story<'_>) -> String {
-    let (query, reference) = (story.query().len(), story.reference().len());
-    let by = match story.method {
+fn summary(progress: &FeatureProgress<'_>) -> String {
+    let (query, reference) = (progress.query().len(), progress.reference().len());
+    let by = match progress.method {
         Some(method) if method != Method::FB => format!("FB within {}", method.label()),
         _ => "FB".to_owned(),
     };
@@ -176,27 +176,27 @@ fn other_run<'a>(context: &ViewContext<'a>) -> Option<&'a Run> {
 }
 
 /// Which features differ from the other run, where only those are wanted.
-fn differing(context: &ViewContext<'_>, story: &Story<'_>) -> Option<Vec<bool>> {
+fn differing(context: &ViewContext<'_>, progress: &FeatureProgress<'_>) -> Option<Vec<bool>> {
     let wanted = context.state.only_differences;
     let other = other_run(context).filter(|_| wanted)?;
-    let other = Story::counterpart(context, story.method?, other)?;
-    Some(story.differing(&other))
+    let other = FeatureProgress::counterpart(context, progress.method?, other)?;
+    Some(progress.differing(&other))
 }
 
 /// What the ground truth says about a feature's match, if it is shown.
 fn true_match(
     context: &ViewContext<'_>,
-    story: &Story<'_>,
+    progress: &FeatureProgress<'_>,
     problem: &Problem,
     feature: usize,
 ) -> Option<TrueMatch> {
-    let found = story.matched(feature)?;
-    let lifted = story.lifted(feature);
+    let found = progress.matched(feature)?;
+    let lifted = progress.lifted(feature);
     Some(TrueMatch::of(
         problem,
         context.truth()?,
-        &story.query().get(feature)?.pixel(),
-        &story.reference().get(found.reference)?.pixel(),
+        &progress.query().get(feature)?.pixel(),
+        &progress.reference().get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
     ))
 }
@@ -205,18 +205,18 @@ fn true_match(
 fn point_at(
     ui: &Ui,
     context: &ViewContext<'_>,
-    sights: &Sights,
-    story: &Story<'_>,
-    photos: [&Shown; 2],
+    visible: &VisibleFeatures,
+    progress: &FeatureProgress<'_>,
+    photos: [&PhotoOnScreen; 2],
 ) -> Option<usize> {
     let over = photos.into_iter().find(|photo| photo.response.hovered())?;
-    let hovered = sights.nearest(over.response.hover_pos()?);
+    let hovered = visible.nearest(over.response.hover_pos()?);
     if over.response.clicked() && context.state.selected_feature != hovered {
         context.send(Command::SelectFeature(hovered));
     }
     if let Some(feature) = hovered {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-        let words = story.words(feature);
+        let words = progress.words(feature);
         let response = over.response.clone();
         response.on_hover_text_at_pointer(format!("query feature {feature}, {words}"));
     }

@@ -9,14 +9,14 @@ use crate::narration;
 
 /// The decisions up to the end of the run; those behind the cursor are pale.
 #[derive(Default)]
-pub struct Log {
+pub struct LogView {
     /// Sentences with their positions, and how many records they were made from.
     lines: Vec<(usize, String)>,
     told: usize,
     cursor_shown: Option<usize>,
 }
 
-impl Log {
+impl LogView {
     fn take_in(&mut self, context: &ViewContext<'_>) {
         let records = context.run.records();
         if records.len() < self.told {
@@ -39,7 +39,7 @@ impl Log {
     }
 }
 
-impl View for Log {
+impl View for LogView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         self.take_in(context);
         if self.lines.is_empty() {

@@ -11,11 +11,11 @@ use crate::params::Params;
 
 /// The list of parameters.
 #[derive(Default)]
-pub struct Parameters {
+pub struct ParametersView {
     filter: String,
 }
 
-impl View for Parameters {
+impl View for ParametersView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let present = std::ptr::eq(context.run, context.state.run());
         ui.horizontal(|ui| {
@@ -50,7 +50,7 @@ impl View for Parameters {
     }
 }
 
-impl Parameters {
+impl ParametersView {
     fn list(
         &self,
         ui: &mut Ui,

@@ -12,11 +12,11 @@ use crate::localize::{QueryResult, Verdict};
 
 /// The list of queries.
 #[derive(Default)]
-pub struct QueryList {
+pub struct QueriesView {
     only_failures: bool,
 }
 
-impl View for QueryList {
+impl View for QueriesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let state = context.state;
         ui.horizontal(|ui| {

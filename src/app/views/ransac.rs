@@ -19,26 +19,26 @@ use trials::Trials;
 
 /// Likelihood and inliers by hypothesis, the sample at the cursor, and the test of the result.
 #[derive(Default)]
-pub struct Ransac {
-    known: Option<(Key, Trials)>,
+pub struct RansacView {
+    known: Option<(TrialsKey, Trials)>,
 }
 
 /// What the trials were read from.
-struct Key {
+struct TrialsKey {
     /// Kept alive, so that its address stays its own: each run has one.
     loaded: Arc<Loaded>,
     records: Range<usize>,
 }
 
-/// Which numbers of the trials a plot shows.
+/// The number of each trial that a plot shows.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Shows {
+enum PlotQuantity {
     Likelihood,
     Inliers,
     Needed,
 }
 
-impl Shows {
+impl PlotQuantity {
     const ALL: [Self; 3] = [Self::Likelihood, Self::Inliers, Self::Needed];
 
     fn name(self) -> &'static str {
@@ -50,7 +50,7 @@ impl Shows {
     }
 }
 
-impl View for Ransac {
+impl View for RansacView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         egui::ScrollArea::vertical()
             .auto_shrink(false)
@@ -81,7 +81,7 @@ fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
     Some((span, span.records.end.min(cursor + 1)))
 }
 
-impl Ransac {
+impl RansacView {
     /// The trials among some records. They are read once as long as the cursor stays.
     fn read(&mut self, context: &ViewContext<'_>, records: Range<usize>) -> Option<&Trials> {
         let loaded = context.run.loaded.as_ref()?;
@@ -90,7 +90,7 @@ impl Ransac {
             .as_ref()
             .is_some_and(|(key, _)| Arc::ptr_eq(&key.loaded, loaded) && key.records == records);
         if !is_known {
-            let key = Key {
+            let key = TrialsKey {
                 loaded: Arc::clone(loaded),
                 records: records.clone(),
             };
@@ -134,25 +134,29 @@ fn hypothesis_color() -> Color32 {
 
 fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
     let group = ui.make_persistent_id("trials");
-    for shows in Shows::ALL {
-        let height = if shows == Shows::Needed { 110.0 } else { 130.0 };
-        let is_last = shows == Shows::Needed;
-        let mut plot = Plot::new(shows.name())
+    for quantity in PlotQuantity::ALL {
+        let height = if quantity == PlotQuantity::Needed {
+            110.0
+        } else {
+            130.0
+        };
+        let is_last = quantity == PlotQuantity::Needed;
+        let mut plot = Plot::new(quantity.name())
             .height(height)
             .link_axis(group, [true, false])
             .allow_scroll(false)
             .show_x(false)
             .show_y(false)
             .y_axis_min_width(62.0)
-            .y_axis_label(shows.name());
+            .y_axis_label(quantity.name());
         if is_last {
             plot = plot
                 .x_axis_label("trial")
                 .y_grid_spacer(decades)
                 .y_axis_formatter(|mark, _| format!("{:.0}", 10_f64.powf(mark.value)));
         }
-        let answer = plot.show(ui, |plot| draw(plot, trials, shows));
-        let name = format!("{} by trial, {} trials", shows.name(), trials.made());
+        let answer = plot.show(ui, |plot| draw(plot, trials, quantity));
+        let name = format!("{} by trial, {} trials", quantity.name(), trials.made());
         answer
             .response
             .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
@@ -164,7 +168,7 @@ fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
                 let point = PlotPoint::new(trial, value);
                 answer.transform.position_from_point(&point).distance_sq(at)
             };
-            if let Some(record) = trials.nearest(points_of(trials, shows), distance) {
+            if let Some(record) = trials.nearest(points_of(trials, quantity), distance) {
                 context.send(Command::MoveCursor(record));
             }
         }
@@ -172,15 +176,15 @@ fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
 }
 
 /// The drawn points of a plot; the last one has none, and is clicked at its line.
-fn points_of(trials: &Trials, shows: Shows) -> &[[f64; 2]] {
-    match shows {
-        Shows::Likelihood => &trials.likelihood.points,
-        Shows::Inliers => &trials.inliers.points,
-        Shows::Needed => &trials.needed_steps,
+fn points_of(trials: &Trials, quantity: PlotQuantity) -> &[[f64; 2]] {
+    match quantity {
+        PlotQuantity::Likelihood => &trials.likelihood.points,
+        PlotQuantity::Inliers => &trials.inliers.points,
+        PlotQuantity::Needed => &trials.needed_steps,
     }
 }
 
-fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, shows: Shows) {
+fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, quantity: PlotQuantity) {
     let line = |name: &str, points: &'p [[f64; 2]]| // Bands would fill the corners of steps.
         Line::new(name, points.to_vec())
             .allow_band(false)
@@ -190,10 +194,10 @@ fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, shows: Shows) {
         let cursor = VLine::new("cursor", trial.index as f64).color(color);
         plot.vline(cursor.width(1.0).allow_hover(false));
     }
-    let series = match shows {
-        Shows::Likelihood => &trials.likelihood,
-        Shows::Inliers => &trials.inliers,
-        Shows::Needed => {
+    let series = match quantity {
+        PlotQuantity::Likelihood => &trials.likelihood,
+        PlotQuantity::Inliers => &trials.inliers,
+        PlotQuantity::Needed => {
             let needed = line("needed", &trials.needed_steps);
             plot.line(needed.color(theme::ESTIMATE).width(1.5));
             let made = line("made", &trials.made_curve);

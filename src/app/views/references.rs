@@ -21,7 +21,7 @@ const WAYS: [(&str, Selection); 4] = [
 
 /// The frames around a query, and which of them are its references.
 #[derive(Default)]
-pub struct References {
+pub struct ReferencesView {
     nearby: Option<Nearby>,
 }
 
@@ -33,7 +33,7 @@ struct Nearby {
     frames: Vec<usize>,
 }
 
-impl View for References {
+impl View for ReferencesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         choice(ui, context);
         fusions(ui, context);
@@ -63,7 +63,7 @@ impl View for References {
     }
 }
 
-impl References {
+impl ReferencesView {
     /// Looking for them in a long scene at every frame would be too slow.
     fn nearby(&mut self, context: &ViewContext<'_>) -> &Nearby {
         let setup = &context.state.setup;

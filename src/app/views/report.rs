@@ -10,9 +10,9 @@ use crate::session::Span;
 
 /// The report of the run, so far.
 #[derive(Default)]
-pub struct Report {}
+pub struct ReportView {}
 
-impl View for Report {
+impl View for ReportView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ScrollArea::both().auto_shrink(false).show(ui, |ui| {
             if context.run.spans().is_empty() {

@@ -3,9 +3,9 @@
 use egui::{Color32, Grid, RichText, ScrollArea, Ui, pos2, vec2};
 
 use super::View;
-use super::canvas::{Lens, Placement, tag};
+use super::canvas::{PanZoom, Placement, tag};
 use super::images::Arrangement;
-use super::ink::{Ink, Mark};
+use super::mesh_painter::{Mark, MeshPainter};
 use crate::app::textures::color_image;
 use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesRanked};
@@ -19,11 +19,11 @@ const TABLE_HEIGHT: f32 = 170.0;
 
 /// The ranking, and one of its frames beside the query.
 #[derive(Default)]
-pub struct Retrieval {
+pub struct RetrievalView {
     looked_at: usize,
 }
 
-impl View for Retrieval {
+impl View for RetrievalView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let Some(event) = told(context) else {
             ui.weak(
@@ -64,7 +64,7 @@ fn told<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
     })
 }
 
-impl Retrieval {
+impl RetrievalView {
     fn table(&mut self, ui: &mut Ui, context: &ViewContext<'_>, event: &ReferencesRanked) {
         let ranking = &event.ranking;
         let score = match ranking.criterion {
@@ -150,24 +150,24 @@ fn photos(
     });
     let sizes = [query.size_vec2(), reference.size_vec2()];
     let arrangement = Arrangement::new(area, sizes[0], sizes[1]);
-    let lens = Lens::default();
-    let of_query = arrangement.place(0, &lens, sizes[0]);
-    let of_reference = arrangement.place(1, &lens, sizes[1]);
+    let pan_zoom = PanZoom::default();
+    let of_query = arrangement.place(0, &pan_zoom, sizes[0]);
+    let of_reference = arrangement.place(1, &pan_zoom, sizes[1]);
     of_query.paint(ui.painter(), query.id(), Color32::WHITE);
     of_reference.paint(ui.painter(), reference.id(), Color32::WHITE);
     let spot = |at: &Placement, pixel: &nalgebra::Point2<f64>| {
         at.on_screen([pixel.x as f32, pixel.y as f32])
     };
-    let mut ink = Ink::new(ui.pixels_per_point());
+    let mut mesh = MeshPainter::new(ui.pixels_per_point());
     let color = theme::state(4);
     for pair in matches {
         let from = spot(&of_query, &pair.query_pixel);
         let to = spot(&of_reference, &pair.reference_pixel);
-        ink.line(from, to, 1.0, color.gamma_multiply(0.6));
-        ink.mark(Mark::Ring, from, 3.0, color);
-        ink.mark(Mark::Ring, to, 3.0, color);
+        mesh.line(from, to, 1.0, color.gamma_multiply(0.6));
+        mesh.mark(Mark::Ring, from, 3.0, color);
+        mesh.mark(Mark::Ring, to, 3.0, color);
     }
-    ink.dry(ui.painter());
+    mesh.paint_on(ui.painter());
     let corner = |at: &Placement| at.visible().min + vec2(4.0, 4.0);
     tag(ui.painter(), corner(&of_query), "query", theme::ESTIMATE);
     let name = format!("rank {}: {}", index + 1, frame.name);

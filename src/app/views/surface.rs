@@ -14,7 +14,7 @@ use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::method::Method;
 
-use maps::{Maps, Shown, progress};
+use maps::{MapContent, Maps, progress};
 use marks::{Mark, legend, moved, place};
 use scale::{NO_SAY, Scale, number, swatch};
 use search::Search;
@@ -24,7 +24,7 @@ const HELP: &str = "Point at a cell; click, drag: camera; wheel: zoom; Shift+dra
 
 /// Maps of a direct method's search, and slices through its minimum.
 #[derive(Default)]
-pub struct Surface {
+pub struct SurfaceView {
     /// The method that was asked for; that at the cursor otherwise.
     method: Option<Method>,
     /// The method at the cursor when `method` was asked for.
@@ -36,7 +36,7 @@ pub struct Surface {
     is_hovering: bool,
 }
 
-impl View for Surface {
+impl View for SurfaceView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let method = self.method(context);
         let mut pointed_at = None;
@@ -53,7 +53,7 @@ impl View for Surface {
     }
 }
 
-impl Surface {
+impl SurfaceView {
     /// The method that is shown. What a person chose holds until the cursor comes to another method.
     fn method(&mut self, context: &ViewContext<'_>) -> Method {
         if self.asked_at != context.method() {
@@ -100,7 +100,7 @@ impl Surface {
         let width = ui.available_width();
         let scale = Scale::of(context.run, search);
         let marks = Mark::all(context, search, floor);
-        let shown = Shown {
+        let shown = MapContent {
             search,
             scale: &scale,
             marks: &marks,

@@ -9,9 +9,9 @@ use egui::{Color32, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
 
 use self::mode::Mode;
 use super::View;
-use super::canvas::{self, Lens};
+use super::canvas::{self, PanZoom};
 use crate::app::textures::color_image;
-use crate::app::{Command, Shown, ViewContext};
+use crate::app::{Command, ShownView, ViewContext};
 use crate::event::{Moment, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -23,27 +23,27 @@ const BLINK_S: f64 = 0.4;
 const CHECKS: u32 = 12;
 
 /// One picture of a direct method at a time.
-pub struct Synthetic {
+pub struct SynthesisView {
     /// The method a person has chosen; `None` follows the cursor.
     chosen: Option<Method>,
     mode: Mode,
     /// Share of the view in the blend.
     blend: f32,
-    lens: Lens,
+    pan_zoom: PanZoom,
 }
 
-impl Default for Synthetic {
+impl Default for SynthesisView {
     fn default() -> Self {
         Self {
             chosen: None,
             mode: Mode::View,
             blend: 0.5,
-            lens: Lens::default(),
+            pan_zoom: PanZoom::default(),
         }
     }
 }
 
-impl View for Synthetic {
+impl View for SynthesisView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let Some(problem) = context.problem() else {
             ui.weak("The photos are being read");
@@ -69,7 +69,7 @@ impl View for Synthetic {
     }
 }
 
-impl Synthetic {
+impl SynthesisView {
     fn toolbar(&mut self, ui: &mut Ui, context: &ViewContext<'_>, method: Method) {
         ui.horizontal_wrapped(|ui| {
             for candidate in context.direct_methods() {
@@ -108,7 +108,7 @@ impl Synthetic {
     }
 
     /// What the picture's colours mean; always of one height, so that the picture stays in its place.
-    fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&Shown>) {
+    fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&ShownView>) {
         let size = Vec2::new(ui.available_width(), 24.0);
         let layout = egui::Layout::left_to_right(egui::Align::Center);
         ui.allocate_ui_with_layout(size, layout, |ui| {
@@ -130,7 +130,7 @@ impl Synthetic {
         context: &ViewContext<'_>,
         problem: &Problem,
         method: Method,
-        shown: Option<&Shown>,
+        shown: Option<&ShownView>,
     ) {
         let area = ui.available_rect_before_wrap();
         let (mode, blinks) = match (shown, context.state.blinking) {
@@ -145,10 +145,10 @@ impl Synthetic {
 
         let query = gray_query(ui, context, problem);
         // At the top, below its legend.
-        let place = |lens: &Lens| lens.place(area, query.size_vec2(), vec2(0.5, 0.0));
-        let before = place(&self.lens);
-        self.lens.handle_input(ui, &response, &before);
-        let at = place(&self.lens);
+        let place = |pan_zoom: &PanZoom| pan_zoom.place(area, query.size_vec2(), vec2(0.5, 0.0));
+        let before = place(&self.pan_zoom);
+        self.pan_zoom.handle_input(ui, &response, &before);
+        let at = place(&self.pan_zoom);
         let painter = ui.painter_at(area);
         let made = shown.and_then(|shown| mode.texture(ui, context, problem, shown));
         match (mode, made) {
@@ -201,7 +201,7 @@ fn caption(
     context: &ViewContext<'_>,
     problem: &Problem,
     method: Method,
-    shown: &Shown,
+    shown: &ShownView,
 ) {
     let name = method.name().to_uppercase();
     let place = place(&problem.reference_from_query(&shown.pose));
@@ -266,7 +266,7 @@ fn covered_at_reference(context: &ViewContext<'_>, method: Method) -> Option<u32
 
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods
 /// where a pose of one's own was tried.
-fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &Shown) {
+fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &ShownView) {
     let probe = context
         .state
         .looking_at()

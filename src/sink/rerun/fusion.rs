@@ -12,11 +12,11 @@ use crate::palette;
 
 /// The fusions of one query so far, as a table each.
 #[derive(Default)]
-pub(super) struct FusionStory {
+pub(super) struct FusionTables {
     tables: String,
 }
 
-impl FusionStory {
+impl FusionTables {
     /// Records one fusion of a method's poses.
     pub(super) fn tell(
         &mut self,

@@ -146,7 +146,7 @@ impl Stream {
     }
 
     /// As [`Self::flush`], and waits until the targets have it.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn flush_blocking(&mut self) {
         let flushed = self.recording.flush_blocking();
         self.ask_file();
         if let Err(error) = flushed
@@ -159,7 +159,7 @@ impl Stream {
 
     /// The end of the recording, with the first error of its life.
     pub(super) fn close(mut self) -> Result<(), RecordError> {
-        self.settle();
+        self.flush_blocking();
         let finished = self.file.as_ref().map_or(Ok(()), RecordingFile::finish);
         if self.serves {
             log::warn!("serving the recording to viewers; press Ctrl-C to end");

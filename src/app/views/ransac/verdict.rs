@@ -59,7 +59,7 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
         .iter()
         .filter(|lifted| lifted.point.is_some())
         .collect();
-    let features = Features::of(context, span, end);
+    let features = SampleKeypoints::of(context, span, end);
     Grid::new("sample").striped(true).show(ui, |ui| {
         let columns = [
             "sample",
@@ -93,12 +93,12 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
 }
 
 /// The keypoints that a sample's indices refer to.
-struct Features<'a> {
+struct SampleKeypoints<'a> {
     query: Option<&'a FeaturesDetected>,
     reference: Option<&'a FeaturesDetected>,
 }
 
-impl<'a> Features<'a> {
+impl<'a> SampleKeypoints<'a> {
     fn of(context: &ViewContext<'a>, span: &Span, end: usize) -> Self {
         let records = context.run.records().get(span.records.start..end);
         let of = |side: Side| {
@@ -124,16 +124,19 @@ impl<'a> Features<'a> {
 fn row(
     ui: &mut Ui,
     context: &ViewContext<'_>,
-    features: &Features<'_>,
+    features: &SampleKeypoints<'_>,
     lifted: &LiftedMatch,
     trial: &Trial,
 ) {
-    let seen = Features::pixel(features.query, lifted.query);
+    let seen = SampleKeypoints::pixel(features.query, lifted.query);
     let pixel = |pixel: Option<Point2<f64>>| {
         pixel.map_or("–".to_owned(), |p| format!("({:.0}, {:.0})", p.x, p.y))
     };
     ui.label(pixel(seen));
-    ui.label(pixel(Features::pixel(features.reference, lifted.reference)));
+    ui.label(pixel(SampleKeypoints::pixel(
+        features.reference,
+        lifted.reference,
+    )));
     let Some(point) = lifted.point else { return };
     ui.label(format!("{:.1}", point.z));
     for hypothesis in [&trial.hypothesis, &trial.best] {

@@ -3,7 +3,7 @@
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{PopupCloseBehavior, RichText, Slider, Ui};
 
-use super::cameras::{Camera, Who};
+use super::cameras::{CameraKind, SceneCamera};
 use super::cloud::Coloring;
 use crate::app::camera::NamedPose;
 use crate::app::{Command, ViewContext, shortcuts};
@@ -40,13 +40,13 @@ impl Default for Layers {
 
 /// What a button asks of the view itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Wish {
+pub(super) enum ViewRequest {
     /// The first look.
     Reset,
     /// From above.
     Top,
     /// Through a camera.
-    Through(Who),
+    Through(CameraKind),
     /// Blink, or stop to.
     Blink,
 }
@@ -56,24 +56,24 @@ pub(super) fn looks(
     ui: &mut Ui,
     methods: &[Method],
     layers: &mut Layers,
-    cameras: &[Camera],
-    through: Option<Who>,
-) -> Option<Wish> {
-    let mut wish = None;
-    let mut button = |ui: &mut Ui, text: &str, help: &str, wanted: Wish| {
+    cameras: &[SceneCamera],
+    through: Option<CameraKind>,
+) -> Option<ViewRequest> {
+    let mut request = None;
+    let mut button = |ui: &mut Ui, text: &str, help: &str, wanted: ViewRequest| {
         if ui.button(text).on_hover_text(help).clicked() {
-            wish = Some(wanted);
+            request = Some(wanted);
         }
     };
     layers_menu(ui, layers);
     let help = "From behind and above. Drag to turn, with Shift or the right button to shift, wheel to zoom";
-    button(ui, "Reset view", help, Wish::Reset);
-    button(ui, "Top", "From straight above", Wish::Top);
+    button(ui, "Reset view", help, ViewRequest::Reset);
+    button(ui, "Top", "From straight above", ViewRequest::Top);
     ui.weak("through");
-    for who in Who::to_look_through(methods) {
-        let camera = cameras.iter().find(|camera| camera.who == who);
-        let text = format!("{} {}", who.shape(), who.name());
-        let selected = through == Some(who);
+    for kind in CameraKind::to_look_through(methods) {
+        let camera = cameras.iter().find(|camera| camera.kind == kind);
+        let text = format!("{} {}", kind.shape(), kind.name());
+        let selected = through == Some(kind);
         let response = ui.add_enabled(
             camera.is_some() || selected,
             egui::Button::selectable(selected, text),
@@ -83,7 +83,7 @@ pub(super) fn looks(
             None => response.on_disabled_hover_text("There is no such pose at this step"),
         };
         if response.clicked() {
-            wish = Some(Wish::Through(who));
+            request = Some(ViewRequest::Through(kind));
         }
     }
     if through.is_some() {
@@ -93,7 +93,7 @@ pub(super) fn looks(
         ui.add(slider)
             .on_hover_text("How much of the photo lies over the cloud");
     }
-    wish
+    request
 }
 
 fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
@@ -120,7 +120,7 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
 }
 
 /// Where the camera in hand goes.
-pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<Wish> {
+pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<ViewRequest> {
     let keys = shortcuts();
     ui.weak("camera to");
     for place in NamedPose::ALL {
@@ -151,7 +151,7 @@ pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Opt
             context.send(command);
         }
     }
-    let mut wish = None;
+    let mut request = None;
     let can_blink =
         context.state.camera.is_some() && context.state.named_pose(NamedPose::Last).is_some();
     let response = ui.add_enabled(
@@ -164,12 +164,12 @@ pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Opt
         .on_disabled_hover_text("Jump to two poses first")
         .clicked()
     {
-        wish = Some(Wish::Blink);
+        request = Some(ViewRequest::Blink);
     }
     let release = ui.add_enabled(context.state.camera.is_some(), egui::Button::new("Let go"));
     let release = release.on_hover_text("Put the camera in hand away (Esc)");
     if release.clicked() {
         context.send(Command::TakeCamera(None));
     }
-    wish
+    request
 }

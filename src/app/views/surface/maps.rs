@@ -62,7 +62,7 @@ struct Cell {
 }
 
 /// What the maps are drawn from.
-pub(super) struct Shown<'a> {
+pub(super) struct MapContent<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) scale: &'a Scale,
     pub(super) marks: &'a [Mark],
@@ -76,7 +76,7 @@ impl Maps {
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
-        shown: &Shown<'_>,
+        shown: &MapContent<'_>,
     ) -> Option<(Pose, String)> {
         let gap = ui.spacing().item_spacing.x;
         let side = ((ui.available_width() - LEFT_AXIS - 2.0 * gap - 2.0) / 3.0).max(60.0);
@@ -138,7 +138,7 @@ impl Maps {
     fn images(
         &mut self,
         ui: &Ui,
-        shown: &Shown<'_>,
+        shown: &MapContent<'_>,
         map: Map,
         texture: &mut usize,
     ) -> Vec<PlotImage> {
@@ -205,7 +205,7 @@ fn picture(searched: &Searched, color: impl Fn(&Score) -> Color32) -> ColorImage
 /// One map. The wheel zooms, Shift and drag or the middle button pan.
 fn plot(
     ui: &mut Ui,
-    shown: &Shown<'_>,
+    shown: &MapContent<'_>,
     map: Map,
     group: Id,
     side: f32,
@@ -368,7 +368,7 @@ fn colours(ui: &mut Ui, scale: &Scale, map: Map, width: f32) {
 }
 
 /// Outlines and marks on top of a map.
-fn overlay(ui: &Ui, shown: &Shown<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
+fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
     let painter = ui
         .painter()
         .with_clip_rect(transform.frame().intersect(ui.clip_rect()));

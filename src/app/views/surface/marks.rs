@@ -11,7 +11,7 @@ use crate::method::Method;
 
 /// What is at a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MarkKind {
     Start,
     Coarse,
     Fine,
@@ -31,7 +31,7 @@ const RANKED: usize = 5;
 
 /// A place on the maps.
 pub(super) struct Mark {
-    pub(super) kind: Kind,
+    pub(super) kind: MarkKind,
     pub(super) offset: Offset,
     pose: Pose,
     words: String,
@@ -51,7 +51,7 @@ impl Mark {
         };
         let start = Offset::default();
         add(
-            Kind::Start,
+            MarkKind::Start,
             start,
             search.pose(&start),
             "start",
@@ -61,11 +61,17 @@ impl Mark {
         for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
             let note = format!(", +{}", number(margin));
             let pose = search.pose(&minimum.offset);
-            add(Kind::Ranked(rank), minimum.offset, pose, "minimum", note);
+            add(
+                MarkKind::Ranked(rank),
+                minimum.offset,
+                pose,
+                "minimum",
+                note,
+            );
         }
         let phases = [
-            (Kind::Coarse, Phase::PositionCoarse, "coarse minimum"),
-            (Kind::Fine, Phase::PositionFine, "fine minimum"),
+            (MarkKind::Coarse, Phase::PositionCoarse, "coarse minimum"),
+            (MarkKind::Fine, Phase::PositionFine, "fine minimum"),
         ];
         for (kind, phase, name) in phases {
             if let Some(searched) = search.last(phase)
@@ -86,7 +92,7 @@ impl Mark {
             let note = format!(", {}", number(moved.cost));
             let pose = search.pose(&moved.offset);
             add(
-                Kind::Floored,
+                MarkKind::Floored,
                 moved.offset,
                 pose,
                 "minimum at this floor",
@@ -94,9 +100,13 @@ impl Mark {
             );
         }
         let cameras = [
-            (Kind::Feature, context.estimate(Method::FB), "FB's estimate"),
-            (Kind::Truth, context.truth().copied(), "truth"),
-            (Kind::Camera, context.state.camera, "camera in hand"),
+            (
+                MarkKind::Feature,
+                context.estimate(Method::FB),
+                "FB's estimate",
+            ),
+            (MarkKind::Truth, context.truth().copied(), "truth"),
+            (MarkKind::Camera, context.state.camera, "camera in hand"),
         ];
         for (kind, pose, name) in cameras {
             if let Some(pose) = pose {
@@ -108,7 +118,10 @@ impl Mark {
 
     /// Paints the mark with its heading; `reach` is half its size \[points\].
     pub(super) fn paint(&self, painter: &Painter, at: Pos2, reach: f32) {
-        if matches!(self.kind, Kind::Feature | Kind::Truth | Kind::Camera) {
+        if matches!(
+            self.kind,
+            MarkKind::Feature | MarkKind::Truth | MarkKind::Camera
+        ) {
             let (sin, cos) = (self.offset.yaw_rad as f32).sin_cos();
             let tip = at + 2.4 * reach * vec2(-sin, -cos);
             painter.line_segment([at, tip], Stroke::new(3.0, Color32::WHITE));
@@ -164,7 +177,7 @@ pub(super) fn place(offset: &Offset) -> String {
     }
 }
 
-impl Kind {
+impl MarkKind {
     fn color(self) -> Color32 {
         match self {
             Self::Start => theme::REFERENCE,

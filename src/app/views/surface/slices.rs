@@ -11,13 +11,13 @@ use crate::method::Method;
 
 /// What changes along a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Along {
+enum SliceAxis {
     Right,
     Forward,
     Yaw,
 }
 
-impl Along {
+impl SliceAxis {
     const ALL: [Self; 3] = [Self::Right, Self::Forward, Self::Yaw];
 
     fn name(self) -> &'static str {
@@ -69,14 +69,14 @@ impl Along {
 
 /// What costs are made comparable by: 0 and 1 on the axis of the slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Range {
+struct CostScale {
     zero: f64,
     one: f64,
     /// Whether these are the result and its shuffled pixels, or else the least and greatest so far.
     is_assessed: bool,
 }
 
-impl Range {
+impl CostScale {
     /// From the best cost to that of shuffled pixels. Before the search is assessed, and where the
     /// best is no better than shuffled pixels, from the least to the greatest cost.
     fn of(assessed: Option<(f64, f64)>, costs: impl Iterator<Item = f64>) -> Option<Self> {
@@ -121,7 +121,7 @@ impl Range {
 /// A method's search with what its costs are measured by.
 struct Curve<'a> {
     search: Search<'a>,
-    range: Range,
+    range: CostScale,
     least_covered: u32,
 }
 
@@ -138,14 +138,14 @@ impl<'a> Curve<'a> {
             .flat_map(|searched| searched.surface.scores.iter().flatten());
         let costs = scores.filter_map(|score| score.eligible_cost(least_covered));
         Some(Self {
-            range: Range::of(assessed, costs)?,
+            range: CostScale::of(assessed, costs)?,
             least_covered,
             search,
         })
     }
 
     /// The stretches of a lattice's slice that may win.
-    fn stretches(&self, along: Along, searched: &Searched) -> Vec<Vec<[f64; 2]>> {
+    fn stretches(&self, along: SliceAxis, searched: &Searched) -> Vec<Vec<[f64; 2]>> {
         let Some(minimum) = searched.minimum(self.least_covered) else {
             return Vec::new();
         };
@@ -162,7 +162,7 @@ impl<'a> Curve<'a> {
             .collect()
     }
 
-    fn draw<'p>(&self, plot: &mut PlotUi<'p>, along: Along) {
+    fn draw<'p>(&self, plot: &mut PlotUi<'p>, along: SliceAxis) {
         let name = self.search.method.name().to_uppercase();
         let color = theme::method(self.search.method);
         for (phase, width) in along.phases().into_iter().zip([1.0, 2.5]) {
@@ -205,7 +205,7 @@ pub(super) fn ui(
     let gap = ui.spacing().item_spacing.x;
     let width = ((width - 2.0 * gap - 2.0) / 3.0).max(60.0);
     ui.horizontal_top(|ui| {
-        for along in Along::ALL {
+        for along in SliceAxis::ALL {
             slice(ui, along, width, &curves, &marks);
         }
     });
@@ -253,7 +253,7 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, shown: &Search<'_>, floor: f64) -> 
     .collect()
 }
 
-fn slice(ui: &mut Ui, along: Along, width: f32, curves: &[Curve<'_>], marks: &[LineMark]) {
+fn slice(ui: &mut Ui, along: SliceAxis, width: f32, curves: &[Curve<'_>], marks: &[LineMark]) {
     const HEIGHT: f32 = 130.0;
     let cost_of = |name: &str, place: f64| {
         let curve = curves
@@ -330,22 +330,22 @@ mod tests {
         let params = GridParams::default();
         let lattice =
             Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params).expect("small");
-        assert_eq!(Along::Right.cells(&lattice, 5), [3, 4, 5]);
-        assert_eq!(Along::Forward.cells(&lattice, 5), [2, 5, 8]);
+        assert_eq!(SliceAxis::Right.cells(&lattice, 5), [3, 4, 5]);
+        assert_eq!(SliceAxis::Forward.cells(&lattice, 5), [2, 5, 8]);
         let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params).expect("small");
-        assert_eq!(Along::Yaw.cells(&yaw, 5).len(), yaw.columns);
+        assert_eq!(SliceAxis::Yaw.cells(&yaw, 5).len(), yaw.columns);
     }
 
     #[test]
     fn a_range_that_means_nothing_gives_way_to_that_of_the_costs() {
         let costs = || [3.0, 1.0, 2.0].into_iter();
-        let assessed = Range::of(Some((1.0, 5.0)), costs()).expect("costs");
+        let assessed = CostScale::of(Some((1.0, 5.0)), costs()).expect("costs");
         assert_eq!((assessed.place(3.0), assessed.cost(0.5)), (0.5, 3.0));
-        let worse_than_shuffled = Range::of(Some((5.0, 1.0)), costs()).expect("costs");
+        let worse_than_shuffled = CostScale::of(Some((5.0, 1.0)), costs()).expect("costs");
         assert!(!worse_than_shuffled.is_assessed);
         assert_eq!(worse_than_shuffled.place(2.0), 0.5);
-        assert_eq!(Range::of(None, std::iter::empty()), None);
-        let flat = Range::of(None, [4.0, 4.0].into_iter()).expect("costs");
+        assert_eq!(CostScale::of(None, std::iter::empty()), None);
+        let flat = CostScale::of(None, [4.0, 4.0].into_iter()).expect("costs");
         assert_eq!(flat.place(4.0), 0.0);
     }
 }

@@ -8,7 +8,7 @@ use image::DynamicImage;
 use crate::app::textures::color_image;
 use crate::app::views::histogram::explains;
 use crate::app::views::legend;
-use crate::app::{Shown, ViewContext, theme};
+use crate::app::{ShownView, ViewContext, theme};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::method::Method;
@@ -81,7 +81,7 @@ impl Mode {
         ui: &Ui,
         context: &ViewContext<'_>,
         problem: &Problem,
-        shown: &Shown,
+        shown: &ShownView,
     ) -> Option<TextureHandle> {
         let of = |what, make: &dyn Fn(&Comparison) -> DynamicImage| {
             let textures = &context.state.textures;
@@ -110,7 +110,7 @@ impl Mode {
         Some(picture)
     }
 
-    pub(super) fn legend(self, ui: &mut Ui, method: Method, shown: Option<&Shown>) {
+    pub(super) fn legend(self, ui: &mut Ui, method: Method, shown: Option<&ShownView>) {
         let explanation = shown.and_then(|shown| shown.comparison.explanation.as_ref());
         match (self, explanation) {
             (Self::Residual, _) => {

@@ -24,14 +24,14 @@ pub(super) enum Mark {
     Square,
 }
 
-/// A mesh that is drawn at once.
-pub(super) struct Ink {
+/// Collects strokes and marks in one mesh, which is painted at once.
+pub(super) struct MeshPainter {
     mesh: Mesh,
     /// Width of the soft edge: one pixel of the screen \[points\].
     soft: f32,
 }
 
-impl Ink {
+impl MeshPainter {
     pub(super) fn new(pixels_per_point: f32) -> Self {
         Self {
             mesh: Mesh::default(),
@@ -39,8 +39,8 @@ impl Ink {
         }
     }
 
-    /// Draws everything and starts anew.
-    pub(super) fn dry(&mut self, painter: &Painter) {
+    /// Paints everything collected so far and starts anew.
+    pub(super) fn paint_on(&mut self, painter: &Painter) {
         let mesh = std::mem::take(&mut self.mesh);
         if !mesh.is_empty() {
             painter.add(mesh);
@@ -189,12 +189,12 @@ mod tests {
             Mark::Disc,
             Mark::Square,
         ] {
-            let mut ink = Ink::new(2.0);
-            ink.line(pos2(0.0, 0.0), pos2(9.0, 9.0), 1.0, Color32::RED);
-            let before = ink.mesh.vertices.len();
-            ink.mark(mark, at, 4.0, Color32::RED);
-            let mark_vertices = &ink.mesh.vertices[before..];
-            assert!(ink.mesh.is_valid(), "{mark:?}");
+            let mut mesh = MeshPainter::new(2.0);
+            mesh.line(pos2(0.0, 0.0), pos2(9.0, 9.0), 1.0, Color32::RED);
+            let before = mesh.mesh.vertices.len();
+            mesh.mark(mark, at, 4.0, Color32::RED);
+            let mark_vertices = &mesh.mesh.vertices[before..];
+            assert!(mesh.mesh.is_valid(), "{mark:?}");
             assert!(mark_vertices.iter().all(|v| v.pos.distance(at) < 7.5));
             assert!(mark_vertices.iter().any(|v| v.pos.distance(at) > 3.5));
         }
@@ -202,9 +202,9 @@ mod tests {
 
     #[test]
     fn a_line_without_length_draws_nothing() {
-        let mut ink = Ink::new(1.0);
-        ink.line(pos2(1.0, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
-        ink.line(pos2(f32::NAN, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
-        assert!(ink.mesh.is_empty());
+        let mut mesh = MeshPainter::new(1.0);
+        mesh.line(pos2(1.0, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
+        mesh.line(pos2(f32::NAN, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
+        assert!(mesh.mesh.is_empty());
     }
 }

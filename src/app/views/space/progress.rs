@@ -16,7 +16,7 @@ use crate::session::Run;
 
 /// The matches that FB lifts into space, and the camera that it finds with them.
 #[derive(Default)]
-pub(super) struct FeatureStory<'a> {
+pub(super) struct LiftedFeatures<'a> {
     lifted: &'a [LiftedMatch],
     states: Option<&'a [FeatureState]>,
     /// The best pose so far: that of MLESAC, then the refined one.
@@ -33,7 +33,7 @@ pub(super) struct Ray {
     pub(super) is_inlier: Option<bool>,
 }
 
-impl<'a> FeatureStory<'a> {
+impl<'a> LiftedFeatures<'a> {
     /// From the estimator at the cursor, if it lifts matches; else from FB's part.
     pub(super) fn at(context: &ViewContext<'a>) -> Self {
         let here = match context.is_inside_hybrid(Method::FB) {
@@ -50,23 +50,23 @@ impl<'a> FeatureStory<'a> {
     }
 
     fn told(run: &'a Run, cursor: usize) -> Self {
-        let mut story = Self::default();
+        let mut progress = Self::default();
         for event in events(run, cursor) {
             match event {
-                Event::DepthsLifted(event) => story.lifted = &event.matches,
-                Event::FeaturesClassified(event) => story.states = Some(&event.states),
+                Event::DepthsLifted(event) => progress.lifted = &event.matches,
+                Event::FeaturesClassified(event) => progress.states = Some(&event.states),
                 Event::HypothesisTried(event) => {
                     if let Some(best) = &event.trial.best {
-                        story.reference_from_query = Some(best.pose.inverse());
+                        progress.reference_from_query = Some(best.pose.inverse());
                     }
                 }
                 Event::PoseRefined(event) => {
-                    story.reference_from_query = Some(event.reference_from_query);
+                    progress.reference_from_query = Some(event.reference_from_query);
                 }
                 _ => {}
             }
         }
-        story
+        progress
     }
 
     pub(super) fn rays(&self) -> impl Iterator<Item = Ray> {
@@ -83,7 +83,7 @@ impl<'a> FeatureStory<'a> {
 
 /// The grid search of a direct method.
 #[derive(Default)]
-pub(super) struct SearchStory<'a> {
+pub(super) struct SearchProgress<'a> {
     /// Complete phases up to the cursor: the coarse positions and those after them.
     pub(super) surfaces: Vec<&'a Arc<ScoredLattice>>,
     /// Hypotheses of a phase that is not complete.
@@ -94,21 +94,21 @@ pub(super) struct SearchStory<'a> {
     pub(super) costs: Option<(f64, f64)>,
 }
 
-impl<'a> SearchStory<'a> {
+impl<'a> SearchProgress<'a> {
     /// From the direct method whose pictures are shown.
     pub(super) fn at(context: &ViewContext<'a>) -> Self {
         let method = context.searching_method();
         let Some((span, cursor)) = context.of(method) else {
             return Self::default();
         };
-        let mut story = Self::default();
+        let mut progress = Self::default();
         for event in events(context.run, cursor) {
             match event {
-                Event::ViewRendered(event) => story.path.push(event.offset),
-                Event::PoseScored(event) => story.scored.push(event),
+                Event::ViewRendered(event) => progress.path.push(event.offset),
+                Event::PoseScored(event) => progress.scored.push(event),
                 Event::PhaseSearched(event) => {
-                    story.scored.clear();
-                    story.surfaces.push(&event.surface);
+                    progress.scored.clear();
+                    progress.surfaces.push(&event.surface);
                 }
                 _ => {}
             }
@@ -118,13 +118,18 @@ impl<'a> SearchStory<'a> {
             Event::PhaseSearched(event) => Some(&event.surface),
             _ => None,
         });
-        story.costs = match first_surface {
+        progress.costs = match first_surface {
             Some(surface) => {
                 ends((0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell)))
             }
-            None => ends(story.scored.iter().filter_map(|scored| scored.score.cost)),
+            None => ends(
+                progress
+                    .scored
+                    .iter()
+                    .filter_map(|scored| scored.score.cost),
+            ),
         };
-        story
+        progress
     }
 }
 
