@@ -168,7 +168,7 @@ fn cpu_time() -> Duration {
     Duration::from_nanos(threads.flatten().filter_map(of_thread).sum())
 }
 
-/// Of this process, where the system tells.
+/// Prints the memory of this process, where the system tells.
 fn print_memory(when: &str, field: &str) {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     if let Some(line) = status.lines().find(|line| line.starts_with(field)) {

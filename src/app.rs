@@ -4,8 +4,9 @@
 //! keys, buttons, views → Command → App::dispatch → AppState → ViewContext → views
 //! ```
 //!
-//! A view keeps no copy of the run. It is handed a [`ViewContext`], the run at the cursor, and answers
-//! with commands; so looking back costs no second run, and whatever a person can do, a test can do.
+//! A view keeps no copy of the run. It is handed a [`ViewContext`], the run at the cursor, and
+//! answers with commands; so looking back costs no second run, and whatever a person can do, a test
+//! can do.
 
 mod adapter;
 mod camera;

@@ -144,8 +144,8 @@ impl Session {
         self.control.set_breakpoints(breakpoints);
     }
 
-    /// Asks the run to stop, and does not wait for it. It says [`RunState::Cancelled`] when it has: an
-    /// estimator looks up after 256 hypotheses, one trial or one pass over an image.
+    /// Asks the run to stop, and does not wait for it. It says [`RunState::Cancelled`] when it has:
+    /// an estimator looks up after 256 hypotheses, one trial or one pass over an image.
     pub fn cancel(&self) {
         self.control.cancel();
     }

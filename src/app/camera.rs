@@ -22,7 +22,7 @@ pub enum NamedPose {
 }
 
 impl NamedPose {
-    /// All of them, in the order of the search.
+    /// All named poses, in the order of the search.
     pub const ALL: [Self; 6] = [
         Self::Start,
         Self::Coarse,
@@ -48,13 +48,13 @@ impl NamedPose {
 /// A small move of the camera in its own frame, in steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nudge {
-    /// To its right.
+    /// Moves to its right.
     Right(f64),
-    /// Upwards.
+    /// Moves upwards.
     Up(f64),
-    /// Ahead.
+    /// Moves ahead.
     Forward(f64),
-    /// About its up axis, to the left.
+    /// Turns about its up axis, to the left.
     Yaw(f64),
 }
 

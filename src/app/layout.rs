@@ -126,7 +126,7 @@ impl Layout {
         serde_json::to_value(&self.tree)
     }
 
-    /// A saved arrangement.
+    /// Goes back to a saved arrangement.
     pub(super) fn restore(&mut self, saved: serde_json::Value) -> serde_json::Result<()> {
         self.tree = serde_json::from_value(saved)?;
         Ok(())

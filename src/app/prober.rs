@@ -20,7 +20,7 @@ pub struct Probe {
     pub pose: Pose,
     /// The synthetic view and cost of each method that has one.
     pub comparisons: Vec<(Method, Arc<Comparison>)>,
-    /// How long it took.
+    /// How long the answer took.
     pub took: Duration,
 }
 

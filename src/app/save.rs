@@ -12,7 +12,7 @@ use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;
 
-/// The menu.
+/// The menu of what can be saved or sent.
 pub(super) fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.menu_button("Save", |ui| {
         let folder = &state.setup.folder;

@@ -89,8 +89,8 @@ impl<'a> ViewContext<'a> {
         self.run.all_until(self.cursor)
     }
 
-    /// The part of an estimator on the reference that is looked at, and the cursor for it: its last record,
-    /// or the cursor itself where it is the estimator at the cursor.
+    /// The part of an estimator on the reference that is looked at, and the cursor for it: its last
+    /// record, or the cursor itself where it is the estimator at the cursor.
     pub fn of(&self, method: Method) -> Option<(&'a Span, usize)> {
         let part = Part::Reference(method, self.reference());
         if let Some(span) = self.span()
@@ -129,8 +129,8 @@ impl<'a> ViewContext<'a> {
             .unwrap_or(Method::MI)
     }
 
-    /// The method in whose part of the run the search of [`Self::direct_method`] is told: a hybrid, if
-    /// the cursor is in one.
+    /// The method in whose part of the run the search of [`Self::direct_method`] is told: a hybrid,
+    /// if the cursor is in one.
     pub fn searching_method(&self) -> Method {
         self.method()
             .filter(|&here| estimator::find(here).and_then(Entry::hybrid).is_some())

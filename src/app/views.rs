@@ -1,7 +1,7 @@
 //! The views: each one file and one entry in [`ALL`].
 //!
-//! A view draws from the [`ViewContext`] that it is handed and keeps nothing of the run. What it does keep
-//! is how a person looks at it: a zoom, a filter.
+//! A view draws from the [`ViewContext`] that it is handed and keeps nothing of the run. What it
+//! does keep is how a person looks at it: a zoom, a filter.
 
 mod breakpoints;
 mod canvas;
@@ -39,7 +39,7 @@ pub struct Entry {
     pub name: &'static str,
     /// The title on its tab.
     pub title: &'static str,
-    /// One phrase.
+    /// What the view shows, in one phrase.
     pub about: &'static str,
     /// Makes the view. The render state is for those that draw on the graphics card themselves.
     pub new: fn(Option<&RenderState>) -> Box<dyn View>,

@@ -34,7 +34,7 @@ pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), C
     }
 }
 
-/// The same run, as a recording.
+/// Makes a recording of the same run.
 fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Result<(), CliError> {
     let query = setup.query_name();
     let recording = setup.folder.join(format!("{query}.rrd"));

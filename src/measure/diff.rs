@@ -8,9 +8,9 @@ use crate::localize::Verdict;
 /// Changes of a pose's error that are not worth mentioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Of the translation error \[m\].
+    /// Change of the translation error \[m\].
     pub metres: f64,
-    /// Of the geodesic rotation error \[°\].
+    /// Change of the geodesic rotation error \[°\].
     pub degrees: f64,
 }
 
@@ -37,7 +37,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// In one word.
+    /// The change in one word.
     pub fn name(self) -> &'static str {
         match self {
             Self::Broken => "broken",
@@ -51,7 +51,7 @@ impl Change {
 /// A query and method of which the runs differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// What happened.
+    /// What happened to the query.
     pub change: Change,
     /// The result in the first run.
     pub before: Row,

@@ -98,7 +98,7 @@ pub enum ExportError {
         /// The methods of the run.
         methods: Vec<Method>,
     },
-    /// Nothing is left.
+    /// No result is left to export.
     #[error("the run has no such results")]
     Nothing,
     /// The format cannot hold a missing pose.
@@ -127,7 +127,7 @@ pub struct ExportedFile {
     pub text: String,
 }
 
-/// An export.
+/// The files of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Export {
     /// One file, or those of a folder.

@@ -20,7 +20,7 @@ pub const SUMMARY_SCHEMA: &str = "posescope.summary/1";
 /// The figures of a run.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// By group and method.
+    /// The figures by group and method.
     pub measures: Vec<Measures>,
     /// What became of the gates.
     pub gate_results: Vec<GateResult>,

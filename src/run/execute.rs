@@ -19,9 +19,9 @@ use crate::trace::Cancelled;
 
 /// The scenes of a run, opened.
 pub struct Scenes {
-    /// In the order of [`RunFile::scenes`].
+    /// The scenes of references, in the order of [`RunFile::scenes`].
     pub references: Vec<Box<dyn Scene>>,
-    /// In the order of [`RunFile::queries`].
+    /// The scenes of queries, in the order of [`RunFile::queries`].
     pub queries: Vec<Box<dyn Scene>>,
 }
 
@@ -55,7 +55,7 @@ pub enum RunError {
 
 /// A query that a method failed on, by its own report or by the error of its pose.
 pub struct FailedQuery<'a> {
-    /// Its scenes.
+    /// The localizer of its scenes.
     pub localizer: &'a Localizer<'a>,
     /// Its place in the plan.
     pub item: Item<'a>,
@@ -95,7 +95,8 @@ pub struct Execution<'a> {
     pub scenes: &'a Scenes,
     /// Its parameters, as in the description.
     pub params: &'a Params,
-    /// What [`Selection::Retrieved`](crate::localize::Selection::Retrieved) asks, by the position of the references' scene.
+    /// What [`Selection::Retrieved`](crate::localize::Selection::Retrieved) asks, by the position
+    /// of the references' scene.
     pub indices: &'a [Box<dyn Ranking>],
 }
 

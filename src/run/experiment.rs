@@ -28,7 +28,7 @@ pub enum Experiment {
 }
 
 impl Experiment {
-    /// All of them.
+    /// All experiments.
     pub const ALL: [Self; 3] = [Self::Single, Self::Multi, Self::Large];
 
     /// The name on the command line and in files.
@@ -132,11 +132,11 @@ fn is_robotcar(scene: &str) -> bool {
 pub struct Draw<'a> {
     /// Share of the frames with a known pose.
     pub share: f64,
-    /// At most as many.
+    /// How many frames at most.
     pub limit: Option<usize>,
     /// Only these of those drawn; all, if none is named.
     pub only: &'a [String],
-    /// Seed.
+    /// The seed of the choice.
     pub seed: u64,
 }
 

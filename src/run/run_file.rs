@@ -16,9 +16,9 @@ pub const RUN_SCHEMA: &str = "posescope.run/1";
 /// One part of a run that is spread over several processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which part, from 1.
+    /// The number of the part, from 1.
     pub number: usize,
-    /// Of how many.
+    /// The number of parts.
     pub of: usize,
 }
 
@@ -54,7 +54,7 @@ posescope_core::serde_as_text!(Shard);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Form", into = "Form")]
 pub struct RunFile {
-    /// [`RUN_SCHEMA`].
+    /// The version of the form, [`RUN_SCHEMA`].
     pub schema: String,
     /// The version of posescope.
     pub version: String,
@@ -62,7 +62,7 @@ pub struct RunFile {
     pub scenes: Vec<String>,
     /// The scenes of the queries, as arguments; none where each scene has its own.
     pub queries: Vec<String>,
-    /// Their format, where it was given.
+    /// The format of the scenes, where it was given.
     pub format: Option<String>,
     /// Which of the paper's experiments, if any.
     pub experiment: Option<Experiment>,
@@ -72,7 +72,7 @@ pub struct RunFile {
     pub radii_m: Vec<f64>,
     /// Share of the frames that were drawn as queries.
     pub share: f64,
-    /// At most as many of them.
+    /// How many queries at most.
     pub limit: Option<usize>,
     /// A pose with a greater translation error is a failure \[m\].
     pub failure_radius_m: f64,
@@ -168,9 +168,9 @@ impl From<RunFile> for Form {
 /// What is wrong with the text of a `run.toml`, and where.
 #[derive(Debug)]
 pub(super) struct Misread {
-    /// From 1.
+    /// The line, counted from 1.
     pub line: usize,
-    /// On one line.
+    /// What is wrong, on one line.
     pub message: String,
 }
 
@@ -308,7 +308,7 @@ impl RunFile {
         }
     }
 
-    /// The same run in one piece.
+    /// The description of the same run in one piece.
     pub fn whole(&self) -> Self {
         Self {
             shard: None,

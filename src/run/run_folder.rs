@@ -29,7 +29,7 @@ pub enum FolderError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// The error of the system.
         source: io::Error,
     },
     /// Something else is in the place of a new run.
@@ -89,7 +89,7 @@ pub enum FolderError {
 }
 
 impl FolderError {
-    /// For `map_err`.
+    /// Makes errors of this path, for `map_err`.
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
         |source| Self::Io { path, source }
@@ -195,7 +195,7 @@ impl RunFolder {
         })
     }
 
-    /// Where it is.
+    /// The path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }

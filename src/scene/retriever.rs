@@ -102,7 +102,7 @@ impl Retriever {
     /// Builds an index of the scene's photos.
     ///
     /// # Errors
-    /// As [`build`]; of the frames, when a photo cannot be read.
+    /// The errors of [`build`]; that of a frame when its photo cannot be read.
     pub fn build(
         scene: &dyn Scene,
         path: &Path,

@@ -18,15 +18,15 @@ use crate::trace::{Cancelled, Record, Sink};
 /// How a run goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunMode {
-    /// Not at all: it waits behind the next event, or within a loop that tells nothing.
+    /// It does not: it waits behind the next event, or within a loop that tells nothing.
     Paused,
-    /// To the next event.
+    /// It runs to the next event.
     StepInto,
-    /// Behind the stage that begins here, or to the next event.
+    /// It runs behind the stage that begins here, or to the next event.
     StepOver,
-    /// To the end of the stage around it.
+    /// It runs to the end of the stage around it.
     StepOut,
-    /// To the next breakpoint, or to the end.
+    /// It runs to the next breakpoint, or to the end.
     Running,
 }
 

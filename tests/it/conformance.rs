@@ -134,7 +134,7 @@ fn every_estimator_can_be_stopped_at_any_event() {
 enum Moment {
     /// It looks at the attention flag.
     LooksUp,
-    /// It tells something.
+    /// It tells an event of this kind.
     Tells(Kind),
 }
 
@@ -194,7 +194,7 @@ fn moments(
     sink.moments
 }
 
-/// As many hypotheses are scored at a time as on any number of threads.
+/// Runs something on 32 threads: as many hypotheses are scored at a time as on any other number.
 fn on_many_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(32).build();
     pool.expect("a pool").install(work)

@@ -115,8 +115,8 @@ const BLOCK: u32 = 4;
 /// How far the mean of a block may be off, of 255: an edge or a glyph that lies half a pixel
 /// elsewhere stays below, a missing line does not.
 const BLOCK_OFF: u8 = 40;
-/// Share of a picture's blocks that may be off farther. Mesa's OpenGL has at most 0.2 %; without the cloud the
-/// 3-D view has 3 %.
+/// Share of a picture's blocks that may be off farther. Mesa's OpenGL has at most 0.2 %; without
+/// the cloud the 3-D view has 3 %.
 const COARSE_SHARE: f64 = 0.005;
 
 /// Share of the blocks whose colours differ.

@@ -129,7 +129,7 @@ pub fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
         .collect()
 }
 
-/// The same without a window.
+/// The results of the same run without a window.
 fn headless(params: &Params) -> Vec<QueryResult> {
     let scene = Walls::new();
     let mut results = Vec::new();

@@ -41,11 +41,11 @@ pub trait Choice {
 
 /// Something that walks over parameters: a list, a setter, a panel of sliders.
 pub trait ParamVisitor {
-    /// A real number.
+    /// Visits a real number.
     fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>);
-    /// A whole number.
+    /// Visits a whole number.
     fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>);
-    /// Yes or no.
+    /// Visits a switch.
     fn flag(&mut self, about: About, value: &mut bool);
     /// One of a few names.
     fn choice(&mut self, about: About, value: &mut dyn Choice);
@@ -114,7 +114,7 @@ pub struct Described {
     pub about: About,
     /// The present value.
     pub value: Value,
-    /// What it accepts.
+    /// What values the parameter accepts.
     pub domain: Domain,
 }
 
@@ -132,11 +132,11 @@ pub enum ParamError {
     /// The value is not of the parameter's kind or outside its range.
     #[error("`{key}` takes {expected}, not `{given}`")]
     BadValue {
-        /// The parameter.
+        /// The parameter, as `group.name`.
         key: String,
-        /// What it accepts.
+        /// What values the parameter accepts.
         expected: String,
-        /// What was given.
+        /// The value that was given.
         given: String,
     },
     /// An assignment without `=`.

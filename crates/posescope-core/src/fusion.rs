@@ -33,7 +33,7 @@ use crate::trace::{Cancelled, Trace};
 pub struct Entry {
     /// The name on the command line, in results and in tables.
     pub name: &'static str,
-    /// One phrase.
+    /// What the fusion does, in one phrase.
     pub about: &'static str,
     /// What each reference has to say, given the number of its matches: not negative, 0 leaves it
     /// out, any common factor does not matter. At least one is positive where there is a reference.

@@ -107,10 +107,11 @@ impl Memo {
         recalled
     }
 
-    /// As [`Self::recall`], for a value whose making can be stopped: then nothing is remembered.
+    /// Recalls as [`Self::recall`] does, for a value whose making can be stopped: then nothing is
+    /// remembered.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// The errors of `make`.
     pub fn try_recall<T: Remembered, E>(
         &self,
         key: impl Any + Hash + Eq + Send + Sync,

@@ -53,7 +53,7 @@ pub trait Scene: Send + Sync {
     /// The frame as a query.
     ///
     /// # Errors
-    /// As [`Scene::photo`].
+    /// The errors of [`Scene::photo`].
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::new(Query {
             name: self.frames()[frame].clone(),
@@ -67,7 +67,7 @@ pub trait Scene: Send + Sync {
     /// pose and cloud. A scene that has these need not have its own.
     ///
     /// # Errors
-    /// As [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
+    /// The errors of [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
     fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
         let world_from_camera = pose_of(self, frame)?;
         let query = self.query(frame)?;

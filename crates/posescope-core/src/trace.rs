@@ -94,8 +94,9 @@ impl<'a> Trace<'a> {
         Self::new(sink, None)
     }
 
-    /// As [`Self::to`]; whenever `attention` is raised, the sink's [`Sink::attend`] is called at the
-    /// next event or checkpoint, wanted or not, and the flag is lowered.
+    /// A trace as [`Self::to`] makes it; whenever `attention` is raised, the sink's
+    /// [`Sink::attend`] is called at the next event or checkpoint, wanted or not, and the flag is
+    /// lowered.
     pub fn watched(sink: &'a mut dyn Sink, attention: &'a AtomicBool) -> Self {
         Self::new(sink, Some(attention))
     }
@@ -160,7 +161,7 @@ impl<'a> Trace<'a> {
     /// Runs `body` as a named part of the estimator, which an observer can step over and out of.
     ///
     /// # Errors
-    /// Those of `body`, and [`Cancelled`].
+    /// The errors of `body`, and [`Cancelled`].
     pub fn stage<T, X: From<Cancelled>>(
         &mut self,
         stage: Stage,

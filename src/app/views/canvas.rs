@@ -83,7 +83,7 @@ impl PanZoom {
 pub(super) struct Placement {
     /// The part of the screen that may show it.
     pub(super) area: Rect,
-    /// Where all of it would be.
+    /// Where the whole picture would be.
     picture: Rect,
     /// Points per pixel.
     pub(super) scale: f32,

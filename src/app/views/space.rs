@@ -41,7 +41,7 @@ use view_camera::ViewCamera;
 /// How long one of two poses is shown while they blink.
 const BLINK: Duration = Duration::from_millis(600);
 
-/// The view.
+/// The view of the scene in space.
 pub struct SpaceView {
     /// `None` where there is no graphics card to draw with.
     painter: Option<Painter>,

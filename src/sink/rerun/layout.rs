@@ -66,7 +66,7 @@ pub(super) enum BlueprintNode {
     Row {
         /// What a tab calls it.
         name: String,
-        /// From left to right.
+        /// The nodes from left to right, each with its share of the width.
         children: Vec<(f32, BlueprintNode)>,
     },
     /// Above each other, with their shares of the height.

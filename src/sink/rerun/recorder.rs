@@ -244,7 +244,7 @@ impl Recorder {
         self.stream.log(&entities::stage(method), &state);
     }
 
-    /// As the direct methods colour it.
+    /// The cloud as the direct methods colour it.
     fn colored(&self, tuple: &ReferenceTuple) -> ColoredCloud {
         let ReferenceTuple {
             photo, intrinsics, ..

@@ -38,7 +38,7 @@ impl Origin {
     }
 }
 
-/// The query's photo.
+/// Records the query's photo.
 pub(super) fn log_query(stream: &mut Stream, query: &Query) {
     stream.log_image(entities::QUERY_IMAGE, jpeg(&picture::photo(&query.photo)));
 }

@@ -86,7 +86,7 @@ impl Stream {
         self.eval = eval;
     }
 
-    /// The next decision.
+    /// Goes on to the next decision of the timeline.
     pub(super) fn advance(&mut self) {
         self.step += 1;
     }
@@ -145,7 +145,7 @@ impl Stream {
         self.ask_file();
     }
 
-    /// As [`Self::flush`], and waits until the targets have it.
+    /// Hands out what was recorded as [`Self::flush`] does, and waits until the targets have it.
     pub(super) fn flush_blocking(&mut self) {
         let flushed = self.recording.flush_blocking();
         self.ask_file();

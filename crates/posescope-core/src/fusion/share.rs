@@ -18,7 +18,7 @@ pub enum ShareOutcome {
 pub struct Share {
     /// The reference frame's name.
     pub reference: String,
-    /// Its feature matches.
+    /// How many feature matches it has with the query.
     pub matches: usize,
     /// Its share of the fused pose. Those of all references add up to 1, or to 0 without a pose.
     pub weight: f64,

@@ -14,13 +14,13 @@ pub struct Chooser<'a> {
     pub localizer: &'a Localizer<'a>,
     /// Parameters of features and matching.
     pub params: &'a Params,
-    /// How.
+    /// How references are chosen, and how many.
     pub selection: Selection,
     /// How far from the query's known position a reference may be \[m\].
     pub radius_m: f64,
     /// Seed of the draw.
     pub seed: u64,
-    /// What [`Selection::Retrieved`] asks.
+    /// The index that [`Selection::Retrieved`] asks.
     pub index: Option<&'a dyn Ranking>,
 }
 

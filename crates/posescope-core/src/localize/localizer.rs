@@ -73,12 +73,12 @@ struct QueryWork<'a> {
     problems: Vec<Problem>,
     /// Feature matches by problem, once they are known.
     matches: Vec<Option<usize>>,
-    /// By method, in the order of [`estimator::methods`], and problem.
+    /// What each method made of each problem, in the order of [`estimator::methods`].
     candidates: Vec<Vec<Option<MethodOutcome>>>,
 }
 
 impl<'a> Localizer<'a> {
-    /// For these scenes, which may be the same.
+    /// A localizer for these scenes, which may be the same.
     pub fn new(
         references: &'a dyn Scene,
         queries: &'a dyn Scene,
@@ -88,7 +88,8 @@ impl<'a> Localizer<'a> {
         Self::with_cached_scenes(CachedScene::pair(references, queries), params, seed)
     }
 
-    /// For scenes, references and queries, whose frames are remembered for longer than this.
+    /// A localizer for scenes, references and queries, whose frames are remembered for longer than
+    /// it lives.
     pub fn with_cached_scenes(
         (references, queries): (CachedScene<'a>, CachedScene<'a>),
         params: &'a Params,

@@ -35,15 +35,15 @@ pub struct BuildRequest {
     pub frames: Vec<usize>,
     /// Number of visual words.
     pub words: usize,
-    /// Of every random choice.
+    /// The seed of every random choice.
     pub seed: u64,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub sample: usize,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub iterations: usize,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub trees: usize,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub checks: usize,
     /// All that decides what the index holds, by name; kept with it and compared when it is used.
     pub recipe: BTreeMap<String, String>,
@@ -71,23 +71,23 @@ impl BuildStep {
     }
 }
 
-/// How far the work is.
+/// How far the building of an index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildProgress {
-    /// The part.
+    /// The part of the work that is being done.
     pub step: BuildStep,
-    /// Of the part.
+    /// How much of the part is done.
     pub done: usize,
-    /// Of the part; k-means may settle sooner.
+    /// How much the part has in all; k-means may converge sooner.
     pub total: usize,
 }
 
-/// What came of it.
+/// What an index was built of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildSummary {
     /// Frames in the index.
     pub frames: usize,
-    /// Their features.
+    /// Features of these frames.
     pub features: usize,
     /// Visual words.
     pub words: usize,
@@ -274,12 +274,12 @@ fn write(
     })
 }
 
-/// As a description has it.
+/// The fingerprint as a description writes it.
 pub(super) fn fingerprint_text(fingerprint: u64) -> String {
     format!("{fingerprint:016x}")
 }
 
-/// As a record has it.
+/// The number as a record writes it.
 fn number(count: usize) -> io::Result<u32> {
     u32::try_from(count).map_err(|_| {
         io::Error::new(

@@ -88,7 +88,7 @@ impl Index {
         self.stored.description()
     }
 
-    /// Where it is.
+    /// The file of the index.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -47,7 +47,7 @@ impl RetrievalParams {
     /// The names of those that decide what an index holds; the others only how it is asked.
     pub const BUILDING: [&'static str; 5] = ["features", "sample", "iterations", "trees", "checks"];
 
-    /// What verification allows.
+    /// The limits of verification.
     pub fn tolerance(&self) -> VerificationLimits {
         VerificationLimits {
             inlier_px: self.inlier_px,

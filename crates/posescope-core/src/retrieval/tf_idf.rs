@@ -21,7 +21,7 @@ pub struct InvertedIndex {
 }
 
 impl InvertedIndexBuilder {
-    /// No document yet.
+    /// An index without a document yet.
     pub fn new(words: usize) -> Self {
         Self {
             lists: vec![Vec::new(); words],

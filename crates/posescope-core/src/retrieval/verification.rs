@@ -30,7 +30,7 @@ pub struct WordMatch {
     pub reference_keypoint: Keypoint,
 }
 
-/// What verification allows.
+/// The limits within which verification takes features to agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VerificationLimits {
     /// Greatest distance of an inlier in the reference \[px\].

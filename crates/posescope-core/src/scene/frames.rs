@@ -15,9 +15,9 @@ use crate::recent::{Limit, Recent};
 /// Frames that are kept unless others hold them anyway: a query, its references, and the candidates
 /// that were looked at to choose them.
 const FRAMES: usize = 64;
-/// Memory that frames may take unless others hold them anyway \[bytes\]: that of 38 candidates within
-/// 15 m of a query on the street, each with its features. A frame with its cloud and all that the four
-/// estimators remember takes three times as much.
+/// Memory that frames may take unless others hold them anyway \[bytes\]: that of 38 candidates
+/// within 15 m of a query on the street, each with its features. A frame with its cloud and all
+/// that the four estimators remember takes three times as much.
 const BYTES: usize = 96 << 20;
 /// Values that one frame's memo keeps: some settings of each stage with several references, so that
 /// going back to the last setting costs nothing either.

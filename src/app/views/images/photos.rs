@@ -69,7 +69,7 @@ pub(super) struct PhotoOnScreen {
 }
 
 impl PhotoPanZoom {
-    /// The switches.
+    /// Draws the switches of the zoom.
     pub(super) fn ui(&mut self, ui: &mut Ui) {
         let help = "Zoom (wheel) and move (drag) both photos together";
         let link = ui.checkbox(&mut self.are_linked, "Link zoom");

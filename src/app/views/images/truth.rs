@@ -112,7 +112,7 @@ impl TrueMatch {
         }
     }
 
-    /// The same in words.
+    /// What the true pose says of the match, in words.
     pub(super) fn verdict(&self, within_px: f64) -> String {
         let seen = self
             .place_px

@@ -9,7 +9,7 @@ use crate::app::camera::NamedPose;
 use crate::app::{Command, ViewContext, shortcuts};
 use crate::method::Method;
 
-/// What is shown.
+/// What of the scene is shown.
 #[derive(Clone, Debug)]
 pub(super) struct Layers {
     pub(super) cloud: bool,
@@ -41,17 +41,17 @@ impl Default for Layers {
 /// What a button asks of the view itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ViewRequest {
-    /// The first look.
+    /// Look at the scene as at first.
     Reset,
-    /// From above.
+    /// Look from above.
     Top,
-    /// Through a camera.
+    /// Look through a camera.
     Through(CameraKind),
-    /// Blink, or stop to.
+    /// Blink between two poses, or stop blinking.
     Blink,
 }
 
-/// Where one looks from.
+/// The buttons for where one looks from.
 pub(super) fn looks(
     ui: &mut Ui,
     methods: &[Method],
@@ -119,7 +119,7 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
     });
 }
 
-/// Where the camera in hand goes.
+/// The buttons for where the camera in hand goes.
 pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<ViewRequest> {
     let keys = shortcuts();
     ui.weak("camera to");

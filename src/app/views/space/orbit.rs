@@ -27,7 +27,7 @@ pub(super) struct Orbit {
     pub(super) heading: f64,
     /// How steeply it looks down \[rad\].
     pub(super) descent: f64,
-    /// From eye to target \[m\].
+    /// The distance from eye to target \[m\].
     pub(super) distance: f64,
 }
 

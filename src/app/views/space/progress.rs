@@ -25,7 +25,7 @@ pub(super) struct LiftedFeatures<'a> {
 
 /// A ray from a camera to a lifted point.
 pub(super) struct Ray {
-    /// In the reference camera's frame \[m\].
+    /// The lifted point, in the reference camera's frame \[m\].
     pub(super) point: Point3<f64>,
     /// Index of the query keypoint.
     pub(super) query: usize,

@@ -19,7 +19,7 @@ pub(super) struct Rays {
 }
 
 /// From the estimated camera; before there is one, from the reference camera that saw the points.
-/// Those of inliers are drawn through, those of outliers dashed. `selected` is drawn broad.
+/// The rays of inliers are drawn through, those of outliers dashed. `selected` is drawn broad.
 pub(super) fn rays(
     geometry: &SceneGeometry,
     progress: &LiftedFeatures<'_>,

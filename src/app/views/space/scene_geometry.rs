@@ -6,7 +6,8 @@ use crate::app::ViewContext;
 use crate::geometry::Pose;
 use crate::grid::Offset;
 
-/// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's camera.
+/// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's
+/// camera.
 pub(super) const GROUND_M: f64 = 1.6;
 
 /// The scene's frame, seen from the world and from the reference at the cursor.
@@ -78,7 +79,7 @@ impl SceneGeometry {
     }
 }
 
-/// As the graphics card takes it.
+/// A place in the scene as the graphics card takes it.
 pub(super) fn spot(in_scene: &Point3<f64>) -> [f32; 3] {
     in_scene.coords.cast::<f32>().into()
 }

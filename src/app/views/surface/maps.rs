@@ -270,7 +270,7 @@ fn small(ui: &Ui, text: &str) -> egui::RichText {
         .color(ui.visuals().weak_text_color())
 }
 
-/// How far a lattice is.
+/// How much of a lattice is scored, in words.
 pub(super) fn progress(searched: &Searched) -> String {
     let all = searched.surface.lattice.hypotheses().count();
     format!(

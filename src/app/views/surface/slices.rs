@@ -35,7 +35,7 @@ impl SliceAxis {
         }
     }
 
-    /// In the unit of the axis.
+    /// The coordinate along the axis, in its unit.
     fn of(self, offset: &Offset) -> f64 {
         match self {
             Self::Right => offset.right_m,

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 use crate::render::Comparison;
 use crate::{palette, picture};
 
-/// What is shown.
+/// What the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
     Query,
