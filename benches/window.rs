@@ -4,7 +4,6 @@
 //! painting into a texture of the size of the window, to the end.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use divan::Bencher;
@@ -223,7 +222,6 @@ fn open() -> Option<Window> {
         index: Arc::default(),
         failure_radius_m: 10.0,
         mode: RunMode::Running,
-        results: BTreeMap::new(),
         folder: std::env::temp_dir(),
     };
     let mut window = Harness::builder()

@@ -31,7 +31,7 @@ mod window;
 pub use command::{Command, Shortcut, shortcuts};
 pub use setup::{ReferencePick, Setup};
 pub use shown::{ShownReason, ShownView};
-pub use state::{AppState, CompareMode, Note};
+pub use state::{AppState, CompareMode, Note, Results};
 pub use view_context::ViewContext;
 pub use window::{WindowError, has_display, open, window_options};
 
@@ -57,6 +57,12 @@ impl App {
             help: false,
             pictures: save::Pictures::default(),
         }
+    }
+
+    /// With results of the setup's queries that are known already.
+    pub fn with_results(mut self, results: Results) -> Self {
+        self.state.know_results(results);
+        self
     }
 
     /// The state that the views draw from: the run, the cursor, the camera.

@@ -43,6 +43,9 @@ pub struct KeptRun {
     pub cursor: usize,
 }
 
+/// Results by query.
+pub type Results = BTreeMap<usize, Vec<QueryResult>>;
+
 /// The state of the application: everything that the views draw from.
 pub struct AppState {
     /// What is run: scenes, query, references, parameters.
@@ -87,7 +90,9 @@ pub struct AppState {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: BTreeMap<usize, Vec<QueryResult>>,
+    pub results: Results,
+    /// The results that the window was opened with, which a restored session goes back to.
+    first_results: Results,
 }
 
 /// A place in a run for the cursor, which can be found again in another run.
@@ -191,9 +196,16 @@ impl AppState {
             camera_before: None,
             notes: Vec::new(),
             textures: Textures::default(),
-            results: setup.results.clone(),
+            results: Results::new(),
+            first_results: Results::new(),
             setup,
         }
+    }
+
+    /// Takes results over that were known before the window was opened.
+    pub(super) fn know_results(&mut self, results: Results) {
+        self.results.clone_from(&results);
+        self.first_results = results;
     }
 
     /// The present run.
@@ -334,7 +346,7 @@ impl AppState {
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
-        self.results = setup.results.clone();
+        self.results = self.first_results.clone();
         self.queries = Queries::new(self.ctx.clone());
         self.setup = setup;
         self.params = Arc::new(self.setup.task.params.clone());

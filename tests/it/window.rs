@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, CompareMode, Setup};
+use posescope::app::{App, Command, CompareMode, Results, Setup};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
@@ -40,16 +40,20 @@ pub fn setup() -> Setup {
         index: Arc::default(),
         failure_radius_m: 10.0,
         mode: RunMode::Paused,
-        results: Default::default(),
         folder: std::env::temp_dir(),
     }
 }
 
 /// The window without a graphics card: what it shows is not painted.
 pub fn window(setup: Setup) -> Harness<'static, App> {
+    window_with_results(setup, Results::new())
+}
+
+/// The window with results that are known before it is opened.
+pub fn window_with_results(setup: Setup, results: Results) -> Harness<'static, App> {
     Harness::builder()
         .with_size([1500.0, 950.0])
-        .build_eframe(|creation| App::new(creation, setup))
+        .build_eframe(|creation| App::new(creation, setup).with_results(results))
 }
 
 /// Draws frames until the worker needs somebody.
