@@ -13,6 +13,7 @@ mod camera;
 mod command;
 mod dispatch;
 mod layout;
+mod navigation;
 mod prober;
 mod queries;
 mod save;
@@ -25,14 +26,16 @@ mod theme;
 mod timeline;
 mod transport;
 mod view_context;
+mod view_options;
 pub mod views;
 mod window;
 
 pub use command::{Command, Shortcut, shortcuts};
 pub use setup::{ReferencePick, Setup};
 pub use shown::{ShownReason, ShownView};
-pub use state::{AppState, CompareMode, Note, Results};
+pub use state::{AppState, Note, Results};
 pub use view_context::ViewContext;
+pub use view_options::{CompareMode, ViewOptions};
 pub use window::{WindowError, has_display, open, window_options};
 
 use layout::Layout;

@@ -6,7 +6,7 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 
 use super::camera::{NamedPose, Nudge};
 use super::setup::ReferencePick;
-use super::state::CompareMode;
+use super::view_options::CompareMode;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::method::Method;

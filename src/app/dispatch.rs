@@ -7,7 +7,8 @@ use super::camera::NamedPose;
 use super::command::Command;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
-use super::state::{AppState, CompareMode, KeptRun};
+use super::state::{AppState, KeptRun};
+use super::view_options::CompareMode;
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
@@ -41,11 +42,11 @@ impl App {
             }
             Command::Restart => state.start_run(RunMode::Paused),
             Command::Forward(steps) => state.forward(steps),
-            Command::Back(steps) => state.move_cursor(state.cursor.saturating_sub(steps)),
+            Command::Back(steps) => state.move_cursor(state.cursor().saturating_sub(steps)),
             Command::First => state.move_cursor(0),
             Command::Last => {
                 state.move_cursor(state.run().len());
-                state.follows = true;
+                state.navigation.follow();
             }
             Command::MoveCursor(cursor) => state.move_cursor(cursor),
             Command::SelectMethod(method) => state.select_method(method),
@@ -82,7 +83,7 @@ impl App {
             Command::Pin => {
                 state.kept = Some(KeptRun {
                     run: state.run().clone(),
-                    cursor: state.cursor,
+                    cursor: state.cursor(),
                 });
                 state.note(
                     "This run is kept as A; change a parameter to compare",
@@ -91,26 +92,28 @@ impl App {
             }
             Command::Unpin => {
                 state.kept = None;
-                state.compare_mode = CompareMode::Present;
+                state.options.compare_mode = CompareMode::Present;
             }
             Command::Compare(_) | Command::Flip if state.kept.is_none() => {
                 state.note("There is no run A; keep one first (P)", true);
             }
-            Command::Compare(compare_mode) => state.compare_mode = compare_mode,
+            Command::Compare(compare_mode) => state.options.compare_mode = compare_mode,
             Command::Flip => {
-                state.compare_mode = match state.compare_mode {
+                state.options.compare_mode = match state.options.compare_mode {
                     CompareMode::Kept => CompareMode::Present,
                     CompareMode::Present | CompareMode::SideBySide => CompareMode::Kept,
                 }
             }
-            Command::Blink => state.blinking = !state.blinking,
-            Command::OnlyDifferences => state.only_differences = !state.only_differences,
-            Command::ShowTruth => state.shows_truth = !state.shows_truth,
+            Command::Blink => state.options.blinking = !state.options.blinking,
+            Command::OnlyDifferences => {
+                state.options.only_differences = !state.options.only_differences
+            }
+            Command::ShowTruth => state.options.shows_truth = !state.options.shows_truth,
             Command::Filter => {
-                state.wants_filter = true;
+                state.options.wants_filter = true;
                 self.layout.show(super::views::PARAMETERS);
             }
-            Command::SelectFeature(feature) => state.selected_feature = feature,
+            Command::SelectFeature(feature) => state.options.selected_feature = feature,
             Command::Hover(pose) => state.hovered = pose,
             Command::TakeCamera(pose) => state.camera = pose,
             Command::JumpCamera(place) => state.jump_camera(place),
@@ -198,7 +201,7 @@ impl App {
             Ok(layout) => layout,
             Err(error) => return self.state.note(error.to_string(), true),
         };
-        let saved = SavedSession::new(&self.state.setup, self.state.cursor, layout);
+        let saved = SavedSession::new(&self.state.setup, self.state.cursor(), layout);
         match saved.write(path) {
             Ok(()) => self
                 .state
@@ -230,32 +233,30 @@ impl AppState {
             self.note("The run is over; restart it (Shift+F5)", false);
             return;
         }
-        self.follows = true;
+        self.navigation.follow();
         self.session.set_mode(mode);
     }
 
     fn forward(&mut self, steps: usize) {
         let last = self.run().len().saturating_sub(1);
-        if self.cursor < last {
-            self.move_cursor(self.cursor + steps);
+        if self.cursor() < last {
+            self.move_cursor(self.cursor() + steps);
         } else if matches!(self.run_state(), RunState::Paused { .. }) {
             self.resume(RunMode::StepInto);
         }
     }
 
     fn move_cursor(&mut self, cursor: usize) {
-        self.cursor = cursor.min(self.run().len().saturating_sub(1));
-        self.follows = false;
-        self.anchor = None;
+        self.navigation.move_to(cursor, self.session.run());
     }
 
     fn select_method(&mut self, method: Method) {
         let run = self.run();
-        let here = run.span_at(self.cursor).map(|span| span.part);
+        let here = run.span_at(self.cursor()).map(|span| span.part);
         let part = match here {
             // From fusion to fusion, and from a reference to the same one.
             Some(Part::Fusion(_)) => Part::Fusion(method),
-            _ => Part::Reference(method, run.reference_at(self.cursor)),
+            _ => Part::Reference(method, run.reference_at(self.cursor())),
         };
         let span = run.span_of(part);
         match span.and_then(|span| span.records.end.checked_sub(1)) {
@@ -353,10 +354,10 @@ impl AppState {
     pub(super) fn named_pose(&self, place: NamedPose) -> Option<Pose> {
         let run = self.run();
         let loaded = run.loaded.as_deref()?;
-        let span = run.span_at(self.cursor);
-        let problem = loaded.problems.get(run.reference_at(self.cursor))?;
+        let span = run.span_at(self.cursor());
+        let problem = loaded.problems.get(run.reference_at(self.cursor()))?;
         let minimum = |wanted: Phase| {
-            let events = run.all_until::<PhaseSearched>(self.cursor);
+            let events = run.all_until::<PhaseSearched>(self.cursor());
             let mut latest = events.rev();
             let best = latest
                 .find(|(_, event)| event.surface.lattice.phase == wanted)?

@@ -6,8 +6,9 @@ use eframe::egui_wgpu::RenderState;
 use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
 
 use super::command::{Command, Queue};
-use super::state::{AppState, CompareMode};
+use super::state::AppState;
 use super::view_context::ViewContext;
+use super::view_options::CompareMode;
 use super::views::{self, View};
 
 /// The tree of views, and the views themselves.
@@ -196,7 +197,7 @@ impl Panes<'_> {
         egui::Frame::NONE.inner_margin(6.0).show(ui, |ui| {
             let present = ViewContext::present(self.state, self.commands);
             let kept = ViewContext::kept(self.state, self.commands);
-            match (self.state.compare_mode, kept) {
+            match (self.state.options.compare_mode, kept) {
                 (CompareMode::Kept, Some(kept)) => draw(ui, "A", &mut pair.kept, &kept),
                 (CompareMode::SideBySide, Some(kept)) => ui.columns(2, |columns| {
                     draw(&mut columns[0], "A", &mut pair.kept, &kept);
@@ -251,7 +252,7 @@ impl Behavior<String> for Panes<'_> {
 
 fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, context: &ViewContext<'_>) {
     ui.push_id(run, |ui| {
-        if context.state.kept.is_some() {
+        if context.other_run().is_some() {
             ui.weak(match run {
                 "A" => "A, kept",
                 _ => "B, present",

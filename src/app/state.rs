@@ -3,28 +3,18 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::navigation::Navigation;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
 use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
+use super::view_options::{CompareMode, ViewOptions};
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session};
-
-/// Which of two runs is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CompareMode {
-    /// The present run, B.
-    #[default]
-    Present,
-    /// The run that was kept, A.
-    Kept,
-    /// Both, beside each other.
-    SideBySide,
-}
+use crate::session::{Breakpoints, Run, RunMode, RunState, Session};
 
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,26 +46,11 @@ pub struct AppState {
     frames: Arc<FrameStore>,
     pub(super) session: Session,
     pub(super) ctx: egui::Context,
-    /// Position among the records of the present run.
-    pub cursor: usize,
-    /// Whether the cursor goes along with new records.
-    pub follows: bool,
-    /// Where the cursor is to be once the new run has come so far.
-    pub(super) anchor: Option<Anchor>,
+    pub(super) navigation: Navigation,
     /// The run A, if one was kept.
     pub kept: Option<KeptRun>,
-    /// Which of the runs is shown.
-    pub compare_mode: CompareMode,
-    /// Whether the ground truth is shown.
-    pub shows_truth: bool,
-    /// Whether only what differs is shown.
-    pub only_differences: bool,
-    /// Whether the picture blinks, and which of the two it shows now.
-    pub blinking: bool,
-    /// Whether the keyboard is wanted by the filter.
-    pub wants_filter: bool,
-    /// The query feature that is looked at.
-    pub selected_feature: Option<usize>,
+    /// What is switched on and selected.
+    pub options: ViewOptions,
     /// The pose under the pointer (`world_from_camera`).
     pub hovered: Option<Pose>,
     /// The camera in hand (`world_from_camera`).
@@ -95,80 +70,6 @@ pub struct AppState {
     first_results: Results,
 }
 
-/// A place in a run for the cursor, which can be found again in another run.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Anchor {
-    /// The place by what the estimator was doing there.
-    Stage(StagePosition),
-    /// The place by the number of its record.
-    Record(usize),
-}
-
-impl Anchor {
-    fn find(&self, run: &Run) -> Option<usize> {
-        match self {
-            Self::Stage(position) => position.find(run),
-            Self::Record(record) => (*record < run.len()).then_some(*record),
-        }
-    }
-}
-
-/// What an estimator was doing at a record.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct StagePosition {
-    part: Part,
-    /// The stages around it, by name, the outermost first.
-    stages: Vec<&'static str>,
-    /// How many records into the innermost stage.
-    records_in: usize,
-    /// Whether it was the last record of the stage.
-    is_end: bool,
-}
-
-impl StagePosition {
-    fn of(run: &Run, cursor: usize) -> Option<Self> {
-        let span = run.span_at(cursor)?;
-        let stages: Vec<_> = run.stages_at(cursor).collect();
-        let innermost = stages.last()?;
-        Some(Self {
-            part: span.part,
-            stages: stages.iter().map(|bar| bar.stage.name()).collect(),
-            records_in: cursor - innermost.records.start,
-            is_end: cursor + 1 == innermost.records.end && innermost.succeeded.is_some(),
-        })
-    }
-
-    /// The same place in another run, if the run has come so far.
-    fn find(&self, run: &Run) -> Option<usize> {
-        let span = run.span_of(self.part)?;
-        let inside = |records: &std::ops::Range<usize>| {
-            span.records.start <= records.start && records.end <= span.records.end
-        };
-        let bar = run.stages().iter().find(|bar| {
-            inside(&bar.records)
-                && bar.depth == self.stages.len()
-                && run
-                    .stages_at(bar.records.start)
-                    .map(|bar| bar.stage.name())
-                    .eq(self.stages.iter().copied())
-        });
-        match bar {
-            Some(bar) => {
-                let last = bar.records.end - 1;
-                let wanted = bar.records.start + self.records_in;
-                match (bar.succeeded.is_some(), self.is_end) {
-                    (true, true) => Some(last),
-                    (true, false) => Some(wanted.min(last)),
-                    (false, true) => None,
-                    (false, false) => (wanted <= last).then_some(wanted),
-                }
-            }
-            // The stage is not part of this run: the estimator stopped before it.
-            None => span.result.as_ref().map(|_| span.records.end - 1),
-        }
-    }
-}
-
 impl AppState {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
         let params = Arc::new(setup.task.params.clone());
@@ -181,16 +82,9 @@ impl AppState {
             frames,
             session,
             ctx,
-            cursor: 0,
-            follows: true,
-            anchor: None,
+            navigation: Navigation::default(),
             kept: None,
-            compare_mode: CompareMode::default(),
-            shows_truth: true,
-            only_differences: false,
-            blinking: false,
-            wants_filter: false,
-            selected_feature: None,
+            options: ViewOptions::default(),
             hovered: None,
             camera: None,
             camera_before: None,
@@ -213,6 +107,11 @@ impl AppState {
         self.session.run()
     }
 
+    /// Position among the records of the present run.
+    pub fn cursor(&self) -> usize {
+        self.navigation.cursor()
+    }
+
     /// What the present run is doing.
     pub fn run_state(&self) -> &RunState {
         self.session.state()
@@ -221,7 +120,7 @@ impl AppState {
     /// The place in the kept run that corresponds to the cursor.
     pub(super) fn kept_cursor(&self) -> Option<usize> {
         let kept = self.kept.as_ref()?;
-        let same = StagePosition::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
+        let same = self.navigation.counterpart(self.run(), &kept.run);
         Some(same.unwrap_or(kept.cursor))
     }
 
@@ -251,22 +150,8 @@ impl AppState {
             {
                 self.setup.chosen = chosen.clone();
             }
-            let last = self.session.run().len().saturating_sub(1);
-            if let Some(anchor) = &self.anchor {
-                match anchor.find(self.session.run()) {
-                    Some(at) => {
-                        self.cursor = at;
-                        self.anchor = None;
-                    }
-                    None if !self.session.is_alive() => {
-                        self.cursor = last;
-                        self.anchor = None;
-                    }
-                    None => self.cursor = last,
-                }
-            } else if self.follows {
-                self.cursor = last;
-            }
+            self.navigation
+                .on_records(self.session.run(), self.session.is_alive());
             if was_alive && !self.session.is_alive() {
                 self.on_run_end();
             }
@@ -296,7 +181,7 @@ impl AppState {
 
     fn problem(&self) -> Option<&crate::problem::Problem> {
         let loaded = self.run().loaded.as_deref()?;
-        loaded.problems.get(self.run().reference_at(self.cursor))
+        loaded.problems.get(self.run().reference_at(self.cursor()))
     }
 
     fn on_run_end(&mut self) {
@@ -326,11 +211,9 @@ impl AppState {
         // The run before would go on beside the new one.
         self.session.cancel();
         self.session = start(&self.setup, mode, &self.frames, &self.ctx);
-        self.cursor = 0;
-        self.follows = true;
-        self.anchor = None;
+        self.navigation = Navigation::default();
         self.hovered = None;
-        self.selected_feature = None;
+        self.options.selected_feature = None;
         self.prober.forget();
     }
 
@@ -351,24 +234,22 @@ impl AppState {
         self.setup = setup;
         self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
-        self.compare_mode = CompareMode::default();
+        self.options.compare_mode = CompareMode::default();
         // The scenes are others, even where they have the same names.
         self.frames = Arc::default();
         self.start_run(RunMode::Running);
-        self.follows = false;
-        self.anchor = Some(Anchor::Record(cursor));
+        self.navigation = Navigation::towards_record(cursor);
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
     pub(super) fn restart_run(&mut self) {
         self.stop_queries();
-        let anchor = StagePosition::of(self.run(), self.cursor).map(Anchor::Stage);
-        let follows = self.follows && self.session.is_alive();
+        let is_alive = self.session.is_alive();
+        let navigation = self.navigation.towards_same(self.run(), is_alive);
         self.params = Arc::new(self.setup.task.params.clone());
         self.start_run(RunMode::Running);
-        self.follows = follows;
-        self.anchor = anchor;
+        self.navigation = navigation;
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let run = state.run();
     let last = run.len().saturating_sub(1);
     ui.horizontal(|ui| {
-        let mut cursor = state.cursor;
+        let mut cursor = state.cursor();
         let label = ui.label("Step");
         ui.spacing_mut().slider_width = (ui.available_width() - 420.0).max(120.0);
         let slider = ui
@@ -32,7 +32,7 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
         }
         ui.label(format!("of {last}"));
         let stages: Vec<_> = run
-            .stages_at(state.cursor)
+            .stages_at(state.cursor())
             .map(|bar| bar.stage.name())
             .collect();
         ui.monospace(stages.join(" › "));
@@ -69,7 +69,7 @@ fn lanes(ui: &mut Ui, state: &AppState, commands: &Queue) {
     for bar in run.stages() {
         draw(ui, &painter, bar, rect, x_of);
     }
-    let x = x_of(state.cursor) + 0.5 * rect.width() / count;
+    let x = x_of(state.cursor()) + 0.5 * rect.width() / count;
     let color = ui.visuals().strong_text_color();
     painter.vline(x, rect.y_range(), Stroke::new(2.0, color));
 

@@ -4,8 +4,9 @@ use egui::{Button, RichText, Ui};
 
 use super::command::{Command, Queue};
 use super::setup::ReferencePick;
-use super::state::{AppState, CompareMode};
+use super::state::AppState;
 use super::theme;
+use super::view_options::CompareMode;
 use crate::localize::Selection;
 use crate::method::Method;
 use crate::session::RunState;
@@ -159,7 +160,7 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
 fn methods(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let here = state
         .run()
-        .span_at(state.cursor)
+        .span_at(state.cursor())
         .and_then(|span| span.part.method());
     let asked = state.setup.task.protocol.methods.iter().copied();
     let others = asked.filter(|method| !Method::PAPER.contains(method));
@@ -190,17 +191,23 @@ fn switches(ui: &mut Ui, state: &AppState, commands: &Queue) {
         }
     };
     let help = "Show the ground truth (G)";
-    switch(ui, state.shows_truth, "Truth", help, Command::ShowTruth);
+    switch(
+        ui,
+        state.options.shows_truth,
+        "Truth",
+        help,
+        Command::ShowTruth,
+    );
     let help = "Show only what differs (D)";
     switch(
         ui,
-        state.only_differences,
+        state.options.only_differences,
         "Differences",
         help,
         Command::OnlyDifferences,
     );
     let help = "Blink between query and synthetic view (B)";
-    switch(ui, state.blinking, "Blink", help, Command::Blink);
+    switch(ui, state.options.blinking, "Blink", help, Command::Blink);
 }
 
 fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
@@ -224,7 +231,7 @@ fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
             "Show both beside each other",
         ),
     ] {
-        let response = ui.selectable_label(state.compare_mode == compare_mode, text);
+        let response = ui.selectable_label(state.options.compare_mode == compare_mode, text);
         if response.on_hover_text(help).clicked() {
             commands.send(Command::Compare(compare_mode));
         }

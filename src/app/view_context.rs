@@ -2,9 +2,15 @@
 
 use std::sync::Arc;
 
+use super::camera::NamedPose;
 use super::command::{Command, Queue};
+use super::prober::Probe;
+use super::queries::Queries;
+use super::setup::Setup;
 use super::shown::{ShownReason, ShownView};
-use super::state::AppState;
+use super::state::{AppState, Results};
+use super::textures::Textures;
+use super::view_options::ViewOptions;
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
@@ -12,42 +18,106 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::{Part, Run, Span};
 
-/// A run at a cursor, with the application's state around it.
+/// A run at a cursor, and what else of the application's state a view draws from.
 #[derive(Clone, Copy)]
 pub struct ViewContext<'a> {
     /// The run that is shown: the present one, or A.
     pub run: &'a Run,
     /// Position among its records.
     pub cursor: usize,
-    /// Everything else: the camera in hand, what is switched on.
-    pub state: &'a AppState,
-    pub(super) commands: &'a Queue,
+    /// What is run: scenes, query, references, parameters.
+    pub setup: &'a Setup,
+    /// What is switched on and selected.
+    pub options: &'a ViewOptions,
+    /// Pictures on the graphics card.
+    pub textures: &'a Textures,
+    /// Thumbnails, and how far the run over all queries is.
+    pub queries: &'a Queries,
+    /// Results of the queries that were run, by query.
+    pub results: &'a Results,
+    state: &'a AppState,
+    commands: &'a Queue,
 }
 
 impl<'a> ViewContext<'a> {
-    /// The present run at the cursor.
-    pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
+    fn new(run: &'a Run, cursor: usize, state: &'a AppState, commands: &'a Queue) -> Self {
         Self {
-            run: state.run(),
-            cursor: state.cursor,
+            run,
+            cursor,
+            setup: &state.setup,
+            options: &state.options,
+            textures: &state.textures,
+            queries: &state.queries,
+            results: &state.results,
             state,
             commands,
         }
     }
 
+    /// The present run at the cursor.
+    pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
+        Self::new(state.run(), state.cursor(), state, commands)
+    }
+
     /// The kept run at the place that corresponds to the cursor.
     pub(super) fn kept(state: &'a AppState, commands: &'a Queue) -> Option<Self> {
-        Some(Self {
-            run: &state.kept.as_ref()?.run,
-            cursor: state.kept_cursor()?,
-            state,
-            commands,
+        let (kept, cursor) = (state.kept.as_ref()?, state.kept_cursor()?);
+        Some(Self::new(&kept.run, cursor, state, commands))
+    }
+
+    /// Whether the run that is shown is the present one, whose parameters can be changed.
+    pub fn is_present(&self) -> bool {
+        std::ptr::eq(self.run, self.state.run())
+    }
+
+    /// The run that this one is compared with: A beside the present one, and the other way round.
+    pub fn other_run(&self) -> Option<&'a Run> {
+        let kept = &self.state.kept.as_ref()?.run;
+        Some(if self.is_present() {
+            kept
+        } else {
+            self.state.run()
         })
     }
 
     /// Asks for something to be done after this frame.
     pub fn send(&self, command: Command) {
         self.commands.send(command);
+    }
+
+    /// Whether a method is known to fail on a query.
+    pub fn has_failed(&self, query: usize) -> bool {
+        self.state.has_failed(query)
+    }
+
+    /// The camera in hand (`world_from_camera`).
+    pub fn camera(&self) -> Option<Pose> {
+        self.state.camera
+    }
+
+    /// The pose under the pointer (`world_from_camera`).
+    pub fn hovered(&self) -> Option<Pose> {
+        self.state.hovered
+    }
+
+    /// A pose that the present run's search knows by name (`world_from_camera`).
+    pub fn named_pose(&self, name: NamedPose) -> Option<Pose> {
+        self.state.named_pose(name)
+    }
+
+    /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
+    pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
+        self.state.looking_at()
+    }
+
+    /// What is known about the pose that was asked for last.
+    pub fn probe(&self) -> Option<&'a Probe> {
+        self.state.probe()
+    }
+
+    /// Whether the answer for the pose that is looked at is still worked out.
+    pub fn is_probing(&self) -> bool {
+        self.state.is_probing()
     }
 
     /// The part of the run that the cursor is in.
@@ -73,7 +143,7 @@ impl<'a> ViewContext<'a> {
 
     /// The true pose of the query, if it is known and shown.
     pub fn truth(&self) -> Option<&'a Pose> {
-        if !self.state.shows_truth {
+        if !self.options.shows_truth {
             return None;
         }
         self.run.loaded.as_deref()?.truth.as_ref()
@@ -112,7 +182,7 @@ impl<'a> ViewContext<'a> {
     /// The methods whose cost can be looked at: those of this run that search one, those of the paper
     /// where there are none.
     pub fn direct_methods(&self) -> Vec<Method> {
-        self.state.setup.direct_methods()
+        self.setup.direct_methods()
     }
 
     /// The direct method whose pictures are shown: that at the cursor, for the others that inside a
@@ -147,8 +217,8 @@ impl<'a> ViewContext<'a> {
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
-        if let Some((pose, at)) = self.state.looking_at()
-            && let Some(probe) = self.state.probe()
+        if let Some((pose, at)) = self.looking_at()
+            && let Some(probe) = self.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.
@@ -196,7 +266,7 @@ impl<'a> ViewContext<'a> {
             best: assessed.map(|assessed| assessed.best),
             truth: report
                 .and_then(|report| report.truth)
-                .filter(|_| self.state.shows_truth),
+                .filter(|_| self.options.shows_truth),
         }
     }
 }

@@ -37,13 +37,13 @@ fn order(window: &mut Harness<'_, App>, command: Command) {
 
 fn latest<E: DebugEvent + Clone + 'static>(window: &Harness<'_, App>) -> E {
     let state = window.state().app_state();
-    let event: Option<&E> = state.run().latest(state.cursor);
+    let event: Option<&E> = state.run().latest(state.cursor());
     event.expect("it was told").clone()
 }
 
 fn query_features(window: &Harness<'_, App>) -> Arc<Features> {
     let state = window.state().app_state();
-    let mut events = state.run().all_until::<FeaturesDetected>(state.cursor);
+    let mut events = state.run().all_until::<FeaturesDetected>(state.cursor());
     let event = events.find(|(_, event)| event.side == Side::Query);
     Arc::clone(&event.expect("detected").1.features)
 }
@@ -114,7 +114,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
     window.step();
     window.get_by_label(&format!("inlier: {inliers}, hidden"));
     click(&mut window, place);
-    let selected = window.state().app_state().selected_feature;
+    let selected = window.state().app_state().options.selected_feature;
     let is_inlier = |i: usize| matches!(states[i], FeatureState::Inlier { .. });
     assert!(!selected.is_some_and(is_inlier), "it is hidden");
 
@@ -132,7 +132,10 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     let mut window = finished(Method::FB, "images");
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
-    assert_eq!(window.state().app_state().selected_feature, Some(feature));
+    assert_eq!(
+        window.state().app_state().options.selected_feature,
+        Some(feature)
+    );
     window.get_by_label(&format!("query feature {feature}: inlier"));
 
     let decisions = latest::<MatchesDecided>(&window).decisions;
@@ -157,7 +160,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     window.get_by_label("Close feature").click();
     window.step();
     window.step();
-    assert_eq!(window.state().app_state().selected_feature, None);
+    assert_eq!(window.state().app_state().options.selected_feature, None);
 }
 
 #[test]

@@ -336,7 +336,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
         .get_by_label_contains("log likelihood by trial")
         .click();
     window.run_steps(3);
-    let cursor = window.state().app_state().cursor;
+    let cursor = window.state().app_state().cursor();
     let place = trials.iter().position(|(at, _)| *at == cursor);
     let place = place.expect("the cursor is at a trial");
     let middle = trials.len() / 2;

@@ -107,7 +107,7 @@ fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event
     });
     run_until_idle(window);
     let state = window.state().app_state();
-    state.run().records()[state.cursor].event.clone()
+    state.run().records()[state.cursor()].event.clone()
 }
 
 /// Whether some label of the window holds these words.
@@ -191,18 +191,18 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
         window.state_mut().send(Command::MoveCursor(cursor));
         window.step();
         window.step();
-        assert_eq!(window.state().app_state().cursor, cursor);
+        assert_eq!(window.state().app_state().cursor(), cursor);
     }
     assert_eq!(window.state().app_state().run().len(), last + 1);
     press(&mut window, Modifiers::NONE, Key::Home);
-    assert_eq!(window.state().app_state().cursor, 0);
+    assert_eq!(window.state().app_state().cursor(), 0);
     press(&mut window, Modifiers::SHIFT, Key::ArrowRight);
-    assert_eq!(window.state().app_state().cursor, 10);
+    assert_eq!(window.state().app_state().cursor(), 10);
     press(&mut window, Modifiers::NONE, Key::ArrowLeft);
-    assert_eq!(window.state().app_state().cursor, 9);
+    assert_eq!(window.state().app_state().cursor(), 9);
     press(&mut window, Modifiers::NONE, Key::Num3);
     let state = window.state().app_state();
-    let span = state.run().span_at(state.cursor).expect("in a span");
+    let span = state.run().span_at(state.cursor()).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
 }
 
@@ -258,9 +258,9 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     window.step();
     assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let state = window.state().app_state();
-    let span = state.run().span_at(state.cursor).expect("in a span");
+    let span = state.run().span_at(state.cursor()).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
-    assert_eq!(state.cursor + 1, span.records.end);
+    assert_eq!(state.cursor() + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
         let bars = state.run().stages().iter();
         bars.filter(|bar| bar.stage.name() == name)
@@ -291,7 +291,10 @@ fn two_settings_are_compared_and_their_differences_marked() {
     window.step();
     assert!(window.query_all_by_label_contains("≠").next().is_some());
     press(&mut window, Modifiers::NONE, Key::X);
-    assert_eq!(window.state().app_state().compare_mode, CompareMode::Kept);
+    assert_eq!(
+        window.state().app_state().options.compare_mode,
+        CompareMode::Kept
+    );
     window
         .state_mut()
         .send(Command::Compare(CompareMode::SideBySide));
@@ -412,7 +415,7 @@ fn a_session_is_saved_and_restored() {
     let state = window.state().app_state();
     assert_eq!(state.setup.query, 1);
     assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
-    assert_eq!(state.cursor, 40);
+    assert_eq!(state.cursor(), 40);
     std::fs::write(&path, "{}").expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();

@@ -14,7 +14,7 @@ pub struct BreakpointsView {
 
 impl View for BreakpointsView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let breakpoints = context.state.setup.task.breakpoints.iter();
+        let breakpoints = context.setup.task.breakpoints.iter();
         let breakpoints: Vec<String> = breakpoints.map(ToString::to_string).collect();
         let parsed = self.text.parse::<Breakpoint>();
         let mut is_added = false;

@@ -59,15 +59,7 @@ fn told<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a ReferencesFuse
             })
             .collect()
     };
-    let others = context
-        .state
-        .setup
-        .task
-        .protocol
-        .methods
-        .iter()
-        .copied()
-        .rev();
+    let others = context.setup.task.protocol.methods.iter().copied().rev();
     context
         .method()
         .into_iter()

@@ -99,10 +99,9 @@ fn caption(ui: &mut Ui, context: &ViewContext<'_>, shown: &ShownView) {
         }
         ui.weak(words);
         let is_old = context
-            .state
             .looking_at()
             .is_some_and(|(pose, _)| pose != shown.pose);
-        if is_old && context.state.is_probing() {
+        if is_old && context.is_probing() {
             ui.label(RichText::new("the next one is worked out").italics());
         }
     });

@@ -24,7 +24,6 @@ use super::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext};
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::session::Run;
 
 /// How strong features are drawn while the pointer is on another one.
 const PALE: f32 = 0.2;
@@ -69,7 +68,10 @@ impl View for ImagesView {
             funnel::ui(ui, &counts, &mut self.shown);
         }
 
-        let selected = context.state.selected_feature.filter(|&i| i < kinds.len());
+        let selected = context
+            .options
+            .selected_feature
+            .filter(|&i| i < kinds.len());
         let area = ui.available_rect_before_wrap();
         let (pictures, panel) = match selected {
             Some(_) => {
@@ -138,7 +140,7 @@ impl ImagesView {
         ui.horizontal_wrapped(|ui| {
             ui.label(summary(progress));
             self.pan_zoom.ui(ui);
-            if context.state.only_differences {
+            if context.options.only_differences {
                 ui.weak(match differing {
                     Some(differing) => {
                         let count = differing.iter().filter(|differs| **differs).count();
@@ -164,21 +166,10 @@ fn summary(progress: &FeatureProgress<'_>) -> String {
     }
 }
 
-/// The run that this one is compared with.
-fn other_run<'a>(context: &ViewContext<'a>) -> Option<&'a Run> {
-    let state = context.state;
-    let kept = &state.kept.as_ref()?.run;
-    Some(if std::ptr::eq(context.run, state.run()) {
-        kept
-    } else {
-        state.run()
-    })
-}
-
 /// Which features differ from the other run, where only those are wanted.
 fn differing(context: &ViewContext<'_>, progress: &FeatureProgress<'_>) -> Option<Vec<bool>> {
-    let wanted = context.state.only_differences;
-    let other = other_run(context).filter(|_| wanted)?;
+    let wanted = context.options.only_differences;
+    let other = context.other_run().filter(|_| wanted)?;
     let other = FeatureProgress::counterpart(context, progress.method?, other)?;
     Some(progress.differing(&other))
 }
@@ -211,7 +202,7 @@ fn point_at(
 ) -> Option<usize> {
     let over = photos.into_iter().find(|photo| photo.response.hovered())?;
     let hovered = visible.nearest(over.response.hover_pos()?);
-    if over.response.clicked() && context.state.selected_feature != hovered {
+    if over.response.clicked() && context.options.selected_feature != hovered {
         context.send(Command::SelectFeature(hovered));
     }
     if let Some(feature) = hovered {

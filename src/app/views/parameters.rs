@@ -17,14 +17,14 @@ pub struct ParametersView {
 
 impl View for ParametersView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let present = std::ptr::eq(context.run, context.state.run());
+        let present = context.is_present();
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.filter).hint_text("Filter (/)");
             let response = ui.add(edit.desired_width(150.0));
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Filter parameters")
             });
-            if context.state.wants_filter {
+            if context.options.wants_filter {
                 response.request_focus();
             }
             let help = "All parameters to their defaults";
@@ -33,14 +33,10 @@ impl View for ParametersView {
             }
         });
         let mut params = match present {
-            true => context.state.setup.task.params.clone(),
+            true => context.setup.task.params.clone(),
             false => context.run.params.clone(),
         };
-        let other = match (&context.state.kept, present) {
-            (Some(kept), true) => Some(kept.run.params.clone()),
-            (Some(_), false) => Some(context.state.run().params.clone()),
-            (None, _) => None,
-        };
+        let other = context.other_run().map(|run| run.params.clone());
         let reference = other.clone().unwrap_or_default();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.add_enabled_ui(present, |ui| {
@@ -68,7 +64,7 @@ impl ParametersView {
             let differs = row.value != references[index].value;
             (row.key.to_lowercase().contains(&filter)
                 || row.about.help().to_lowercase().contains(&filter))
-                && (differs || !context.state.only_differences)
+                && (differs || !context.options.only_differences)
         };
         let shown: Vec<bool> = (0..rows.len()).map(is_shown).collect();
         if !shown.contains(&true) {

@@ -4,7 +4,6 @@ use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
-use crate::app::state::AppState;
 use crate::app::{Command, ViewContext, theme};
 use crate::estimator;
 use crate::event::Side;
@@ -18,9 +17,8 @@ pub struct QueriesView {
 
 impl View for QueriesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let state = context.state;
         ui.horizontal(|ui| {
-            let (text, help) = match state.queries.progress() {
+            let (text, help) = match context.queries.progress() {
                 Some((done, all)) => (format!("Stop ({done} of {all})"), "Stop"),
                 None => (
                     "Run all".to_owned(),
@@ -31,19 +29,19 @@ impl View for QueriesView {
                 context.send(Command::RunAllQueries);
             }
             ui.checkbox(&mut self.only_failures, "Failures only");
-            let failed = state
+            let failed = context
                 .results
                 .keys()
-                .filter(|query| state.has_failed(**query));
+                .filter(|query| context.has_failed(**query));
             let failed = failed.count();
-            ui.weak(format!("{failed} of {} failed", state.results.len()));
+            ui.weak(format!("{failed} of {} failed", context.results.len()));
         });
-        let shown: Vec<usize> = state
+        let shown: Vec<usize> = context
             .setup
             .offered
             .iter()
             .copied()
-            .filter(|query| !self.only_failures || state.has_failed(*query))
+            .filter(|query| !self.only_failures || context.has_failed(*query))
             .collect();
         ScrollArea::vertical().auto_shrink(false).show_rows(
             ui,
@@ -59,25 +57,24 @@ impl View for QueriesView {
 }
 
 fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize) {
-    let state = context.state;
-    let name = &state.setup.queries.frames()[query];
-    let is_here = query == state.setup.query;
+    let name = &context.setup.queries.frames()[query];
+    let is_here = query == context.setup.query;
     ui.horizontal(|ui| {
-        thumbnail(ui, state, Side::Query, query);
+        thumbnail(ui, context, Side::Query, query);
         ui.vertical(|ui| {
             let text = RichText::new(name).monospace();
             if ui.selectable_label(is_here, text).clicked() {
                 context.send(Command::SelectQuery(query));
             }
-            let results = state.results.get(&query).map_or(&[][..], Vec::as_slice);
-            ui.horizontal(|ui| dots(ui, state, results));
+            let results = context.results.get(&query).map_or(&[][..], Vec::as_slice);
+            ui.horizontal(|ui| dots(ui, context, results));
         });
     });
 }
 
 /// One mark per method: what it is tells the shape too.
-pub(super) fn dots(ui: &mut Ui, state: &AppState, results: &[QueryResult]) {
-    let failure_radius_m = state.setup.failure_radius_m;
+pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
+    let failure_radius_m = context.setup.failure_radius_m;
     ui.spacing_mut().item_spacing.x = 2.0;
     for method in estimator::methods() {
         for result in results.iter().filter(|r| r.method == method) {
@@ -87,7 +84,7 @@ pub(super) fn dots(ui: &mut Ui, state: &AppState, results: &[QueryResult]) {
                 Verdict::Near => ("●", theme::TRUTH),
                 Verdict::Unmeasured => ("●", theme::REFERENCE),
             };
-            let words = match state.shows_truth {
+            let words = match context.options.shows_truth {
                 true => format!("{}: {}", method.name(), result.words(failure_radius_m)),
                 false => method.name().to_owned(),
             };

@@ -38,7 +38,7 @@ impl View for ReferencesView {
         choice(ui, context);
         fusions(ui, context);
         ui.separator();
-        let setup = &context.state.setup;
+        let setup = context.setup;
         let nearby = self.nearby(context);
         let (frames, radius_m) = (&nearby.frames, nearby.radius_m);
         // Those that were named may be farther away than the radius.
@@ -66,7 +66,7 @@ impl View for ReferencesView {
 impl ReferencesView {
     /// Looking for them in a long scene at every frame would be too slow.
     fn nearby(&mut self, context: &ViewContext<'_>) -> &Nearby {
-        let setup = &context.state.setup;
+        let setup = context.setup;
         let radius_m = setup.task.reach_m();
         let is_known = self.nearby.as_ref().is_some_and(|nearby| {
             nearby.query == setup.query
@@ -84,7 +84,7 @@ impl ReferencesView {
 }
 
 fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
-    let setup = &context.state.setup;
+    let setup = context.setup;
     let name = |pick: ReferencePick| match pick {
         ReferencePick::ByHand => "by hand",
         ReferencePick::By(selection) => WAYS
@@ -129,7 +129,7 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
 }
 
 fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
-    let setup = &context.state.setup;
+    let setup = context.setup;
     ui.horizontal(|ui| {
         ui.label("Fuse");
         let present = &setup.task.protocol.fusions;
@@ -149,8 +149,7 @@ fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
 }
 
 fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
-    let state = context.state;
-    let setup = &state.setup;
+    let setup = context.setup;
     let name = &setup.references.frames()[frame];
     ui.horizontal(|ui| {
         let mut is_used = setup.chosen.frames.contains(&frame);
@@ -165,7 +164,7 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
             }
             context.send(Command::SetReferences(frames));
         }
-        thumbnail(ui, state, Side::Reference, frame);
+        thumbnail(ui, context, Side::Reference, frame);
         ui.vertical(|ui| {
             ui.label(RichText::new(name).monospace().color(theme::REFERENCE));
             ui.horizontal(|ui| {
@@ -175,7 +174,7 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
                     .filter(|result| result.fusion.is_none() && result.references == [name.clone()])
                     .cloned()
                     .collect();
-                dots(ui, state, &results);
+                dots(ui, context, &results);
                 if let Some(words) = distance(context, frame) {
                     ui.weak(words);
                 }
@@ -186,12 +185,12 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
 
 /// How far a reference is from the query, which tells the truth.
 fn distance(context: &ViewContext<'_>, frame: usize) -> Option<String> {
-    let setup = &context.state.setup;
+    let setup = context.setup;
     let reference = setup.references.pose(frame)?;
     let query = setup.queries.pose(setup.query)?;
     let error = PoseError::between(&query, &reference);
     context
-        .state
+        .options
         .shows_truth
         .then(|| format!("{}, {} away", error.translation(), error.rotation()))
 }

@@ -3,7 +3,6 @@
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::state::{AppState, CompareMode};
 use crate::app::{ViewContext, theme};
 use crate::localize::{QueryResult, Verdict};
 use crate::session::Span;
@@ -31,12 +30,7 @@ impl View for ReportView {
 
 /// The results of the run that this one is compared with.
 fn other_results<'a>(context: &ViewContext<'a>) -> Vec<&'a QueryResult> {
-    let state = context.state;
-    let other = match &state.kept {
-        Some(kept) if std::ptr::eq(context.run, state.run()) => Some(&kept.run),
-        Some(_) if state.compare_mode != CompareMode::Present => Some(state.run()),
-        _ => None,
-    };
+    let other = context.other_run();
     other.map_or(Vec::new(), |run| run.results().collect())
 }
 
@@ -88,19 +82,19 @@ fn name(ui: &mut Ui, span: &Span) {
 }
 
 /// The verdict in words and its colour. An error tells the ground truth, which may be hidden.
-fn verdict(result: &QueryResult, state: &AppState) -> (String, Option<Color32>) {
-    let failure_radius_m = state.setup.failure_radius_m;
+fn verdict(result: &QueryResult, context: &ViewContext<'_>) -> (String, Option<Color32>) {
+    let failure_radius_m = context.setup.failure_radius_m;
     let words = result.words(failure_radius_m);
     match result.verdict(failure_radius_m) {
         Verdict::NoPose => (format!("× {words}"), Some(theme::ESTIMATE)),
-        _ if !state.shows_truth => ("a pose".to_owned(), None),
+        _ if !context.options.shows_truth => ("a pose".to_owned(), None),
         Verdict::Far => (format!("▲ {words}"), Some(theme::FAR)),
         Verdict::Near | Verdict::Unmeasured => (words, None),
     }
 }
 
 fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
-    let shows_truth = context.state.shows_truth;
+    let shows_truth = context.options.shows_truth;
     Grid::new("verdicts").striped(true).show(ui, |ui| {
         heading(ui, &["method", "reference", "result"]);
         let parts = context.run.spans().iter();
@@ -112,8 +106,8 @@ fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
                 continue;
             };
             ui.label(result.references.join(", "));
-            let (text, color) = verdict(result, context.state);
-            let other = counterpart(span, others).map(|other| verdict(other, context.state).0);
+            let (text, color) = verdict(result, context);
+            let other = counterpart(span, others).map(|other| verdict(other, context).0);
             let marked = other.is_some_and(|other| other != text);
             let text = RichText::new(if marked { format!("{text} ≠") } else { text });
             ui.label(color.map_or(text.clone(), |color| text.color(color)));
@@ -174,7 +168,7 @@ fn costs(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
     if spans.peek().is_none() {
         return;
     }
-    let shows_truth = context.state.shows_truth;
+    let shows_truth = context.options.shows_truth;
     Grid::new("costs").striped(true).show(ui, |ui| {
         let columns = [
             "costs",

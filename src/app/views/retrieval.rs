@@ -133,7 +133,7 @@ fn photos(
         ui.weak("There is no picture of this frame");
         return;
     };
-    let (ctx, textures) = (ui.ctx(), &context.state.textures);
+    let (ctx, textures) = (ui.ctx(), context.textures);
     let query = textures.of(ctx, "photo", &problem.query, |query| {
         color_image(&picture::photo(&query.photo))
     });

@@ -99,7 +99,7 @@ impl View for SpaceView {
         let looks = ui.horizontal_wrapped(|ui| {
             controls::looks(
                 ui,
-                &context.state.setup.task.protocol.methods,
+                &context.setup.task.protocol.methods,
                 &mut self.layers,
                 &content.cameras,
                 through,
@@ -127,7 +127,7 @@ impl SpaceView {
         };
         SceneContent {
             cameras: cameras::cameras(context, geometry, &features, &search),
-            rays: rays::rays(geometry, &features, context.state.selected_feature),
+            rays: rays::rays(geometry, &features, context.options.selected_feature),
             search: CostGround::new(&search, &context.run.params.grid).with_relief(relief_m),
             path: search.path,
         }
@@ -163,7 +163,7 @@ impl SpaceView {
 
     fn blink(&mut self, ui: &Ui, context: &ViewContext<'_>) {
         let Some(next) = self.next_flip else { return };
-        if context.state.camera.is_none() || context.state.named_pose(NamedPose::Last).is_none() {
+        if context.camera().is_none() || context.named_pose(NamedPose::Last).is_none() {
             self.next_flip = None;
             return;
         }
@@ -407,7 +407,7 @@ impl SpaceView {
         let Some(problem) = context.problem() else {
             return;
         };
-        let (ctx, textures) = (ui.ctx(), &context.state.textures);
+        let (ctx, textures) = (ui.ctx(), context.textures);
         let texture = match camera.kind.is_query() {
             true => textures.of(ctx, "photo in space", &problem.query, |query| {
                 color_image(&picture::photo(&query.photo))

@@ -146,7 +146,7 @@ impl SurfaceView {
             if ui.button("Reset floor").clicked() {
                 self.floor = None;
             }
-            let is_present = std::ptr::eq(context.run, context.state.run());
+            let is_present = context.is_present();
             let apply = ui.add_enabled(is_present, egui::Button::new("Run with this floor"));
             if apply.on_hover_text("Sets grid.coverage_floor").clicked() {
                 context.send(Command::SetParam {
@@ -181,7 +181,7 @@ impl SurfaceView {
     /// Says where the pointer is, once when it comes and once when it leaves.
     fn hover(&mut self, context: &ViewContext<'_>, pointed_at: Option<Pose>) {
         if pointed_at.is_some() {
-            if context.state.hovered != pointed_at {
+            if context.hovered() != pointed_at {
                 context.send(Command::Hover(pointed_at));
             }
         } else if self.is_hovering {

@@ -97,7 +97,7 @@ impl SynthesisView {
                     self.mode = mode;
                 }
             }
-            let mut blinks = context.state.blinking;
+            let mut blinks = context.options.blinking;
             let blink = ui.toggle_value(&mut blinks, "Blink");
             let help = "Query and picture in turn (B)";
             let blink = blink.accessible_name("Blink pictures").on_hover_text(help);
@@ -133,7 +133,7 @@ impl SynthesisView {
         shown: Option<&ShownView>,
     ) {
         let area = ui.available_rect_before_wrap();
-        let (mode, blinks) = match (shown, context.state.blinking) {
+        let (mode, blinks) = match (shown, context.options.blinking) {
             (None, _) => (Mode::Query, false),
             (Some(_), true) => (blinking(ui, self.mode), true),
             (Some(_), false) => (self.mode, false),
@@ -189,7 +189,7 @@ fn blinking(ui: &Ui, mode: Mode) -> Mode {
 
 /// The query in grey values, as the costs see it but for their smoothing.
 fn gray_query(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> TextureHandle {
-    let textures = &context.state.textures;
+    let textures = context.textures;
     textures.of(ui.ctx(), "gray photo", &problem.query, |query| {
         color_image(&query.photo.gray.clone().into())
     })
@@ -208,7 +208,7 @@ fn caption(
     ui.horizontal_wrapped(|ui| {
         ui.strong(format!("{name}, {}", shown.at.name()));
         ui.label(place);
-        if context.state.is_probing() {
+        if context.is_probing() {
             ui.weak("the pose asked for is being worked out");
         }
     });
@@ -267,10 +267,7 @@ fn covered_at_reference(context: &ViewContext<'_>, method: Method) -> Option<u32
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods
 /// where a pose of one's own was tried.
 fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &ShownView) {
-    let probe = context
-        .state
-        .looking_at()
-        .and_then(|_| context.state.probe());
+    let probe = context.looking_at().and_then(|_| context.probe());
     match probe {
         Some(probe) => {
             for (method, comparison) in &probe.comparisons {

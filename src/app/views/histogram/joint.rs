@@ -33,7 +33,6 @@ pub(super) fn ui(
     let sees = cost.map_or("value", |cost| cost.sees);
     let margins = Margins::of(histogram);
     let texture = context
-        .state
         .textures
         .of(ui.ctx(), "joint histogram", shown, |_| {
             let picture = picture::joint_histogram(histogram).into();

@@ -31,7 +31,7 @@ pub(super) struct Photos {
 impl Photos {
     pub(super) fn of(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> Self {
         let image = |photo: &Photo| color_image(&picture::photo(photo));
-        let (ctx, textures) = (ui.ctx(), &context.state.textures);
+        let (ctx, textures) = (ui.ctx(), context.textures);
         let query = textures.of(ctx, "photo", &problem.query, |query| image(&query.photo));
         let reference = textures.of(ctx, "photo", &problem.reference, |tuple| {
             image(&tuple.photo)

@@ -53,7 +53,7 @@ impl<'a> FeatureProgress<'a> {
         let part = match context.method().filter(|&here| with_features(here)) {
             Some(here) => context.of(here),
             None => {
-                let mut asked = context.state.setup.task.protocol.methods.iter().copied();
+                let mut asked = context.setup.task.protocol.methods.iter().copied();
                 asked.find_map(|method| with_features(method).then(|| context.of(method))?)
             }
         };

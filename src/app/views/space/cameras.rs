@@ -198,7 +198,7 @@ pub(super) fn cameras(
         problem.reference.world_from_camera,
     )];
     all.extend(truth.map(|pose| camera(CameraKind::Truth, *pose)));
-    for &method in &context.state.setup.task.protocol.methods {
+    for &method in &context.setup.task.protocol.methods {
         if let Some(pose) = estimate(context, method) {
             all.push(camera(CameraKind::Estimate(method), pose));
         }
@@ -211,16 +211,10 @@ pub(super) fn cameras(
     );
     all.extend(
         context
-            .state
-            .hovered
+            .hovered()
             .map(|pose| camera(CameraKind::Pointer, pose)),
     );
-    all.extend(
-        context
-            .state
-            .camera
-            .map(|pose| camera(CameraKind::Hand, pose)),
-    );
+    all.extend(context.camera().map(|pose| camera(CameraKind::Hand, pose)));
     all
 }
 

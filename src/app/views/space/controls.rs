@@ -129,8 +129,8 @@ pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Opt
         let key = key.map_or(String::new(), |shortcut| {
             ui.ctx().format_shortcut(&shortcut.keys)
         });
-        let is_there = context.state.named_pose(place).is_some()
-            && (place != NamedPose::Truth || context.state.shows_truth);
+        let is_there = context.named_pose(place).is_some()
+            && (place != NamedPose::Truth || context.options.shows_truth);
         let mut text = egui::text::LayoutJob::default();
         let style = ui.style();
         RichText::new(place.name()).append_to(
@@ -152,8 +152,7 @@ pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Opt
         }
     }
     let mut request = None;
-    let can_blink =
-        context.state.camera.is_some() && context.state.named_pose(NamedPose::Last).is_some();
+    let can_blink = context.camera().is_some() && context.named_pose(NamedPose::Last).is_some();
     let response = ui.add_enabled(
         can_blink || blinks,
         egui::Button::selectable(blinks, "Blink poses"),
@@ -166,7 +165,7 @@ pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Opt
     {
         request = Some(ViewRequest::Blink);
     }
-    let release = ui.add_enabled(context.state.camera.is_some(), egui::Button::new("Let go"));
+    let release = ui.add_enabled(context.camera().is_some(), egui::Button::new("Let go"));
     let release = release.on_hover_text("Put the camera in hand away (Esc)");
     if release.clicked() {
         context.send(Command::TakeCamera(None));

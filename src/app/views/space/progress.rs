@@ -137,7 +137,7 @@ impl<'a> SearchProgress<'a> {
 pub(super) fn colored<'a>(context: &ViewContext<'a>) -> Option<&'a Arc<ColoredCloud>> {
     let here = context.latest::<CloudColored>();
     let other = || {
-        let methods = context.state.setup.task.protocol.methods.iter();
+        let methods = context.setup.task.protocol.methods.iter();
         methods
             .copied()
             .find_map(|method| context.latest_of::<CloudColored>(method))

@@ -125,7 +125,7 @@ impl Maps {
             offset,
         } = pointed_at?;
         let pose = shown.search.pose(&offset);
-        if takes_camera && context.state.camera != Some(pose) {
+        if takes_camera && context.camera() != Some(pose) {
             context.send(Command::TakeCamera(Some(pose)));
         }
         let searched = shown.search.positions().nth(lattice)?;

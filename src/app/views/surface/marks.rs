@@ -106,7 +106,7 @@ impl Mark {
                 "FB's estimate",
             ),
             (MarkKind::Truth, context.truth().copied(), "truth"),
-            (MarkKind::Camera, context.state.camera, "camera in hand"),
+            (MarkKind::Camera, context.camera(), "camera in hand"),
         ];
         for (kind, pose, name) in cameras {
             if let Some(pose) = pose {

@@ -234,7 +234,7 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, shown: &Search<'_>, floor: f64) -> 
     });
     let truth = context.truth().map(|pose| shown.offset(pose));
     let hypothesis = shown.hypothesis.map(|scored| scored.offset);
-    let camera = context.state.camera.map(|pose| shown.offset(&pose));
+    let camera = context.camera().map(|pose| shown.offset(&pose));
     let strong = ui.visuals().strong_text_color();
     let dashed = LineStyle::dashed_loose();
     [
