@@ -19,7 +19,7 @@ mod tables;
 
 pub use diff::{Change, Difference, RunComparison, Tolerance};
 #[cfg(feature = "cli")]
-pub use export::{Choice, Export, ExportError, ExportedFile, Format, export};
+pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
 pub use gate::{Gate, GateResult};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
 pub use paper::{FigureKey, figure as paper_figure};

@@ -56,7 +56,7 @@ impl Format {
 
 /// Which of several results of a query is meant.
 #[derive(Clone, Debug, Default)]
-pub struct Choice {
+pub struct ResultChoice {
     /// The method.
     pub method: Option<Method>,
     /// The fusion.
@@ -69,7 +69,7 @@ pub struct Choice {
     pub scene: Option<String>,
 }
 
-impl Choice {
+impl ResultChoice {
     fn takes(&self, result: &QueryResult) -> bool {
         let setting = result.setting;
         (self.method).is_none_or(|method| method == result.method)
@@ -150,7 +150,7 @@ pub fn export(
     folder: &Path,
     run: &RunFile,
     format: Format,
-    choice: &Choice,
+    choice: &ResultChoice,
 ) -> Result<Export, ExportError> {
     match format {
         Format::Csv => return single(csv(folder, run, choice)?),
@@ -191,7 +191,7 @@ fn single(text: String) -> Result<Export, ExportError> {
 fn localized<'a>(
     folder: &Path,
     run: &'a RunFile,
-    choice: &Choice,
+    choice: &ResultChoice,
 ) -> Result<Vec<Localized<'a>>, ExportError> {
     let per_item = run.results_per_item();
     let mut all = Vec::new();
@@ -315,7 +315,7 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
     ]
 }
 
-fn csv(folder: &Path, run: &RunFile, choice: &Choice) -> Result<String, ExportError> {
+fn csv(folder: &Path, run: &RunFile, choice: &ResultChoice) -> Result<String, ExportError> {
     let mut table = Table::new(
         "results",
         "",

@@ -7,7 +7,7 @@ use egui::{Color32, Mesh, Painter, Pos2, Vec2, epaint::Vertex, pos2, vec2};
 
 /// A mark for a place in a photo; the shape tells the state as the colour does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mark {
+pub(super) enum MarkShape {
     /// A cross of two diagonals.
     Cross,
     /// A cross of an upright and a level line.
@@ -70,24 +70,24 @@ impl MeshPainter {
     }
 
     /// A mark of a radius \[points\].
-    pub(super) fn mark(&mut self, mark: Mark, at: Pos2, radius: f32, color: Color32) {
+    pub(super) fn mark(&mut self, mark: MarkShape, at: Pos2, radius: f32, color: Color32) {
         const WIDTH: f32 = 1.3;
         match mark {
-            Mark::Cross => {
+            MarkShape::Cross => {
                 for arm in [vec2(0.75, 0.75), vec2(0.75, -0.75)] {
                     self.line(at - radius * arm, at + radius * arm, WIDTH, color);
                 }
             }
-            Mark::Plus => {
+            MarkShape::Plus => {
                 for arm in [vec2(1.0, 0.0), vec2(0.0, 1.0)] {
                     self.line(at - radius * arm, at + radius * arm, 2.0, color);
                 }
             }
-            Mark::Triangle => self.outline(3, 0.0, at, 1.25 * radius, WIDTH, color),
-            Mark::Ring => self.ring(at, radius, WIDTH, color),
-            Mark::Diamond => self.outline(4, 0.0, at, 1.2 * radius, WIDTH, color),
-            Mark::Disc => self.disc(at, radius, color),
-            Mark::Square => self.outline(4, 0.5, at, 1.2 * radius, WIDTH, color),
+            MarkShape::Triangle => self.outline(3, 0.0, at, 1.25 * radius, WIDTH, color),
+            MarkShape::Ring => self.ring(at, radius, WIDTH, color),
+            MarkShape::Diamond => self.outline(4, 0.0, at, 1.2 * radius, WIDTH, color),
+            MarkShape::Disc => self.disc(at, radius, color),
+            MarkShape::Square => self.outline(4, 0.5, at, 1.2 * radius, WIDTH, color),
         }
     }
 
@@ -181,13 +181,13 @@ mod tests {
     fn every_mark_stays_near_its_place_and_refers_to_its_own_vertices() {
         let at = pos2(50.0, 60.0);
         for mark in [
-            Mark::Cross,
-            Mark::Plus,
-            Mark::Triangle,
-            Mark::Ring,
-            Mark::Diamond,
-            Mark::Disc,
-            Mark::Square,
+            MarkShape::Cross,
+            MarkShape::Plus,
+            MarkShape::Triangle,
+            MarkShape::Ring,
+            MarkShape::Diamond,
+            MarkShape::Disc,
+            MarkShape::Square,
         ] {
             let mut mesh = MeshPainter::new(2.0);
             mesh.line(pos2(0.0, 0.0), pos2(9.0, 9.0), 1.0, Color32::RED);

@@ -5,7 +5,7 @@ use egui::{Color32, Grid, RichText, ScrollArea, Ui, pos2, vec2};
 use super::View;
 use super::canvas::{PanZoom, Placement, tag};
 use super::images::Arrangement;
-use super::mesh_painter::{Mark, MeshPainter};
+use super::mesh_painter::{MarkShape, MeshPainter};
 use crate::app::textures::color_image;
 use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesRanked};
@@ -164,8 +164,8 @@ fn photos(
         let from = spot(&of_query, &pair.query_pixel);
         let to = spot(&of_reference, &pair.reference_pixel);
         mesh.line(from, to, 1.0, color.gamma_multiply(0.6));
-        mesh.mark(Mark::Ring, from, 3.0, color);
-        mesh.mark(Mark::Ring, to, 3.0, color);
+        mesh.mark(MarkShape::Ring, from, 3.0, color);
+        mesh.mark(MarkShape::Ring, to, 3.0, color);
     }
     mesh.paint_on(ui.painter());
     let corner = |at: &Placement| at.visible().min + vec2(4.0, 4.0);

@@ -346,7 +346,7 @@ impl SpaceView {
         content: &SceneContent,
         view_camera: &ViewCamera,
         points: Arc<Points>,
-    ) -> Vec<ground::Mark> {
+    ) -> Vec<ground::GridLabel> {
         let visuals = ui.visuals();
         let mut lines = Vec::new();
         let mut faces = Vec::new();

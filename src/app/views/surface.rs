@@ -15,7 +15,7 @@ use crate::geometry::Pose;
 use crate::method::Method;
 
 use maps::{MapContent, Maps, progress};
-use marks::{Mark, legend, moved, place};
+use marks::{MapMark, legend, moved, place};
 use scale::{NO_SAY, Scale, number, swatch};
 use search::Search;
 
@@ -99,7 +99,7 @@ impl SurfaceView {
         let floor = self.floor.unwrap_or(run_floor);
         let width = ui.available_width();
         let scale = Scale::of(context.run, search);
-        let marks = Mark::all(context, search, floor);
+        let marks = MapMark::all(context, search, floor);
         let shown = MapContent {
             search,
             scale: &scale,

@@ -6,7 +6,7 @@ use super::progress::UNDECIDED;
 use super::truth::TrueMatch;
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
-use crate::app::views::mesh_painter::{Mark, MeshPainter};
+use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 use crate::camera::Intrinsics;
 use crate::features::Keypoint;
 
@@ -20,15 +20,15 @@ pub(super) fn color(kind: usize) -> Color32 {
 }
 
 /// The mark of a state, or of none yet.
-pub(super) fn mark(kind: usize) -> Mark {
-    const MARKS: [Mark; UNDECIDED] = [
-        Mark::Cross,
-        Mark::Triangle,
-        Mark::Ring,
-        Mark::Diamond,
-        Mark::Disc,
+pub(super) fn mark(kind: usize) -> MarkShape {
+    const MARKS: [MarkShape; UNDECIDED] = [
+        MarkShape::Cross,
+        MarkShape::Triangle,
+        MarkShape::Ring,
+        MarkShape::Diamond,
+        MarkShape::Disc,
     ];
-    MARKS.get(kind).copied().unwrap_or(Mark::Square)
+    MARKS.get(kind).copied().unwrap_or(MarkShape::Square)
 }
 
 /// Where a keypoint is \[px\].
@@ -51,6 +51,6 @@ pub(super) fn draw_truth(
     }
     if let Some(pixel) = &truth.place {
         mesh.disc(place(pixel), 8.0, shade);
-        mesh.mark(Mark::Plus, place(pixel), 6.0, theme::TRUTH);
+        mesh.mark(MarkShape::Plus, place(pixel), 6.0, theme::TRUTH);
     }
 }

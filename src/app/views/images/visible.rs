@@ -5,7 +5,7 @@ use egui::{Color32, Pos2};
 use super::marks::{color, mark, position};
 use super::progress::{FeatureProgress, KINDS, UNDECIDED};
 use crate::app::views::canvas::Placement;
-use crate::app::views::mesh_painter::{Mark, MeshPainter};
+use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 
 /// How near the pointer must be \[points\].
 const REACH: f32 = 6.0;
@@ -124,8 +124,8 @@ impl VisibleFeatures {
     ) {
         let area = at.visible();
         let (mark, radius, color) = match progress.is_unmatched() {
-            true => (Mark::Square, radius(UNDECIDED), color(UNDECIDED)),
-            false => (Mark::Disc, 1.3, color(0)),
+            true => (MarkShape::Square, radius(UNDECIDED), color(UNDECIDED)),
+            false => (MarkShape::Disc, 1.3, color(0)),
         };
         let color = color.gamma_multiply(strength);
         for (keypoint, is_matched) in progress.reference().iter().zip(&self.is_matched) {

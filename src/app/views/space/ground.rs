@@ -180,7 +180,7 @@ fn quad(faces: &mut Vec<Spot>, corners: [[f32; 3]; 4], color: Color32) {
 }
 
 /// A number to be written beside the grid.
-pub(super) struct Mark {
+pub(super) struct GridLabel {
     pub(super) at: Point3<f64>,
     pub(super) text: String,
 }
@@ -190,7 +190,7 @@ pub(super) fn grid(
     geometry: &SceneGeometry,
     color: Color32,
     strong: Color32,
-) -> (Vec<Line>, Vec<Mark>) {
+) -> (Vec<Line>, Vec<GridLabel>) {
     let step = geometry.grid_m();
     let count = (geometry.radius_m / step).ceil() as i32;
     let reach = f64::from(count) * step;
@@ -214,7 +214,7 @@ pub(super) fn grid(
                     (true, true) => positive,
                     (true, false) => negative,
                 };
-                marks.push(Mark {
+                marks.push(GridLabel {
                     at: geometry.on_ground(x, z, GRID_ABOVE_M),
                     text: format!("{} m{side}", at.abs()),
                 });

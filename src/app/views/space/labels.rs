@@ -7,7 +7,7 @@ use egui::{
 };
 
 use super::cameras::{CameraKind, SceneCamera};
-use super::ground::Mark;
+use super::ground::GridLabel;
 use super::view_camera::ViewCamera;
 
 /// Labels of cameras, none over another; a click on one answers with its camera.
@@ -87,7 +87,7 @@ fn inside(place: Rect, pane: Rect) -> Rect {
 }
 
 /// The metres of the grid; those that would lie over another are left out.
-pub(super) fn marks(ui: &Ui, pane: Rect, view_camera: &ViewCamera, marks: &[Mark]) {
+pub(super) fn marks(ui: &Ui, pane: Rect, view_camera: &ViewCamera, marks: &[GridLabel]) {
     let painter = ui.painter_at(pane);
     let mut taken: Vec<Rect> = Vec::new();
     for mark in marks {

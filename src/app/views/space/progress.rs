@@ -24,7 +24,7 @@ pub(super) struct LiftedFeatures<'a> {
 }
 
 /// A ray from a camera to a lifted point.
-pub(super) struct Ray {
+pub(super) struct LiftedRay {
     /// The lifted point, in the reference camera's frame \[m\].
     pub(super) point: Point3<f64>,
     /// Index of the query keypoint.
@@ -69,10 +69,10 @@ impl<'a> LiftedFeatures<'a> {
         progress
     }
 
-    pub(super) fn rays(&self) -> impl Iterator<Item = Ray> {
+    pub(super) fn rays(&self) -> impl Iterator<Item = LiftedRay> {
         self.lifted.iter().filter_map(|lifted| {
             let state = self.states.and_then(|states| states.get(lifted.query));
-            Some(Ray {
+            Some(LiftedRay {
                 point: lifted.point?,
                 query: lifted.query,
                 is_inlier: state.map(|state| matches!(state, FeatureState::Inlier { .. })),

@@ -4,7 +4,7 @@
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
-use super::marks::{Mark, place};
+use super::marks::{MapMark, place};
 use super::scale::{NO_SAY, Scale, bar, number};
 use super::search::{Search, Searched};
 use crate::app::{Command, ViewContext};
@@ -65,7 +65,7 @@ struct Cell {
 pub(super) struct MapContent<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) scale: &'a Scale,
-    pub(super) marks: &'a [Mark],
+    pub(super) marks: &'a [MapMark],
     /// The floor of the slider.
     pub(super) floor: f64,
 }

@@ -30,14 +30,14 @@ const REACH: f32 = 5.0;
 const RANKED: usize = 5;
 
 /// A place on the maps.
-pub(super) struct Mark {
+pub(super) struct MapMark {
     pub(super) kind: MarkKind,
     pub(super) offset: Offset,
     pose: Pose,
     words: String,
 }
 
-impl Mark {
+impl MapMark {
     /// Everything that is to be marked, what matters most last. `floor` is what the slider says.
     pub(super) fn all(context: &ViewContext<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
         let mut marks = Vec::new();
@@ -242,7 +242,7 @@ impl MarkKind {
 
 /// The marks in words. Pointing at one looks at its pose, which is answered; a click takes the
 /// camera there.
-pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[Mark]) -> Option<Pose> {
+pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) -> Option<Pose> {
     let mut pointed_at = None;
     ui.horizontal_wrapped(|ui| {
         // The room for the mark is part of the button, so that both wrap together.

@@ -4,7 +4,7 @@ use egui::{Color32, Mesh, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 
 use crate::app::theme;
 use crate::app::view_context::CostBounds;
-use crate::app::views::mesh_painter::{Mark, MeshPainter};
+use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 use crate::method::Method;
 
 /// Height of the bar with its marks \[points\].
@@ -14,18 +14,20 @@ const BEYOND: f64 = 0.04;
 
 /// A bar from the cost of shuffled pixels to the least known cost, with a mark for each cost.
 pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Option<f64>) {
-    let range = CostRange::of(bounds);
+    let range = BarRange::of(bounds);
     let costs = [
-        NamedCost::new("shuffled", "■", Mark::Square, bounds.shuffled, |ui| {
+        NamedCost::new("shuffled", "■", MarkShape::Square, bounds.shuffled, |ui| {
             ui.visuals().text_color()
         }),
-        NamedCost::new("best", "▲", Mark::Triangle, bounds.best, |_| {
+        NamedCost::new("best", "▲", MarkShape::Triangle, bounds.best, |_| {
             theme::ESTIMATE
         }),
-        NamedCost::new("truth", "◆", Mark::Diamond, bounds.truth, |_| {
+        NamedCost::new("truth", "◆", MarkShape::Diamond, bounds.truth, |_| {
             theme::TRUTH
         }),
-        NamedCost::new("present", "○", Mark::Ring, present, |_| theme::CAMERA),
+        NamedCost::new("present", "○", MarkShape::Ring, present, |_| {
+            theme::CAMERA
+        }),
     ];
     let name = method.name().to_uppercase();
     if let Some(range) = &range {
@@ -59,7 +61,7 @@ pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Opti
 struct NamedCost {
     name: &'static str,
     glyph: &'static str,
-    mark: Mark,
+    mark: MarkShape,
     value: Option<f64>,
     color: fn(&Ui) -> Color32,
 }
@@ -68,7 +70,7 @@ impl NamedCost {
     fn new(
         name: &'static str,
         glyph: &'static str,
-        mark: Mark,
+        mark: MarkShape,
         value: Option<f64>,
         color: fn(&Ui) -> Color32,
     ) -> Self {
@@ -84,12 +86,12 @@ impl NamedCost {
 
 /// The costs at the ends of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct CostRange {
+struct BarRange {
     shuffled: f64,
     least: f64,
 }
 
-impl CostRange {
+impl BarRange {
     /// From shuffled pixels to the truth, or to the best where that costs less still; `None` before
     /// they are known, and where nothing lies between them.
     fn of(bounds: &CostBounds) -> Option<Self> {
@@ -105,7 +107,7 @@ impl CostRange {
     }
 }
 
-fn bar(ui: &mut Ui, name: &str, range: &CostRange, costs: &[NamedCost]) {
+fn bar(ui: &mut Ui, name: &str, range: &BarRange, costs: &[NamedCost]) {
     let size = vec2(ui.available_width(), HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let spoken = format!("{name} cost from shuffled pixels to the least");
@@ -137,7 +139,7 @@ fn bar(ui: &mut Ui, name: &str, range: &CostRange, costs: &[NamedCost]) {
         let Some(value) = cost.value else { continue };
         let place = at(range.share(value));
         // The present cost goes around those that it equals.
-        if cost.mark == Mark::Ring {
+        if cost.mark == MarkShape::Ring {
             mesh.ring(place, 7.0, 2.2, (cost.color)(ui));
         } else {
             mesh.disc(place, 7.0, ui.visuals().panel_fill);
@@ -158,10 +160,10 @@ mod tests {
             best: Some(0.7),
             truth: None,
         };
-        let range = CostRange::of(&bounds).expect("both are known");
+        let range = BarRange::of(&bounds).expect("both are known");
         assert!((range.share(0.8) - 0.5).abs() < 1e-12);
         bounds.truth = Some(0.5);
-        let range = CostRange::of(&bounds).expect("all are known");
+        let range = BarRange::of(&bounds).expect("all are known");
         assert!((range.share(0.7) - 0.5).abs() < 1e-12);
         assert!(range.share(1.1) < 0.0);
     }
@@ -173,7 +175,7 @@ mod tests {
             best: Some(0.5),
             truth: None,
         };
-        assert_eq!(CostRange::of(&flat), None);
-        assert_eq!(CostRange::of(&CostBounds::default()), None);
+        assert_eq!(BarRange::of(&flat), None);
+        assert_eq!(BarRange::of(&CostBounds::default()), None);
     }
 }
