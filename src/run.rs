@@ -12,6 +12,6 @@ pub use experiment::{
     Defaults, Draw, DrawError, Experiment, default_failure_radius_m, default_prior_m, defaults,
 };
 pub use protocol::Protocol;
-pub use run_file::{Item, RUN_SCHEMA, RunFile, Shard};
+pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run};
 pub use scene_pair::{QueryCamera, ScenePair};

@@ -116,7 +116,7 @@ impl App {
             Command::SelectFeature(feature) => state.options.selected_feature = feature,
             Command::Hover(pose) => state.hovered = pose,
             Command::TakeCamera(pose) => state.camera = pose,
-            Command::JumpCamera(place) => state.jump_camera(place),
+            Command::JumpCamera(target) => state.jump_camera(target),
             Command::MoveCamera(nudge) => {
                 match state.camera.or_else(|| state.named_pose(NamedPose::Start)) {
                     Some(pose) => state.camera = Some(nudge.apply(&pose)),
@@ -340,9 +340,9 @@ impl AppState {
         }
     }
 
-    fn jump_camera(&mut self, place: NamedPose) {
-        let Some(pose) = self.named_pose(place) else {
-            let name = place.name().to_lowercase();
+    fn jump_camera(&mut self, target: NamedPose) {
+        let Some(pose) = self.named_pose(target) else {
+            let name = target.name().to_lowercase();
             self.note(format!("There is no pose for {name} here"), false);
             return;
         };
@@ -351,7 +351,7 @@ impl AppState {
     }
 
     /// The pose of a place of the search (`world_from_camera`).
-    pub(super) fn named_pose(&self, place: NamedPose) -> Option<Pose> {
+    pub(super) fn named_pose(&self, target: NamedPose) -> Option<Pose> {
         let run = self.run();
         let loaded = run.loaded.as_deref()?;
         let span = run.span_at(self.cursor());
@@ -365,7 +365,7 @@ impl AppState {
                 .best?;
             Some(problem.world_from_query(&best.reference_from_camera()))
         };
-        match place {
+        match target {
             NamedPose::Start => Some(problem.reference.world_from_camera),
             NamedPose::Coarse => minimum(Phase::PositionCoarse),
             NamedPose::Fine => minimum(Phase::PositionFine),

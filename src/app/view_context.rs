@@ -161,7 +161,7 @@ impl<'a> ViewContext<'a> {
 
     /// The part of an estimator on the reference that is looked at, and the cursor for it: its last
     /// record, or the cursor itself where it is the estimator at the cursor.
-    pub fn of(&self, method: Method) -> Option<(&'a Span, usize)> {
+    pub fn part_of(&self, method: Method) -> Option<(&'a Span, usize)> {
         let part = Part::Reference(method, self.reference());
         if let Some(span) = self.span()
             && span.part == part
@@ -175,7 +175,7 @@ impl<'a> ViewContext<'a> {
     /// The latest event of a type that a method has told: up to the cursor if the cursor is in its
     /// part, else in all of its part.
     pub fn latest_of<E: DebugEvent + 'static>(&self, method: Method) -> Option<&'a E> {
-        let (span, cursor) = self.of(method)?;
+        let (span, cursor) = self.part_of(method)?;
         self.run.latest_in(span, cursor)
     }
 
@@ -250,7 +250,7 @@ impl<'a> ViewContext<'a> {
         if self.span()?.part == Part::Fusion(method) {
             return self.latest::<ReferencesFused>()?.pose;
         }
-        let (span, _) = self.of(method)?;
+        let (span, _) = self.part_of(method)?;
         span.result.as_ref()?.pose.as_ref()?.to_pose()
     }
 
@@ -259,7 +259,7 @@ impl<'a> ViewContext<'a> {
     pub fn cost_bounds(&self, method: Method) -> CostBounds {
         let assessed = self.latest_of::<MinimumAssessed>(method);
         let report = self
-            .of(method)
+            .part_of(method)
             .and_then(|(span, _)| span.result.as_ref()?.cost.as_ref());
         CostBounds {
             shuffled: assessed.and_then(|assessed| assessed.shuffled),

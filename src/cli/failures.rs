@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use posescope::localize::{LocalizeError, LocalizeObserver};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::run::{FailedQuery, FolderError, Item, RunError, RunFile, RunFolder, RunObserver};
+use posescope::run::{
+    FailedQuery, FolderError, RunError, RunFile, RunFolder, RunItem, RunObserver,
+};
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
 use super::args::EvalArgs;
@@ -226,14 +228,14 @@ impl RunObserver for FailureRecordings<'_> {
         Ok(())
     }
 
-    fn done(&mut self, item: &Item<'_>) {
+    fn done(&mut self, item: &RunItem<'_>) {
         self.bar.set_message(item.query.to_owned());
         self.bar.inc(1);
     }
 }
 
 /// `QUERY-METHOD`, with the scenes before it where there are several pairs of them.
-fn name_of(item: &Item<'_>, method: Method, several_pairs: bool) -> String {
+fn name_of(item: &RunItem<'_>, method: Method, several_pairs: bool) -> String {
     let pair = item.pair;
     let name = if several_pairs {
         format!(

@@ -16,7 +16,7 @@ use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::{FolderError, read_results};
-use crate::run::{Item, QueryCamera, RunFile};
+use crate::run::{QueryCamera, RunFile, RunItem};
 
 /// A format to export to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +138,7 @@ pub struct Export {
 
 /// A query with its result.
 struct Localized<'a> {
-    item: Item<'a>,
+    item: RunItem<'a>,
     pose: Option<Pose>,
 }
 

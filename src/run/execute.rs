@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::run_file::{Item, RunFile};
+use super::run_file::{RunFile, RunItem};
 use super::run_folder::{FolderError, RunFolder};
 use super::scene_pair::ScenePair;
 use crate::estimator::Failure;
@@ -58,7 +58,7 @@ pub struct FailedQuery<'a> {
     /// The localizer of its scenes.
     pub localizer: &'a Localizer<'a>,
     /// Its place in the plan.
-    pub item: Item<'a>,
+    pub item: RunItem<'a>,
     /// Its position in its scene.
     pub frame: usize,
     /// The method.
@@ -82,7 +82,7 @@ pub trait RunObserver {
     }
 
     /// A query is done.
-    fn done(&mut self, item: &Item<'_>) {
+    fn done(&mut self, item: &RunItem<'_>) {
         let _ = item;
     }
 }
@@ -111,11 +111,11 @@ impl Execution<'_> {
         folder: &mut RunFolder,
         observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
-        let items: Vec<Item<'_>> = self.run.items().collect();
+        let items: Vec<RunItem<'_>> = self.run.items().collect();
         let mut rest = items.get(folder.done()..).unwrap_or_default();
         // One localizer per pair of scenes, whose features are kept as long.
         while let Some(first) = rest.first() {
-            let same = |item: &&Item<'_>| std::ptr::eq(item.pair, first.pair);
+            let same = |item: &&RunItem<'_>| std::ptr::eq(item.pair, first.pair);
             let (now, later) = rest.split_at(rest.iter().take_while(same).count());
             let references = self.scenes.references[first.pair.scene_index].as_ref();
             let queries = self.scenes.of_queries(first.pair);
@@ -149,7 +149,7 @@ impl Execution<'_> {
 
     fn results(
         &self,
-        item: &Item<'_>,
+        item: &RunItem<'_>,
         localizer: &Localizer<'_>,
         left_out: &BTreeSet<usize>,
         observer: &mut dyn RunObserver,
@@ -221,7 +221,7 @@ impl Execution<'_> {
     /// One call per method that failed in any of the requests.
     fn tell_failures(
         &self,
-        item: &Item<'_>,
+        item: &RunItem<'_>,
         localizer: &Localizer<'_>,
         frame: usize,
         requests: &[Request],
@@ -254,7 +254,7 @@ impl Execution<'_> {
     }
 
     /// The results of a query that cannot even be begun.
-    fn broken(&self, item: &Item<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
+    fn broken(&self, item: &RunItem<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
         let failure = Failure::Internal {
             message: message.to_owned(),
         };

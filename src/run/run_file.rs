@@ -52,7 +52,7 @@ posescope_core::serde_as_text!(Shard);
 
 /// A run as its folder describes it. Threads are missing: results do not depend on them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Form", into = "Form")]
+#[serde(from = "RunFileForm", into = "RunFileForm")]
 pub struct RunFile {
     /// The version of the form, [`RUN_SCHEMA`].
     pub schema: String,
@@ -86,7 +86,7 @@ pub struct RunFile {
 
 /// The file, key by key in its order.
 #[derive(Serialize, Deserialize)]
-struct Form {
+struct RunFileForm {
     schema: String,
     version: String,
     scenes: Vec<String>,
@@ -113,8 +113,8 @@ struct Form {
     params: toml::Table,
 }
 
-impl From<Form> for RunFile {
-    fn from(form: Form) -> Self {
+impl From<RunFileForm> for RunFile {
+    fn from(form: RunFileForm) -> Self {
         Self {
             schema: form.schema,
             version: form.version,
@@ -140,7 +140,7 @@ impl From<Form> for RunFile {
     }
 }
 
-impl From<RunFile> for Form {
+impl From<RunFile> for RunFileForm {
     fn from(run: RunFile) -> Self {
         Self {
             schema: run.schema,
@@ -167,7 +167,7 @@ impl From<RunFile> for Form {
 
 /// What is wrong with the text of a `run.toml`, and where.
 #[derive(Debug)]
-pub(super) struct Misread {
+pub(super) struct RunFileError {
     /// The line, counted from 1.
     pub line: usize,
     /// What is wrong, on one line.
@@ -217,7 +217,7 @@ impl Places {
 
 /// One query of a pair: what is done, written and spread as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Item<'a> {
+pub struct RunItem<'a> {
     /// Its place in the plan.
     pub index: usize,
     /// Its scenes.
@@ -232,22 +232,24 @@ pub struct Item<'a> {
 
 impl RunFile {
     /// All items of the run in their order, those of other shards too.
-    pub fn plan(&self) -> impl Iterator<Item = Item<'_>> {
+    pub fn plan(&self) -> impl Iterator<Item = RunItem<'_>> {
         let queries = self.pairs.iter().flat_map(|pair| {
             let queries = pair.queries.iter().enumerate();
             queries.map(move |(at, query)| (pair, at, query))
         });
-        queries.enumerate().map(|(index, (pair, at, query))| Item {
-            index,
-            pair,
-            query,
-            camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
-            time_s: pair.times_s.get(at).copied(),
-        })
+        queries
+            .enumerate()
+            .map(|(index, (pair, at, query))| RunItem {
+                index,
+                pair,
+                query,
+                camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
+                time_s: pair.times_s.get(at).copied(),
+            })
     }
 
     /// The items of this shard.
-    pub fn items(&self) -> impl Iterator<Item = Item<'_>> {
+    pub fn items(&self) -> impl Iterator<Item = RunItem<'_>> {
         self.plan()
             .filter(|item| self.shard.is_none_or(|shard| shard.has(item.index)))
     }
@@ -291,19 +293,19 @@ impl RunFile {
     }
 
     /// Reads the text of a `run.toml` and checks it.
-    pub(super) fn read(text: &str) -> Result<Self, Misread> {
-        let misread = |at: usize, message: String| Misread {
+    pub(super) fn read(text: &str) -> Result<Self, RunFileError> {
+        let error_at = |at: usize, message: String| RunFileError {
             line: text[..at.min(text.len())].matches('\n').count() + 1,
             message: message.replace('\n', " "),
         };
         let syntax = |error: toml::de::Error| {
             let at = error.span().map_or(0, |span| span.start);
-            misread(at, error.message().to_owned())
+            error_at(at, error.message().to_owned())
         };
         let run: Self = toml::from_str(text).map_err(syntax)?;
         let places: Places = toml::from_str(text).map_err(syntax)?;
         match places.wrong(&run) {
-            Some((at, message)) => Err(misread(at, message)),
+            Some((at, message)) => Err(error_at(at, message)),
             None => Ok(run),
         }
     }

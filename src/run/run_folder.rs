@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::run_file::{Misread, RunFile};
+use super::run_file::{RunFile, RunFileError};
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
@@ -363,7 +363,7 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
         read => read.map_err(FolderError::io(&path))?,
     };
     let mut run =
-        RunFile::read(&text).map_err(|Misread { line, message }| FolderError::Damaged {
+        RunFile::read(&text).map_err(|RunFileError { line, message }| FolderError::Damaged {
             path,
             line,
             message,

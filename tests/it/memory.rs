@@ -80,15 +80,15 @@ impl Scene for Counting {
 
 /// How often each stage was worked out, and how often it was at hand.
 #[derive(Default)]
-struct Notebook(BTreeMap<&'static str, [usize; 2]>);
+struct StageCounts(BTreeMap<&'static str, [usize; 2]>);
 
-impl Notebook {
+impl StageCounts {
     fn of(&self, stage: &str) -> [usize; 2] {
         self.0.get(stage).copied().unwrap_or_default()
     }
 }
 
-impl Sink for Notebook {
+impl Sink for StageCounts {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
         if let Event::StageEnded(StageEnded { stage, reused, .. }) = record.event {
             self.0.entry(stage.name()).or_default()[usize::from(reused)] += 1;
@@ -97,7 +97,7 @@ impl Sink for Notebook {
     }
 }
 
-impl LocalizeObserver for Notebook {}
+impl LocalizeObserver for StageCounts {}
 
 fn request(references: References) -> Request {
     Request {
@@ -139,13 +139,13 @@ fn three_methods_color_a_cloud_once_and_read_each_frame_once() {
     // FB finds nothing, so the hybrid searches too.
     let params = without_features();
     let localizer = Localizer::new(&scene, &scene, &params, 7);
-    let mut notebook = Notebook::default();
+    let mut counts = StageCounts::default();
     let direct = [Method::PM, Method::MI, Method::HY];
-    let results = localize(&localizer, vec![0].into(), &direct, &mut notebook);
+    let results = localize(&localizer, vec![0].into(), &direct, &mut counts);
     assert!(results.iter().all(|(result, _)| result.pose.is_some()));
-    assert_eq!(notebook.of("color"), [1, 2]);
+    assert_eq!(counts.of("color"), [1, 2]);
     // The hybrid's search is that of MI.
-    assert_eq!(notebook.of("position_coarse"), [2, 1]);
+    assert_eq!(counts.of("position_coarse"), [2, 1]);
     assert_eq!(scene.photos(), [1, 1, 0, 0, 0]);
     assert_eq!(scene.clouds(), [1, 0, 0, 0, 0]);
 }
@@ -168,9 +168,9 @@ fn features_are_found_once_for_ranking_and_for_every_reference() {
         .expect("readable");
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(scene.clouds(), [0; 5]);
-    let mut notebook = Notebook::default();
-    localize(&localizer, chosen, &[Method::FB], &mut notebook);
-    assert_eq!(notebook.of("detect"), [0, 2]);
+    let mut counts = StageCounts::default();
+    localize(&localizer, chosen, &[Method::FB], &mut counts);
+    assert_eq!(counts.of("detect"), [0, 2]);
     assert_eq!(scene.photos(), [1, 1, 1, 0, 0]);
     assert_eq!(scene.clouds(), [1, 0, 1, 0, 0]);
 }
@@ -187,7 +187,7 @@ fn a_hybrid_takes_as_long_whoever_watches() {
             localize(&localizer, vec![0].into(), &Method::PAPER, observer)
         };
         let unseen = all(&mut NoObserver);
-        let watched = all(&mut Notebook::default());
+        let watched = all(&mut StageCounts::default());
         for ((a, a_times), (b, b_times)) in unseen.iter().zip(&watched) {
             assert_eq!(a, b);
             assert_eq!(stages(a_times), stages(b_times));

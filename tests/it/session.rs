@@ -123,8 +123,8 @@ fn stepping_gives_the_results_of_running() {
     assert_eq!(run_until_idle(&mut run), RunState::Finished);
     let mut stepped = start(job(1), RunMode::Paused, &[]);
     run_until_idle(&mut stepped);
-    let orders = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
-    for mode in orders.into_iter().cycle() {
+    let steps = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
+    for mode in steps.into_iter().cycle() {
         order(&mut stepped, mode);
         if !stepped.is_alive() {
             break;

@@ -306,9 +306,9 @@ mod tests {
 
     /// Writes down what it is shown.
     #[derive(Default)]
-    struct Clerk(Vec<String>);
+    struct RecordingVisitor(Vec<String>);
 
-    impl Clerk {
+    impl RecordingVisitor {
         fn write(&mut self, about: About, rest: &str) {
             let About { name, unit, .. } = about;
             self.0
@@ -316,7 +316,7 @@ mod tests {
         }
     }
 
-    impl ParamVisitor for Clerk {
+    impl ParamVisitor for RecordingVisitor {
         fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
             self.write(about, &format!("{value} in {range:?}"));
         }
@@ -341,15 +341,15 @@ mod tests {
             inner: Inner { rounds: 3 },
             side: Side::Right,
         };
-        let mut clerk = Clerk::default();
-        all.visit(&mut clerk);
+        let mut visitor = RecordingVisitor::default();
+        all.visit(&mut visitor);
         let shown = [
             "reach [m] How far, as in std: 1.5 in 0.5..=2.0",
             "on [] Whether at all: true",
             "rounds [] A number of times, at most: 3 in 1..=10",
             "side [] Which side: right of [\"left\", \"right\"]",
         ];
-        assert_eq!(clerk.0, shown);
+        assert_eq!(visitor.0, shown);
         assert_eq!(all.side, Side::Left);
     }
 }

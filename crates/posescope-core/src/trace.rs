@@ -224,14 +224,14 @@ mod tests {
     use crate::event::{Kind, ProjectedCloud};
 
     /// Keeps what it gets; stops the run at event number `stop_at`.
-    struct Notebook {
+    struct RecordingSink {
         wanted: KindSet,
         records: Vec<Record>,
         stop_at: Option<u64>,
         attended: usize,
     }
 
-    impl Notebook {
+    impl RecordingSink {
         fn wanting(wanted: KindSet) -> Self {
             Self {
                 wanted,
@@ -242,7 +242,7 @@ mod tests {
         }
     }
 
-    impl Sink for Notebook {
+    impl Sink for RecordingSink {
         fn wanted(&self) -> KindSet {
             self.wanted
         }
@@ -272,23 +272,23 @@ mod tests {
 
     #[test]
     fn an_unwanted_event_is_not_even_built_but_stages_are_told() {
-        let mut notebook = Notebook::wanting(KindSet::NONE);
-        let mut trace = Trace::to(&mut notebook);
+        let mut sink = RecordingSink::wanting(KindSet::NONE);
+        let mut trace = Trace::to(&mut sink);
         trace
             .emit(|| -> ProjectedCloud { panic!("nobody wants this") })
             .expect("not cancelled");
         two_stages(&mut trace).expect("not cancelled");
-        let depths: Vec<_> = notebook.records.iter().map(|r| r.depth).collect();
+        let depths: Vec<_> = sink.records.iter().map(|r| r.depth).collect();
         assert_eq!(depths, [1, 2, 2, 1]);
     }
 
     #[test]
     fn a_cancelled_run_still_closes_its_stages() {
-        let mut notebook = Notebook::wanting(KindSet::ALL);
-        notebook.stop_at = Some(1);
-        let outcome = two_stages(&mut Trace::to(&mut notebook));
+        let mut sink = RecordingSink::wanting(KindSet::ALL);
+        sink.stop_at = Some(1);
+        let outcome = two_stages(&mut Trace::to(&mut sink));
         assert_eq!(outcome, Err(Cancelled));
-        let last = notebook.records.last().expect("some were told");
+        let last = sink.records.last().expect("some were told");
         assert!(matches!(
             last.event,
             Event::StageEnded(StageEnded {
@@ -301,20 +301,20 @@ mod tests {
 
     #[test]
     fn raised_attention_reaches_the_sink_once_even_without_a_wanted_event() {
-        let mut notebook = Notebook::wanting(KindSet::NONE);
+        let mut sink = RecordingSink::wanting(KindSet::NONE);
         let attention = AtomicBool::new(true);
-        let mut trace = Trace::watched(&mut notebook, &attention);
+        let mut trace = Trace::watched(&mut sink, &attention);
         for _ in 0..3 {
             trace.checkpoint().expect("not cancelled");
         }
-        assert_eq!(notebook.attended, 1);
+        assert_eq!(sink.attended, 1);
     }
 
     #[test]
     fn records_are_numbered_without_gaps() {
-        let mut notebook = Notebook::wanting(KindSet::of(&[Kind::ProjectedCloud]));
-        two_stages(&mut Trace::to(&mut notebook)).expect("not cancelled");
-        let indices: Vec<_> = notebook.records.iter().map(|r| r.index).collect();
+        let mut sink = RecordingSink::wanting(KindSet::of(&[Kind::ProjectedCloud]));
+        two_stages(&mut Trace::to(&mut sink)).expect("not cancelled");
+        let indices: Vec<_> = sink.records.iter().map(|r| r.index).collect();
         assert_eq!(indices, [0, 1, 2, 3, 4]);
     }
 }

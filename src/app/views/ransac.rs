@@ -76,7 +76,7 @@ fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
         context.is_inside_hybrid(Method::FB) && context.latest::<HypothesisTried>().is_some();
     let (span, cursor) = match is_inside {
         true => (context.span()?, context.cursor),
-        false => context.of(Method::FB)?,
+        false => context.part_of(Method::FB)?,
     };
     Some((span, span.records.end.min(cursor + 1)))
 }

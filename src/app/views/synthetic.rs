@@ -258,7 +258,10 @@ fn covered_at_reference(context: &ViewContext<'_>, method: Method) -> Option<u32
         let start = events.find(|(_, event)| event.moment == Moment::Start)?;
         Some(start.1.comparison.score.covered)
     };
-    match context.of(method).and_then(|(_, cursor)| start(cursor)) {
+    match context
+        .part_of(method)
+        .and_then(|(_, cursor)| start(cursor))
+    {
         None => start(context.cursor),
         covered => covered,
     }

@@ -51,10 +51,10 @@ impl<'a> FeatureProgress<'a> {
             inside || matches!(entry.parts, Parts::Features)
         };
         let part = match context.method().filter(|&here| with_features(here)) {
-            Some(here) => context.of(here),
+            Some(here) => context.part_of(here),
             None => {
                 let mut asked = context.setup.task.protocol.methods.iter().copied();
-                asked.find_map(|method| with_features(method).then(|| context.of(method))?)
+                asked.find_map(|method| with_features(method).then(|| context.part_of(method))?)
             }
         };
         part.map_or_else(Self::default, |(span, cursor)| {

@@ -220,7 +220,7 @@ pub(super) fn cameras(
 
 /// The estimate of a method: of that at the cursor only once the cursor has come to its end.
 fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
-    let (span, cursor) = context.of(method)?;
+    let (span, cursor) = context.part_of(method)?;
     (cursor + 1 >= span.records.end)
         .then(|| context.estimate(method))
         .flatten()

@@ -123,17 +123,17 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
 pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<ViewRequest> {
     let keys = shortcuts();
     ui.weak("camera to");
-    for place in NamedPose::ALL {
-        let command = Command::JumpCamera(place);
+    for target in NamedPose::ALL {
+        let command = Command::JumpCamera(target);
         let key = keys.iter().find(|shortcut| shortcut.command == command);
         let key = key.map_or(String::new(), |shortcut| {
             ui.ctx().format_shortcut(&shortcut.keys)
         });
-        let is_there = context.named_pose(place).is_some()
-            && (place != NamedPose::Truth || context.options.shows_truth);
+        let is_there = context.named_pose(target).is_some()
+            && (target != NamedPose::Truth || context.options.shows_truth);
         let mut text = egui::text::LayoutJob::default();
         let style = ui.style();
-        RichText::new(place.name()).append_to(
+        RichText::new(target.name()).append_to(
             &mut text,
             style,
             egui::FontSelection::Default,

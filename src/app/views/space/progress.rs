@@ -43,7 +43,7 @@ impl<'a> LiftedFeatures<'a> {
         if !here.lifted.is_empty() {
             return here;
         }
-        match context.of(Method::FB) {
+        match context.part_of(Method::FB) {
             Some((_, cursor)) => Self::told(context.run, cursor),
             None => here,
         }
@@ -98,7 +98,7 @@ impl<'a> SearchProgress<'a> {
     /// From the direct method whose pictures are shown.
     pub(super) fn at(context: &ViewContext<'a>) -> Self {
         let method = context.searching_method();
-        let Some((span, cursor)) = context.of(method) else {
+        let Some((span, cursor)) = context.part_of(method) else {
             return Self::default();
         };
         let mut progress = Self::default();

@@ -165,7 +165,7 @@ fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usiz
     let is_inside = context.is_inside_hybrid(method) && context.latest::<PoseScored>().is_some();
     match is_inside {
         true => Some((context.span()?, context.cursor)),
-        false => context.of(method),
+        false => context.part_of(method),
     }
 }
 
