@@ -64,7 +64,7 @@ impl App {
 
     /// With results of the setup's queries that are known already.
     pub fn with_results(mut self, results: Results) -> Self {
-        self.state.know_results(results);
+        self.state.set_known_results(results);
         self
     }
 

@@ -14,7 +14,7 @@ pub struct ShownView {
     /// Where the camera is (`world_from_camera`).
     pub pose: Pose,
     /// Why it is shown.
-    pub at: ShownReason,
+    pub reason: ShownReason,
 }
 
 /// Why a synthetic view is shown.

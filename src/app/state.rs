@@ -97,7 +97,7 @@ impl AppState {
     }
 
     /// Takes results over that were known before the window was opened.
-    pub(super) fn know_results(&mut self, results: Results) {
+    pub(super) fn set_known_results(&mut self, results: Results) {
         self.results.clone_from(&results);
         self.first_results = results;
     }

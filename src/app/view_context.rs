@@ -217,16 +217,15 @@ impl<'a> ViewContext<'a> {
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
-        if let Some((pose, at)) = self.looking_at()
+        if let Some((_, reason)) = self.looking_at()
             && let Some(probe) = self.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.
-            let _ = pose;
             return Some(ShownView {
                 comparison: Arc::clone(comparison),
                 pose: probe.pose,
-                at,
+                reason,
             });
         }
         // A hybrid's views are those of the direct method inside it. Where it kept the other's pose it
@@ -240,7 +239,7 @@ impl<'a> ViewContext<'a> {
         Some(ShownView {
             comparison: Arc::clone(&event.comparison),
             pose: problem.world_from_query(&event.offset.reference_from_camera()),
-            at: ShownReason::Event(event.moment),
+            reason: ShownReason::Event(event.moment),
         })
     }
 

@@ -83,7 +83,7 @@ pub(super) fn explains(method: Method) -> Option<ExplanationKind> {
 /// Why this view is shown, and where its camera is.
 fn caption(ui: &mut Ui, context: &ViewContext<'_>, shown: &ShownView) {
     ui.horizontal_wrapped(|ui| {
-        let mut words = shown.at.name().to_owned();
+        let mut words = shown.reason.name().to_owned();
         if let Some(problem) = context.problem() {
             let offset = Offset::of(&problem.reference_from_query(&shown.pose));
             let numbers = [

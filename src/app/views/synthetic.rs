@@ -206,7 +206,7 @@ fn caption(
     let name = method.name().to_uppercase();
     let place = place(&problem.reference_from_query(&shown.pose));
     ui.horizontal_wrapped(|ui| {
-        ui.strong(format!("{name}, {}", shown.at.name()));
+        ui.strong(format!("{name}, {}", shown.reason.name()));
         ui.label(place);
         if context.is_probing() {
             ui.weak("the pose asked for is being worked out");
