@@ -4,7 +4,6 @@
 //! painting into a texture of the size of the window, to the end.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use divan::Bencher;
@@ -20,7 +19,7 @@ use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::scene::{self, Scene, SceneError};
-use posescope::session::{RunMode, State, Task};
+use posescope::session::{RunMode, RunState, Task};
 
 /// Size of the window, as it opens.
 const SIZE: [f32; 2] = [1500.0, 950.0];
@@ -223,7 +222,6 @@ fn open() -> Option<Window> {
         index: Arc::default(),
         failure_radius_m: 10.0,
         mode: RunMode::Running,
-        results: BTreeMap::new(),
         folder: std::env::temp_dir(),
     };
     let mut window = Harness::builder()
@@ -231,13 +229,13 @@ fn open() -> Option<Window> {
         .renderer(canvas)
         .build_eframe(|creation| App::new(creation, setup));
     while matches!(
-        window.state().desk().state(),
-        State::Loading | State::Running
+        window.state().app_state().run_state(),
+        RunState::Loading | RunState::Running
     ) {
         window.step();
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    assert_eq!(window.state().desk().state(), &State::Finished);
+    assert_eq!(window.state().app_state().run_state(), &RunState::Finished);
     draw(&mut window);
     Some(window)
 }
@@ -261,7 +259,7 @@ fn idle(bencher: Bencher) {
 #[divan::bench(sample_count = 60, sample_size = 1)]
 fn scrubbing(bencher: Bencher) {
     with_window(|window| {
-        let records = window.state().desk().run().len();
+        let records = window.state().app_state().run().len();
         let mut cursor = 0;
         bencher.bench_local(|| {
             cursor = (cursor + records / 60) % records;
@@ -309,7 +307,7 @@ fn what_if_painted(bencher: Bencher) {
 
 /// One move of the camera at each call.
 fn what_if(window: &mut Window, end: impl Fn(&mut Window)) -> impl FnMut() {
-    let loaded = window.state().desk().run().loaded.clone();
+    let loaded = window.state().app_state().run().loaded.clone();
     let loaded = loaded.expect("the run is over");
     let start = loaded.problems[0].reference.world_from_camera;
     let mut moves = 0;
@@ -319,8 +317,8 @@ fn what_if(window: &mut Window, end: impl Fn(&mut Window)) -> impl FnMut() {
         window.state_mut().send(Command::TakeCamera(Some(pose)));
         loop {
             window.step();
-            let desk = window.state().desk();
-            if desk.probe().is_some_and(|probe| probe.pose == pose) {
+            let state = window.state().app_state();
+            if state.probe().is_some_and(|probe| probe.pose == pose) {
                 break;
             }
             std::thread::sleep(std::time::Duration::from_millis(1));

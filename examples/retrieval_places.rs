@@ -68,7 +68,7 @@ impl Options {
     }
 }
 
-/// What came of the queries of a scene.
+/// How the queries of a scene were answered.
 #[derive(Default)]
 struct Tally {
     queries: usize,

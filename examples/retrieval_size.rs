@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use posescope::features::{Descriptor, Features, Keypoint};
-use posescope::retrieval::{Index, Request, RetrievalParams, Step, build};
+use posescope::retrieval::{BuildRequest, BuildStep, Index, RetrievalParams, build};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
@@ -57,7 +57,7 @@ fn main() -> Result<(), Failure> {
 
 fn build_index(path: &Path, frames: usize, features: usize, words: usize) -> Result<(), Failure> {
     let params = RetrievalParams::default();
-    let request = Request {
+    let request = BuildRequest {
         scene: "synthetic".to_owned(),
         fingerprint: 0,
         frames: (0..frames).collect(),
@@ -74,7 +74,7 @@ fn build_index(path: &Path, frames: usize, features: usize, words: usize) -> Res
     let view = |frame| Ok::<_, Infallible>(view(frame, features, 0));
     let summary = build(path, &request, view, |progress| {
         ended[progress.step as usize] = started.elapsed();
-        if progress.step == Step::Vocabulary {
+        if progress.step == BuildStep::Vocabulary {
             eprintln!("round {}, {:.1?}", progress.done, started.elapsed());
         }
     })?;
@@ -168,7 +168,7 @@ fn cpu_time() -> Duration {
     Duration::from_nanos(threads.flatten().filter_map(of_thread).sum())
 }
 
-/// Of this process, where the system tells.
+/// Prints the memory of this process, where the system tells.
 fn print_memory(when: &str, field: &str) {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     if let Some(line) = status.lines().find(|line| line.starts_with(field)) {

@@ -1,8 +1,8 @@
 //! How well each method localises a photo of one weather against a reference of another.
 //!
-//! `cargo run --release --no-default-features --example street_conditions -- --queries 60` prints Markdown: for FB, PM,
-//! MI and HY tables of five reference conditions (rows) by five query conditions (columns), and
-//! whether the findings of Fu, Pertuz, Matas and Kämäräinen (2019) show.
+//! `cargo run --release --no-default-features --example street_conditions -- --queries 60` prints
+//! Markdown: for FB, PM, MI and HY tables of five reference conditions (rows) by five query
+//! conditions (columns), and whether the findings of Fu, Pertuz, Matas and Kämäräinen (2019) show.
 //!
 //! The protocol is the paper's: query frames spread over the route, the same for all pairs; for
 //! each, one reference drawn at random among the frames within 10 m; a pose counts if the method
@@ -95,11 +95,11 @@ type Errors = HashMap<Cell, Vec<f64>>;
 
 /// The cost of MI at three poses, as normalised mutual information.
 struct Information {
-    /// At the true pose.
+    /// The cost at the true pose.
     at_truth: f64,
-    /// At the pose found.
+    /// The cost at the pose found.
     at_found: f64,
-    /// Of pixels that have nothing to do with each other.
+    /// The cost of pixels that have nothing to do with each other.
     by_chance: f64,
     /// Whether the pose found is less than 2 m off.
     is_near: bool,

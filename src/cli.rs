@@ -1,7 +1,6 @@
 //! The command line of posescope.
 
 mod args;
-mod audience;
 mod demo;
 mod demo_settings;
 mod diff;
@@ -10,6 +9,7 @@ mod export;
 mod failure;
 mod failures;
 mod index;
+mod observer;
 mod output;
 mod params;
 mod run;

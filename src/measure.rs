@@ -17,12 +17,12 @@ mod table;
 #[cfg(feature = "cli")]
 mod tables;
 
-pub use diff::{Change, Comparison, Difference, Tolerance};
+pub use diff::{Change, Difference, RunComparison, Tolerance};
 #[cfg(feature = "cli")]
-pub use export::{Choice, Export, ExportError, ExportedFile, Format, export};
-pub use gate::{Gate, Passage};
+pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
+pub use gate::{Gate, GateResult};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
-pub use paper::{Sought, figure as paper_figure};
+pub use paper::{FigureKey, figure as paper_figure};
 #[cfg(feature = "cli")]
 pub use report::{Report, SUMMARY_SCHEMA, read_rows, write_report};
 #[cfg(feature = "cli")]

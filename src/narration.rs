@@ -4,7 +4,7 @@ use crate::event::{
     Event, MinimumAssessed, Moment, ReferencesFused, ReferencesRanked, Side, Stage, ViewRendered,
 };
 use crate::features::MatchVerdict;
-use crate::fusion::Fate;
+use crate::fusion::ShareOutcome;
 use crate::grid::Offset;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 
@@ -134,10 +134,10 @@ fn fused(event: &ReferencesFused) -> String {
         .shares
         .iter()
         .map(|share| {
-            let say = match share.fate {
-                Fate::Kept => format!("weight {:.3}", share.weight),
-                Fate::Dropped => "dropped".to_owned(),
-                Fate::Failed => "failed".to_owned(),
+            let say = match share.outcome {
+                ShareOutcome::Kept => format!("weight {:.3}", share.weight),
+                ShareOutcome::Dropped => "dropped".to_owned(),
+                ShareOutcome::Failed => "failed".to_owned(),
             };
             format!("{} {say} ({} matches)", share.reference, share.matches)
         })

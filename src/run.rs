@@ -2,16 +2,16 @@
 
 mod execute;
 mod experiment;
-mod pair;
 mod protocol;
 mod run_file;
 mod run_folder;
+mod scene_pair;
 
-pub use execute::{Companion, Execution, FailedQuery, RunError, Scenes};
+pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
 pub use experiment::{
     Defaults, Draw, DrawError, Experiment, default_failure_radius_m, default_prior_m, defaults,
 };
-pub use pair::{Camera, Pair};
 pub use protocol::Protocol;
-pub use run_file::{Item, RUN_SCHEMA, RunFile, Shard};
+pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run};
+pub use scene_pair::{QueryCamera, ScenePair};

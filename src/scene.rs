@@ -5,7 +5,7 @@
 mod kitti;
 mod retriever;
 
-pub use posescope_core::scene::{AtHand, Entry, FrameStore, Scene, SceneError};
+pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
 
 pub use kitti::{KittiOdometry, SequenceWriter};

@@ -1,15 +1,15 @@
 //! A run that somebody drives: an estimator on a thread of its own that can be paused, stepped,
 //! broken into and stopped.
 //!
-//! The estimators know nothing of this. A gate, which is one more [`Sink`](crate::trace::Sink),
-//! holds the thread back between two events.
+//! The estimators know nothing of this. An observer of the run, which is one more
+//! [`Sink`](crate::trace::Sink), holds the thread back between two events.
 
 mod breakpoint;
-mod gate;
 mod index_file;
 mod job;
 mod loaded;
 mod message;
+mod pausing;
 mod run;
 mod task;
 
@@ -19,19 +19,19 @@ use std::sync::mpsc::{self, Receiver};
 use crate::localize::References;
 
 pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
-pub use gate::RunMode;
 pub use index_file::IndexFile;
 pub use job::{Job, JobError};
 pub use loaded::Loaded;
+pub use pausing::RunMode;
 pub use run::{Part, Run, Span, StageBar};
 pub use task::Task;
 
-use gate::Control;
 use message::Message;
+use pausing::Control;
 
 /// What a session is doing.
 #[derive(Clone, Debug, PartialEq)]
-pub enum State {
+pub enum RunState {
     /// Photos and clouds are being read.
     Loading,
     /// Events are coming in.
@@ -57,7 +57,7 @@ pub struct Session {
     inbox: Receiver<Message>,
     run: Run,
     chosen: Option<References>,
-    state: State,
+    state: RunState,
 }
 
 impl Session {
@@ -79,7 +79,7 @@ impl Session {
             inbox,
             run,
             chosen: None,
-            state: State::Loading,
+            state: RunState::Loading,
         }
     }
 
@@ -92,20 +92,20 @@ impl Session {
                 Message::Chosen(chosen) => self.chosen = Some(chosen),
                 Message::Loaded(loaded) => {
                     self.run.loaded = Some(loaded);
-                    self.state = State::Running;
+                    self.state = RunState::Running;
                 }
                 Message::Began(part) => self.run.begin(part),
                 Message::Told(record) => {
                     self.run.push(*record);
                     // It was told to go on, or is about to say that it waits.
-                    self.state = State::Running;
+                    self.state = RunState::Running;
                 }
-                Message::Waits { breakpoint } => self.state = State::Paused { breakpoint },
-                Message::Goes => self.state = State::Running,
+                Message::Waits { breakpoint } => self.state = RunState::Paused { breakpoint },
+                Message::Goes => self.state = RunState::Running,
                 Message::Ended { result, times } => self.run.end(*result, times),
-                Message::Finished => self.state = State::Finished,
-                Message::Cancelled => self.state = State::Cancelled,
-                Message::Broke(why) => self.state = State::Broken(why),
+                Message::Finished => self.state = RunState::Finished,
+                Message::Cancelled => self.state = RunState::Cancelled,
+                Message::Broke(why) => self.state = RunState::Broken(why),
             }
         }
         is_new
@@ -122,7 +122,7 @@ impl Session {
     }
 
     /// What the session is doing, as of the last [`Self::drain`].
-    pub fn state(&self) -> &State {
+    pub fn state(&self) -> &RunState {
         &self.state
     }
 
@@ -130,7 +130,7 @@ impl Session {
     pub fn is_alive(&self) -> bool {
         matches!(
             self.state,
-            State::Loading | State::Running | State::Paused { .. }
+            RunState::Loading | RunState::Running | RunState::Paused { .. }
         )
     }
 
@@ -144,8 +144,8 @@ impl Session {
         self.control.set_breakpoints(breakpoints);
     }
 
-    /// Asks the run to stop, and does not wait for it. It says [`State::Cancelled`] when it has: an
-    /// estimator looks up after 256 hypotheses, one trial or one pass over an image.
+    /// Asks the run to stop, and does not wait for it. It says [`RunState::Cancelled`] when it has:
+    /// an estimator looks up after 256 hypotheses, one trial or one pass over an image.
     pub fn cancel(&self) {
         self.control.cancel();
     }

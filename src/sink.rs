@@ -1,4 +1,4 @@
-//! Those who watch a run: recordings, progress bars, several at once.
+//! Sinks for the events of a run: recordings, progress bars, several at once.
 
 #[cfg(feature = "cli")]
 mod progress;

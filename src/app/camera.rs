@@ -6,7 +6,7 @@ use crate::geometry::{Pose, yaw};
 
 /// A pose that the search knows by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum NamedPose {
     /// The reference's pose, where the search starts.
     Start,
     /// The minimum of the coarse positions.
@@ -21,8 +21,8 @@ pub enum Place {
     Last,
 }
 
-impl Place {
-    /// All of them, in the order of the search.
+impl NamedPose {
+    /// All named poses, in the order of the search.
     pub const ALL: [Self; 6] = [
         Self::Start,
         Self::Coarse,
@@ -48,13 +48,13 @@ impl Place {
 /// A small move of the camera in its own frame, in steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nudge {
-    /// To its right.
+    /// Moves to its right.
     Right(f64),
-    /// Upwards.
+    /// Moves upwards.
     Up(f64),
-    /// Ahead.
+    /// Moves ahead.
     Forward(f64),
-    /// About its up axis, to the left.
+    /// Turns about its up axis, to the left.
     Yaw(f64),
 }
 

@@ -4,9 +4,9 @@ use std::cell::RefCell;
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-use super::camera::{Nudge, Place};
-use super::desk::Comparing;
+use super::camera::{NamedPose, Nudge};
 use super::setup::ReferencePick;
+use super::view_options::CompareMode;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -80,7 +80,7 @@ pub enum Command {
     /// Forget A.
     Unpin,
     /// Show another of the two runs.
-    Compare(Comparing),
+    Compare(CompareMode),
     /// Show A instead of B, or the other way round.
     Flip,
     /// Blink between query and synthetic view.
@@ -98,7 +98,7 @@ pub enum Command {
     /// Take the camera in hand at a pose (`world_from_camera`), or let it go.
     TakeCamera(Option<Pose>),
     /// Take the camera to a place of the search.
-    JumpCamera(Place),
+    JumpCamera(NamedPose),
     /// Move the camera in hand, in its own frame \[m, rad\].
     MoveCamera(Nudge),
     /// Save the run as a recording.
@@ -219,37 +219,37 @@ pub fn shortcuts() -> Vec<Shortcut> {
         keys(
             NONE,
             Key::Num5,
-            Command::JumpCamera(Place::Start),
+            Command::JumpCamera(NamedPose::Start),
             "Camera to the start",
         ),
         keys(
             NONE,
             Key::Num6,
-            Command::JumpCamera(Place::Coarse),
+            Command::JumpCamera(NamedPose::Coarse),
             "Camera to the coarse minimum",
         ),
         keys(
             NONE,
             Key::Num7,
-            Command::JumpCamera(Place::Fine),
+            Command::JumpCamera(NamedPose::Fine),
             "Camera to the fine minimum",
         ),
         keys(
             NONE,
             Key::Num8,
-            Command::JumpCamera(Place::Estimate),
+            Command::JumpCamera(NamedPose::Estimate),
             "Camera to the estimate",
         ),
         keys(
             NONE,
             Key::Num9,
-            Command::JumpCamera(Place::Truth),
+            Command::JumpCamera(NamedPose::Truth),
             "Camera to the truth",
         ),
         keys(
             NONE,
             Key::Num0,
-            Command::JumpCamera(Place::Last),
+            Command::JumpCamera(NamedPose::Last),
             "Camera to where it was before",
         ),
         keys(

@@ -6,20 +6,21 @@ use eframe::egui_wgpu::RenderState;
 use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
 
 use super::command::{Command, Queue};
-use super::desk::{Comparing, Desk};
-use super::scope::Scope;
+use super::state::AppState;
+use super::view_context::ViewContext;
+use super::view_options::CompareMode;
 use super::views::{self, View};
 
 /// The tree of views, and the views themselves.
 pub(super) struct Layout {
     tree: Tree<String>,
-    views: BTreeMap<&'static str, Panel>,
+    views: BTreeMap<&'static str, ViewPair>,
     /// The view that has all the room, if one has.
     alone: Option<String>,
 }
 
 /// A view has what it remembers once for each of two runs.
-struct Panel {
+struct ViewPair {
     present: Box<dyn View>,
     kept: Box<dyn View>,
 }
@@ -29,11 +30,11 @@ impl Layout {
         let views = views::ALL
             .iter()
             .map(|entry| {
-                let panel = Panel {
+                let pair = ViewPair {
                     present: (entry.new)(render_state),
                     kept: (entry.new)(render_state),
                 };
-                (entry.name, panel)
+                (entry.name, pair)
             })
             .collect();
         Self {
@@ -92,10 +93,10 @@ impl Layout {
         self.tree.make_active(|tile, _| tile == id);
     }
 
-    pub(super) fn ui(&mut self, ui: &mut egui::Ui, desk: &Desk, commands: &Queue) {
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, state: &AppState, commands: &Queue) {
         let mut panes = Panes {
             views: &mut self.views,
-            desk,
+            state,
             commands,
         };
         if let Some(name) = &mut self.alone {
@@ -126,7 +127,7 @@ impl Layout {
         serde_json::to_value(&self.tree)
     }
 
-    /// A saved arrangement.
+    /// Goes back to a saved arrangement.
     pub(super) fn restore(&mut self, saved: serde_json::Value) -> serde_json::Result<()> {
         self.tree = serde_json::from_value(saved)?;
         Ok(())
@@ -177,8 +178,8 @@ fn first_tree() -> Tree<String> {
 
 /// What the tree draws its panes with.
 struct Panes<'a> {
-    views: &'a mut BTreeMap<&'static str, Panel>,
-    desk: &'a Desk,
+    views: &'a mut BTreeMap<&'static str, ViewPair>,
+    state: &'a AppState,
     commands: &'a Queue,
 }
 
@@ -189,20 +190,20 @@ fn title(name: &str) -> &str {
 
 impl Panes<'_> {
     fn draw_pane(&mut self, ui: &mut egui::Ui, pane: &str) {
-        let Some(panel) = self.views.get_mut(pane) else {
+        let Some(pair) = self.views.get_mut(pane) else {
             ui.weak(format!("There is no view `{pane}`"));
             return;
         };
         egui::Frame::NONE.inner_margin(6.0).show(ui, |ui| {
-            let present = Scope::present(self.desk, self.commands);
-            let kept = Scope::kept(self.desk, self.commands);
-            match (self.desk.comparing, kept) {
-                (Comparing::Kept, Some(kept)) => draw(ui, "A", &mut panel.kept, &kept),
-                (Comparing::SideBySide, Some(kept)) => ui.columns(2, |columns| {
-                    draw(&mut columns[0], "A", &mut panel.kept, &kept);
-                    draw(&mut columns[1], "B", &mut panel.present, &present);
+            let present = ViewContext::present(self.state, self.commands);
+            let kept = ViewContext::kept(self.state, self.commands);
+            match (self.state.options.compare_mode, kept) {
+                (CompareMode::Kept, Some(kept)) => draw(ui, "A", &mut pair.kept, &kept),
+                (CompareMode::SideBySide, Some(kept)) => ui.columns(2, |columns| {
+                    draw(&mut columns[0], "A", &mut pair.kept, &kept);
+                    draw(&mut columns[1], "B", &mut pair.present, &present);
                 }),
-                _ => draw(ui, "B", &mut panel.present, &present),
+                _ => draw(ui, "B", &mut pair.present, &present),
             }
         });
     }
@@ -249,14 +250,14 @@ impl Behavior<String> for Panes<'_> {
     }
 }
 
-fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, scope: &Scope<'_>) {
+fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, context: &ViewContext<'_>) {
     ui.push_id(run, |ui| {
-        if scope.desk.kept.is_some() {
+        if context.other_run().is_some() {
             ui.weak(match run {
                 "A" => "A, kept",
                 _ => "B, present",
             });
         }
-        view.ui(ui, scope);
+        view.ui(ui, context);
     });
 }

@@ -20,11 +20,11 @@ pub struct Probe {
     pub pose: Pose,
     /// The synthetic view and cost of each method that has one.
     pub comparisons: Vec<(Method, Arc<Comparison>)>,
-    /// How long it took.
+    /// How long the answer took.
     pub took: Duration,
 }
 
-struct Request {
+struct ProbeRequest {
     problem: Problem,
     methods: Vec<Method>,
     params: Arc<Params>,
@@ -33,7 +33,7 @@ struct Request {
 
 /// Answers for the pose that was asked for last; older questions are dropped.
 pub struct Prober {
-    requests: Sender<Request>,
+    requests: Sender<ProbeRequest>,
     answers: Receiver<Result<Probe, String>>,
     asked: Option<Pose>,
     latest: Option<Probe>,
@@ -41,7 +41,7 @@ pub struct Prober {
 
 impl Prober {
     pub(super) fn new(ctx: egui::Context) -> Self {
-        let (requests, inbox) = mpsc::channel::<Request>();
+        let (requests, inbox) = mpsc::channel::<ProbeRequest>();
         let (outbox, answers) = mpsc::channel();
         // Without a thread the answers never come, and the send below says so.
         let _ = thread::Builder::new()
@@ -76,7 +76,7 @@ impl Prober {
         if self.asked == Some(pose) {
             return;
         }
-        let request = Request {
+        let request = ProbeRequest {
             problem: problem.clone(),
             methods: methods.to_vec(),
             params: Arc::clone(params),
@@ -94,7 +94,7 @@ impl Prober {
     }
 
     /// Takes in answers. An error is a fault of ours.
-    pub(super) fn attend(&mut self) -> Result<(), String> {
+    pub(super) fn poll(&mut self) -> Result<(), String> {
         while let Ok(answer) = self.answers.try_recv() {
             self.latest = Some(answer?);
         }
@@ -112,7 +112,7 @@ impl Prober {
     }
 }
 
-impl Request {
+impl ProbeRequest {
     fn answer(&self) -> Probe {
         let begun = Instant::now();
         let comparisons = self

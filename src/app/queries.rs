@@ -12,7 +12,7 @@ use egui::{ColorImage, TextureHandle, TextureOptions};
 use super::setup::Setup;
 use super::textures::color_image;
 use crate::event::{KindSet, Side};
-use crate::localize::{QueryResult, Watch};
+use crate::localize::{LocalizeObserver, QueryResult};
 use crate::picture;
 use crate::scene::{FrameStore, Scene};
 use crate::session::JobError;
@@ -22,19 +22,19 @@ use crate::trace::{Cancelled, Record, Sink};
 const THUMBNAIL_WIDTH: u32 = 124;
 
 /// The results of a query, or why it could not be run.
-pub(super) type Outcome = (usize, Result<Vec<QueryResult>, String>);
+pub(super) type BatchOutcome = (usize, Result<Vec<QueryResult>, String>);
 
 /// Thumbnails and results that are made beside the window's thread.
 pub struct Queries {
     ctx: egui::Context,
     thumbnails: BTreeMap<(Side, usize), Option<TextureHandle>>,
     wanted: Arc<Mutex<BTreeSet<(Side, usize)>>>,
-    pictures: (Sender<Picture>, Receiver<Picture>),
+    pictures: (Sender<PainterMessage>, Receiver<PainterMessage>),
     painter_is_busy: bool,
     batch: Option<Batch>,
 }
 
-enum Picture {
+enum PainterMessage {
     Thumbnail((Side, usize), Option<ColorImage>),
     Idle,
 }
@@ -42,7 +42,7 @@ enum Picture {
 /// All queries at work, one after the other. Nobody joins the worker: it ends soon after the batch is
 /// dropped.
 struct Batch {
-    outcomes: Receiver<Outcome>,
+    outcomes: Receiver<BatchOutcome>,
     stop: Arc<AtomicBool>,
     done: usize,
     all: usize,
@@ -71,7 +71,7 @@ impl Sink for UntilStopped {
     }
 }
 
-impl Watch for UntilStopped {
+impl LocalizeObserver for UntilStopped {
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         Some(Arc::clone(&self.0))
     }
@@ -160,23 +160,23 @@ impl Queries {
     }
 
     /// Takes in what was made; has what is wanted made.
-    pub(super) fn attend(&mut self) -> Vec<Outcome> {
+    pub(super) fn poll(&mut self) -> Vec<BatchOutcome> {
         while let Ok(picture) = self.pictures.1.try_recv() {
             match picture {
-                Picture::Thumbnail(frame, image) => {
+                PainterMessage::Thumbnail(frame, image) => {
                     let texture = image.map(|image| {
                         let name = format!("thumbnail {frame:?}");
                         self.ctx.load_texture(name, image, TextureOptions::LINEAR)
                     });
                     self.thumbnails.insert(frame, texture);
                 }
-                Picture::Idle => self.painter_is_busy = false,
+                PainterMessage::Idle => self.painter_is_busy = false,
             }
         }
         let Some(batch) = &mut self.batch else {
             return Vec::new();
         };
-        let outcomes: Vec<Outcome> = batch.outcomes.try_iter().collect();
+        let outcomes: Vec<BatchOutcome> = batch.outcomes.try_iter().collect();
         batch.done += outcomes.len();
         if batch.done == batch.all {
             self.batch = None;
@@ -206,14 +206,14 @@ impl Queries {
                         Side::Reference => references.as_ref(),
                     };
                     let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene, frame)));
-                    let picture = Picture::Thumbnail((side, frame), image.ok().flatten());
+                    let picture = PainterMessage::Thumbnail((side, frame), image.ok().flatten());
                     let told = outbox.send(picture);
                     if told.is_err() {
                         return;
                     }
                     ctx.request_repaint();
                 }
-                let _ = outbox.send(Picture::Idle);
+                let _ = outbox.send(PainterMessage::Idle);
                 ctx.request_repaint();
             });
         self.painter_is_busy = started.is_ok();
@@ -244,6 +244,6 @@ fn localize(
 ) -> Result<Vec<QueryResult>, JobError> {
     let mut setup = setup.clone();
     setup.go_to(query);
-    let mut watch = UntilStopped(Arc::clone(stop));
-    setup.job(frames).work(&mut watch, |_| {})
+    let mut observer = UntilStopped(Arc::clone(stop));
+    setup.job(frames).work(&mut observer, |_| {})
 }

@@ -6,17 +6,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use egui::Ui;
 
 use super::command::{Command, Queue};
-use super::desk::Desk;
-use crate::localize::Watch as _;
+use super::state::AppState;
+use crate::localize::LocalizeObserver as _;
 use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;
 
-/// The menu.
-pub(super) fn menu(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+/// The menu of what can be saved or sent.
+pub(super) fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.menu_button("Save", |ui| {
-        let folder = &desk.setup.folder;
-        let name = desk.setup.query_name();
+        let folder = &state.setup.folder;
+        let name = state.setup.query_name();
         let mut item = |text: &str, help: &str, command: Command| {
             if ui.button(text).on_hover_text(help).clicked() {
                 commands.send(command);
@@ -60,7 +60,7 @@ pub(super) fn menu(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     });
 }
 
-impl Desk {
+impl AppState {
     /// Tells the run to a recording, from the history: nothing is computed anew.
     pub(super) fn record(&self, targets: &Targets) -> Result<(), RecordError> {
         let run = self.run();

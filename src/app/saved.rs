@@ -37,7 +37,7 @@ pub(super) struct SavedSession {
     pub(super) layout: serde_json::Value,
 }
 
-/// As the first version was written. It had neither the format nor the index.
+/// A session as the first version was written. It had neither the format nor the index.
 #[derive(Deserialize)]
 struct SavedSession1 {
     scene: String,

@@ -1,13 +1,12 @@
 //! What the window is opened on.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use crate::estimator;
-use crate::localize::{QueryResult, References, Selection, frames_within};
+use crate::localize::{References, Selection, frames_within};
 use crate::method::Method;
 use crate::scene::{FrameStore, Scene};
 use crate::session::{IndexFile, Job, RunMode, Task};
@@ -65,8 +64,6 @@ pub struct Setup {
     pub failure_radius_m: f64,
     /// Whether it waits at the first step or runs.
     pub mode: RunMode,
-    /// Results that are known already, by query.
-    pub results: BTreeMap<usize, Vec<QueryResult>>,
     /// Where recordings, pictures and sessions are saved unless somebody names another place.
     pub folder: PathBuf,
 }

@@ -8,18 +8,18 @@ use crate::render::Comparison;
 
 /// A synthetic view beside the query, and where it comes from.
 #[derive(Clone)]
-pub struct Shown {
+pub struct ShownView {
     /// View, cost, and what made the cost.
     pub comparison: Arc<Comparison>,
     /// Where the camera is (`world_from_camera`).
     pub pose: Pose,
     /// Why it is shown.
-    pub at: ShownAt,
+    pub reason: ShownReason,
 }
 
 /// Why a synthetic view is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ShownAt {
+pub enum ShownReason {
     /// The pointer is over this pose.
     Pointer,
     /// The camera in hand is there.
@@ -28,7 +28,7 @@ pub enum ShownAt {
     Event(Moment),
 }
 
-impl ShownAt {
+impl ShownReason {
     /// The reason in words, as a caption.
     pub fn name(self) -> &'static str {
         match self {

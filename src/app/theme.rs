@@ -19,7 +19,7 @@ pub const CAMERA: Color32 = rgb(palette::UNDECIDED);
 /// Colour of a pose that is too far from the truth.
 pub const FAR: Color32 = Color32::from_rgb(0xE6, 0x9F, 0x00);
 
-/// As egui takes it.
+/// A colour as egui takes it.
 pub const fn rgb([r, g, b]: Rgb) -> Color32 {
     Color32::from_rgb(r, g, b)
 }

@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, FontId, Rect, Sense, Slider, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::command::{Command, Queue};
-use super::desk::Desk;
+use super::state::AppState;
 use super::theme;
 use crate::method::Method;
 use crate::session::{Part, Run, StageBar};
@@ -13,11 +13,11 @@ const BAR_HEIGHT: f32 = 9.0;
 /// Depths that have a row of their own; deeper stages share the last.
 const ROWS: usize = 3;
 
-pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let run = desk.run();
+pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let run = state.run();
     let last = run.len().saturating_sub(1);
     ui.horizontal(|ui| {
-        let mut cursor = desk.cursor;
+        let mut cursor = state.cursor();
         let label = ui.label("Step");
         ui.spacing_mut().slider_width = (ui.available_width() - 420.0).max(120.0);
         let slider = ui
@@ -32,16 +32,16 @@ pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         }
         ui.label(format!("of {last}"));
         let stages: Vec<_> = run
-            .stages_at(desk.cursor)
+            .stages_at(state.cursor())
             .map(|bar| bar.stage.name())
             .collect();
         ui.monospace(stages.join(" › "));
     });
-    lanes(ui, desk, commands);
+    lanes(ui, state, commands);
 }
 
-fn lanes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let run = desk.run();
+fn lanes(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let run = state.run();
     let height = BAR_HEIGHT * ROWS as f32 + 16.0;
     let size = vec2(ui.available_width(), height);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
@@ -69,7 +69,7 @@ fn lanes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     for bar in run.stages() {
         draw(ui, &painter, bar, rect, x_of);
     }
-    let x = x_of(desk.cursor) + 0.5 * rect.width() / count;
+    let x = x_of(state.cursor()) + 0.5 * rect.width() / count;
     let color = ui.visuals().strong_text_color();
     painter.vline(x, rect.y_range(), Stroke::new(2.0, color));
 

@@ -3,26 +3,27 @@
 use egui::{Button, RichText, Ui};
 
 use super::command::{Command, Queue};
-use super::desk::{Comparing, Desk};
 use super::setup::ReferencePick;
+use super::state::AppState;
 use super::theme;
+use super::view_options::CompareMode;
 use crate::localize::Selection;
 use crate::method::Method;
-use crate::session::State;
+use crate::session::RunState;
 
-pub(super) fn ui(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.horizontal_wrapped(|ui| {
-        run_buttons(ui, desk, commands);
+        run_buttons(ui, state, commands);
         ui.separator();
-        query(ui, desk, commands);
+        query(ui, state, commands);
         ui.separator();
-        methods(ui, desk, commands);
+        methods(ui, state, commands);
         ui.separator();
-        switches(ui, desk, commands);
-        compared(ui, desk, commands);
-        menus(ui, desk, commands);
+        switches(ui, state, commands);
+        compared(ui, state, commands);
+        menus(ui, state, commands);
     });
-    notes(ui, desk, commands);
+    notes(ui, state, commands);
 }
 
 fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Command) {
@@ -31,15 +32,15 @@ fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Comman
     }
 }
 
-fn run_buttons(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let is_running = matches!(desk.state(), State::Running | State::Loading);
+fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let is_running = matches!(state.run_state(), RunState::Running | RunState::Loading);
     let (text, help) = if is_running {
         ("Pause", "Pause behind the next event (Space)")
     } else {
         ("▶ Run", "Run to the next breakpoint or the end (Space, F5)")
     };
     button(ui, commands, text, help, Command::RunOrPause);
-    let is_paused = matches!(desk.state(), State::Paused { .. });
+    let is_paused = matches!(state.run_state(), RunState::Paused { .. });
     ui.add_enabled_ui(is_paused || is_running, |ui| {
         button(
             ui,
@@ -57,39 +58,39 @@ fn run_buttons(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     });
     let help = "Begin again and wait at the first step (Shift+F5)";
     button(ui, commands, "Restart", help, Command::Restart);
-    match desk.state() {
-        State::Loading => {
+    match state.run_state() {
+        RunState::Loading => {
             ui.spinner();
             ui.label("Loading");
         }
-        State::Running => {
+        RunState::Running => {
             ui.spinner();
             ui.label("Running");
         }
-        State::Paused { breakpoint: None } => {
+        RunState::Paused { breakpoint: None } => {
             ui.label("Paused");
         }
-        State::Paused {
+        RunState::Paused {
             breakpoint: Some(text),
         } => {
             ui.label(RichText::new(format!("● {text}")).color(theme::ESTIMATE))
                 .on_hover_text("The breakpoint that stopped the run");
         }
-        State::Finished => {
+        RunState::Finished => {
             ui.label("Finished");
         }
-        State::Cancelled => {
+        RunState::Cancelled => {
             ui.label("Cancelled");
         }
-        State::Broken(why) => {
+        RunState::Broken(why) => {
             ui.label(RichText::new("Stopped").color(theme::ESTIMATE))
                 .on_hover_text(why);
         }
     }
 }
 
-fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let setup = &desk.setup;
+fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let setup = &state.setup;
     let frame = |scene: &std::sync::Arc<dyn crate::scene::Scene>, index: usize| {
         scene.frames()[index].clone()
     };
@@ -156,12 +157,12 @@ fn query(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     });
 }
 
-fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    let here = desk
+fn methods(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let here = state
         .run()
-        .span_at(desk.cursor)
+        .span_at(state.cursor())
         .and_then(|span| span.part.method());
-    let asked = desk.setup.task.protocol.methods.iter().copied();
+    let asked = state.setup.task.protocol.methods.iter().copied();
     let others = asked.filter(|method| !Method::PAPER.contains(method));
     for method in Method::PAPER.into_iter().chain(others) {
         let is_here = here == Some(method);
@@ -178,7 +179,7 @@ fn methods(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     }
 }
 
-fn switches(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+fn switches(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let switch = |ui: &mut Ui, is_on: bool, text: &str, help: &str, command: Command| {
         let mut state = is_on;
         if ui
@@ -190,22 +191,28 @@ fn switches(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         }
     };
     let help = "Show the ground truth (G)";
-    switch(ui, desk.shows_truth, "Truth", help, Command::ShowTruth);
+    switch(
+        ui,
+        state.options.shows_truth,
+        "Truth",
+        help,
+        Command::ShowTruth,
+    );
     let help = "Show only what differs (D)";
     switch(
         ui,
-        desk.only_differences,
+        state.options.only_differences,
         "Differences",
         help,
         Command::OnlyDifferences,
     );
     let help = "Blink between query and synthetic view (B)";
-    switch(ui, desk.blinking, "Blink", help, Command::Blink);
+    switch(ui, state.options.blinking, "Blink", help, Command::Blink);
 }
 
-fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.separator();
-    if desk.kept.is_none() {
+    if state.kept.is_none() {
         button(
             ui,
             commands,
@@ -215,18 +222,18 @@ fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
         );
         return;
     }
-    for (comparing, text, help) in [
-        (Comparing::Kept, "A", "Show the run that was kept (X)"),
-        (Comparing::Present, "B", "Show the present run (X)"),
+    for (compare_mode, text, help) in [
+        (CompareMode::Kept, "A", "Show the run that was kept (X)"),
+        (CompareMode::Present, "B", "Show the present run (X)"),
         (
-            Comparing::SideBySide,
+            CompareMode::SideBySide,
             "A | B",
             "Show both beside each other",
         ),
     ] {
-        let response = ui.selectable_label(desk.comparing == comparing, text);
+        let response = ui.selectable_label(state.options.compare_mode == compare_mode, text);
         if response.on_hover_text(help).clicked() {
-            commands.send(Command::Compare(comparing));
+            commands.send(Command::Compare(compare_mode));
         }
     }
     button(
@@ -238,7 +245,7 @@ fn compared(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     );
 }
 
-fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
+fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.separator();
     ui.menu_button("Views", |ui| {
         for entry in super::views::ALL {
@@ -251,7 +258,7 @@ fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
             commands.send(Command::ResetLayout);
         }
     });
-    super::save::menu(ui, desk, commands);
+    super::save::menu(ui, state, commands);
     button(
         ui,
         commands,
@@ -262,8 +269,8 @@ fn menus(ui: &mut Ui, desk: &Desk, commands: &Queue) {
     button(ui, commands, "?", "All keys (?)", Command::Help);
 }
 
-fn notes(ui: &mut Ui, desk: &Desk, commands: &Queue) {
-    for (index, note) in desk.notes.iter().enumerate() {
+fn notes(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    for (index, note) in state.notes.iter().enumerate() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Dismiss").clicked() {
                 commands.send(Command::Dismiss(index));

@@ -5,6 +5,7 @@ use egui::ViewportBuilder;
 use super::App;
 use super::adapter;
 use super::setup::Setup;
+use super::state::Results;
 
 /// Why no window could be opened, and what would help.
 #[derive(Debug, thiserror::Error)]
@@ -53,11 +54,11 @@ pub fn window_options() -> eframe::NativeOptions {
     }
 }
 
-/// Opens the window and returns when it is closed.
+/// Opens the window with the results that are known already, and returns when it is closed.
 ///
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
-pub fn open(setup: Setup) -> Result<(), WindowError> {
+pub fn open(setup: Setup, results: Results) -> Result<(), WindowError> {
     if !has_display() {
         return Err(WindowError::NoDisplay);
     }
@@ -67,7 +68,7 @@ pub fn open(setup: Setup) -> Result<(), WindowError> {
     eframe::run_native(
         "posescope",
         options,
-        Box::new(|creation| Ok(Box::new(App::new(creation, setup)))),
+        Box::new(|creation| Ok(Box::new(App::new(creation, setup).with_results(results)))),
     )
     .map_err(|error| match error {
         eframe::Error::Wgpu(why) => WindowError::NoAdapter(one_line(&why.to_string())),

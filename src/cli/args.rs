@@ -180,7 +180,7 @@ impl TaskArgs {
     }
 }
 
-/// As without any option.
+/// What is asked where no option is given.
 impl Default for TaskArgs {
     fn default() -> Self {
         Self {

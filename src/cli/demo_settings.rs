@@ -12,7 +12,7 @@ pub struct Settings {
     pub recording: PathBuf,
 }
 
-/// Those of `assets/demo.toml`.
+/// The settings of `assets/demo.toml`.
 pub fn settings() -> &'static Settings {
     static SETTINGS: LazyLock<Settings> = LazyLock::new(|| {
         let settings = toml::from_str(include_str!("../../assets/demo.toml"));

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::measure::{Change, Comparison, Tolerance, read_rows};
+use posescope::measure::{Change, RunComparison, Tolerance, read_rows};
 use posescope::run::read_run;
 use posescope::sink::rerun::{Targets, record_comparison};
 
@@ -19,7 +19,7 @@ pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
         degrees: args.tolerance_deg,
     };
     let (before, after) = (read_run(&args.before)?, read_run(&args.after)?);
-    let comparison = Comparison::of(
+    let comparison = RunComparison::of(
         (&read_rows(&args.before)?, before.failure_radius_m),
         (&read_rows(&args.after)?, after.failure_radius_m),
         &tolerance,
@@ -49,7 +49,7 @@ pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
 
 /// Records both runs on the same timelines, in the second one's folder unless told otherwise.
 pub fn record(
-    comparison: &Comparison,
+    comparison: &RunComparison,
     (before, after): (&Path, &Path),
     save: Option<&Path>,
     terminal: &Terminal,
@@ -67,7 +67,7 @@ pub fn record(
 }
 
 /// The comparison in words, as Markdown.
-pub fn text(comparison: &Comparison) -> String {
+pub fn text(comparison: &RunComparison) -> String {
     let mut text = format!(
         "{} broken, {} fixed, {} worse, {} better, of {} results in both runs",
         comparison.count(Change::Broken),

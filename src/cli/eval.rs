@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use posescope::localize::{Ranking, Selection};
-use posescope::measure::{Change, Comparison, Gate, Report, Tolerance, read_rows, write_report};
+use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
 use posescope::params::Params;
 use posescope::run::{
-    Draw, Execution, Experiment, Pair, RUN_SCHEMA, RunFile, RunFolder, Scenes,
+    Draw, Execution, Experiment, RUN_SCHEMA, RunFile, RunFolder, ScenePair, Scenes,
     default_failure_radius_m, default_prior_m, defaults, merge, read_run,
 };
 use posescope::scene::{self, Retriever, Scene};
@@ -61,16 +61,16 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     };
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(folder.done() as u64);
-    let mut companion = FailureRecordings::new(args, &folder, &run, &params, bar.clone())?;
+    let mut observer = FailureRecordings::new(args, &folder, &run, &params, bar.clone())?;
     let execution = Execution {
         run: &run,
         scenes: &scenes,
         params: &params,
         indices: &indices,
     };
-    let outcome = execution.go_on(&mut folder, &mut companion);
+    let outcome = execution.run_remaining(&mut folder, &mut observer);
     bar.finish_and_clear();
-    companion.close();
+    observer.close();
     outcome?;
     Ok(run)
 }
@@ -156,7 +156,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
 }
 
 /// Every scene with itself, or every scene of references with every one of queries.
-fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<Pair>, CliError> {
+fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     let mut pairs = Vec::new();
     for (index, references) in scenes.references.iter().enumerate() {
         let references = references.as_ref();
@@ -184,10 +184,10 @@ fn finish(
         eprintln!("Run: {}", folder.display());
     }
     let mut failures: Vec<String> = report
-        .passages
+        .gate_results
         .iter()
-        .filter(|passage| !passage.passed)
-        .map(|passage| format!("gate `{}` failed: {}", passage.gate, passage.found))
+        .filter(|gate_result| !gate_result.passed)
+        .map(|gate_result| format!("gate `{}` failed: {}", gate_result.gate, gate_result.found))
         .collect();
     if let Some(baseline) = &args.baseline {
         let comparison = against(baseline, folder, run)?;
@@ -215,16 +215,23 @@ fn show(report: &Report, run: &RunFile) -> Result<(), CliError> {
     for table in report.tables.iter().skip(skipped) {
         output::print(&table.markdown())?;
     }
-    for passage in &report.passages {
-        let verdict = if passage.passed { "passed" } else { "FAILED" };
-        output::print(&format!("{verdict}: {}: {}", passage.gate, passage.found))?;
+    for gate_result in &report.gate_results {
+        let verdict = if gate_result.passed {
+            "passed"
+        } else {
+            "FAILED"
+        };
+        output::print(&format!(
+            "{verdict}: {}: {}",
+            gate_result.gate, gate_result.found
+        ))?;
     }
     Ok(())
 }
 
-fn against(baseline: &Path, folder: &Path, run: &RunFile) -> Result<Comparison, CliError> {
+fn against(baseline: &Path, folder: &Path, run: &RunFile) -> Result<RunComparison, CliError> {
     let before = read_run(baseline)?;
-    Ok(Comparison::of(
+    Ok(RunComparison::of(
         (&read_rows(baseline)?, before.failure_radius_m),
         (&read_rows(folder)?, run.failure_radius_m),
         &Tolerance::default(),

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use posescope::measure::{Choice, Export, ExportError, export};
+use posescope::measure::{Export, ExportError, ResultChoice, export};
 use posescope::run::{FolderError, read_run};
 
 use super::args::ExportArgs;
@@ -13,7 +13,7 @@ use super::terminal::Terminal;
 /// Runs the command.
 pub fn run(args: &ExportArgs, terminal: &Terminal) -> Result<(), CliError> {
     let run = read_run(&args.run)?;
-    let choice = Choice {
+    let choice = ResultChoice {
         method: args.method,
         fusion: args.fusion,
         radius_m: args.radius,

@@ -6,45 +6,47 @@ use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use posescope::localize::{LocalizeError, Watch};
+use posescope::localize::{LocalizeError, LocalizeObserver};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::run::{Companion, FailedQuery, FolderError, Item, RunError, RunFile, RunFolder};
+use posescope::run::{
+    FailedQuery, FolderError, RunError, RunFile, RunFolder, RunItem, RunObserver,
+};
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
 use super::args::EvalArgs;
-use super::audience::Audience;
 use super::failure::CliError;
+use super::observer::CliObserver;
 
 const FOLDER: &str = "failures";
 /// Names of failed queries without a recording, one per line.
 const DROPPED: &str = "dropped.txt";
 
-/// Accompanies a run: a progress bar, and a recording of each failure while there is room.
+/// Observes a run: a progress bar, and a recording of each failure while the budget lasts.
 ///
 /// A failure is localised once more to be recorded: most queries succeed, and recording each of them
 /// would cost more than repeating a few.
 pub struct FailureRecordings<'a> {
     folder: PathBuf,
-    room: Room,
+    budget: RecordingBudget,
     params: &'a Params,
     seed: u64,
     failure_radius_m: f64,
     several_pairs: bool,
     bar: indicatif::ProgressBar,
-    audience: Audience,
+    observer: CliObserver,
     dropped: usize,
 }
 
 /// What recordings may still take. Once one does not fit, none does: the first failures are kept,
 /// whatever their sizes.
-struct Room {
+struct RecordingBudget {
     recordings: usize,
     bytes: u64,
     is_full: bool,
 }
 
-impl Room {
+impl RecordingBudget {
     fn new(args: &EvalArgs) -> Self {
         Self {
             recordings: args.max_recordings,
@@ -77,17 +79,17 @@ impl<'a> FailureRecordings<'a> {
         let path = folder.path().join(FOLDER);
         fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
         let several_pairs = run.pairs.len() > 1;
-        let mut room = Room::new(args);
+        let mut budget = RecordingBudget::new(args);
         let dropped = read_dropped(&path)?;
         let mut still_dropped = String::new();
         for item in run.items().take(folder.done()) {
             for method in &run.protocol.methods {
                 let name = name_of(&item, *method, several_pairs);
                 if dropped.contains(&name) {
-                    room.is_full = true;
+                    budget.is_full = true;
                     still_dropped += &format!("{name}\n");
                 } else if let Ok(file) = fs::metadata(path.join(format!("{name}.rrd"))) {
-                    room.take(file.len());
+                    budget.take(file.len());
                 }
             }
         }
@@ -99,13 +101,13 @@ impl<'a> FailureRecordings<'a> {
         }
         Ok(Self {
             folder: path,
-            room,
+            budget,
             params,
             seed: run.protocol.seed,
             failure_radius_m: run.failure_radius_m,
             several_pairs,
             bar,
-            audience: Audience::new(indicatif::ProgressBar::hidden(), None),
+            observer: CliObserver::new(indicatif::ProgressBar::hidden(), None),
             dropped: still_dropped.lines().count(),
         })
     }
@@ -163,7 +165,7 @@ impl<'a> FailureRecordings<'a> {
     ) -> Result<(), FolderError> {
         let folder = target.join(FOLDER);
         fs::create_dir_all(&folder).map_err(FolderError::io(&folder))?;
-        let mut room = Room::new(args);
+        let mut budget = RecordingBudget::new(args);
         let mut dropped_in_parts = BTreeSet::new();
         for part in parts {
             dropped_in_parts.extend(read_dropped(&part.join(FOLDER))?);
@@ -181,12 +183,12 @@ impl<'a> FailureRecordings<'a> {
                     None => continue,
                 };
                 match source {
-                    Some(source) if room.take(size) => {
+                    Some(source) if budget.take(size) => {
                         let copied = fs::copy(&source, folder.join(&file));
                         copied.map_err(FolderError::io(source))?;
                     }
                     _ => {
-                        room.is_full = true;
+                        budget.is_full = true;
                         dropped += 1;
                         append_dropped(&folder, &name)?;
                     }
@@ -198,9 +200,9 @@ impl<'a> FailureRecordings<'a> {
     }
 }
 
-impl Companion for FailureRecordings<'_> {
-    fn watch(&mut self) -> &mut dyn Watch {
-        &mut self.audience
+impl RunObserver for FailureRecordings<'_> {
+    fn query_observer(&mut self) -> &mut dyn LocalizeObserver {
+        &mut self.observer
     }
 
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
@@ -210,8 +212,8 @@ impl Companion for FailureRecordings<'_> {
         if query.request.references.frames.is_empty() {
             return Ok(());
         }
-        if self.room.is_full || self.room.recordings == 0 {
-            self.room.is_full = true;
+        if self.budget.is_full || self.budget.recordings == 0 {
+            self.budget.is_full = true;
             return Ok(self.drop(&name)?);
         }
         if let Err(error) = self.record(query, &path) {
@@ -219,21 +221,21 @@ impl Companion for FailureRecordings<'_> {
             return Ok(());
         }
         let size = fs::metadata(&path).map_err(FolderError::io(&path))?.len();
-        if !self.room.take(size) {
+        if !self.budget.take(size) {
             remove_if_there(&path)?;
             self.drop(&name)?;
         }
         Ok(())
     }
 
-    fn done(&mut self, item: &Item<'_>) {
+    fn done(&mut self, item: &RunItem<'_>) {
         self.bar.set_message(item.query.to_owned());
         self.bar.inc(1);
     }
 }
 
 /// `QUERY-METHOD`, with the scenes before it where there are several pairs of them.
-fn name_of(item: &Item<'_>, method: Method, several_pairs: bool) -> String {
+fn name_of(item: &RunItem<'_>, method: Method, several_pairs: bool) -> String {
     let pair = item.pair;
     let name = if several_pairs {
         format!(

@@ -1,6 +1,6 @@
 //! `posescope index`: the retrieval index of a scene.
 
-use posescope::retrieval::{BuildError, Index, IndexError, Progress};
+use posescope::retrieval::{BuildError, BuildProgress, Index, IndexError};
 use posescope::scene::{self, IndexOptions, NoIndex, Retriever};
 
 use super::args::IndexArgs;
@@ -44,7 +44,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     let bar = terminal.bar(0);
     let built = Retriever::build(scene.as_ref(), &path, &request, &params, |progress| {
-        let Progress { step, done, total } = progress;
+        let BuildProgress { step, done, total } = progress;
         bar.set_message(step.name());
         bar.set_length(total as u64);
         bar.set_position(done as u64);

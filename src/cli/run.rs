@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use posescope::localize::{
-    Chooser, Localizer, QueryResult, Ranking, References, Request, Selection, Unwatched,
+    Chooser, Localizer, NoObserver, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::run::default_failure_radius_m;
 use posescope::scene::{self, Retriever, Scene};
@@ -11,8 +11,8 @@ use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
-use super::audience::Audience;
 use super::failure::CliError;
+use super::observer::CliObserver;
 use super::output::{self, JsonLines};
 use super::table;
 use super::terminal::Terminal;
@@ -25,7 +25,7 @@ struct Plan<'a> {
 }
 
 /// One query, as its position in its scene, with its references.
-struct Planned {
+struct PlannedQuery {
     query: usize,
     references: References,
 }
@@ -57,10 +57,10 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let methods = &task.protocol.methods;
     let estimates = tasks.iter().map(|task| task.references.frames.len());
     let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
-    let mut audience = Audience::new(bar.clone(), plan.recorder(&tasks)?);
+    let mut observer = CliObserver::new(bar.clone(), plan.recorder(&tasks)?);
     if !task.breakpoints.is_empty() {
         let breakpoints = Breakpoints::new(task.breakpoints.iter().cloned());
-        audience.stop = Some(StopAtBreakpoint::new(breakpoints));
+        observer.stop = Some(StopAtBreakpoint::new(breakpoints));
     }
     let outcome = tasks.iter().enumerate().try_for_each(|(index, query)| {
         let request = Request {
@@ -74,7 +74,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
             query.query,
             &[request],
             methods,
-            &mut audience,
+            &mut observer,
             |result, times| {
                 let written = json.as_mut().map_or(Ok(()), |json| json.write(&result));
                 results.push((result, times.total()));
@@ -86,11 +86,11 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
 
     // Whatever went wrong, what was computed is shown and the recording is closed.
     let shown = plan.show(&results, terminal);
-    let reached = audience.stop.as_ref().and_then(StopAtBreakpoint::reached);
+    let reached = observer.stop.as_ref().and_then(StopAtBreakpoint::reached);
     if let (Some(breakpoint), false) = (reached, terminal.is_quiet()) {
         eprintln!("Stopped at {breakpoint}");
     }
-    let closed = audience.recorder.map_or(Ok(()), Recorder::close);
+    let closed = observer.recorder.map_or(Ok(()), Recorder::close);
     match outcome {
         Ok(()) | Err(CliError::Stopped(_)) => {}
         Err(error) => return Err(error),
@@ -135,7 +135,7 @@ impl Plan<'_> {
         output::print(&table)
     }
 
-    fn queries(&self) -> Result<Vec<Planned>, CliError> {
+    fn queries(&self) -> Result<Vec<PlannedQuery>, CliError> {
         let (args, task, protocol) = (self.args, self.task, &self.task.protocol);
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let wanted = if args.all {
@@ -177,13 +177,13 @@ impl Plan<'_> {
                 } else {
                     named.clone().into()
                 };
-                Ok(Planned { query, references })
+                Ok(PlannedQuery { query, references })
             })
             .collect()
     }
 
     fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<References, CliError> {
-        let chosen = chooser.choose(query, &|_| false, &mut Unwatched)?;
+        let chosen = chooser.choose(query, &|_| false, &mut NoObserver)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(
@@ -196,7 +196,7 @@ impl Plan<'_> {
         Ok(chosen)
     }
 
-    fn recorder(&self, tasks: &[Planned]) -> Result<Option<Recorder>, CliError> {
+    fn recorder(&self, tasks: &[PlannedQuery]) -> Result<Option<Recorder>, CliError> {
         let recording = &self.args.recording;
         let targets = Targets {
             save: recording.save.clone(),

@@ -1,11 +1,10 @@
 //! `posescope view`: the window; without a display, the same run as a recording.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Parser as _;
-use posescope::app::{self, ReferencePick, Setup, WindowError};
+use posescope::app::{self, ReferencePick, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::params::Params;
 use posescope::run::{Protocol, default_failure_radius_m, read_results, read_run};
@@ -24,9 +23,9 @@ const FOLDER: &str = "recordings";
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
     run::use_threads(args.task.protocol.threads)?;
-    let setup = setup(args, mode)?;
+    let (setup, results) = setup(args, mode)?;
     let headless = setup.clone();
-    match app::open(setup) {
+    match app::open(setup, results) {
         Ok(()) => Ok(()),
         Err(
             error @ (WindowError::NoDisplay | WindowError::NoAdapter(_) | WindowError::Failed(_)),
@@ -34,7 +33,7 @@ pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), C
     }
 }
 
-/// The same run, as a recording.
+/// Makes a recording of the same run.
 fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Result<(), CliError> {
     let query = setup.query_name();
     let recording = setup.folder.join(format!("{query}.rrd"));
@@ -54,14 +53,15 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
     }
 }
 
-fn setup(args: &ViewArgs, mode: RunMode) -> Result<Setup, CliError> {
+/// What the window is opened on, and the results that are known already.
+fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, Results), CliError> {
     let folder = Path::new(&args.scene);
-    let mut setup = match folder.join("run.toml").is_file() {
+    let (mut setup, results) = match folder.join("run.toml").is_file() {
         true => of_a_run(args, folder)?,
-        false => of_a_scene(args)?,
+        false => (of_a_scene(args)?, Results::new()),
     };
     setup.mode = mode;
-    Ok(setup)
+    Ok((setup, results))
 }
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
@@ -88,7 +88,6 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         task,
         failure_radius_m,
         mode: RunMode::Paused,
-        results: BTreeMap::new(),
         folder: PathBuf::from(FOLDER),
     };
     begin_at(args, &mut setup)?;
@@ -129,7 +128,7 @@ fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
 }
 
 /// The queries of a run, with its results; the first failure is looked at first.
-fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
+fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError> {
     let file = read_run(folder)?;
     let known: Vec<QueryResult> = read_results(folder)?.collect::<Result<_, _>>()?;
     let Some(pair) = file.pairs.first() else {
@@ -161,7 +160,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
             path: folder.join("run.toml"),
             source,
         })?;
-    let mut results: BTreeMap<usize, Vec<QueryResult>> = BTreeMap::new();
+    let mut results = Results::new();
     for result in known {
         if let Ok(frame) = queries.find(&result.query) {
             results.entry(frame).or_default().push(result);
@@ -203,7 +202,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         params,
         breakpoints: args.task.breakpoints.clone(),
     };
-    Ok(Setup {
+    let setup = Setup {
         offered: results.keys().copied().collect(),
         references,
         queries,
@@ -213,7 +212,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<Setup, CliError> {
         task,
         failure_radius_m,
         mode: RunMode::Paused,
-        results,
         folder: PathBuf::from(FOLDER),
-    })
+    };
+    Ok((setup, results))
 }

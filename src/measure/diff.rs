@@ -8,9 +8,9 @@ use crate::localize::Verdict;
 /// Changes of a pose's error that are not worth mentioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Of the translation error \[m\].
+    /// Change of the translation error \[m\].
     pub metres: f64,
-    /// Of the geodesic rotation error \[°\].
+    /// Change of the geodesic rotation error \[°\].
     pub degrees: f64,
 }
 
@@ -37,7 +37,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// In one word.
+    /// The change in one word.
     pub fn name(self) -> &'static str {
         match self {
             Self::Broken => "broken",
@@ -51,7 +51,7 @@ impl Change {
 /// A query and method of which the runs differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// What happened.
+    /// What happened to the query.
     pub change: Change,
     /// The result in the first run.
     pub before: Row,
@@ -63,7 +63,7 @@ pub struct Difference {
 
 /// All differences of two runs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Comparison {
+pub struct RunComparison {
     /// By change, then in the order of the first run.
     pub differences: Vec<Difference>,
     /// Results that both have.
@@ -74,7 +74,7 @@ pub struct Comparison {
     pub only_after: usize,
 }
 
-impl Comparison {
+impl RunComparison {
     /// Compares two runs. Each has its own failure radius \[m\].
     pub fn of(before: (&[Row], f64), after: (&[Row], f64), tolerance: &Tolerance) -> Self {
         let key = |row: &Row| format!("{:?}/{}/{}", row.group(), row.query, row.method);
@@ -140,8 +140,8 @@ mod tests {
     use super::super::metrics::tests::{row, rows};
     use super::*;
 
-    fn compare(before: &[Row], after: &[Row]) -> Comparison {
-        Comparison::of((before, 10.0), (after, 10.0), &Tolerance::default())
+    fn compare(before: &[Row], after: &[Row]) -> RunComparison {
+        RunComparison::of((before, 10.0), (after, 10.0), &Tolerance::default())
     }
 
     #[test]

@@ -15,8 +15,8 @@ use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
-use crate::run::{Camera, Item, RunFile};
 use crate::run::{FolderError, read_results};
+use crate::run::{QueryCamera, RunFile, RunItem};
 
 /// A format to export to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ impl Format {
 
 /// Which of several results of a query is meant.
 #[derive(Clone, Debug, Default)]
-pub struct Choice {
+pub struct ResultChoice {
     /// The method.
     pub method: Option<Method>,
     /// The fusion.
@@ -69,7 +69,7 @@ pub struct Choice {
     pub scene: Option<String>,
 }
 
-impl Choice {
+impl ResultChoice {
     fn takes(&self, result: &QueryResult) -> bool {
         let setting = result.setting;
         (self.method).is_none_or(|method| method == result.method)
@@ -98,7 +98,7 @@ pub enum ExportError {
         /// The methods of the run.
         methods: Vec<Method>,
     },
-    /// Nothing is left.
+    /// No result is left to export.
     #[error("the run has no such results")]
     Nothing,
     /// The format cannot hold a missing pose.
@@ -127,7 +127,7 @@ pub struct ExportedFile {
     pub text: String,
 }
 
-/// An export.
+/// The files of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Export {
     /// One file, or those of a folder.
@@ -138,7 +138,7 @@ pub struct Export {
 
 /// A query with its result.
 struct Localized<'a> {
-    item: Item<'a>,
+    item: RunItem<'a>,
     pose: Option<Pose>,
 }
 
@@ -150,7 +150,7 @@ pub fn export(
     folder: &Path,
     run: &RunFile,
     format: Format,
-    choice: &Choice,
+    choice: &ResultChoice,
 ) -> Result<Export, ExportError> {
     match format {
         Format::Csv => return single(csv(folder, run, choice)?),
@@ -191,7 +191,7 @@ fn single(text: String) -> Result<Export, ExportError> {
 fn localized<'a>(
     folder: &Path,
     run: &'a RunFile,
-    choice: &Choice,
+    choice: &ResultChoice,
 ) -> Result<Vec<Localized<'a>>, ExportError> {
     let per_item = run.results_per_item();
     let mut all = Vec::new();
@@ -275,7 +275,7 @@ fn vloc(localized: &[Localized<'_>]) -> String {
 }
 
 fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
-    let mut cameras: Vec<Camera> = Vec::new();
+    let mut cameras: Vec<QueryCamera> = Vec::new();
     let mut images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points\n".to_owned();
     for (index, one) in localized.iter().enumerate() {
         let camera = one.item.camera;
@@ -315,7 +315,7 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
     ]
 }
 
-fn csv(folder: &Path, run: &RunFile, choice: &Choice) -> Result<String, ExportError> {
+fn csv(folder: &Path, run: &RunFile, choice: &ResultChoice) -> Result<String, ExportError> {
     let mut table = Table::new(
         "results",
         "",

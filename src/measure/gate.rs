@@ -17,7 +17,7 @@ enum Metric {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Comparison {
+enum Relation {
     AtLeast,
     Above,
     AtMost,
@@ -32,13 +32,13 @@ pub struct Gate {
     text: String,
     metric: Metric,
     method: Method,
-    comparison: Comparison,
+    relation: Relation,
     limit: f64,
 }
 
-/// What became of a gate.
+/// Whether a gate holds, and what decided it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Passage {
+pub struct GateResult {
     /// The gate as it was given.
     pub gate: String,
     /// Whether it holds everywhere.
@@ -58,11 +58,11 @@ impl FromStr for Gate {
                  >=, >, <= or <"
             )
         };
-        let (sign, comparison) = [
-            (">=", Comparison::AtLeast),
-            ("<=", Comparison::AtMost),
-            (">", Comparison::Above),
-            ("<", Comparison::Below),
+        let (sign, relation) = [
+            (">=", Relation::AtLeast),
+            ("<=", Relation::AtMost),
+            (">", Relation::Above),
+            ("<", Relation::Below),
         ]
         .into_iter()
         .find(|(sign, _)| text.contains(sign))
@@ -78,7 +78,7 @@ impl FromStr for Gate {
             text: text.trim().to_owned(),
             metric: metric_of(metric).ok_or_else(expected)?,
             method,
-            comparison,
+            relation,
             limit,
         })
     }
@@ -103,33 +103,33 @@ fn metric_of(text: &str) -> Option<Metric> {
 
 impl Gate {
     /// Holds it against the figures of a run. A figure that does not exist passes no gate.
-    pub fn check(&self, measures: &[Measures]) -> Passage {
+    pub fn check(&self, measures: &[Measures]) -> GateResult {
         let of_method = measures.iter().filter(|one| one.method == self.method);
         let mut worst: Option<(f64, Option<f64>, String)> = None;
         for one in of_method {
             let value = self.value(one);
             // How far on the good side; what is missing is on the worst.
-            let margin = value.map_or(f64::NEG_INFINITY, |value| match self.comparison {
-                Comparison::AtLeast | Comparison::Above => value - self.limit,
-                Comparison::AtMost | Comparison::Below => self.limit - value,
+            let margin = value.map_or(f64::NEG_INFINITY, |value| match self.relation {
+                Relation::AtLeast | Relation::Above => value - self.limit,
+                Relation::AtMost | Relation::Below => self.limit - value,
             });
             if worst.as_ref().is_none_or(|(known, ..)| margin < *known) {
                 worst = Some((margin, value, one.group.to_string()));
             }
         }
         let Some((margin, value, group)) = worst else {
-            return self.passage(false, format!("the run has no results of {}", self.method));
+            return self.result(false, format!("the run has no results of {}", self.method));
         };
-        let passed = match self.comparison {
-            Comparison::AtLeast | Comparison::AtMost => margin >= 0.0,
-            Comparison::Above | Comparison::Below => margin > 0.0,
+        let passed = match self.relation {
+            Relation::AtLeast | Relation::AtMost => margin >= 0.0,
+            Relation::Above | Relation::Below => margin > 0.0,
         };
         let found = value.map_or("no figure".to_owned(), |value| format!("{value:.4}"));
-        self.passage(passed, format!("{found} ({group})"))
+        self.result(passed, format!("{found} ({group})"))
     }
 
-    fn passage(&self, passed: bool, found: String) -> Passage {
-        Passage {
+    fn result(&self, passed: bool, found: String) -> GateResult {
+        GateResult {
             gate: self.text.clone(),
             passed,
             found,

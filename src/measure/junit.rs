@@ -4,7 +4,7 @@ use std::path::Path;
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
-use super::gate::Passage;
+use super::gate::GateResult;
 use super::metrics::Row;
 use crate::fusion::Fusion;
 use crate::localize::{Reason, Setting};
@@ -23,7 +23,11 @@ struct Case {
 ///
 /// # Errors
 /// A line of the results that is none.
-pub fn junit(folder: &Path, run: &RunFile, passages: &[Passage]) -> Result<String, FolderError> {
+pub fn junit(
+    folder: &Path,
+    run: &RunFile,
+    gate_results: &[GateResult],
+) -> Result<String, FolderError> {
     let mut report = Report::new("posescope");
     // Results come by query; a suite holds those of a method.
     let mut suites: Vec<TestSuite> = Vec::new();
@@ -50,15 +54,15 @@ pub fn junit(folder: &Path, run: &RunFile, passages: &[Passage]) -> Result<Strin
             }
         }
     }
-    if !passages.is_empty() {
+    if !gate_results.is_empty() {
         let mut suite = TestSuite::new("gates");
-        for passage in passages {
-            let status = if passage.passed {
+        for gate_result in gate_results {
+            let status = if gate_result.passed {
                 TestCaseStatus::success()
             } else {
-                failure("gate", &passage.found)
+                failure("gate", &gate_result.found)
             };
-            suite.add_test_case(TestCase::new(passage.gate.as_str(), status));
+            suite.add_test_case(TestCase::new(gate_result.gate.as_str(), status));
         }
         suites.push(suite);
     }

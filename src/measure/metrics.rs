@@ -94,7 +94,7 @@ impl std::fmt::Display for Group {
 /// Median and root mean square of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// How many errors.
+    /// How many errors there are.
     pub count: usize,
     /// Median translation error \[m\].
     pub median_m: Option<f64>,
@@ -120,7 +120,7 @@ impl Spread {
     }
 }
 
-/// Of an even number the mean of the two in the middle.
+/// The median; of an even number of values the mean of the two in the middle.
 fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -147,11 +147,11 @@ pub struct Measures {
     pub group: Group,
     /// The method.
     pub method: Method,
-    /// Queries asked.
+    /// How many queries were asked.
     pub queries: usize,
-    /// Of those, with a pose.
+    /// How many queries have a pose.
     pub poses: usize,
-    /// Of those, within the failure radius.
+    /// How many queries have a pose within the failure radius.
     pub successes: usize,
     /// Successes over queries.
     pub success_rate: f64,

@@ -9,17 +9,17 @@ use std::sync::LazyLock;
 /// `table,scene,query_scene,method,radius_m,references,fusion,measure,value`.
 const FIGURES: &str = include_str!("../../assets/paper.csv");
 
-struct Figure {
+struct PaperFigure {
     key: String,
     value: f64,
 }
 
-static ALL: LazyLock<Vec<Figure>> = LazyLock::new(|| {
+static ALL: LazyLock<Vec<PaperFigure>> = LazyLock::new(|| {
     let lines = FIGURES.lines().skip(1);
     lines
         .filter_map(|line| {
             let (key, value) = line.rsplit_once(',')?;
-            Some(Figure {
+            Some(PaperFigure {
                 key: key.to_owned(),
                 value: value.parse().ok()?,
             })
@@ -27,9 +27,9 @@ static ALL: LazyLock<Vec<Figure>> = LazyLock::new(|| {
         .collect()
 });
 
-/// Which figure of the paper is wanted.
+/// What a figure of the paper is found by.
 #[derive(Clone, Copy, Debug)]
-pub struct Sought<'a> {
+pub struct FigureKey<'a> {
     /// The table's number.
     pub table: u8,
     /// The references' scene.
@@ -49,18 +49,18 @@ pub struct Sought<'a> {
 }
 
 /// The figure, if the paper has it for this scene.
-pub fn figure(sought: &Sought<'_>) -> Option<f64> {
-    let radius = sought.radius_m.map(|radius| radius.to_string());
+pub fn figure(key: &FigureKey<'_>) -> Option<f64> {
+    let radius = key.radius_m.map(|radius| radius.to_string());
     let key = format!(
         "{},{},{},{},{},{},{},{}",
-        sought.table,
-        sought.scene,
-        sought.query_scene.unwrap_or_default(),
-        sought.method,
+        key.table,
+        key.scene,
+        key.query_scene.unwrap_or_default(),
+        key.method,
         radius.unwrap_or_default(),
-        sought.references,
-        sought.fusion.unwrap_or_default(),
-        sought.measure
+        key.references,
+        key.fusion.unwrap_or_default(),
+        key.measure
     );
     ALL.iter()
         .find(|figure| figure.key == key)
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn figures_are_found_where_the_paper_has_them_and_nowhere_else() {
-        let single = Sought {
+        let single = FigureKey {
             table: 1,
             scene: "kitti/00",
             query_scene: None,
@@ -84,7 +84,7 @@ mod tests {
             measure: "median_m",
         };
         assert_eq!(figure(&single), Some(14.85));
-        let multi = Sought {
+        let multi = FigureKey {
             table: 2,
             method: "fb",
             radius_m: Some(10.0),
@@ -94,7 +94,7 @@ mod tests {
             ..single
         };
         assert_eq!(figure(&multi), Some(0.045));
-        let large = Sought {
+        let large = FigureKey {
             table: 4,
             scene: "robotcar/night",
             query_scene: Some("robotcar/rain"),
@@ -105,7 +105,7 @@ mod tests {
         };
         assert_eq!(figure(&large), Some(37.6));
         assert_eq!(
-            figure(&Sought {
+            figure(&FigureKey {
                 scene: "street",
                 ..single
             }),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::gate::{Gate, Passage};
+use super::gate::{Gate, GateResult};
 use super::metrics::{Measures, Row, measure};
 use super::table::Table;
 use super::{junit, plots, tables};
@@ -20,10 +20,10 @@ pub const SUMMARY_SCHEMA: &str = "posescope.summary/1";
 /// The figures of a run.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// By group and method.
+    /// The figures by group and method.
     pub measures: Vec<Measures>,
     /// What became of the gates.
-    pub passages: Vec<Passage>,
+    pub gate_results: Vec<GateResult>,
     /// The tables, the overview first.
     pub tables: Vec<Table>,
 }
@@ -50,7 +50,7 @@ pub fn read_rows(folder: &Path) -> Result<Vec<Row>, FolderError> {
 pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Report, FolderError> {
     let rows = read_rows(folder)?;
     let measures = measure(&rows, run.failure_radius_m);
-    let passages: Vec<Passage> = gates.iter().map(|gate| gate.check(&measures)).collect();
+    let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&measures)).collect();
     let tables = tables::tables(run, &measures);
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
@@ -60,7 +60,7 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
     write(&folder.join("summary.json"), &json)?;
-    let text = markdown(run, &tables, &passages);
+    let text = markdown(run, &tables, &gate_results);
     write(&folder.join("summary.md"), text.as_bytes())?;
     for table in &tables {
         let path = |extension: &str| {
@@ -80,11 +80,11 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
         write(&path, svg.as_bytes())?;
     }
     let path = folder.join("junit.xml");
-    let xml = junit::junit(folder, run, &passages)?;
+    let xml = junit::junit(folder, run, &gate_results)?;
     write(&path, xml.as_bytes())?;
     Ok(Report {
         measures,
-        passages,
+        gate_results,
         tables,
     })
 }
@@ -96,7 +96,7 @@ fn write(path: &PathBuf, bytes: &[u8]) -> Result<(), FolderError> {
     write_whole(path, bytes).map_err(FolderError::io(path))
 }
 
-fn markdown(run: &RunFile, tables: &[Table], passages: &[Passage]) -> String {
+fn markdown(run: &RunFile, tables: &[Table], gate_results: &[GateResult]) -> String {
     let scenes: Vec<String> = run
         .pairs
         .iter()
@@ -116,11 +116,18 @@ fn markdown(run: &RunFile, tables: &[Table], passages: &[Passage]) -> String {
         run.protocol.seed,
         run.failure_radius_m
     );
-    for passage in passages {
-        let verdict = if passage.passed { "passed" } else { "FAILED" };
-        text += &format!("- {verdict}: `{}`: {}\n", passage.gate, passage.found);
+    for gate_result in gate_results {
+        let verdict = if gate_result.passed {
+            "passed"
+        } else {
+            "FAILED"
+        };
+        text += &format!(
+            "- {verdict}: `{}`: {}\n",
+            gate_result.gate, gate_result.found
+        );
     }
-    if !passages.is_empty() {
+    if !gate_results.is_empty() {
         text += "\n";
     }
     for table in tables {

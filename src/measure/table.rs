@@ -5,11 +5,11 @@
 pub struct Table {
     /// The name of its files.
     pub name: String,
-    /// What it shows.
+    /// What the table shows.
     pub caption: String,
     /// One cell per column.
     pub header: Vec<String>,
-    /// As many cells each.
+    /// The rows, each with as many cells as the header.
     pub rows: Vec<Vec<String>>,
 }
 

@@ -1,12 +1,12 @@
 //! The tables of a run: an overview, and those of the paper with its figures beside ours.
 
 use super::metrics::{Measures, RECALL_LIMITS};
-use super::paper::{self, Sought};
+use super::paper::{self, FigureKey};
 use super::table::Table;
 use crate::fusion::Fusion;
 use crate::method::Method;
 use crate::run::Experiment;
-use crate::run::{Pair, RunFile};
+use crate::run::{RunFile, ScenePair};
 
 /// What stands where there is no figure.
 const NOTHING: &str = "–";
@@ -78,13 +78,13 @@ fn overview(measures: &[Measures]) -> Table {
 
 /// The figures of one pair of scenes.
 struct OfPair<'a> {
-    pair: &'a Pair,
+    pair: &'a ScenePair,
     query_scene: Option<&'a str>,
     measures: Vec<&'a Measures>,
 }
 
 impl<'a> OfPair<'a> {
-    fn new(pair: &'a Pair, measures: &'a [Measures]) -> Self {
+    fn new(pair: &'a ScenePair, measures: &'a [Measures]) -> Self {
         let is_same = pair.scene == pair.query_scene;
         let query_scene = (!is_same).then_some(pair.query_scene.as_str());
         let of_pair = |one: &&Measures| {
@@ -127,8 +127,8 @@ impl<'a> OfPair<'a> {
         }
     }
 
-    fn sought<'s>(&'s self, table: u8, method: &'s str, measure: &'s str) -> Sought<'s> {
-        Sought {
+    fn figure_key<'s>(&'s self, table: u8, method: &'s str, measure: &'s str) -> FigureKey<'s> {
+        FigureKey {
             table,
             scene: &self.pair.scene,
             query_scene: self.query_scene,
@@ -191,9 +191,9 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
         };
         let counted_by_paper = |radius: f64| {
             let find = |measure| {
-                paper::figure(&Sought {
+                paper::figure(&FigureKey {
                     radius_m: Some(radius),
-                    ..of_pair.sought(1, "", measure)
+                    ..of_pair.figure_key(1, "", measure)
                 })
             };
             Some(format!(
@@ -212,9 +212,9 @@ fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
                 Some(number(figure(one), 2))
             };
             let papers = |radius: f64| {
-                let figure = paper::figure(&Sought {
+                let figure = paper::figure(&FigureKey {
                     radius_m: Some(radius),
-                    ..of_pair.sought(1, method.name(), measure)
+                    ..of_pair.figure_key(1, method.name(), measure)
                 });
                 Some(number(Some(figure?), 2))
             };
@@ -271,11 +271,11 @@ fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
             let papers: Vec<Option<f64>> = (1..=most)
                 .flat_map(|references| {
                     ["rmse_m", "rmse_deg"].map(|measure| {
-                        paper::figure(&Sought {
+                        paper::figure(&FigureKey {
                             radius_m: Some(radius),
                             references,
                             fusion: Some(fusion.name),
-                            ..of_pair.sought(2, method.name(), measure)
+                            ..of_pair.figure_key(2, method.name(), measure)
                         })
                     })
                 })
@@ -317,10 +317,10 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
                 } else {
                     4
                 };
-                paper::figure(&Sought {
+                paper::figure(&FigureKey {
                     references: 5,
                     fusion: Some("r-wavg"),
-                    ..of_pair.sought(number, one.method.name(), measure)
+                    ..of_pair.figure_key(number, one.method.name(), measure)
                 })
             });
             rows.push((cells, papers));

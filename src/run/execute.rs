@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::pair::Pair;
-use super::run_file::{Item, RunFile};
+use super::run_file::{RunFile, RunItem};
 use super::run_folder::{FolderError, RunFolder};
+use super::scene_pair::ScenePair;
 use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
-    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, StageTimes,
-    Unwatched, Watch,
+    ChoiceError, Chooser, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking,
+    References, Request, StageTimes,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -19,15 +19,15 @@ use crate::trace::Cancelled;
 
 /// The scenes of a run, opened.
 pub struct Scenes {
-    /// In the order of [`RunFile::scenes`].
+    /// The scenes of references, in the order of [`RunFile::scenes`].
     pub references: Vec<Box<dyn Scene>>,
-    /// In the order of [`RunFile::queries`].
+    /// The scenes of queries, in the order of [`RunFile::queries`].
     pub queries: Vec<Box<dyn Scene>>,
 }
 
 impl Scenes {
     /// The scene that a pair takes its queries from.
-    pub fn of_queries(&self, pair: &Pair) -> &dyn Scene {
+    pub fn of_queries(&self, pair: &ScenePair) -> &dyn Scene {
         self.queries
             .iter()
             .find(|scene| scene.name() == pair.query_scene)
@@ -55,10 +55,10 @@ pub enum RunError {
 
 /// A query that a method failed on, by its own report or by the error of its pose.
 pub struct FailedQuery<'a> {
-    /// Its scenes.
+    /// The localizer of its scenes.
     pub localizer: &'a Localizer<'a>,
     /// Its place in the plan.
-    pub item: Item<'a>,
+    pub item: RunItem<'a>,
     /// Its position in its scene.
     pub frame: usize,
     /// The method.
@@ -67,10 +67,10 @@ pub struct FailedQuery<'a> {
     pub request: &'a Request,
 }
 
-/// Whoever accompanies a run.
-pub trait Companion {
-    /// The watcher of the next query.
-    fn watch(&mut self) -> &mut dyn Watch;
+/// An observer of a run over many queries.
+pub trait RunObserver {
+    /// The observer that the next query is localised under.
+    fn query_observer(&mut self) -> &mut dyn LocalizeObserver;
 
     /// A method failed on a query whose results are about to be written.
     ///
@@ -82,7 +82,7 @@ pub trait Companion {
     }
 
     /// A query is done.
-    fn done(&mut self, item: &Item<'_>) {
+    fn done(&mut self, item: &RunItem<'_>) {
         let _ = item;
     }
 }
@@ -95,7 +95,8 @@ pub struct Execution<'a> {
     pub scenes: &'a Scenes,
     /// Its parameters, as in the description.
     pub params: &'a Params,
-    /// What [`Selection::Retrieved`](crate::localize::Selection::Retrieved) asks, by the position of the references' scene.
+    /// What [`Selection::Retrieved`](crate::localize::Selection::Retrieved) asks, by the position
+    /// of the references' scene.
     pub indices: &'a [Box<dyn Ranking>],
 }
 
@@ -105,16 +106,16 @@ impl Execution<'_> {
     ///
     /// # Errors
     /// [`RunError`]. What was done until then is in the folder.
-    pub fn go_on(
+    pub fn run_remaining(
         &self,
         folder: &mut RunFolder,
-        companion: &mut dyn Companion,
+        observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
-        let items: Vec<Item<'_>> = self.run.items().collect();
+        let items: Vec<RunItem<'_>> = self.run.items().collect();
         let mut rest = items.get(folder.done()..).unwrap_or_default();
         // One localizer per pair of scenes, whose features are kept as long.
         while let Some(first) = rest.first() {
-            let same = |item: &&Item<'_>| std::ptr::eq(item.pair, first.pair);
+            let same = |item: &&RunItem<'_>| std::ptr::eq(item.pair, first.pair);
             let (now, later) = rest.split_at(rest.iter().take_while(same).count());
             let references = self.scenes.references[first.pair.scene_index].as_ref();
             let queries = self.scenes.of_queries(first.pair);
@@ -122,9 +123,9 @@ impl Execution<'_> {
                 Localizer::new(references, queries, self.params, self.run.protocol.seed);
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
-                let results = self.results(item, &localizer, &left_out, companion)?;
+                let results = self.results(item, &localizer, &left_out, observer)?;
                 folder.append(&results)?;
-                companion.done(item);
+                observer.done(item);
             }
             rest = later;
         }
@@ -132,7 +133,11 @@ impl Execution<'_> {
     }
 
     /// Frames of the references' scene that are queries themselves.
-    fn left_out(&self, pair: &Pair, references: &dyn Scene) -> Result<BTreeSet<usize>, SceneError> {
+    fn left_out(
+        &self,
+        pair: &ScenePair,
+        references: &dyn Scene,
+    ) -> Result<BTreeSet<usize>, SceneError> {
         if pair.scene != pair.query_scene {
             return Ok(BTreeSet::new());
         }
@@ -144,10 +149,10 @@ impl Execution<'_> {
 
     fn results(
         &self,
-        item: &Item<'_>,
+        item: &RunItem<'_>,
         localizer: &Localizer<'_>,
         left_out: &BTreeSet<usize>,
-        companion: &mut dyn Companion,
+        observer: &mut dyn RunObserver,
     ) -> Result<Vec<(QueryResult, StageTimes)>, RunError> {
         let frame = localizer.queries().find(item.query)?;
         let mut results = Vec::new();
@@ -158,7 +163,7 @@ impl Execution<'_> {
                 frame,
                 &requests,
                 &self.run.protocol.methods,
-                companion.watch(),
+                observer.query_observer(),
                 |result, times| {
                     results.push((result, times));
                     Ok::<(), RunError>(())
@@ -169,7 +174,7 @@ impl Execution<'_> {
         match localized {
             Ok(requests) => {
                 let requests = requests?;
-                self.tell_failures(item, localizer, frame, &requests, &results, companion)?;
+                self.tell_failures(item, localizer, frame, &requests, &results, observer)?;
             }
             Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
         }
@@ -197,7 +202,7 @@ impl Execution<'_> {
                 seed: protocol.seed,
                 index,
             };
-            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut Unwatched)
+            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut NoObserver)
         };
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;
@@ -216,12 +221,12 @@ impl Execution<'_> {
     /// One call per method that failed in any of the requests.
     fn tell_failures(
         &self,
-        item: &Item<'_>,
+        item: &RunItem<'_>,
         localizer: &Localizer<'_>,
         frame: usize,
         requests: &[Request],
         results: &[(QueryResult, StageTimes)],
-        companion: &mut dyn Companion,
+        observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
         let methods = &self.run.protocol.methods;
         let per_method = (results.len() / methods.len().max(1)).max(1);
@@ -237,7 +242,7 @@ impl Execution<'_> {
             else {
                 continue;
             };
-            companion.failed(&FailedQuery {
+            observer.failed(&FailedQuery {
                 localizer,
                 item: *item,
                 frame,
@@ -249,7 +254,7 @@ impl Execution<'_> {
     }
 
     /// The results of a query that cannot even be begun.
-    fn broken(&self, item: &Item<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
+    fn broken(&self, item: &RunItem<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
         let failure = Failure::Internal {
             message: message.to_owned(),
         };

@@ -8,8 +8,8 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-use super::pair::{Pair, cameras_of, times_of};
 use super::protocol::Protocol;
+use super::scene_pair::{ScenePair, cameras_of, times_of};
 use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;
@@ -28,7 +28,7 @@ pub enum Experiment {
 }
 
 impl Experiment {
-    /// All of them.
+    /// All experiments.
     pub const ALL: [Self; 3] = [Self::Single, Self::Multi, Self::Large];
 
     /// The name on the command line and in files.
@@ -132,11 +132,11 @@ fn is_robotcar(scene: &str) -> bool {
 pub struct Draw<'a> {
     /// Share of the frames with a known pose.
     pub share: f64,
-    /// At most as many.
+    /// How many frames at most.
     pub limit: Option<usize>,
     /// Only these of those drawn; all, if none is named.
     pub only: &'a [String],
-    /// Seed.
+    /// The seed of the choice.
     pub seed: u64,
 }
 
@@ -174,7 +174,7 @@ impl Draw<'_> {
         scene_index: usize,
         references: &dyn Scene,
         queries: &dyn Scene,
-    ) -> Result<Pair, DrawError> {
+    ) -> Result<ScenePair, DrawError> {
         let drawn = self.frames(queries)?;
         let wanted: BTreeSet<usize> = self
             .only
@@ -204,7 +204,7 @@ impl Draw<'_> {
         let (camera, cameras) = cameras_of(queries, &asked);
         // Where every frame is a query, all the others are its references.
         let left_out = if self.share < 1.0 { &drawn[..] } else { &[] };
-        Ok(Pair {
+        Ok(ScenePair {
             scene_index,
             scene: references.name().to_owned(),
             query_scene: queries.name().to_owned(),

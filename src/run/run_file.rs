@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::experiment::Experiment;
-use super::pair::{Camera, Pair};
 use super::protocol::Protocol;
+use super::scene_pair::{QueryCamera, ScenePair};
 use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
@@ -16,9 +16,9 @@ pub const RUN_SCHEMA: &str = "posescope.run/1";
 /// One part of a run that is spread over several processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which part, from 1.
+    /// The number of the part, from 1.
     pub number: usize,
-    /// Of how many.
+    /// The number of parts.
     pub of: usize,
 }
 
@@ -52,9 +52,9 @@ posescope_core::serde_as_text!(Shard);
 
 /// A run as its folder describes it. Threads are missing: results do not depend on them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Form", into = "Form")]
+#[serde(from = "RunFileForm", into = "RunFileForm")]
 pub struct RunFile {
-    /// [`RUN_SCHEMA`].
+    /// The version of the form, [`RUN_SCHEMA`].
     pub schema: String,
     /// The version of posescope.
     pub version: String,
@@ -62,7 +62,7 @@ pub struct RunFile {
     pub scenes: Vec<String>,
     /// The scenes of the queries, as arguments; none where each scene has its own.
     pub queries: Vec<String>,
-    /// Their format, where it was given.
+    /// The format of the scenes, where it was given.
     pub format: Option<String>,
     /// Which of the paper's experiments, if any.
     pub experiment: Option<Experiment>,
@@ -72,21 +72,21 @@ pub struct RunFile {
     pub radii_m: Vec<f64>,
     /// Share of the frames that were drawn as queries.
     pub share: f64,
-    /// At most as many of them.
+    /// How many queries at most.
     pub limit: Option<usize>,
     /// A pose with a greater translation error is a failure \[m\].
     pub failure_radius_m: f64,
     /// Which part of the run this is.
     pub shard: Option<Shard>,
     /// Scenes paired, with the queries.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<ScenePair>,
     /// Every parameter of the estimators, as it was written: another version may have had others.
     pub params: toml::Table,
 }
 
 /// The file, key by key in its order.
 #[derive(Serialize, Deserialize)]
-struct Form {
+struct RunFileForm {
     schema: String,
     version: String,
     scenes: Vec<String>,
@@ -109,12 +109,12 @@ struct Form {
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
     #[serde(rename = "pair")]
-    pairs: Vec<Pair>,
+    pairs: Vec<ScenePair>,
     params: toml::Table,
 }
 
-impl From<Form> for RunFile {
-    fn from(form: Form) -> Self {
+impl From<RunFileForm> for RunFile {
+    fn from(form: RunFileForm) -> Self {
         Self {
             schema: form.schema,
             version: form.version,
@@ -140,7 +140,7 @@ impl From<Form> for RunFile {
     }
 }
 
-impl From<RunFile> for Form {
+impl From<RunFile> for RunFileForm {
     fn from(run: RunFile) -> Self {
         Self {
             schema: run.schema,
@@ -167,10 +167,10 @@ impl From<RunFile> for Form {
 
 /// What is wrong with the text of a `run.toml`, and where.
 #[derive(Debug)]
-pub(super) struct Misread {
-    /// From 1.
+pub(super) struct RunFileError {
+    /// The line, counted from 1.
     pub line: usize,
-    /// On one line.
+    /// What is wrong, on one line.
     pub message: String,
 }
 
@@ -180,11 +180,11 @@ struct Places {
     schema: Spanned<String>,
     methods: Spanned<Vec<Method>>,
     radii_m: Spanned<Vec<f64>>,
-    pair: Vec<PairPlaces>,
+    pair: Vec<ScenePairPlaces>,
 }
 
 #[derive(Deserialize)]
-struct PairPlaces {
+struct ScenePairPlaces {
     scene_index: Spanned<usize>,
 }
 
@@ -217,37 +217,39 @@ impl Places {
 
 /// One query of a pair: what is done, written and spread as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Item<'a> {
+pub struct RunItem<'a> {
     /// Its place in the plan.
     pub index: usize,
     /// Its scenes.
-    pub pair: &'a Pair,
+    pub pair: &'a ScenePair,
     /// The query frame's name.
     pub query: &'a str,
     /// The query's camera.
-    pub camera: Camera,
+    pub camera: QueryCamera,
     /// When the query was taken \[s\].
     pub time_s: Option<f64>,
 }
 
 impl RunFile {
     /// All items of the run in their order, those of other shards too.
-    pub fn plan(&self) -> impl Iterator<Item = Item<'_>> {
+    pub fn plan(&self) -> impl Iterator<Item = RunItem<'_>> {
         let queries = self.pairs.iter().flat_map(|pair| {
             let queries = pair.queries.iter().enumerate();
             queries.map(move |(at, query)| (pair, at, query))
         });
-        queries.enumerate().map(|(index, (pair, at, query))| Item {
-            index,
-            pair,
-            query,
-            camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
-            time_s: pair.times_s.get(at).copied(),
-        })
+        queries
+            .enumerate()
+            .map(|(index, (pair, at, query))| RunItem {
+                index,
+                pair,
+                query,
+                camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
+                time_s: pair.times_s.get(at).copied(),
+            })
     }
 
     /// The items of this shard.
-    pub fn items(&self) -> impl Iterator<Item = Item<'_>> {
+    pub fn items(&self) -> impl Iterator<Item = RunItem<'_>> {
         self.plan()
             .filter(|item| self.shard.is_none_or(|shard| shard.has(item.index)))
     }
@@ -291,24 +293,24 @@ impl RunFile {
     }
 
     /// Reads the text of a `run.toml` and checks it.
-    pub(super) fn read(text: &str) -> Result<Self, Misread> {
-        let misread = |at: usize, message: String| Misread {
+    pub(super) fn read(text: &str) -> Result<Self, RunFileError> {
+        let error_at = |at: usize, message: String| RunFileError {
             line: text[..at.min(text.len())].matches('\n').count() + 1,
             message: message.replace('\n', " "),
         };
         let syntax = |error: toml::de::Error| {
             let at = error.span().map_or(0, |span| span.start);
-            misread(at, error.message().to_owned())
+            error_at(at, error.message().to_owned())
         };
         let run: Self = toml::from_str(text).map_err(syntax)?;
         let places: Places = toml::from_str(text).map_err(syntax)?;
         match places.wrong(&run) {
-            Some((at, message)) => Err(misread(at, message)),
+            Some((at, message)) => Err(error_at(at, message)),
             None => Ok(run),
         }
     }
 
-    /// The same run in one piece.
+    /// The description of the same run in one piece.
     pub fn whole(&self) -> Self {
         Self {
             shard: None,

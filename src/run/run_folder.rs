@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::run_file::{Misread, RunFile};
+use super::run_file::{RunFile, RunFileError};
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
@@ -29,7 +29,7 @@ pub enum FolderError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// The error of the system.
         source: io::Error,
     },
     /// Something else is in the place of a new run.
@@ -89,7 +89,7 @@ pub enum FolderError {
 }
 
 impl FolderError {
-    /// For `map_err`.
+    /// Makes errors of this path, for `map_err`.
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
         |source| Self::Io { path, source }
@@ -195,7 +195,7 @@ impl RunFolder {
         })
     }
 
-    /// Where it is.
+    /// The path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -363,7 +363,7 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
         read => read.map_err(FolderError::io(&path))?,
     };
     let mut run =
-        RunFile::read(&text).map_err(|Misread { line, message }| FolderError::Damaged {
+        RunFile::read(&text).map_err(|RunFileError { line, message }| FolderError::Damaged {
             path,
             line,
             message,

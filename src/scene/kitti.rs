@@ -41,9 +41,9 @@ pub struct KittiOdometry {
     /// The camera's frame from the rectified camera 0, which poses and `Tr` speak of.
     camera_from_camera0: Pose,
     camera0_from_velodyne: Option<Matrix3x4<f64>>,
-    /// By frame number.
+    /// The poses by frame number.
     poses: Vec<Pose>,
-    /// By frame number.
+    /// The times by frame number \[s\].
     times_s: Vec<f64>,
 }
 

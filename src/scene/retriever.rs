@@ -11,8 +11,8 @@ use crate::localize::{ChoiceError, Ranking};
 use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{
-    BuildError, Criterion, Index, IndexError, Progress, Ranked, Request, Retrieval,
-    RetrievalParams, Summary, build,
+    BuildError, BuildProgress, BuildRequest, BuildSummary, Criterion, Index, IndexError, Ranked,
+    Retrieval, RetrievalParams, build,
 };
 use crate::trace::Cancelled;
 use posescope_core::files::user_cache_folder;
@@ -79,13 +79,13 @@ impl Retriever {
     }
 
     /// What the index of a scene is to hold.
-    pub fn request(scene: &dyn Scene, options: &IndexOptions, params: &Params) -> Request {
+    pub fn request(scene: &dyn Scene, options: &IndexOptions, params: &Params) -> BuildRequest {
         let IndexOptions { words, every, seed } = *options;
         let mut recipe = recipe(params, &RetrievalParams::BUILDING);
         let numbers = [("words", words), ("every", every)];
         recipe.extend(numbers.map(|(key, value)| (key.to_owned(), value.to_string())));
         recipe.insert("seed".to_owned(), seed.to_string());
-        Request {
+        BuildRequest {
             scene: scene.name().to_owned(),
             fingerprint: scene.fingerprint(),
             frames: (0..scene.frames().len()).step_by(every.max(1)).collect(),
@@ -102,14 +102,14 @@ impl Retriever {
     /// Builds an index of the scene's photos.
     ///
     /// # Errors
-    /// As [`build`]; of the frames, when a photo cannot be read.
+    /// The errors of [`build`]; that of a frame when its photo cannot be read.
     pub fn build(
         scene: &dyn Scene,
         path: &Path,
-        request: &Request,
+        request: &BuildRequest,
         params: &Params,
-        progress: impl FnMut(Progress),
-    ) -> Result<Summary, BuildError<SceneError>> {
+        progress: impl FnMut(BuildProgress),
+    ) -> Result<BuildSummary, BuildError<SceneError>> {
         let features = params.retrieval.surf(&params.surf);
         let features_of = |frame| Ok(surf(&scene.photo(frame)?.gray, &features));
         build(path, request, features_of, progress)

@@ -47,7 +47,7 @@ impl IndexFile {
     /// The index.
     ///
     /// # Errors
-    /// As [`Retriever::find`].
+    /// The errors of [`Retriever::find`].
     pub fn open(&self, scene: &dyn Scene, params: &Params) -> Result<Arc<Retriever>, NoIndex> {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = &*opened

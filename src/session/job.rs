@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread;
 
-use super::gate::{Control, Gate};
 use super::index_file::IndexFile;
 use super::message::Message;
+use super::pausing::{Control, PausingObserver};
 use super::task::Task;
 use crate::localize::{
-    ChoiceError, Chooser, LocalizeError, Localizer, QueryResult, Ranking, References, Request,
-    Selection, Watch, words_of,
+    ChoiceError, Chooser, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking,
+    References, Request, Selection, words_of,
 };
 use crate::scene::{FrameStore, NoIndex, Scene};
 
@@ -66,7 +66,7 @@ pub enum JobError {
 }
 
 impl JobError {
-    /// Whether the watcher asked the job to stop.
+    /// Whether the observer asked the job to stop.
     pub fn is_cancelled(&self) -> bool {
         matches!(
             self,
@@ -83,7 +83,8 @@ pub(super) fn spawn(
     outbox: Sender<Message>,
     wake: Arc<dyn Fn() + Send + Sync>,
 ) {
-    let mut gate = Gate::new(Arc::clone(&control), outbox.clone(), Arc::clone(&wake));
+    let mut observer =
+        PausingObserver::new(Arc::clone(&control), outbox.clone(), Arc::clone(&wake));
     let choices = outbox.clone();
     let started = thread::Builder::new()
         .name("estimator".to_owned())
@@ -92,7 +93,7 @@ pub(super) fn spawn(
                 // The session may be gone; the next event finds out.
                 let _ = choices.send(Message::Chosen(chosen.clone()));
             };
-            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut gate, on_choice)));
+            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut observer, on_choice)));
             let last_words = match outcome {
                 Ok(Ok(_)) => Message::Finished,
                 Ok(Err(error)) if error.is_cancelled() => Message::Cancelled,
@@ -102,7 +103,7 @@ pub(super) fn spawn(
                 }
             };
             // Nobody to tell: the session was dropped.
-            let _ = gate.tell(last_words);
+            let _ = observer.send(last_words);
         });
     if let Err(error) = started {
         let _ = outbox.send(Message::Broke(format!(
@@ -122,7 +123,7 @@ impl Job {
     /// [`JobError`].
     pub fn work(
         &self,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
         let (task, protocol) = (&self.task, &self.task.protocol);
@@ -130,8 +131,8 @@ impl Job {
             self.frames.of(&self.references),
             self.frames.of(&self.queries),
         );
-        let localizer = Localizer::at_hand(scenes, &task.params, protocol.seed);
-        let chosen = self.choose(&localizer, watch)?;
+        let localizer = Localizer::with_cached_scenes(scenes, &task.params, protocol.seed);
+        let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
         let request = Request {
             radius_m: task.radius_m,
@@ -144,14 +145,14 @@ impl Job {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };
-        localizer.localize(0, self.query, &[request], &protocol.methods, watch, keep)?;
+        localizer.localize(0, self.query, &[request], &protocol.methods, observer, keep)?;
         Ok(results)
     }
 
     fn choose(
         &self,
         localizer: &Localizer<'_>,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<References, JobError> {
         if !self.chosen.frames.is_empty() {
             return Ok(self.chosen.clone());
@@ -175,7 +176,7 @@ impl Job {
             seed: protocol.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),
         };
-        let chosen = chooser.choose(self.query, &|_| false, watch)?;
+        let chosen = chooser.choose(self.query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear {
                 query: query(),

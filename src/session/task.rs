@@ -38,7 +38,7 @@ pub struct Task {
     pub breakpoints: Vec<Breakpoint>,
 }
 
-/// As a configuration file, with every parameter.
+/// Writes the parameters as a configuration file, every one of them.
 fn write_params<S: Serializer>(params: &Params, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&params.to_toml())
 }

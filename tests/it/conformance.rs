@@ -129,18 +129,18 @@ fn every_estimator_can_be_stopped_at_any_event() {
     }
 }
 
-/// What a run does that concerns its watcher.
+/// What a run does that concerns its observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Moment {
     /// It looks at the attention flag.
     LooksUp,
-    /// It tells something.
+    /// It tells an event of this kind.
     Tells(Kind),
 }
 
 /// Keeps the attention flag up, so that the run comes by whenever it looks; stops it at one of the
 /// times.
-struct Attended<'a> {
+struct AttentionSeeker<'a> {
     flag: &'a AtomicBool,
     wanted: KindSet,
     moments: Vec<Moment>,
@@ -148,7 +148,7 @@ struct Attended<'a> {
     stop_at: Option<usize>,
 }
 
-impl<'a> Attended<'a> {
+impl<'a> AttentionSeeker<'a> {
     fn new(flag: &'a AtomicBool, wanted: KindSet, stop_at: Option<usize>) -> Self {
         flag.store(true, Ordering::Release);
         Self {
@@ -161,7 +161,7 @@ impl<'a> Attended<'a> {
     }
 }
 
-impl Sink for Attended<'_> {
+impl Sink for AttentionSeeker<'_> {
     fn wanted(&self) -> KindSet {
         self.wanted
     }
@@ -180,21 +180,21 @@ impl Sink for Attended<'_> {
     }
 }
 
-/// Everything that concerns the watcher of a run that is not stopped.
+/// Everything that concerns the observer of a run that is not stopped.
 fn moments(
     estimator: &dyn estimator::Estimator,
     problem: &Problem,
     wanted: KindSet,
 ) -> Vec<Moment> {
     let flag = AtomicBool::new(false);
-    let mut sink = Attended::new(&flag, wanted, None);
+    let mut sink = AttentionSeeker::new(&flag, wanted, None);
     estimator
         .estimate(problem, &mut Trace::watched(&mut sink, &flag))
         .expect("nobody cancels");
     sink.moments
 }
 
-/// As many hypotheses are scored at a time as on any number of threads.
+/// Runs something on 32 threads: as many hypotheses are scored at a time as on any other number.
 fn on_many_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(32).build();
     pool.expect("a pool").install(work)
@@ -290,7 +290,7 @@ fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
             let stops = (1..=looks).filter(|i| *i < 40 || looks - i < 4 || i % 1999 == 0);
             for stop in stops {
                 let flag = AtomicBool::new(false);
-                let mut sink = Attended::new(&flag, wanted, Some(stop));
+                let mut sink = AttentionSeeker::new(&flag, wanted, Some(stop));
                 let mut trace = Trace::watched(&mut sink, &flag);
                 let outcome = estimator.estimate(&problem, &mut trace);
                 assert_eq!(
@@ -450,8 +450,8 @@ fn stages_nest_and_every_one_that_starts_ends() {
 
 #[test]
 fn an_uninterested_sink_hears_stages_only() {
-    struct Uninterested(History);
-    impl Sink for Uninterested {
+    struct WantsNothing(History);
+    impl Sink for WantsNothing {
         fn wanted(&self) -> KindSet {
             KindSet::NONE
         }
@@ -460,7 +460,7 @@ fn an_uninterested_sink_hears_stages_only() {
         }
     }
     for (name, estimator) in estimators() {
-        let mut sink = Uninterested(History::default());
+        let mut sink = WantsNothing(History::default());
         estimator
             .estimate(&solvable(), &mut Trace::to(&mut sink))
             .expect("nobody cancels");

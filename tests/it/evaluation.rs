@@ -10,11 +10,11 @@ use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
-use posescope::localize::{QueryResult, Selection, Unwatched, Watch};
+use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Companion, Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, Scenes, read_results,
+    Draw, Execution, Protocol, RUN_SCHEMA, RunFile, RunFolder, RunObserver, Scenes, read_results,
 };
 use posescope::scene::{self, Scene, SceneError};
 
@@ -479,12 +479,12 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
 }
 
 /// A scene whose photo of one frame makes the program panic.
-struct Trapped {
+struct PanickingScene {
     scene: Box<dyn Scene>,
     frame: usize,
 }
 
-impl Scene for Trapped {
+impl Scene for PanickingScene {
     fn name(&self) -> &str {
         self.scene.name()
     }
@@ -512,10 +512,10 @@ impl Scene for Trapped {
     }
 }
 
-struct Nobody(Unwatched);
+struct NoRunObserver(NoObserver);
 
-impl Companion for Nobody {
-    fn watch(&mut self) -> &mut dyn Watch {
+impl RunObserver for NoRunObserver {
+    fn query_observer(&mut self) -> &mut dyn LocalizeObserver {
         &mut self.0
     }
 }
@@ -526,7 +526,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     let folder = sequence.folder();
     let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
     let scenes = Scenes {
-        references: vec![Box::new(Trapped { scene, frame: 1 })],
+        references: vec![Box::new(PanickingScene { scene, frame: 1 })],
         queries: Vec::new(),
     };
     let draw = Draw {
@@ -565,7 +565,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         indices: &[],
     };
     execution
-        .go_on(&mut folder, &mut Nobody(Unwatched))
+        .run_remaining(&mut folder, &mut NoRunObserver(NoObserver))
         .expect("a panic is a result");
     let results: Vec<QueryResult> = read_results(&out)
         .expect("results")

@@ -9,10 +9,10 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command, views};
 use posescope::method::Method;
-use posescope::session::{RunMode, State};
+use posescope::session::{RunMode, RunState};
 
-use crate::painted::{Painted, painted};
-use crate::window::{settle, setup, wait};
+use crate::painted::{PaintedWindow, painted};
+use crate::window::{run_until_idle, setup, wait};
 
 /// The views whose point is pixels.
 const PICTURES: [&str; 4] = ["images", "synthetic", "space", "surface"];
@@ -25,7 +25,7 @@ fn show(window: &mut Harness<'_, App>, view: &'static str) {
     // What is in sight asks for its thumbnails.
     window.run_steps(2);
     wait(window, |app| {
-        !app.desk().is_probing() && !app.desk().queries.is_painting()
+        !app.app_state().is_probing() && !app.app_state().queries.is_painting()
     });
     window.run_steps(4);
 }
@@ -35,10 +35,12 @@ fn at_every_moment(
     window: &mut Harness<'_, App>,
     mut see: impl FnMut(&mut Harness<'_, App>, &str, &[&str]),
 ) {
-    settle(window);
+    run_until_idle(window);
     see(window, "waiting", &[]);
     window.state_mut().send(Command::Run);
-    wait(window, |app| *app.desk().state() == State::Finished);
+    wait(window, |app| {
+        *app.app_state().run_state() == RunState::Finished
+    });
     window.state_mut().send(Command::SelectMethod(Method::FB));
     see(window, "features", &[]);
     window.state_mut().send(Command::SelectMethod(Method::MI));
@@ -49,7 +51,9 @@ fn at_every_moment(
     let all = posescope::fusion::Fusion::all().collect();
     window.state_mut().send(Command::SetFusions(all));
     window.run_steps(2);
-    wait(window, |app| *app.desk().state() == State::Finished);
+    wait(window, |app| {
+        *app.app_state().run_state() == RunState::Finished
+    });
     window.state_mut().send(Command::Last);
     see(
         window,
@@ -70,7 +74,7 @@ fn seen(of: &[&str], in_pictures: bool) -> impl Iterator<Item = &'static str> {
 
 #[test]
 fn every_picture_looks_as_it_did() {
-    let Some(Painted {
+    let Some(PaintedWindow {
         mut window,
         mut judge,
     }) = painted(setup(), SIZE)
@@ -158,10 +162,10 @@ fn every_view_bears_a_run_that_never_began() {
     broken.chosen = vec![1].into();
     broken.mode = RunMode::Running;
     let mut window = crate::window::window(broken);
-    settle(&mut window);
+    run_until_idle(&mut window);
     for entry in views::ALL {
         window.state_mut().send(Command::Maximize(Some(entry.name)));
         window.run_steps(3);
     }
-    assert!(window.state().desk().run().is_empty());
+    assert!(window.state().app_state().run().is_empty());
 }

@@ -10,14 +10,14 @@ use posescope::event::{Event, StageEnded};
 use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::localize::{
-    Chooser, LocalizeError, Localizer, QueryResult, References, Request, Selection, StageTimes,
-    Unwatched, Watch,
+    Chooser, LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, References,
+    Request, Selection, StageTimes,
 };
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Query, ReferenceTuple};
 use posescope::run::Draw;
-use posescope::scene::{AtHand, FrameStore, Scene, SceneError};
+use posescope::scene::{CachedScene, FrameStore, Scene, SceneError};
 use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::Walls;
@@ -80,15 +80,15 @@ impl Scene for Counting {
 
 /// How often each stage was worked out, and how often it was at hand.
 #[derive(Default)]
-struct Notebook(BTreeMap<&'static str, [usize; 2]>);
+struct StageCounts(BTreeMap<&'static str, [usize; 2]>);
 
-impl Notebook {
+impl StageCounts {
     fn of(&self, stage: &str) -> [usize; 2] {
         self.0.get(stage).copied().unwrap_or_default()
     }
 }
 
-impl Sink for Notebook {
+impl Sink for StageCounts {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
         if let Event::StageEnded(StageEnded { stage, reused, .. }) = record.event {
             self.0.entry(stage.name()).or_default()[usize::from(reused)] += 1;
@@ -97,7 +97,7 @@ impl Sink for Notebook {
     }
 }
 
-impl Watch for Notebook {}
+impl LocalizeObserver for StageCounts {}
 
 fn request(references: References) -> Request {
     Request {
@@ -112,7 +112,7 @@ fn localize(
     localizer: &Localizer<'_>,
     references: References,
     methods: &[Method],
-    watch: &mut dyn Watch,
+    observer: &mut dyn LocalizeObserver,
 ) -> Vec<(QueryResult, StageTimes)> {
     let mut results = Vec::new();
     let keep = |result, times| {
@@ -120,7 +120,7 @@ fn localize(
         Ok::<(), LocalizeError>(())
     };
     localizer
-        .localize(0, 1, &[request(references)], methods, watch, keep)
+        .localize(0, 1, &[request(references)], methods, observer, keep)
         .expect("good data");
     results
 }
@@ -139,13 +139,13 @@ fn three_methods_color_a_cloud_once_and_read_each_frame_once() {
     // FB finds nothing, so the hybrid searches too.
     let params = without_features();
     let localizer = Localizer::new(&scene, &scene, &params, 7);
-    let mut notebook = Notebook::default();
+    let mut counts = StageCounts::default();
     let direct = [Method::PM, Method::MI, Method::HY];
-    let results = localize(&localizer, vec![0].into(), &direct, &mut notebook);
+    let results = localize(&localizer, vec![0].into(), &direct, &mut counts);
     assert!(results.iter().all(|(result, _)| result.pose.is_some()));
-    assert_eq!(notebook.of("color"), [1, 2]);
+    assert_eq!(counts.of("color"), [1, 2]);
     // The hybrid's search is that of MI.
-    assert_eq!(notebook.of("position_coarse"), [2, 1]);
+    assert_eq!(counts.of("position_coarse"), [2, 1]);
     assert_eq!(scene.photos(), [1, 1, 0, 0, 0]);
     assert_eq!(scene.clouds(), [1, 0, 0, 0, 0]);
 }
@@ -164,13 +164,13 @@ fn features_are_found_once_for_ranking_and_for_every_reference() {
         index: None,
     };
     let chosen = chooser
-        .choose(1, &|_| false, &mut Unwatched)
+        .choose(1, &|_| false, &mut NoObserver)
         .expect("readable");
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(scene.clouds(), [0; 5]);
-    let mut notebook = Notebook::default();
-    localize(&localizer, chosen, &[Method::FB], &mut notebook);
-    assert_eq!(notebook.of("detect"), [0, 2]);
+    let mut counts = StageCounts::default();
+    localize(&localizer, chosen, &[Method::FB], &mut counts);
+    assert_eq!(counts.of("detect"), [0, 2]);
     assert_eq!(scene.photos(), [1, 1, 1, 0, 0]);
     assert_eq!(scene.clouds(), [1, 0, 1, 0, 0]);
 }
@@ -182,12 +182,12 @@ fn a_hybrid_takes_as_long_whoever_watches() {
     };
     for params in [Params::default(), without_features()] {
         let scene = Walls::new();
-        let all = |watch: &mut dyn Watch| {
+        let all = |observer: &mut dyn LocalizeObserver| {
             let localizer = Localizer::new(&scene, &scene, &params, 7);
-            localize(&localizer, vec![0].into(), &Method::PAPER, watch)
+            localize(&localizer, vec![0].into(), &Method::PAPER, observer)
         };
-        let unseen = all(&mut Unwatched);
-        let watched = all(&mut Notebook::default());
+        let unseen = all(&mut NoObserver);
+        let watched = all(&mut StageCounts::default());
         for ((a, a_times), (b, b_times)) in unseen.iter().zip(&watched) {
             assert_eq!(a, b);
             assert_eq!(stages(a_times), stages(b_times));
@@ -203,8 +203,8 @@ fn a_store_keeps_to_its_frames_and_what_others_hold() {
     let counting = Arc::new(Counting::new());
     let scene: Arc<dyn Scene> = counting.clone();
     let store = Arc::new(FrameStore::new(2, usize::MAX));
-    let at_hand = store.of(&scene);
-    let look = |frame| at_hand.query(frame).expect("readable");
+    let cached = store.of(&scene);
+    let look = |frame| cached.query(frame).expect("readable");
     for frame in [0, 1, 2, 2, 1] {
         look(frame);
     }
@@ -227,10 +227,10 @@ fn a_store_keeps_to_its_frames_and_what_others_hold() {
 fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
     let scene = Counting::new();
     let params = Params::default();
-    let (references, queries) = AtHand::pair(&scene, &scene);
+    let (references, queries) = CachedScene::pair(&scene, &scene);
     let store = Arc::clone(references.store());
-    let localizer = Localizer::at_hand((references, queries), &params, 7);
-    localize(&localizer, vec![0].into(), &Method::PAPER, &mut Unwatched);
+    let localizer = Localizer::with_cached_scenes((references, queries), &params, 7);
+    localize(&localizer, vec![0].into(), &Method::PAPER, &mut NoObserver);
     let of_two = store.bytes();
     // Both photos, the cloud, and what follows from them.
     assert!(of_two > 2 * 24_000 + 12 * 12_000, "{of_two}");
@@ -240,11 +240,11 @@ fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
     for _ in 0..3 {
         for query in [1, 3] {
             let scenes = (small.of(&counting), small.of(&counting));
-            let localizer = Localizer::at_hand(scenes, &params, 7);
+            let localizer = Localizer::with_cached_scenes(scenes, &params, 7);
             let keep = |_, _| Ok::<(), LocalizeError>(());
             let requests = [request(vec![0, 2].into())];
             localizer
-                .localize(0, query, &requests, &Method::PAPER, &mut Unwatched, keep)
+                .localize(0, query, &requests, &Method::PAPER, &mut NoObserver, keep)
                 .expect("good data");
             // Nobody holds anything now: the next look makes room.
             store_is_within(&small, &counting, of_two / 2);
@@ -254,9 +254,9 @@ fn a_store_keeps_to_its_bytes_whatever_is_worked_out() {
 
 /// Asked for a frame that is small, a store lets others go.
 fn store_is_within(store: &Arc<FrameStore>, scene: &Arc<dyn Scene>, limit: usize) {
-    let at_hand = store.of(scene);
+    let cached = store.of(scene);
     for _ in 0..2 {
-        drop(at_hand.query(3).expect("readable"));
+        drop(cached.query(3).expect("readable"));
     }
     assert!(store.bytes() <= limit, "{} of {limit}", store.bytes());
 }
@@ -274,9 +274,9 @@ fn scenes_of_one_name_are_not_taken_for_each_other() {
 }
 
 /// Reads a photo only when two threads want it.
-struct Meeting(Walls, Barrier);
+struct RendezvousScene(Walls, Barrier);
 
-impl Scene for Meeting {
+impl Scene for RendezvousScene {
     fn name(&self) -> &str {
         "meeting"
     }
@@ -307,14 +307,14 @@ impl Scene for Meeting {
 
 #[test]
 fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
-    let scene = Meeting(Walls::new(), Barrier::new(2));
-    let (at_hand, _) = AtHand::pair(&scene, &scene);
+    let scene = RendezvousScene(Walls::new(), Barrier::new(2));
+    let (cached, _) = CachedScene::pair(&scene, &scene);
     let got: Mutex<Vec<(Arc<ReferenceTuple>, Arc<Query>)>> = Mutex::default();
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                let tuple = at_hand.reference(0).expect("readable");
-                let query = at_hand.query(0).expect("is there");
+                let tuple = cached.reference(0).expect("readable");
+                let query = cached.query(0).expect("is there");
                 got.lock().expect("whole").push((tuple, query));
             });
         }
@@ -326,9 +326,9 @@ fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
 }
 
 /// A scene that answers everything in its own way.
-struct Peculiar(Walls);
+struct UnusualScene(Walls);
 
-impl Scene for Peculiar {
+impl Scene for UnusualScene {
     fn name(&self) -> &str {
         "peculiar"
     }
@@ -416,17 +416,17 @@ fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
 
 #[test]
 fn a_scene_at_hand_says_all_that_the_scene_says() {
-    let scene = Peculiar(Walls::new());
-    let (at_hand, other) = AtHand::pair(&scene, &scene);
+    let scene = UnusualScene(Walls::new());
+    let (cached, other) = CachedScene::pair(&scene, &scene);
     // Frame 0 is whole, 2 has no pose, the photo of 4 cannot be read.
     for frame in [0, 2, 4] {
         for _ in 0..2 {
-            assert_eq!(said(&at_hand, frame), said(&scene, frame));
+            assert_eq!(said(&cached, frame), said(&scene, frame));
             assert_eq!(said(&other, frame), said(&scene, frame));
         }
     }
     let cloud = |scene: &dyn Scene| scene.cloud(0).expect("has one").points;
-    assert_eq!(cloud(&at_hand), cloud(&scene));
+    assert_eq!(cloud(&cached), cloud(&scene));
 }
 
 /// Frame 1 is seen by a camera of half the size.
@@ -490,7 +490,7 @@ fn a_query_may_have_another_camera_than_its_reference() {
     let params = Params::default();
     let localizer = Localizer::new(&scene, &scene, &params, 7);
     let direct = [Method::PM, Method::MI];
-    for (result, _) in localize(&localizer, vec![0].into(), &direct, &mut Unwatched) {
+    for (result, _) in localize(&localizer, vec![0].into(), &direct, &mut NoObserver) {
         let error = result.error.expect("a pose");
         assert!(error.translation_m < 0.6, "{}: {error:?}", result.method);
     }

@@ -8,13 +8,13 @@ use image::imageops::{FilterType, resize};
 use posescope::app::{App, Setup};
 
 /// A window with something to paint it.
-pub struct Painted {
+pub struct PaintedWindow {
     pub window: Harness<'static, App>,
-    pub judge: Judge,
+    pub judge: SnapshotComparison,
 }
 
 /// Holds pictures against the stored ones.
-pub struct Judge {
+pub struct SnapshotComparison {
     adapter: wgpu::AdapterInfo,
     /// Pictures that were compared coarsely.
     coarsely: usize,
@@ -43,7 +43,7 @@ fn words_of(info: &wgpu::AdapterInfo) -> String {
 }
 
 /// A painted window; `None`, and a line that says so, where there is nothing to paint with.
-pub fn painted(setup: Setup, size: [f32; 2]) -> Option<Painted> {
+pub fn painted(setup: Setup, size: [f32; 2]) -> Option<PaintedWindow> {
     let Some(state) = render_state() else {
         println!("skipped: no graphics adapter; Mesa's software Vulkan is one");
         return None;
@@ -54,16 +54,16 @@ pub fn painted(setup: Setup, size: [f32; 2]) -> Option<Painted> {
         .with_size(size)
         .renderer(WgpuTestRenderer::from_render_state(state))
         .build_eframe(|creation| App::new(creation, setup));
-    Some(Painted {
+    Some(PaintedWindow {
         window,
-        judge: Judge {
+        judge: SnapshotComparison {
             adapter,
             coarsely: 0,
         },
     })
 }
 
-impl Judge {
+impl SnapshotComparison {
     /// Whether this is the rasterizer that painted the stored pictures: only its pixels can be
     /// compared one by one.
     fn painted_the_stored(&self) -> bool {
@@ -97,7 +97,7 @@ impl Judge {
     }
 }
 
-impl Drop for Judge {
+impl Drop for SnapshotComparison {
     fn drop(&mut self) {
         if self.coarsely > 0 {
             println!(
@@ -115,8 +115,8 @@ const BLOCK: u32 = 4;
 /// How far the mean of a block may be off, of 255: an edge or a glyph that lies half a pixel
 /// elsewhere stays below, a missing line does not.
 const BLOCK_OFF: u8 = 40;
-/// Share of a picture's blocks that may be off farther. Mesa's OpenGL has at most 0.2 %; without the cloud the
-/// 3-D view has 3 %.
+/// Share of a picture's blocks that may be off farther. Mesa's OpenGL has at most 0.2 %; without
+/// the cloud the 3-D view has 3 %.
 const COARSE_SHARE: f64 = 0.005;
 
 /// Share of the blocks whose colours differ.

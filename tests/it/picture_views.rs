@@ -13,17 +13,17 @@ use posescope::event::{
 use posescope::features::FeatureState;
 use posescope::features::Features;
 use posescope::method::Method;
-use posescope::session::{RunMode, State};
+use posescope::session::{RunMode, RunState};
 
 use crate::two_walls::CAMERA;
-use crate::window::{settle, setup, window};
+use crate::window::{run_until_idle, setup, window};
 
 /// The small world after its run, at the end of a method, with a view in front.
 fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     order(&mut window, Command::SelectMethod(method));
     order(&mut window, Command::Maximize(Some(view)));
     window
@@ -36,14 +36,14 @@ fn order(window: &mut Harness<'_, App>, command: Command) {
 }
 
 fn latest<E: DebugEvent + Clone + 'static>(window: &Harness<'_, App>) -> E {
-    let desk = window.state().desk();
-    let event: Option<&E> = desk.run().latest(desk.cursor);
+    let state = window.state().app_state();
+    let event: Option<&E> = state.run().latest(state.cursor());
     event.expect("it was told").clone()
 }
 
 fn query_features(window: &Harness<'_, App>) -> Arc<Features> {
-    let desk = window.state().desk();
-    let mut events = desk.run().all_until::<FeaturesDetected>(desk.cursor);
+    let state = window.state().app_state();
+    let mut events = state.run().all_until::<FeaturesDetected>(state.cursor());
     let event = events.find(|(_, event)| event.side == Side::Query);
     Arc::clone(&event.expect("detected").1.features)
 }
@@ -87,7 +87,7 @@ fn lonely_inlier(window: &Harness<'_, App>) -> (usize, Pos2) {
 #[test]
 fn before_detection_there_are_just_the_photos() {
     let mut window = window(setup());
-    settle(&mut window);
+    run_until_idle(&mut window);
     order(&mut window, Command::ShowView("images"));
     window.get_by_label("No features yet: FB finds them first");
     window.get_by_label("query photo 000001");
@@ -114,7 +114,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
     window.step();
     window.get_by_label(&format!("inlier: {inliers}, hidden"));
     click(&mut window, place);
-    let selected = window.state().desk().selected_feature;
+    let selected = window.state().app_state().options.selected_feature;
     let is_inlier = |i: usize| matches!(states[i], FeatureState::Inlier { .. });
     assert!(!selected.is_some_and(is_inlier), "it is hidden");
 
@@ -132,7 +132,10 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     let mut window = finished(Method::FB, "images");
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
-    assert_eq!(window.state().desk().selected_feature, Some(feature));
+    assert_eq!(
+        window.state().app_state().options.selected_feature,
+        Some(feature)
+    );
     window.get_by_label(&format!("query feature {feature}: inlier"));
 
     let decisions = latest::<MatchesDecided>(&window).decisions;
@@ -157,7 +160,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     window.get_by_label("Close feature").click();
     window.step();
     window.step();
-    assert_eq!(window.state().desk().selected_feature, None);
+    assert_eq!(window.state().app_state().options.selected_feature, None);
 }
 
 #[test]
@@ -188,7 +191,7 @@ fn only_differences_leaves_the_features_that_ended_in_another_state() {
     let before = latest::<FeaturesClassified>(&window).states;
     let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
     order(&mut window, Command::SetParam { key, value });
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     order(&mut window, Command::SelectMethod(Method::FB));
     let after = latest::<FeaturesClassified>(&window).states;
     let pairs = before.iter().zip(after.iter());
@@ -247,7 +250,7 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
             assessed.shuffled.expect("a cost")
         ));
         window.get_by_label(&format!("best {:.4}", assessed.best));
-        let results = window.state().desk().run().results();
+        let results = window.state().app_state().run().results();
         let mut costs = results.filter(|result| result.method == method);
         let cost = costs
             .find_map(|result| result.cost.clone())
@@ -261,7 +264,7 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
     let mut window = finished(Method::MI, "synthetic");
     let truth = window
         .state()
-        .desk()
+        .app_state()
         .run()
         .loaded
         .as_ref()
@@ -269,14 +272,19 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
         .truth;
     order(&mut window, Command::TakeCamera(truth));
     let begun = std::time::Instant::now();
-    while window.state().desk().probe().is_none() {
+    while window.state().app_state().probe().is_none() {
         assert!(begun.elapsed().as_secs() < 60, "it hangs");
         std::thread::sleep(std::time::Duration::from_millis(5));
         window.step();
     }
     window.step();
     window.get_by_label("MI, camera in hand");
-    let probe = window.state().desk().probe().expect("an answer").clone();
+    let probe = window
+        .state()
+        .app_state()
+        .probe()
+        .expect("an answer")
+        .clone();
     for (_, comparison) in &probe.comparisons {
         let cost = comparison.score.cost.expect("a cost");
         window.get_by_label(&format!("present {cost:.4}"));
@@ -323,7 +331,7 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 fn both_views_draw_at_every_moment_of_a_run() {
     let mut window = finished(Method::FB, "images");
     order(&mut window, Command::SelectFeature(Some(0)));
-    let len = window.state().desk().run().len();
+    let len = window.state().app_state().run().len();
     // Every moment of FB's story, and some of the long searches.
     let mut cursor = 0;
     while cursor < len {

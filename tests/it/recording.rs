@@ -11,7 +11,7 @@ use posescope::estimator::{self, Direct};
 use posescope::event::{Kind, KindSet, ReferencesRanked, Stage};
 use posescope::features::FeatureState;
 use posescope::geometry::Pose;
-use posescope::localize::{StageTimes, Watch as _, evaluate, localize_by};
+use posescope::localize::{LocalizeObserver as _, StageTimes, evaluate, localize_by};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};

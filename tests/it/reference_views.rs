@@ -10,23 +10,23 @@ use posescope::localize::Selection;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scene::{IndexOptions, Retriever};
-use posescope::session::{IndexFile, Part, State};
+use posescope::session::{IndexFile, Part, RunState};
 use posescope::sink::rerun::entities;
 
 use crate::recording::{chunks, timelines};
 use crate::walls_scene::Walls;
-use crate::window::{finished, is_said, results, settle, setup};
+use crate::window::{finished, is_said, results, run_until_idle, setup};
 
 fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
     window.state_mut().send(Command::Maximize(Some(view)));
     window.run_steps(3);
 }
 
-fn pick(window: &mut Harness<'_, App>, selection: Selection) -> State {
+fn pick(window: &mut Harness<'_, App>, selection: Selection) -> RunState {
     let pick = ReferencePick::By(selection);
     window.state_mut().send(Command::PickReferences(pick));
     window.run_steps(2);
-    settle(window)
+    run_until_idle(window)
 }
 
 fn index(file: &Path, params: &Params) {
@@ -51,7 +51,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
         .get_by_role_and_label(egui::Role::CheckBox, "000002")
         .click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     assert!(
         results(&window)
@@ -59,19 +59,19 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
             .all(|result| result.fusion.is_none())
     );
 
-    let stages = window.state().desk().run().stages();
+    let stages = window.state().app_state().run().stages();
     let inner = stages.iter().filter(|bar| bar.stage.name() == "detect");
     assert!(inner.count() >= 2);
     window.get_by_label("wavg").click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let fused: Vec<_> = results(&window)
         .into_iter()
         .filter(|result| result.fusion.is_some_and(|f| f.name == "wavg"))
         .collect();
     assert_eq!(fused.len(), Method::PAPER.len());
     // Only the fusion is new.
-    let run = window.state().desk().run();
+    let run = window.state().app_state().run();
     for bar in run.stages() {
         let name = bar.stage.name();
         assert!(name != "detect" && name != "color" || bar.reused, "{name}");
@@ -85,7 +85,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     assert!(recorded.contains_key(&entities::fusion_weights(Method::FB)));
     assert!(!recorded.contains_key(entities::RETRIEVAL_TABLE));
 
-    let command = window.state().desk().setup.command_line();
+    let command = window.state().app_state().setup.command_line();
     assert!(
         command.contains("--reference 000000 --reference 000002"),
         "{command}"
@@ -123,8 +123,8 @@ fn references_may_be_as_far_away_as_the_prior_allows() {
     narrow.task.protocol.prior_m = Some(3.0);
     assert_eq!(narrow.candidates(1), [2, 0]);
     let mut window = finished(narrow);
-    assert_eq!(pick(&mut window, Selection::Nearest(2)), State::Finished);
-    assert_eq!(window.state().desk().setup.chosen.frames, [2, 0]);
+    assert_eq!(pick(&mut window, Selection::Nearest(2)), RunState::Finished);
+    assert_eq!(window.state().app_state().setup.chosen.frames, [2, 0]);
     maximize(&mut window, "references");
     assert!(is_said(&window, "2 of 2 frames within 3 m"));
 }
@@ -132,13 +132,13 @@ fn references_may_be_as_far_away_as_the_prior_allows() {
 #[test]
 fn references_are_ranked_by_their_matches() {
     let mut window = finished(setup());
-    assert_eq!(pick(&mut window, Selection::Matched(1)), State::Finished);
-    let setup = &window.state().desk().setup;
+    assert_eq!(pick(&mut window, Selection::Matched(1)), RunState::Finished);
+    let setup = &window.state().app_state().setup;
     let ranking = setup.chosen.ranking.as_ref().expect("they were ranked");
     assert_eq!(setup.chosen.frames, [ranking.frames[0].ranked.frame]);
     let scores: Vec<f32> = ranking.frames.iter().map(|f| f.ranked.score).collect();
     assert!(scores.len() == 2 && scores[0] >= scores[1], "{scores:?}");
-    let run = window.state().desk().run();
+    let run = window.state().app_state().run();
     assert_eq!(run.spans()[0].part, Part::Retrieval);
     maximize(&mut window, "retrieval");
     assert!(is_said(
@@ -150,8 +150,8 @@ fn references_are_ranked_by_their_matches() {
     let value = "0.7".to_owned();
     window.state_mut().send(Command::SetParam { key, value });
     window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
-    let again = &window.state().desk().run().spans()[0];
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    let again = &window.state().app_state().run().spans()[0];
     assert_eq!(again.part, Part::Retrieval);
 }
 
@@ -163,7 +163,7 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     asked.index = Arc::new(IndexFile::new("walls", Some(file.clone())));
     let mut window = finished(asked);
     let state = pick(&mut window, Selection::Retrieved(2));
-    assert!(matches!(state, State::Broken(_)), "{state:?}");
+    assert!(matches!(state, RunState::Broken(_)), "{state:?}");
     assert!(is_said(
         &window,
         "there is no retrieval index; `posescope index walls"
@@ -182,8 +182,11 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     assert!(left("not chosen") < left("Truth"));
 
     index(&file, &Params::default());
-    assert_eq!(pick(&mut window, Selection::Retrieved(2)), State::Finished);
-    let chosen = &window.state().desk().setup.chosen;
+    assert_eq!(
+        pick(&mut window, Selection::Retrieved(2)),
+        RunState::Finished
+    );
+    let chosen = &window.state().app_state().setup.chosen;
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     maximize(&mut window, "retrieval");
@@ -191,7 +194,7 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
         &window,
         "2 of 2 frames are references, ranked by visual words"
     ));
-    let ranking = window.state().desk().setup.chosen.ranking.clone();
+    let ranking = window.state().app_state().setup.chosen.ranking.clone();
     let first = &ranking.expect("an index ranks").frames[0];
     let found = first.ranked.verification().expect("the walls are the same");
     let recording = folder.path().join("ranked.rrd");

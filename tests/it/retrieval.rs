@@ -7,7 +7,9 @@ use std::sync::Arc;
 use assert_cmd::Command;
 use posescope::event::{Event, ReferencesRanked, Stage};
 use posescope::geometry::Pose;
-use posescope::localize::{LocalizeError, Localizer, QueryResult, References, Request, Watch};
+use posescope::localize::{
+    LocalizeError, LocalizeObserver, Localizer, QueryResult, References, Request,
+};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
@@ -201,12 +203,12 @@ fn without_a_cache_directory_a_file_has_to_be_named() {
 
 /// Writes down what comes between the beginning of a query and that of its first method.
 #[derive(Default)]
-struct Notebook {
+struct RecordingObserver {
     notes: Vec<String>,
     rankings: Vec<ReferencesRanked>,
 }
 
-impl Sink for Notebook {
+impl Sink for RecordingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
         match &record.event {
             Event::StageStarted(event) if event.stage == Stage::Retrieve => {
@@ -225,7 +227,7 @@ impl Sink for Notebook {
     }
 }
 
-impl Watch for Notebook {
+impl LocalizeObserver for RecordingObserver {
     fn begin_query(&mut self, _: usize, _: &[Problem], _: Option<&Pose>) {
         self.notes.push("query".to_owned());
     }
@@ -234,11 +236,11 @@ impl Watch for Notebook {
     }
 }
 
-fn localized(requests: &[Request], watch: &mut dyn Watch) -> Vec<QueryResult> {
+fn localized(requests: &[Request], observer: &mut dyn LocalizeObserver) -> Vec<QueryResult> {
     let (scene, params) = (Walls::new(), Params::default());
     let mut results = Vec::new();
     Localizer::new(&scene, &scene, &params, 7)
-        .localize(0, 1, requests, &[Method::FB], watch, |result, _| {
+        .localize(0, 1, requests, &[Method::FB], observer, |result, _| {
             results.push(result);
             Ok::<(), LocalizeError>(())
         })
@@ -276,16 +278,16 @@ fn a_ranking_is_told_once_after_the_query_and_a_lost_photo_does_not_matter() {
     let asked = |ranking: Option<&Arc<ReferenceRanking>>| {
         [3.0, 4.0].map(|radius_m| request(radius_m, ranking.cloned()))
     };
-    let mut notebook = Notebook::default();
-    let results = localized(&asked(Some(&ranking)), &mut notebook);
+    let mut observer = RecordingObserver::default();
+    let results = localized(&asked(Some(&ranking)), &mut observer);
     let expected = ["query", "retrieve", "ranking", "retrieved", "fb", "fb"];
-    assert_eq!(notebook.notes, expected);
-    let told = &notebook.rankings[0];
+    assert_eq!(observer.notes, expected);
+    let told = &observer.rankings[0];
     assert_eq!(told.ranking, ranking);
     let is_there: Vec<bool> = told.photos.iter().map(Option::is_some).collect();
     assert_eq!(is_there, [true, false]);
 
-    let mut other = Notebook::default();
+    let mut other = RecordingObserver::default();
     assert_eq!(localized(&asked(None), &mut other), results);
     assert_eq!(other.notes, ["query", "fb", "fb"]);
 }

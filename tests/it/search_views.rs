@@ -9,9 +9,9 @@ use posescope::event::{
 };
 use posescope::grid::{Phase, least_covered};
 use posescope::method::Method;
-use posescope::session::{RunMode, Span, State};
+use posescope::session::{RunMode, RunState, Span};
 
-use crate::window::{settle, setup, window};
+use crate::window::{run_until_idle, setup, window};
 
 /// The small world after all of its run.
 fn finished() -> Harness<'static, App> {
@@ -20,12 +20,12 @@ fn finished() -> Harness<'static, App> {
     let mut window = window(setup);
     // It shares its place with the view of the space.
     window.state_mut().send(Command::ShowView("ransac"));
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     window
 }
 
 fn span(window: &Harness<'_, App>, method: Method) -> Span {
-    let spans = window.state().desk().run().spans();
+    let spans = window.state().app_state().run().spans();
     let span = spans.iter().find(|span| span.part.method() == Some(method));
     span.expect("the method ran").clone()
 }
@@ -33,7 +33,7 @@ fn span(window: &Harness<'_, App>, method: Method) -> Span {
 /// The events of a type that a method told, with their positions.
 fn told<E: DebugEvent + Clone>(window: &Harness<'_, App>, method: Method) -> Vec<(usize, E)> {
     let records = span(window, method).records;
-    let all = window.state().desk().run().records();
+    let all = window.state().app_state().run().records();
     records
         .filter_map(|at| Some((at, E::from_event(&all[at].event)?.clone())))
         .collect()
@@ -112,10 +112,10 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
                 .iter()
                 .find(|(_, event)| !event.phase.is_yaw() && readout.starts_with(&words(event)))
                 .unwrap_or_else(|| panic!("`{readout}` was not recorded"));
-            let desk = window.state().desk();
-            let problem = &desk.run().loaded.as_ref().expect("loaded").problems[0];
+            let state = window.state().app_state();
+            let problem = &state.run().loaded.as_ref().expect("loaded").problems[0];
             let pose = problem.world_from_query(&event.offset.reference_from_camera());
-            let hovered = desk.hovered.expect("the pointer is over a cell");
+            let hovered = state.hovered.expect("the pointer is over a cell");
             assert!((hovered.inverse() * pose).translation.vector.norm() < 1e-9);
             seen.push(readout);
         }
@@ -130,14 +130,14 @@ fn leaving_a_map_is_said_once() {
     let mut window = finished();
     move_to_end(&mut window, Method::MI);
     hover(&mut window, "Cost map:", 0.5, 0.5).expect("a cell");
-    let hovered = window.state().desk().hovered;
+    let hovered = window.state().app_state().hovered;
     assert!(hovered.is_some());
     window.hover_at(egui::pos2(5.0, 5.0));
     window.run_steps(3);
-    assert_eq!(window.state().desk().hovered, None);
+    assert_eq!(window.state().app_state().hovered, None);
     window.state_mut().send(Command::Hover(hovered));
     window.run_steps(3);
-    assert_eq!(window.state().desk().hovered, hovered);
+    assert_eq!(window.state().app_state().hovered, hovered);
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn a_click_takes_the_camera_to_the_cell() {
     let mut window = finished();
     move_to_end(&mut window, Method::PM);
     hover(&mut window, "Cost map:", 0.25, 0.5).expect("a cell");
-    let hovered = window.state().desk().hovered;
+    let hovered = window.state().app_state().hovered;
     let rect = window.get_by_label_contains("Cost map:").rect();
     let at = rect.min + rect.size() * egui::vec2(0.25, 0.5);
     window.drag_at(at);
@@ -153,7 +153,7 @@ fn a_click_takes_the_camera_to_the_cell() {
     window.drop_at(at);
     window.run_steps(2);
     assert!(hovered.is_some());
-    assert_eq!(window.state().desk().camera, hovered);
+    assert_eq!(window.state().app_state().camera, hovered);
 }
 
 #[test]
@@ -233,8 +233,15 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
 
     window.get_by_label("Run with this floor").click();
     window.run_steps(2);
-    assert_eq!(settle(&mut window), State::Finished);
-    let floor = window.state().desk().setup.task.params.grid.coverage_floor;
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    let floor = window
+        .state()
+        .app_state()
+        .setup
+        .task
+        .params
+        .grid
+        .coverage_floor;
     assert!((floor - moving).abs() < 1e-9, "{floor}");
     let surfaces = told::<PhaseSearched>(&window, Method::MI);
     assert_eq!(surfaces[0].1.surface.minimum(), Some(cell));
@@ -329,7 +336,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
         .get_by_label_contains("log likelihood by trial")
         .click();
     window.run_steps(3);
-    let cursor = window.state().desk().cursor;
+    let cursor = window.state().app_state().cursor();
     let place = trials.iter().position(|(at, _)| *at == cursor);
     let place = place.expect("the cursor is at a trial");
     let middle = trials.len() / 2;
@@ -363,7 +370,7 @@ fn every_moment_of_a_run_can_be_drawn() {
     // From the first frame on, when nothing is read yet.
     let mut window = finished();
     window.state_mut().send(Command::ShowView("ransac"));
-    let records = window.state().desk().run().len();
+    let records = window.state().app_state().run().len();
     for cursor in (0..records).step_by(9).chain([records - 1]) {
         move_to(&mut window, cursor);
         // Each says what is missing, or names what it draws.

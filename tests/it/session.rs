@@ -6,10 +6,12 @@ use std::time::{Duration, Instant};
 
 use posescope::event::{Event, ReferencesFused, Stage, StageEnded, StageStarted};
 use posescope::fusion::Fusion;
-use posescope::localize::{LocalizeError, Localizer, QueryResult, Request, Unwatched, Watch};
+use posescope::localize::{
+    LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request,
+};
 use posescope::method::Method;
 use posescope::run::Protocol;
-use posescope::session::{Breakpoints, Job, Part, RunMode, Session, State, Task};
+use posescope::session::{Breakpoints, Job, Part, RunMode, RunState, Session, Task};
 use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
@@ -41,12 +43,12 @@ fn start(job: Job, mode: RunMode, breakpoints: &[&str]) -> Session {
 }
 
 /// Waits until the session needs somebody.
-fn settle(session: &mut Session) -> State {
+fn run_until_idle(session: &mut Session) -> RunState {
     let begun = Instant::now();
     loop {
         session.drain();
         match session.state() {
-            State::Loading | State::Running => {}
+            RunState::Loading | RunState::Running => {}
             state => return state.clone(),
         }
         assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
@@ -59,7 +61,7 @@ fn order(session: &mut Session, mode: RunMode) -> Event {
     let before = session.run().len();
     session.set_mode(mode);
     loop {
-        settle(session);
+        run_until_idle(session);
         if session.run().len() > before || !session.is_alive() {
             break;
         }
@@ -89,7 +91,10 @@ fn results(session: &Session) -> Vec<QueryResult> {
 #[test]
 fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     let mut session = start(job(1), RunMode::Paused, &[]);
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
     assert_eq!(session.run().len(), 1);
     let first = &session.run().records()[0].event;
     assert_eq!(starts(first), Some(Stage::Estimator(Method::FB)));
@@ -106,17 +111,20 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
 }
 
 #[test]
 fn stepping_gives_the_results_of_running() {
     let mut run = start(job(1), RunMode::Running, &[]);
-    assert_eq!(settle(&mut run), State::Finished);
+    assert_eq!(run_until_idle(&mut run), RunState::Finished);
     let mut stepped = start(job(1), RunMode::Paused, &[]);
-    settle(&mut stepped);
-    let orders = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
-    for mode in orders.into_iter().cycle() {
+    run_until_idle(&mut stepped);
+    let steps = [RunMode::StepInto, RunMode::StepOver, RunMode::StepOut];
+    for mode in steps.into_iter().cycle() {
         order(&mut stepped, mode);
         if !stepped.is_alive() {
             break;
@@ -134,16 +142,16 @@ fn a_breakpoint_stops_a_run_and_says_which_it_was() {
         RunMode::Running,
         &["mi.yaw_coarse", "inliers < 1000"],
     );
-    let stopped_by = |text: &str| State::Paused {
+    let stopped_by = |text: &str| RunState::Paused {
         breakpoint: Some(text.to_owned()),
     };
-    assert_eq!(settle(&mut session), stopped_by("inliers < 1000"));
+    assert_eq!(run_until_idle(&mut session), stopped_by("inliers < 1000"));
     let event = order(&mut session, RunMode::Running);
     assert_eq!(starts(&event).map(Stage::name), Some("yaw_coarse"));
     assert_eq!(session.state(), &stopped_by("mi.yaw_coarse"));
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
-    assert_eq!(settle(&mut session), State::Finished);
+    assert_eq!(run_until_idle(&mut session), RunState::Finished);
 }
 
 #[test]
@@ -162,10 +170,13 @@ fn a_running_session_pauses_and_a_paused_one_stays() {
     let mut session = Session::start(job(1), RunMode::Running, Breakpoints::default(), wake);
     arrival.recv().expect("the run has five messages");
     session.drain();
-    assert_eq!(session.state(), &State::Running);
+    assert_eq!(session.state(), &RunState::Running);
     session.set_mode(RunMode::Paused);
     release.send(()).expect("the worker waits");
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
     let told = session.run().len();
     session.set_mode(RunMode::Paused);
     std::thread::sleep(Duration::from_millis(30));
@@ -176,14 +187,14 @@ fn a_running_session_pauses_and_a_paused_one_stays() {
 #[test]
 fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
     let mut session = start(job(1), RunMode::Paused, &[]);
-    settle(&mut session);
+    run_until_idle(&mut session);
     session.cancel();
     while session.is_alive() {
-        settle(&mut session);
+        run_until_idle(&mut session);
         std::thread::yield_now();
         session.drain();
     }
-    assert_eq!(session.state(), &State::Cancelled);
+    assert_eq!(session.state(), &RunState::Cancelled);
 
     let scene = Arc::new(Walls::new());
     let mut dropped = start(
@@ -195,7 +206,7 @@ fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
         RunMode::Paused,
         &[],
     );
-    settle(&mut dropped);
+    run_until_idle(&mut dropped);
     drop(dropped);
     let begun = Instant::now();
     // The worker's handles on the scene go with it.
@@ -226,7 +237,10 @@ fn a_session_pauses_and_stops_within_a_lattice() {
     let in_the_lattice = |session: &Session| session.run().len() > 500;
     wait(&mut session, in_the_lattice);
     session.set_mode(RunMode::Paused);
-    assert_eq!(settle(&mut session), State::Paused { breakpoint: None });
+    assert_eq!(
+        run_until_idle(&mut session),
+        RunState::Paused { breakpoint: None }
+    );
     let told = session.run().len();
     // A million hypotheses are to come, most of which were not even scored.
     assert!(told < 500_000, "{told}");
@@ -235,7 +249,7 @@ fn a_session_pauses_and_stops_within_a_lattice() {
     let begun = Instant::now();
     session.cancel();
     wait(&mut session, |session| !session.is_alive());
-    assert_eq!(session.state(), &State::Cancelled);
+    assert_eq!(session.state(), &RunState::Cancelled);
     assert!(begun.elapsed() < Duration::from_secs(5));
 }
 
@@ -264,7 +278,7 @@ impl Sink for UntilStopped {
     }
 }
 
-impl Watch for UntilStopped {
+impl LocalizeObserver for UntilStopped {
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         Some(Arc::clone(&self.0))
     }
@@ -273,12 +287,12 @@ impl Watch for UntilStopped {
 #[test]
 fn bad_data_is_said_and_a_hopeless_query_is_a_result() {
     let mut session = start(job(UNREADABLE), RunMode::Running, &[]);
-    match settle(&mut session) {
-        State::Broken(why) => assert!(why.contains("000004"), "{why}"),
+    match run_until_idle(&mut session) {
+        RunState::Broken(why) => assert!(why.contains("000004"), "{why}"),
         other => panic!("{other:?}"),
     }
     let mut session = start(job(GREY), RunMode::Running, &[]);
-    assert_eq!(settle(&mut session), State::Finished);
+    assert_eq!(run_until_idle(&mut session), RunState::Finished);
     let results = results(&session);
     assert_eq!(results.len(), 4);
     assert!(results[0].pose.is_none() && results[0].reason.is_some());
@@ -290,8 +304,8 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
     // This frame has no cloud; the scene of this test panics when asked for one all the same.
     broken.chosen = vec![1].into();
     let mut session = start(broken, RunMode::Running, &[]);
-    match settle(&mut session) {
-        State::Broken(why) => assert!(why.contains("internal error"), "{why}"),
+    match run_until_idle(&mut session) {
+        RunState::Broken(why) => assert!(why.contains("internal error"), "{why}"),
         other => panic!("{other:?}"),
     }
 }
@@ -300,11 +314,11 @@ fn a_fault_in_the_worker_is_a_state_of_the_session() {
 fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
     let mut again = job(1);
     let mut first = start(again.clone(), RunMode::Running, &[]);
-    settle(&mut first);
+    run_until_idle(&mut first);
     let params = &mut again.task.params;
     params.assign("fb.ratio=0.7").expect("a good value");
     let mut second = start(again, RunMode::Running, &[]);
-    settle(&mut second);
+    run_until_idle(&mut second);
     let reused: Vec<_> = second
         .run()
         .stages()
@@ -352,19 +366,19 @@ fn several_references_are_fused_as_without_a_session() {
             1,
             &[request],
             &task.protocol.methods,
-            &mut Unwatched,
+            &mut NoObserver,
             keep,
         )
         .expect("good data");
 
     let mut session = start(several, RunMode::Running, &["fusion"]);
-    let at_fusion = State::Paused {
+    let at_fusion = RunState::Paused {
         breakpoint: Some("fusion".to_owned()),
     };
-    assert_eq!(settle(&mut session), at_fusion);
+    assert_eq!(run_until_idle(&mut session), at_fusion);
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
-    assert_eq!(settle(&mut session), State::Finished);
+    assert_eq!(run_until_idle(&mut session), RunState::Finished);
     let (fused, alone): (Vec<_>, Vec<_>) = results(&session)
         .into_iter()
         .partition(|result| result.fusion.is_some());

@@ -9,14 +9,14 @@ use posescope::geometry::Pose;
 use posescope::grid::Phase;
 use posescope::session::RunMode;
 
-use crate::painted::{Painted, painted};
-use crate::window::{settle, setup, window};
+use crate::painted::{PaintedWindow, painted};
+use crate::window::{run_until_idle, setup, window};
 
 fn finished() -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::Maximize(Some("space")));
     window.run_steps(3);
     window
@@ -61,13 +61,17 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
 }
 
 fn in_hand(window: &Harness<'_, App>) -> Pose {
-    window.state().desk().camera.expect("a camera is in hand")
+    window
+        .state()
+        .app_state()
+        .camera
+        .expect("a camera is in hand")
 }
 
 #[test]
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let mut window = finished();
-    let run = window.state().desk().run().clone();
+    let run = window.state().app_state().run().clone();
     let ends: Vec<usize> = run
         .spans()
         .iter()
@@ -192,7 +196,7 @@ fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
 fn start(window: &Harness<'_, App>) -> Pose {
     let loaded = window
         .state()
-        .desk()
+        .app_state()
         .run()
         .loaded
         .as_deref()
@@ -220,7 +224,7 @@ fn jumps_and_blinking_go_between_two_poses() {
     assert!(seen.len() >= 4, "{} changes", seen.len());
     assert!(seen.iter().all(|pose| [begin, truth].contains(pose)));
     click(&mut window, "Let go");
-    assert_eq!(window.state().desk().camera, None);
+    assert_eq!(window.state().app_state().camera, None);
 }
 
 /// The number that follows some words.
@@ -255,7 +259,7 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
         let cost = number_after(&words, "cost ");
         let right_m = number_after(&words, "at (");
         let forward_m = number_after(&words, &format!("at ({right_m:.1}, "));
-        let run = window.state().desk().run();
+        let run = window.state().app_state().run();
         let span = run
             .spans()
             .iter()
@@ -299,11 +303,11 @@ fn without_a_graphics_card_the_view_says_so() {
 }
 
 /// The window with its run over, drawn by any adapter there is; `None` without one.
-fn drawn() -> Option<Painted> {
+fn drawn() -> Option<PaintedWindow> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut painted = painted(setup, [1500.0, 950.0])?;
-    settle(&mut painted.window);
+    run_until_idle(&mut painted.window);
     painted.window.step();
     Some(painted)
 }

@@ -1,9 +1,8 @@
 //! One meaning of success and one way to write an error, wherever a result is shown.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use posescope::app::{Command, Setup};
+use posescope::app::{Command, Results, Setup};
 use posescope::localize::QueryResult;
 use posescope::measure::{measure, read_rows};
 use posescope::method::Method;
@@ -12,7 +11,7 @@ use posescope::scene::{self, Scene};
 
 use crate::binary::posescope;
 use crate::small_sequence::SmallSequence;
-use crate::window::{finished, is_said, settle, setup, window};
+use crate::window::{finished, is_said, run_until_idle, setup, window_with_results};
 
 #[test]
 fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
@@ -104,17 +103,17 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     let failed = measures[0].queries - measures[0].successes;
     assert!(failed > 0 && failed < 6, "{failed} of 6 failed");
 
-    let mut results: BTreeMap<usize, Vec<QueryResult>> = BTreeMap::new();
+    let mut results = Results::new();
     for (query, result) in read_results(&out).expect("a file").enumerate() {
         results.insert(query, vec![result.expect("a result")]);
     }
-    let mut window = window(Setup {
+    let setup = Setup {
         offered: results.keys().copied().filter(|query| *query < 3).collect(),
         failure_radius_m,
-        results,
         ..setup()
-    });
-    settle(&mut window);
+    };
+    let mut window = window_with_results(setup, results);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::Maximize(Some("queries")));
     window.run_steps(3);
     assert!(is_said(&window, &format!("{failed} of 6 failed")));

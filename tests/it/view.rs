@@ -29,9 +29,9 @@ fn without_a_display_it_records_instead() {
 }
 
 /// A process that ends with the test.
-struct Ending(Child);
+struct KilledOnDrop(Child);
 
-impl Drop for Ending {
+impl Drop for KilledOnDrop {
     fn drop(&mut self) {
         // One that is over already is just as well.
         let _ = self.0.kill();
@@ -40,7 +40,7 @@ impl Drop for Ending {
 }
 
 /// A display of its own, and its number; none where there is no Xvfb.
-fn virtual_display() -> Option<(Ending, String)> {
+fn virtual_display() -> Option<(KilledOnDrop, String)> {
     let mut server = Process::new("Xvfb")
         .args(["-displayfd", "1", "-nolisten", "tcp"])
         .args(["-screen", "0", "1600x1000x24"])
@@ -50,7 +50,7 @@ fn virtual_display() -> Option<(Ending, String)> {
         .ok()?;
     let mut number = String::new();
     let mut words = BufReader::new(server.stdout.take()?);
-    let server = Ending(server);
+    let server = KilledOnDrop(server);
     words.read_line(&mut number).ok()?;
     let number = number.trim();
     (!number.is_empty()).then(|| (server, format!(":{number}")))
@@ -90,7 +90,7 @@ fn on_a_display_it_opens_a_window_that_stays() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
-    let mut child = Ending(child);
+    let mut child = KilledOnDrop(child);
     let begun = Instant::now();
     while is_shown(&display, "posescope") != Some(true) {
         if let Some(status) = child.0.try_wait().expect("it is ours") {

@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, Comparing, Setup};
+use posescope::app::{App, Command, CompareMode, Results, Setup};
 use posescope::event::{Event, Stage};
-use posescope::localize::{Localizer, QueryResult, Request, Unwatched};
+use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::Protocol;
 use posescope::scene;
 use posescope::scene::Scene;
-use posescope::session::{RunMode, State, Task};
+use posescope::session::{RunMode, RunState, Task};
 
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
@@ -40,25 +40,32 @@ pub fn setup() -> Setup {
         index: Arc::default(),
         failure_radius_m: 10.0,
         mode: RunMode::Paused,
-        results: Default::default(),
         folder: std::env::temp_dir(),
     }
 }
 
 /// The window without a graphics card: what it shows is not painted.
 pub fn window(setup: Setup) -> Harness<'static, App> {
+    window_with_results(setup, Results::new())
+}
+
+/// The window with results that are known before it is opened.
+pub fn window_with_results(setup: Setup, results: Results) -> Harness<'static, App> {
     Harness::builder()
         .with_size([1500.0, 950.0])
-        .build_eframe(|creation| App::new(creation, setup))
+        .build_eframe(|creation| App::new(creation, setup).with_results(results))
 }
 
 /// Draws frames until the worker needs somebody.
-pub fn settle(window: &mut Harness<'_, App>) -> State {
+pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
     wait(window, |app| {
-        !matches!(app.desk().state(), State::Loading | State::Running)
+        !matches!(
+            app.app_state().run_state(),
+            RunState::Loading | RunState::Running
+        )
     });
     window.step();
-    window.state().desk().state().clone()
+    window.state().app_state().run_state().clone()
 }
 
 /// Draws frames until something is the case.
@@ -80,7 +87,7 @@ pub fn finished(setup: Setup) -> Harness<'static, App> {
         mode: RunMode::Running,
         ..setup
     });
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     window
 }
 
@@ -92,14 +99,15 @@ fn press(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) {
 
 /// Gives an order by a key, and waits for what comes of it.
 fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event {
-    let before = window.state().desk().run().len();
+    let before = window.state().app_state().run().len();
     press(window, modifiers, key);
     wait(window, |app| {
-        app.desk().run().len() > before || matches!(app.desk().state(), State::Finished)
+        app.app_state().run().len() > before
+            || matches!(app.app_state().run_state(), RunState::Finished)
     });
-    settle(window);
-    let desk = window.state().desk();
-    desk.run().records()[desk.cursor].event.clone()
+    run_until_idle(window);
+    let state = window.state().app_state();
+    state.run().records()[state.cursor()].event.clone()
 }
 
 /// Whether some label of the window holds these words.
@@ -116,10 +124,16 @@ fn stage(event: &Event) -> Option<(Stage, bool)> {
 }
 
 pub fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
-    window.state().desk().run().results().cloned().collect()
+    window
+        .state()
+        .app_state()
+        .run()
+        .results()
+        .cloned()
+        .collect()
 }
 
-/// The same without a window.
+/// The results of the same run without a window.
 fn headless(params: &Params) -> Vec<QueryResult> {
     let scene = Walls::new();
     let mut results = Vec::new();
@@ -135,7 +149,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
             1,
             &[request],
             &Method::PAPER,
-            &mut Unwatched,
+            &mut NoObserver,
             |result, _| {
                 results.push(result);
                 Ok::<(), posescope::localize::LocalizeError>(())
@@ -148,11 +162,14 @@ fn headless(params: &Params) -> Vec<QueryResult> {
 #[test]
 fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let mut window = window(setup());
-    assert_eq!(settle(&mut window), State::Paused { breakpoint: None });
-    assert_eq!(window.state().desk().run().len(), 1);
+    assert_eq!(
+        run_until_idle(&mut window),
+        RunState::Paused { breakpoint: None }
+    );
+    assert_eq!(window.state().app_state().run().len(), 1);
     window.get_by_label("Into").click();
-    wait(&mut window, |app| app.desk().run().len() == 2);
-    settle(&mut window);
+    wait(&mut window, |app| app.app_state().run().len() == 2);
+    run_until_idle(&mut window);
     let event = order(&mut window, Modifiers::NONE, Key::F10);
     assert_eq!(stage(&event), Some((Stage::Detect, false)));
     let event = order(&mut window, Modifiers::NONE, Key::ArrowRight);
@@ -162,37 +179,37 @@ fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let event = order(&mut window, Modifiers::SHIFT, Key::F11);
     assert_eq!(stage(&event), Some((Stage::Match, false)));
     order(&mut window, Modifiers::NONE, Key::F9);
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     assert_eq!(results(&window), headless(&Params::default()));
 }
 
 #[test]
 fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     let mut window = finished(setup());
-    let last = window.state().desk().run().len() - 1;
+    let last = window.state().app_state().run().len() - 1;
     for cursor in (0..=last).step_by(7).chain([last]) {
         window.state_mut().send(Command::MoveCursor(cursor));
         window.step();
         window.step();
-        assert_eq!(window.state().desk().cursor, cursor);
+        assert_eq!(window.state().app_state().cursor(), cursor);
     }
-    assert_eq!(window.state().desk().run().len(), last + 1);
+    assert_eq!(window.state().app_state().run().len(), last + 1);
     press(&mut window, Modifiers::NONE, Key::Home);
-    assert_eq!(window.state().desk().cursor, 0);
+    assert_eq!(window.state().app_state().cursor(), 0);
     press(&mut window, Modifiers::SHIFT, Key::ArrowRight);
-    assert_eq!(window.state().desk().cursor, 10);
+    assert_eq!(window.state().app_state().cursor(), 10);
     press(&mut window, Modifiers::NONE, Key::ArrowLeft);
-    assert_eq!(window.state().desk().cursor, 9);
+    assert_eq!(window.state().app_state().cursor(), 9);
     press(&mut window, Modifiers::NONE, Key::Num3);
-    let desk = window.state().desk();
-    let span = desk.run().span_at(desk.cursor).expect("in a span");
+    let state = window.state().app_state();
+    let span = state.run().span_at(state.cursor()).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
 }
 
 #[test]
 fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     let mut window = window(setup());
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::ShowView("breakpoints"));
     window.step();
     window.step();
@@ -205,22 +222,22 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     window.get_by_label("Add").click();
     window.step();
     window.step();
-    let breakpoints = &window.state().desk().setup.task.breakpoints;
+    let breakpoints = &window.state().app_state().setup.task.breakpoints;
     assert_eq!(breakpoints[0].to_string(), "mi.yaw_coarse");
     assert_eq!(breakpoints.len(), 1);
     press(&mut window, Modifiers::NONE, Key::F5);
-    wait(&mut window, |app| app.desk().run().len() > 10);
-    let stopped = State::Paused {
+    wait(&mut window, |app| app.app_state().run().len() > 10);
+    let stopped = RunState::Paused {
         breakpoint: Some("mi.yaw_coarse".to_owned()),
     };
-    assert_eq!(settle(&mut window), stopped);
+    assert_eq!(run_until_idle(&mut window), stopped);
     assert!(is_said(&window, "mi.yaw_coarse"));
 }
 
 #[test]
 fn a_wrong_breakpoint_is_refused_with_what_there_is() {
     let mut window = window(setup());
-    settle(&mut window);
+    run_until_idle(&mut window);
     let wrong = vec!["inlers < 3".to_owned()];
     window.state_mut().send(Command::SetBreakpoints(wrong));
     window.step();
@@ -239,13 +256,13 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
         value: "2".to_owned(),
     });
     window.step();
-    assert_eq!(settle(&mut window), State::Finished);
-    let desk = window.state().desk();
-    let span = desk.run().span_at(desk.cursor).expect("in a span");
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    let state = window.state().app_state();
+    let span = state.run().span_at(state.cursor()).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
-    assert_eq!(desk.cursor + 1, span.records.end);
+    assert_eq!(state.cursor() + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
-        let bars = desk.run().stages().iter();
+        let bars = state.run().stages().iter();
         bars.filter(|bar| bar.stage.name() == name)
             .map(|bar| bar.reused)
             .collect()
@@ -268,16 +285,19 @@ fn two_settings_are_compared_and_their_differences_marked() {
         value: "8".to_owned(),
     });
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::ShowView("report"));
     window.step();
     window.step();
     assert!(window.query_all_by_label_contains("≠").next().is_some());
     press(&mut window, Modifiers::NONE, Key::X);
-    assert_eq!(window.state().desk().comparing, Comparing::Kept);
+    assert_eq!(
+        window.state().app_state().options.compare_mode,
+        CompareMode::Kept
+    );
     window
         .state_mut()
-        .send(Command::Compare(Comparing::SideBySide));
+        .send(Command::Compare(CompareMode::SideBySide));
     window.step();
     window.step();
     assert!(is_said(&window, "A, kept"));
@@ -292,14 +312,14 @@ fn two_settings_are_compared_and_their_differences_marked() {
 fn the_next_failure_is_found_once_all_queries_were_run() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::N);
-    assert_eq!(window.state().desk().setup.query, 1);
+    assert_eq!(window.state().app_state().setup.query, 1);
     window.get_by_label("Run all").click();
-    wait(&mut window, |app| app.desk().results.len() == 3);
+    wait(&mut window, |app| app.app_state().results.len() == 3);
     press(&mut window, Modifiers::NONE, Key::N);
-    assert_eq!(window.state().desk().setup.query, GREY);
-    settle(&mut window);
+    assert_eq!(window.state().app_state().setup.query, GREY);
+    run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::K);
-    assert_eq!(window.state().desk().setup.query, 2);
+    assert_eq!(window.state().app_state().setup.query, 2);
 }
 
 #[test]
@@ -316,8 +336,8 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         setup.task.params.assign(change).expect("a good value");
     }
     let mut window = window(setup);
-    settle(&mut window);
-    wait(&mut window, |app| !app.desk().queries.is_painting());
+    run_until_idle(&mut window);
+    wait(&mut window, |app| !app.app_state().queries.is_painting());
     std::thread::sleep(Duration::from_millis(100));
     // Every worker has its handles on the scene.
     let alone = Arc::strong_count(&scene);
@@ -326,7 +346,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         let begun = Instant::now();
         window.state_mut().send(command);
         window.step();
-        assert_eq!(window.state().desk().queries.progress(), None);
+        assert_eq!(window.state().app_state().queries.progress(), None);
         wait(&mut window, is_alone);
         assert!(begun.elapsed() < Duration::from_secs(20));
         let running = Instant::now();
@@ -335,7 +355,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         }
         window.state_mut().send(Command::RunAllQueries);
         window.step();
-        assert_eq!(window.state().desk().queries.progress(), Some((0, 3)));
+        assert_eq!(window.state().app_state().queries.progress(), Some((0, 3)));
         wait(&mut window, |app| !is_alone(app));
     };
     // The first time there is nothing to stop but the session, which waits at its first event.
@@ -356,17 +376,17 @@ fn what_goes_wrong_is_said_and_the_window_lives_on() {
     let mut window = finished(setup);
     window.state_mut().send(Command::SelectQuery(UNREADABLE));
     window.step();
-    assert!(matches!(settle(&mut window), State::Broken(_)));
+    assert!(matches!(run_until_idle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "000004"));
     // Frame 1 has no cloud, and the scene of this test panics when it is asked for it.
     window.state_mut().send(Command::SelectQuery(1));
     window.state_mut().send(Command::SetReferences(vec![1]));
     window.step();
-    assert!(matches!(settle(&mut window), State::Broken(_)));
+    assert!(matches!(run_until_idle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "internal error"));
     window.state_mut().send(Command::SetReferences(vec![0]));
     window.step();
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
 }
 
 #[test]
@@ -379,23 +399,23 @@ fn a_session_is_saved_and_restored() {
         value: "0.8".to_owned(),
     });
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     window.state_mut().send(Command::MoveCursor(40));
     window.state_mut().send(Command::SaveSession(path.clone()));
     window.step();
     window.state_mut().send(Command::ResetParams);
     window.state_mut().send(Command::SelectQuery(2));
     window.step();
-    settle(&mut window);
+    run_until_idle(&mut window);
     window
         .state_mut()
         .send(Command::RestoreSession(path.clone()));
     window.step();
-    settle(&mut window);
-    let desk = window.state().desk();
-    assert_eq!(desk.setup.query, 1);
-    assert_eq!(desk.setup.task.params.changes(), ["fb.ratio=0.8"]);
-    assert_eq!(desk.cursor, 40);
+    run_until_idle(&mut window);
+    let state = window.state().app_state();
+    assert_eq!(state.setup.query, 1);
+    assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
+    assert_eq!(state.cursor(), 40);
     std::fs::write(&path, "{}").expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();
@@ -419,9 +439,9 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     std::fs::write(&path, elsewhere).expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();
-    assert_eq!(settle(&mut window), State::Finished);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
-    let loaded = window.state().desk().run().loaded.clone();
+    let loaded = window.state().app_state().run().loaded.clone();
     let problem = &loaded.expect("it ran").problems[0];
     assert_eq!(problem.query.photo.gray, photo.expect("readable").gray);
 }
@@ -435,8 +455,8 @@ fn a_session_of_an_earlier_program_is_restored() {
     let restore = Command::RestoreSession(EARLIER_SESSION.into());
     window.state_mut().send(restore);
     window.step();
-    settle(&mut window);
-    let setup = &window.state().desk().setup;
+    run_until_idle(&mut window);
+    let setup = &window.state().app_state().setup;
     let task = &setup.task;
     assert_eq!(setup.pick().to_string(), "maxf:2");
     assert_eq!(setup.chosen.frames, [0, 2]);
@@ -489,7 +509,7 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
         window.step();
         window.step();
         let place = format!("session.json:{line}: ");
-        let note = window.state().desk().notes.last().expect("it is said");
+        let note = window.state().app_state().notes.last().expect("it is said");
         let said = &note.text;
         assert!(said.contains(&place) && said.contains(words), "{said}");
         assert!(!said.contains('\n') && note.is_error, "{said}");
@@ -515,9 +535,9 @@ fn a_session_keeps_the_format_and_the_index() {
     let mut here = finished(self::setup());
     here.state_mut().send(Command::RestoreSession(path.clone()));
     here.step();
-    settle(&mut here);
-    let restored = &here.state().desk().setup;
-    assert_eq!(restored.task, there.state().desk().setup.task);
+    run_until_idle(&mut here);
+    let restored = &here.state().app_state().setup;
+    assert_eq!(restored.task, there.state().app_state().setup.task);
     let index = restored.index.file().and_then(|file| file.to_str());
     assert_eq!(index, Some("an.index"));
     // A format that does not fit is refused as it would be on the command line.
@@ -541,7 +561,7 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     window.step();
     assert!(path.metadata().expect("written").len() > 10_000);
     assert_eq!(
-        window.state().desk().setup.command_line(),
+        window.state().app_state().setup.command_line(),
         "posescope run walls --query 000001 --reference 000000 --radius 3 --seed 7"
     );
 }
@@ -570,10 +590,10 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::Num9);
     let truth = Walls::new().pose(1).expect("known");
-    assert_eq!(window.state().desk().camera, Some(truth));
-    wait(&mut window, |app| !app.desk().is_probing());
-    let desk = window.state().desk();
-    let probe = desk.probe().expect("answered");
+    assert_eq!(window.state().app_state().camera, Some(truth));
+    wait(&mut window, |app| !app.app_state().is_probing());
+    let state = window.state().app_state();
+    let probe = state.probe().expect("answered");
     for (method, comparison) in &probe.comparisons {
         let results = results(&window);
         let result = results.iter().find(|result| result.method == *method);
@@ -583,10 +603,10 @@ fn the_camera_in_hand_has_costs_of_its_own() {
         assert_eq!(comparison.score.cost, report.truth);
     }
     press(&mut window, Modifiers::ALT, Key::ArrowUp);
-    let moved = window.state().desk().camera.expect("in hand");
+    let moved = window.state().app_state().camera.expect("in hand");
     assert!((moved.translation.z - truth.translation.z - 0.2).abs() < 1e-9);
     press(&mut window, Modifiers::NONE, Key::Escape);
-    assert_eq!(window.state().desk().camera, None);
+    assert_eq!(window.state().app_state().camera, None);
 }
 
 /// Whatever is registered is shown as the paper's methods are, in glyphs that the fonts have.

@@ -32,11 +32,11 @@ pub struct DepthReading {
 /// Depths of the projected points within a radius \[m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthsWithin {
-    /// Of the nearest projection; of two at the same pixel distance, the nearer surface.
+    /// Depth of the nearest projection; of two at the same pixel distance, the nearer surface.
     pub nearest: f64,
-    /// The least.
+    /// The least depth within the radius \[m\].
     pub least: f64,
-    /// The greatest.
+    /// The greatest depth within the radius \[m\].
     pub greatest: f64,
 }
 

@@ -41,11 +41,11 @@ pub trait Choice {
 
 /// Something that walks over parameters: a list, a setter, a panel of sliders.
 pub trait ParamVisitor {
-    /// A real number.
+    /// Visits a real number.
     fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>);
-    /// A whole number.
+    /// Visits a whole number.
     fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>);
-    /// Yes or no.
+    /// Visits a switch.
     fn flag(&mut self, about: About, value: &mut bool);
     /// One of a few names.
     fn choice(&mut self, about: About, value: &mut dyn Choice);
@@ -114,7 +114,7 @@ pub struct Described {
     pub about: About,
     /// The present value.
     pub value: Value,
-    /// What it accepts.
+    /// What values the parameter accepts.
     pub domain: Domain,
 }
 
@@ -132,11 +132,11 @@ pub enum ParamError {
     /// The value is not of the parameter's kind or outside its range.
     #[error("`{key}` takes {expected}, not `{given}`")]
     BadValue {
-        /// The parameter.
+        /// The parameter, as `group.name`.
         key: String,
-        /// What it accepts.
+        /// What values the parameter accepts.
         expected: String,
-        /// What was given.
+        /// The value that was given.
         given: String,
     },
     /// An assignment without `=`.
@@ -306,9 +306,9 @@ mod tests {
 
     /// Writes down what it is shown.
     #[derive(Default)]
-    struct Clerk(Vec<String>);
+    struct RecordingVisitor(Vec<String>);
 
-    impl Clerk {
+    impl RecordingVisitor {
         fn write(&mut self, about: About, rest: &str) {
             let About { name, unit, .. } = about;
             self.0
@@ -316,7 +316,7 @@ mod tests {
         }
     }
 
-    impl ParamVisitor for Clerk {
+    impl ParamVisitor for RecordingVisitor {
         fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
             self.write(about, &format!("{value} in {range:?}"));
         }
@@ -341,15 +341,15 @@ mod tests {
             inner: Inner { rounds: 3 },
             side: Side::Right,
         };
-        let mut clerk = Clerk::default();
-        all.visit(&mut clerk);
+        let mut visitor = RecordingVisitor::default();
+        all.visit(&mut visitor);
         let shown = [
             "reach [m] How far, as in std: 1.5 in 0.5..=2.0",
             "on [] Whether at all: true",
             "rounds [] A number of times, at most: 3 in 1..=10",
             "side [] Which side: right of [\"left\", \"right\"]",
         ];
-        assert_eq!(clerk.0, shown);
+        assert_eq!(visitor.0, shown);
         assert_eq!(all.side, Side::Left);
     }
 }

@@ -37,11 +37,11 @@ pub struct FeatureCounts {
     pub reference_keypoints: usize,
     /// Query keypoints whose nearest reference feature passed the ratio test.
     pub ratio_passed: usize,
-    /// Of those, mutually best.
+    /// Matches that passed the ratio test and are mutually best.
     pub unique: usize,
-    /// Of those, with a depth.
+    /// Mutually best matches whose reference keypoint has a depth.
     pub with_depth: usize,
-    /// Of those, explained by the estimated pose.
+    /// Matches with a depth that the estimated pose explains.
     pub inliers: usize,
 }
 
@@ -99,7 +99,7 @@ pub trait Estimator: Send + Sync {
         Some(self.compare_at(problem, world_from_query)?.score)
     }
 
-    /// As [`Self::score_at`], with the synthetic view and what the cost was made of.
+    /// What [`Self::score_at`] returns, with the synthetic view and what the cost was made of.
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         let _ = (problem, world_from_query);
         None
@@ -111,7 +111,7 @@ pub trait Estimator: Send + Sync {
 pub struct Entry {
     /// The method that it is.
     pub method: Method,
-    /// One phrase.
+    /// What the estimator does, in one phrase.
     pub about: &'static str,
     /// What it is made of.
     pub parts: Parts,
@@ -190,8 +190,8 @@ pub fn methods() -> impl Iterator<Item = Method> {
     all().iter().map(|entry| entry.method)
 }
 
-/// Those of some methods that search the pose of least cost, and those that a hybrid among them runs,
-/// in the order of [`all`].
+/// The methods among these that search the pose of least cost, and those that a hybrid among them
+/// runs, in the order of [`all`].
 pub fn direct_methods(methods: &[Method]) -> Vec<Method> {
     let runs = |method: Method| {
         methods.iter().any(|&asked| {
@@ -213,10 +213,11 @@ pub fn find(method: Method) -> Option<&'static Entry> {
     all().iter().find(|entry| entry.method == method)
 }
 
-/// As [`find`], for a method that is registered: read from text, or named in [`Method`].
+/// The entry that [`find`] finds, for a method that is registered: read from text, or named in
+/// [`Method`].
 ///
 /// # Panics
-/// For any other.
+/// When the method is registered nowhere.
 pub fn entry(method: Method) -> &'static Entry {
     find(method).unwrap_or_else(|| panic!("{method} is in no registry"))
 }

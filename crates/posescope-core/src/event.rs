@@ -15,7 +15,7 @@ use crate::render::{ColoredCloud, Comparison, Score};
 use crate::retrieval::ReferenceRanking;
 use crate::robust::{Acceptance, Trial};
 
-/// Which of the two photos.
+/// One of the two photos of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
     /// The query photo.
@@ -24,7 +24,7 @@ pub enum Side {
     Reference,
 }
 
-/// A named part of an estimator, which a watcher can step over.
+/// A named part of an estimator, which an observer can step over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// A whole estimator; within the hybrid also the one it runs inside.
@@ -174,14 +174,14 @@ events! {
 /// A stage begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageStarted {
-    /// Which.
+    /// The stage.
     pub stage: Stage,
 }
 
 /// A stage is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageEnded {
-    /// Which.
+    /// The stage.
     pub stage: Stage,
     /// Whether it did what it was for.
     pub succeeded: bool,
@@ -192,7 +192,7 @@ pub struct StageEnded {
 /// SURF features of one photo.
 #[derive(Clone, Debug)]
 pub struct FeaturesDetected {
-    /// Of which photo.
+    /// The photo that the features are of.
     pub side: Side,
     /// Keypoints and descriptors.
     pub features: Arc<Features>,
@@ -311,11 +311,11 @@ pub struct PhaseSearched {
 /// Why a synthetic view was rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Moment {
-    /// At the reference pose.
+    /// It is the view at the reference pose.
     Start,
-    /// At a new best hypothesis.
+    /// A hypothesis is better than all before.
     NewBest,
-    /// At the result.
+    /// It is the view at the result.
     End,
 }
 

@@ -12,15 +12,15 @@ use directories::ProjectDirs;
 /// leaves nothing.
 ///
 /// # Errors
-/// What the system says.
+/// The error of the system.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole_with(path, |file| file.write_all(bytes))
 }
 
-/// As [`write_whole`], for what is not in memory.
+/// Writes a file as [`write_whole`] does, from what is not in memory.
 ///
 /// # Errors
-/// What the system or `write` says.
+/// The error of the system or of `write`.
 pub fn write_whole_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
@@ -47,8 +47,8 @@ pub fn write_whole_with(
 /// Names the cache directory; empty turns caching off.
 const CACHE_VARIABLE: &str = "POSESCOPE_CACHE";
 
-/// The folder `name` of the user's cache directory, where the environment or else the system says; `None` where caching is turned
-/// off or the user has no cache directory.
+/// The folder `name` of the user's cache directory, where the environment or else the system says;
+/// `None` where caching is turned off or the user has no cache directory.
 pub fn user_cache_folder(name: &str) -> Option<PathBuf> {
     let folder = match env::var_os(CACHE_VARIABLE) {
         Some(folder) => PathBuf::from(folder),

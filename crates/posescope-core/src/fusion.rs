@@ -20,7 +20,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 pub use average::average_pose;
-pub use share::{Fate, Share};
+pub use share::{Share, ShareOutcome};
 
 use crate::estimator::Failure;
 use crate::event::{ReferencesFused, Stage};
@@ -33,7 +33,7 @@ use crate::trace::{Cancelled, Trace};
 pub struct Entry {
     /// The name on the command line, in results and in tables.
     pub name: &'static str,
-    /// One phrase.
+    /// What the fusion does, in one phrase.
     pub about: &'static str,
     /// What each reference has to say, given the number of its matches: not negative, 0 leaves it
     /// out, any common factor does not matter. At least one is positive where there is a reference.
@@ -122,7 +122,7 @@ pub fn fuse(
         let shares = shares(fusion, candidates);
         let members: Vec<(f64, &Pose)> = shares
             .iter()
-            .filter(|share| share.fate == Fate::Kept)
+            .filter(|share| share.outcome == ShareOutcome::Kept)
             .filter_map(|share| Some((share.weight, share.pose.as_ref()?)))
             .collect();
         let pose = average_pose(&members);
@@ -138,31 +138,31 @@ pub fn fuse(
 fn shares(fusion: &Entry, candidates: &[Candidate<'_>]) -> Vec<Share> {
     let matches: Vec<usize> = candidates.iter().map(|c| c.matches).collect();
     let weights = (fusion.weigh)(&matches);
-    let fate = |candidate: &Candidate<'_>, weight: f64| match candidate.pose {
-        _ if weight <= 0.0 => Fate::Dropped,
-        Err(_) => Fate::Failed,
-        Ok(_) => Fate::Kept,
+    let outcome = |candidate: &Candidate<'_>, weight: f64| match candidate.pose {
+        _ if weight <= 0.0 => ShareOutcome::Dropped,
+        Err(_) => ShareOutcome::Failed,
+        Ok(_) => ShareOutcome::Kept,
     };
     let kept: f64 = candidates
         .iter()
         .zip(&weights)
-        .filter(|(candidate, weight)| fate(candidate, **weight) == Fate::Kept)
+        .filter(|(candidate, weight)| outcome(candidate, **weight) == ShareOutcome::Kept)
         .map(|(_, weight)| weight)
         .sum();
     candidates
         .iter()
         .zip(weights)
         .map(|(candidate, weight)| {
-            let fate = fate(candidate, weight);
+            let outcome = outcome(candidate, weight);
             Share {
                 reference: candidate.reference.to_owned(),
                 matches: candidate.matches,
-                weight: if fate == Fate::Kept {
+                weight: if outcome == ShareOutcome::Kept {
                     weight / kept
                 } else {
                     0.0
                 },
-                fate,
+                outcome,
                 pose: candidate.pose.ok().copied(),
             }
         })
@@ -171,12 +171,14 @@ fn shares(fusion: &Entry, candidates: &[Candidate<'_>]) -> Vec<Share> {
 
 /// The reason names the reference that should have been the best.
 fn no_pose(shares: &[Share], candidates: &[Candidate<'_>]) -> Failure {
-    let failed = shares.iter().filter(|share| share.fate == Fate::Failed);
+    let failed = shares
+        .iter()
+        .filter(|share| share.outcome == ShareOutcome::Failed);
     let weighed = failed.count();
     let best = shares
         .iter()
         .zip(candidates)
-        .filter(|(share, _)| share.fate == Fate::Failed)
+        .filter(|(share, _)| share.outcome == ShareOutcome::Failed)
         // The last of equals would win; the first one is wanted.
         .rev()
         .max_by_key(|(share, _)| share.matches);
@@ -273,9 +275,13 @@ mod tests {
         let candidates = [(60, Err(failure())), (30, Ok(at(1.0))), (90, Ok(at(5.0)))];
         assert!((x("wavg", &candidates) - 4.0).abs() < 1e-12);
         let (_, told) = fused("wavg", &candidates);
-        let fates: Vec<_> = told.shares.iter().map(|s| (s.fate, s.weight)).collect();
-        let expected = [(Fate::Failed, 0.0), (Fate::Kept, 0.25), (Fate::Kept, 0.75)];
-        assert_eq!(fates, expected);
+        let outcomes: Vec<_> = told.shares.iter().map(|s| (s.outcome, s.weight)).collect();
+        let expected = [
+            (ShareOutcome::Failed, 0.0),
+            (ShareOutcome::Kept, 0.25),
+            (ShareOutcome::Kept, 0.75),
+        ];
+        assert_eq!(outcomes, expected);
         assert_eq!(told.shares[2].pose, Some(at(5.0)));
     }
 
@@ -290,7 +296,7 @@ mod tests {
         }
         assert!(fused("wavg", &candidates).0.is_ok());
         let (_, told) = fused("r-wavg", &candidates);
-        assert_eq!(told.shares[1].fate, Fate::Dropped);
+        assert_eq!(told.shares[1].outcome, ShareOutcome::Dropped);
     }
 
     #[test]

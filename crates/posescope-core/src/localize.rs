@@ -3,15 +3,16 @@
 
 mod choose;
 mod localizer;
+mod observer;
 mod result;
 mod select;
 mod single;
 mod timing;
 mod verdict;
-mod watch;
 
 pub use choose::Chooser;
 pub use localizer::{LocalizeError, Localizer, Request};
+pub use observer::{LocalizeObserver, NoObserver};
 pub use result::{
     CostReport, Diagnosis, PoseReport, QueryResult, Reason, SCHEMA, Setting, Status, evaluate,
 };
@@ -21,4 +22,3 @@ pub use select::{
 pub use single::{localize, localize_by, localize_traced, words_of};
 pub use timing::{StageTimes, StageTimings};
 pub use verdict::Verdict;
-pub use watch::{Unwatched, Watch};

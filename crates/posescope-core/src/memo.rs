@@ -44,11 +44,11 @@ pub struct MemoId(u64);
 
 struct Values {
     id: MemoId,
-    recent: Recent<(TypeId, Key), Kept>,
+    recent: Recent<(TypeId, Key), Entry>,
 }
 
 #[derive(Clone)]
-struct Kept {
+struct Entry {
     value: Arc<dyn Any + Send + Sync>,
     bytes: usize,
 }
@@ -77,7 +77,7 @@ impl Memo {
         };
         Self(Some(Arc::new(Values {
             id: MemoId(NEXT.fetch_add(1, Ordering::Relaxed)),
-            recent: Recent::within(limit, |kept: &Kept| kept.bytes, |_| false),
+            recent: Recent::within(limit, |entry: &Entry| entry.bytes, |_| false),
         })))
     }
 
@@ -107,10 +107,11 @@ impl Memo {
         recalled
     }
 
-    /// As [`Self::recall`], for a value whose making can be stopped: then nothing is remembered.
+    /// Recalls as [`Self::recall`] does, for a value whose making can be stopped: then nothing is
+    /// remembered.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// The errors of `make`.
     pub fn try_recall<T: Remembered, E>(
         &self,
         key: impl Any + Hash + Eq + Send + Sync,
@@ -120,8 +121,8 @@ impl Memo {
             return Ok(Recalled::made(Arc::new(make()?)));
         };
         let key = (TypeId::of::<T>(), Key::new(key));
-        if let Some(kept) = values.recent.get(&key)
-            && let Ok(value) = kept.value.downcast()
+        if let Some(entry) = values.recent.get(&key)
+            && let Ok(value) = entry.value.downcast()
         {
             return Ok(Recalled {
                 value,
@@ -129,14 +130,14 @@ impl Memo {
             });
         }
         let made = Arc::new(make()?);
-        let kept = values.recent.insert(
+        let entry = values.recent.insert(
             key,
-            Kept {
+            Entry {
                 bytes: size_of::<T>() + made.heap_bytes(),
                 value: Arc::clone(&made) as Arc<dyn Any + Send + Sync>,
             },
         );
-        Ok(Recalled::made(kept.value.downcast().unwrap_or(made)))
+        Ok(Recalled::made(entry.value.downcast().unwrap_or(made)))
     }
 }
 

@@ -54,7 +54,7 @@ impl fmt::Display for Method {
     }
 }
 
-/// Those of the paper in its order, then the others by name.
+/// Sorts methods: those of the paper in its order, then the others by name.
 impl Ord for Method {
     fn cmp(&self, other: &Self) -> Ordering {
         let key = |method: &Self| (method.rank(), method.0);

@@ -59,7 +59,7 @@ impl Params {
 
     /// All parameters with their present values.
     pub fn list(&self) -> Vec<Described> {
-        let mut lister = Lister::default();
+        let mut lister = ListVisitor::default();
         self.clone().visit_groups(|group, params| {
             lister.group = group;
             params.visit(&mut lister);
@@ -84,7 +84,7 @@ impl Params {
     /// [`ParamError`] with what was expected.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), ParamError> {
         let (wanted_group, name) = key.split_once('.').unwrap_or(("", key));
-        let mut setter = Setter {
+        let mut setter = SetVisitor {
             name,
             text: value,
             outcome: None,
@@ -184,12 +184,12 @@ impl Params {
 }
 
 #[derive(Default)]
-struct Lister {
+struct ListVisitor {
     group: &'static str,
     rows: Vec<Described>,
 }
 
-impl Lister {
+impl ListVisitor {
     fn push(&mut self, about: About, value: Value, domain: Domain) {
         self.rows.push(Described {
             key: format!("{}.{}", self.group, about.name),
@@ -200,7 +200,7 @@ impl Lister {
     }
 }
 
-impl ParamVisitor for Lister {
+impl ParamVisitor for ListVisitor {
     fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
         self.push(about, Value::Number(*value), Domain::Number(range));
     }
@@ -221,13 +221,13 @@ impl ParamVisitor for Lister {
 }
 
 /// Sets the parameter `name` of the group it is shown.
-struct Setter<'a> {
+struct SetVisitor<'a> {
     name: &'a str,
     text: &'a str,
     outcome: Option<Result<(), Domain>>,
 }
 
-impl Setter<'_> {
+impl SetVisitor<'_> {
     fn set<T>(&mut self, about: About, parsed: Option<T>, domain: Domain, place: &mut T) {
         if about.name == self.name {
             self.outcome = Some(match parsed {
@@ -241,7 +241,7 @@ impl Setter<'_> {
     }
 }
 
-impl ParamVisitor for Setter<'_> {
+impl ParamVisitor for SetVisitor<'_> {
     fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
         let parsed = self.text.parse().ok().filter(|v| range.contains(v));
         self.set(about, parsed, Domain::Number(range), value);

@@ -33,10 +33,10 @@ mod verification;
 mod vocabulary;
 
 pub use affine::Affine;
-pub use build::{Progress, Request, Step, Summary, build};
+pub use build::{BuildProgress, BuildRequest, BuildStep, BuildSummary, build};
 pub use error::{BuildError, IndexError};
 pub use index::{Geometry, Index, Ranked, Retrieval};
-pub use layout::{Counts, Description};
+pub use layout::{Description, RecordCounts};
 pub use params::RetrievalParams;
 pub use ranking::{Criterion, RankedReference, ReferenceRanking};
 pub use verification::{Verification, VerifiedMatch};

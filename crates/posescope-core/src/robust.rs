@@ -18,6 +18,6 @@ pub mod params;
 
 pub use acceptance::{Acceptance, AcceptanceRule, effective_area_px, inliers_beyond_chance};
 pub use consensus::{Consensus, Hypothesis, MlesacError, Trial};
-pub use likelihood::Score;
+pub use likelihood::LikelihoodScore;
 pub use mlesac::mlesac;
 pub use params::MlesacParams;

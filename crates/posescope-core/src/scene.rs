@@ -8,7 +8,7 @@ use std::sync::Arc;
 use xxhash_rust::xxh3::Xxh3;
 
 pub use error::SceneError;
-pub use frames::{AtHand, FrameStore};
+pub use frames::{CachedScene, FrameStore};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -53,7 +53,7 @@ pub trait Scene: Send + Sync {
     /// The frame as a query.
     ///
     /// # Errors
-    /// As [`Scene::photo`].
+    /// The errors of [`Scene::photo`].
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::new(Query {
             name: self.frames()[frame].clone(),
@@ -67,7 +67,7 @@ pub trait Scene: Send + Sync {
     /// pose and cloud. A scene that has these need not have its own.
     ///
     /// # Errors
-    /// As [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
+    /// The errors of [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
     fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
         let world_from_camera = pose_of(self, frame)?;
         let query = self.query(frame)?;

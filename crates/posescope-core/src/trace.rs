@@ -17,7 +17,7 @@
 //! ```
 //!
 //! The closure runs only where somebody wants that kind of event, so that building an image inside
-//! costs nothing in a run that nobody watches. A sink may block (the watcher paused) or answer
+//! costs nothing in a run that nobody watches. A sink may block (the observer paused) or answer
 //! [`Cancelled`], which `?` carries out of the estimator. Listening never changes the answer.
 
 mod fanout;
@@ -28,7 +28,7 @@ pub use fanout::Fanout;
 
 use crate::event::{DebugEvent, Event, KindSet, Stage, StageEnded, StageStarted};
 
-/// The watcher asked the run to stop.
+/// The observer asked the run to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run was cancelled")]
 pub struct Cancelled;
@@ -48,7 +48,7 @@ pub struct Record {
 pub trait Sink {
     /// The kinds of event this sink wants now. Stage events come in any case.
     ///
-    /// Asked at the start, and again whenever the run attends to its watcher.
+    /// Asked at the start, and again whenever the run attends to its observer.
     fn wanted(&self) -> KindSet {
         KindSet::ALL
     }
@@ -70,10 +70,10 @@ pub trait Sink {
 
 /// The narrator's end: what an estimator holds.
 pub struct Trace<'a> {
-    watcher: Option<Watcher<'a>>,
+    observer: Option<Observer<'a>>,
 }
 
-struct Watcher<'a> {
+struct Observer<'a> {
     sink: &'a mut dyn Sink,
     attention: Option<&'a AtomicBool>,
     wanted: KindSet,
@@ -86,7 +86,7 @@ struct Watcher<'a> {
 impl<'a> Trace<'a> {
     /// Nobody watches: no sink, no thread, no allocation.
     pub const fn off() -> Self {
-        Self { watcher: None }
+        Self { observer: None }
     }
 
     /// Every wanted event goes to `sink`, on the caller's thread.
@@ -94,8 +94,9 @@ impl<'a> Trace<'a> {
         Self::new(sink, None)
     }
 
-    /// As [`Self::to`]; whenever `attention` is raised, the sink's [`Sink::attend`] is called at the
-    /// next event or checkpoint, wanted or not, and the flag is lowered.
+    /// A trace as [`Self::to`] makes it; whenever `attention` is raised, the sink's
+    /// [`Sink::attend`] is called at the next event or checkpoint, wanted or not, and the flag is
+    /// lowered.
     pub fn watched(sink: &'a mut dyn Sink, attention: &'a AtomicBool) -> Self {
         Self::new(sink, Some(attention))
     }
@@ -103,7 +104,7 @@ impl<'a> Trace<'a> {
     fn new(sink: &'a mut dyn Sink, attention: Option<&'a AtomicBool>) -> Self {
         let wanted = sink.wanted();
         Self {
-            watcher: Some(Watcher {
+            observer: Some(Observer {
                 sink,
                 attention,
                 wanted,
@@ -117,15 +118,15 @@ impl<'a> Trace<'a> {
     /// Tells one event, if anybody wants its kind.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watcher asked the run to stop.
+    /// [`Cancelled`] when the observer asked the run to stop.
     #[inline]
     pub fn emit<E: DebugEvent>(&mut self, make: impl FnOnce() -> E) -> Result<(), Cancelled> {
-        let Some(watcher) = &mut self.watcher else {
+        let Some(observer) = &mut self.observer else {
             return Ok(());
         };
-        watcher.attend_if_asked()?;
-        if watcher.wanted.contains(E::KIND) {
-            watcher.deliver(make().into())?;
+        observer.attend_if_asked()?;
+        if observer.wanted.contains(E::KIND) {
+            observer.deliver(make().into())?;
         }
         Ok(())
     }
@@ -133,54 +134,54 @@ impl<'a> Trace<'a> {
     /// Whether anybody wants this kind of event now. For what is kept to be told again: what is told
     /// at once asks [`Self::emit`], which runs its closure only then.
     pub fn wants<E: DebugEvent>(&self) -> bool {
-        self.watcher
+        self.observer
             .as_ref()
-            .is_some_and(|watcher| watcher.wanted.contains(E::KIND))
+            .is_some_and(|observer| observer.wanted.contains(E::KIND))
     }
 
-    /// For long loops that tell nothing: lets the watcher pause or stop the run.
+    /// For long loops that tell nothing: lets the observer pause or stop the run.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watcher asked the run to stop.
+    /// [`Cancelled`] when the observer asked the run to stop.
     #[inline]
     pub fn checkpoint(&mut self) -> Result<(), Cancelled> {
-        match &mut self.watcher {
-            Some(watcher) => watcher.attend_if_asked(),
+        match &mut self.observer {
+            Some(observer) => observer.attend_if_asked(),
             None => Ok(()),
         }
     }
 
     /// Says where the stage's result comes from: whether it was remembered from an earlier run.
     pub fn note_reuse(&mut self, reused: bool) {
-        if let Some(watcher) = &mut self.watcher {
-            watcher.reused = reused;
+        if let Some(observer) = &mut self.observer {
+            observer.reused = reused;
         }
     }
 
-    /// Runs `body` as a named part of the estimator, which a watcher can step over and out of.
+    /// Runs `body` as a named part of the estimator, which an observer can step over and out of.
     ///
     /// # Errors
-    /// Those of `body`, and [`Cancelled`].
+    /// The errors of `body`, and [`Cancelled`].
     pub fn stage<T, X: From<Cancelled>>(
         &mut self,
         stage: Stage,
         body: impl FnOnce(&mut Self) -> Result<T, X>,
     ) -> Result<T, X> {
-        if let Some(watcher) = &mut self.watcher {
-            watcher.attend_if_asked()?;
-            watcher.depth += 1;
-            watcher.reused = false;
-            watcher.deliver(StageStarted { stage }.into())?;
+        if let Some(observer) = &mut self.observer {
+            observer.attend_if_asked()?;
+            observer.depth += 1;
+            observer.reused = false;
+            observer.deliver(StageStarted { stage }.into())?;
         }
         let outcome = body(self);
-        if let Some(watcher) = &mut self.watcher {
+        if let Some(observer) = &mut self.observer {
             let ended = StageEnded {
                 stage,
                 succeeded: outcome.is_ok(),
-                reused: std::mem::take(&mut watcher.reused),
+                reused: std::mem::take(&mut observer.reused),
             };
-            let told = watcher.deliver(ended.into());
-            watcher.depth -= 1;
+            let told = observer.deliver(ended.into());
+            observer.depth -= 1;
             if outcome.is_ok() {
                 told?;
             }
@@ -189,7 +190,7 @@ impl<'a> Trace<'a> {
     }
 }
 
-impl Watcher<'_> {
+impl Observer<'_> {
     #[inline]
     fn attend_if_asked(&mut self) -> Result<(), Cancelled> {
         match self.attention {
@@ -223,14 +224,14 @@ mod tests {
     use crate::event::{Kind, ProjectedCloud};
 
     /// Keeps what it gets; stops the run at event number `stop_at`.
-    struct Notebook {
+    struct RecordingSink {
         wanted: KindSet,
         records: Vec<Record>,
         stop_at: Option<u64>,
         attended: usize,
     }
 
-    impl Notebook {
+    impl RecordingSink {
         fn wanting(wanted: KindSet) -> Self {
             Self {
                 wanted,
@@ -241,7 +242,7 @@ mod tests {
         }
     }
 
-    impl Sink for Notebook {
+    impl Sink for RecordingSink {
         fn wanted(&self) -> KindSet {
             self.wanted
         }
@@ -271,23 +272,23 @@ mod tests {
 
     #[test]
     fn an_unwanted_event_is_not_even_built_but_stages_are_told() {
-        let mut notebook = Notebook::wanting(KindSet::NONE);
-        let mut trace = Trace::to(&mut notebook);
+        let mut sink = RecordingSink::wanting(KindSet::NONE);
+        let mut trace = Trace::to(&mut sink);
         trace
             .emit(|| -> ProjectedCloud { panic!("nobody wants this") })
             .expect("not cancelled");
         two_stages(&mut trace).expect("not cancelled");
-        let depths: Vec<_> = notebook.records.iter().map(|r| r.depth).collect();
+        let depths: Vec<_> = sink.records.iter().map(|r| r.depth).collect();
         assert_eq!(depths, [1, 2, 2, 1]);
     }
 
     #[test]
     fn a_cancelled_run_still_closes_its_stages() {
-        let mut notebook = Notebook::wanting(KindSet::ALL);
-        notebook.stop_at = Some(1);
-        let outcome = two_stages(&mut Trace::to(&mut notebook));
+        let mut sink = RecordingSink::wanting(KindSet::ALL);
+        sink.stop_at = Some(1);
+        let outcome = two_stages(&mut Trace::to(&mut sink));
         assert_eq!(outcome, Err(Cancelled));
-        let last = notebook.records.last().expect("some were told");
+        let last = sink.records.last().expect("some were told");
         assert!(matches!(
             last.event,
             Event::StageEnded(StageEnded {
@@ -300,20 +301,20 @@ mod tests {
 
     #[test]
     fn raised_attention_reaches_the_sink_once_even_without_a_wanted_event() {
-        let mut notebook = Notebook::wanting(KindSet::NONE);
+        let mut sink = RecordingSink::wanting(KindSet::NONE);
         let attention = AtomicBool::new(true);
-        let mut trace = Trace::watched(&mut notebook, &attention);
+        let mut trace = Trace::watched(&mut sink, &attention);
         for _ in 0..3 {
             trace.checkpoint().expect("not cancelled");
         }
-        assert_eq!(notebook.attended, 1);
+        assert_eq!(sink.attended, 1);
     }
 
     #[test]
     fn records_are_numbered_without_gaps() {
-        let mut notebook = Notebook::wanting(KindSet::of(&[Kind::ProjectedCloud]));
-        two_stages(&mut Trace::to(&mut notebook)).expect("not cancelled");
-        let indices: Vec<_> = notebook.records.iter().map(|r| r.index).collect();
+        let mut sink = RecordingSink::wanting(KindSet::of(&[Kind::ProjectedCloud]));
+        two_stages(&mut Trace::to(&mut sink)).expect("not cancelled");
+        let indices: Vec<_> = sink.records.iter().map(|r| r.index).collect();
         assert_eq!(indices, [0, 1, 2, 3, 4]);
     }
 }

@@ -3,18 +3,18 @@
 use egui::{ScrollArea, TextEdit, Ui};
 
 use super::View;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::session::Breakpoint;
 
 /// The list of breakpoints, and a line to write a new one.
 #[derive(Default)]
-pub struct BreakpointList {
+pub struct BreakpointsView {
     text: String,
 }
 
-impl View for BreakpointList {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let breakpoints = scope.desk.setup.task.breakpoints.iter();
+impl View for BreakpointsView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let breakpoints = context.setup.task.breakpoints.iter();
         let breakpoints: Vec<String> = breakpoints.map(ToString::to_string).collect();
         let parsed = self.text.parse::<Breakpoint>();
         let mut is_added = false;
@@ -32,7 +32,7 @@ impl View for BreakpointList {
         if is_added {
             let mut all = breakpoints.clone();
             all.push(std::mem::take(&mut self.text).trim().to_owned());
-            scope.send(Command::SetBreakpoints(all));
+            context.send(Command::SetBreakpoints(all));
         } else if let (Err(error), false) = (&parsed, self.text.trim().is_empty()) {
             ui.weak(error.to_string());
         }
@@ -46,7 +46,7 @@ impl View for BreakpointList {
                     if remove.clicked() {
                         let mut all = breakpoints.clone();
                         all.remove(index);
-                        scope.send(Command::SetBreakpoints(all));
+                        context.send(Command::SetBreakpoints(all));
                     }
                     ui.monospace(breakpoint);
                 });
@@ -65,7 +65,7 @@ impl View for BreakpointList {
                             true => all.retain(|text| text != stage),
                             false => all.push(stage.to_owned()),
                         }
-                        scope.send(Command::SetBreakpoints(all));
+                        context.send(Command::SetBreakpoints(all));
                     }
                 }
             });

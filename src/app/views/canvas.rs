@@ -7,14 +7,14 @@ const LARGEST_ZOOM: f32 = 60.0;
 
 /// Which part of a picture is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lens {
+pub(super) struct PanZoom {
     /// Magnification over the picture fitted into its area, at least 1.
     zoom: f32,
     /// What is in the middle, as shares of the picture's width and height.
     centre: Vec2,
 }
 
-impl Default for Lens {
+impl Default for PanZoom {
     fn default() -> Self {
         Self {
             zoom: 1.0,
@@ -23,7 +23,7 @@ impl Default for Lens {
     }
 }
 
-impl Lens {
+impl PanZoom {
     /// Where a picture of `size` \[px\] lies in an area of the screen; `align` says to which side it
     /// keeps where the area is larger (0 left or top, 1 right or bottom).
     pub(super) fn place(&self, area: Rect, size: Vec2, align: Vec2) -> Placement {
@@ -50,7 +50,7 @@ impl Lens {
 
     /// Zooms by wheel and pinch about the pointer, moves by dragging, and goes back to the whole
     /// picture on a double click. Whether anything has changed.
-    pub(super) fn obey(&mut self, ui: &Ui, response: &Response, at: &Placement) -> bool {
+    pub(super) fn handle_input(&mut self, ui: &Ui, response: &Response, at: &Placement) -> bool {
         let before = *self;
         if response.dragged() {
             self.centre = at.centre() - response.drag_delta() / at.picture.size();
@@ -83,7 +83,7 @@ impl Lens {
 pub(super) struct Placement {
     /// The part of the screen that may show it.
     pub(super) area: Rect,
-    /// Where all of it would be.
+    /// Where the whole picture would be.
     picture: Rect,
     /// Points per pixel.
     pub(super) scale: f32,
@@ -169,11 +169,11 @@ mod tests {
 
     #[test]
     fn a_fitted_picture_is_centred_and_pixel_centres_are_at_integers() {
-        let at = Lens::default().place(area(), SIZE, CENTRED);
+        let at = PanZoom::default().place(area(), SIZE, CENTRED);
         assert_eq!(at.scale, 0.5);
         assert_eq!(at.on_screen([-0.5, -0.5]), pos2(10.0, 95.0));
         assert_eq!(at.on_screen([399.5, 99.5]), pos2(210.0, 145.0));
-        let low = Lens::default().place(area(), SIZE, vec2(0.5, 1.0));
+        let low = PanZoom::default().place(area(), SIZE, vec2(0.5, 1.0));
         assert_eq!(low.visible().max, area().max);
     }
 
@@ -190,13 +190,13 @@ mod tests {
             x in 10.0_f32..210.0, y in 95.0_f32..145.0,
             factors in prop::collection::vec(0.7_f32..1.6, 1..12),
         ) {
-            let mut lens = Lens::default();
+            let mut pan_zoom = PanZoom::default();
             let pointer = pos2(x, y);
             for factor in factors {
-                let before = lens.place(area(), SIZE, CENTRED);
+                let before = pan_zoom.place(area(), SIZE, CENTRED);
                 let pixel = (pointer - before.picture.min) / before.scale;
-                lens.magnify(factor, pointer, &before);
-                let after = lens.place(area(), SIZE, CENTRED);
+                pan_zoom.magnify(factor, pointer, &before);
+                let after = pan_zoom.place(area(), SIZE, CENTRED);
                 let again = (pointer - after.picture.min) / after.scale;
                 // Where the picture is as wide as its area, the border has the last word.
                 let is_free = |axis: usize| {
@@ -205,7 +205,7 @@ mod tests {
                         && after.picture.max[axis] > area().max[axis] + 1e-3
                 };
                 for axis in [0, 1] {
-                    if is_free(axis) && factor > 1.0 && lens.zoom < LARGEST_ZOOM {
+                    if is_free(axis) && factor > 1.0 && pan_zoom.zoom < LARGEST_ZOOM {
                         prop_assert!((pixel[axis] - again[axis]).abs() < 0.05, "{pixel} {again}");
                     }
                 }

@@ -4,9 +4,9 @@ use egui::{Color32, Grid, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use egui_plot::{MarkerShape, Plot, PlotUi, Points};
 
 use super::View;
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesFused};
-use crate::fusion::{Fate, Share};
+use crate::fusion::{Share, ShareOutcome};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::session::Part;
@@ -18,11 +18,11 @@ const MAP_HEIGHT: f32 = 230.0;
 
 /// The fusions of a method, in a table and on a map.
 #[derive(Default)]
-pub struct Fusion {}
+pub struct FusionView {}
 
-impl View for Fusion {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some((method, fused)) = told(scope) else {
+impl View for FusionView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some((method, fused)) = told(context) else {
             ui.weak(
                 "No poses were fused so far. Choose two references or more and a fusion in the \
                  view References.",
@@ -36,22 +36,22 @@ impl View for Fusion {
                     .color(theme::method(method))
                     .strong(),
             );
-            table(ui, scope, method, &fused);
-            map(ui, scope, method, &fused);
+            table(ui, context, method, &fused);
+            map(ui, context, method, &fused);
         });
     }
 }
 
 /// The fusions that were told up to the cursor, of the method at the cursor if it has any, else of
 /// the latest that has.
-fn told<'a>(scope: &Scope<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
+fn told<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
     let of = |wanted: Method| -> Vec<&'a ReferencesFused> {
-        let spans = scope.run.spans().iter();
+        let spans = context.run.spans().iter();
         spans
             .filter(|span| span.part == Part::Fusion(wanted))
             .flat_map(|span| {
-                let end = span.records.end.min(scope.cursor + 1);
-                &scope.run.records()[span.records.start.min(end)..end]
+                let end = span.records.end.min(context.cursor + 1);
+                &context.run.records()[span.records.start.min(end)..end]
             })
             .filter_map(|record| match &record.event {
                 Event::ReferencesFused(fused) => Some(fused),
@@ -59,8 +59,8 @@ fn told<'a>(scope: &Scope<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
             })
             .collect()
     };
-    let others = scope.desk.setup.task.protocol.methods.iter().copied().rev();
-    scope
+    let others = context.setup.task.protocol.methods.iter().copied().rev();
+    context
         .method()
         .into_iter()
         .chain(others)
@@ -69,15 +69,15 @@ fn told<'a>(scope: &Scope<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
 }
 
 /// How far a pose is from the truth, or why there is nothing to say.
-fn error(scope: &Scope<'_>, pose: Option<&Pose>) -> String {
-    match (pose, scope.truth()) {
+fn error(context: &ViewContext<'_>, pose: Option<&Pose>) -> String {
+    match (pose, context.truth()) {
         (None, _) => "× no pose".to_owned(),
         (Some(_), None) => "a pose".to_owned(),
         (Some(pose), Some(truth)) => PoseError::between(truth, pose).to_string(),
     }
 }
 
-fn table(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused]) {
+fn table(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&ReferencesFused]) {
     let weak = |ui: &mut Ui, text: &str| ui.label(RichText::new(text).weak().small());
     Grid::new("fusion").striped(true).show(ui, |ui| {
         for text in ["reference", "matches", "alone"] {
@@ -90,7 +90,7 @@ fn table(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFus
         for (index, share) in fused[0].shares.iter().enumerate() {
             ui.label(RichText::new(&share.reference).color(theme::REFERENCE));
             ui.label(share.matches.to_string());
-            ui.label(error(scope, share.pose.as_ref()));
+            ui.label(error(context, share.pose.as_ref()));
             for fusion in fused {
                 weight(ui, &fusion.shares[index], theme::method(method));
             }
@@ -100,7 +100,7 @@ fn table(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFus
         ui.label("");
         ui.label("");
         for fusion in fused {
-            ui.strong(error(scope, fusion.pose.as_ref()));
+            ui.strong(error(context, fusion.pose.as_ref()));
         }
         ui.end_row();
     });
@@ -108,16 +108,16 @@ fn table(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFus
 
 /// A bar as long as the weight; what has none says why.
 fn weight(ui: &mut Ui, share: &Share, color: Color32) {
-    match share.fate {
-        Fate::Dropped => {
+    match share.outcome {
+        ShareOutcome::Dropped => {
             ui.weak("left out")
                 .on_hover_text("The fusion gives it no weight");
         }
-        Fate::Failed => {
+        ShareOutcome::Failed => {
             ui.label(RichText::new("× failed").color(theme::ESTIMATE))
                 .on_hover_text("It had a weight, but no pose");
         }
-        Fate::Kept => {
+        ShareOutcome::Kept => {
             ui.horizontal(|ui| {
                 let size = vec2(FULL_BAR, 10.0);
                 let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
@@ -133,8 +133,8 @@ fn weight(ui: &mut Ui, share: &Share, color: Color32) {
 
 /// Seen from above, in the frame of the first reference: references, what each gives alone, the
 /// fused poses, the truth.
-fn map(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused]) {
-    let Some(loaded) = scope.run.loaded.as_deref() else {
+fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&ReferencesFused]) {
+    let Some(loaded) = context.run.loaded.as_deref() else {
         return;
     };
     let Some(first) = loaded.problems.first() else {
@@ -146,7 +146,7 @@ fn map(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused
         [centre.x, centre.z]
     };
     // The fusion at the cursor says who was left out.
-    let present = scope
+    let present = context
         .latest::<ReferencesFused>()
         .unwrap_or(fused[fused.len() - 1]);
     let answer = Plot::new("fusion map")
@@ -170,9 +170,11 @@ fn map(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused
             }
             for share in present.shares.iter() {
                 let Some(pose) = &share.pose else { continue };
-                let (name, shape) = match share.fate {
-                    Fate::Kept => ("alone, kept", MarkerShape::Circle),
-                    Fate::Dropped | Fate::Failed => ("alone, left out", MarkerShape::Cross),
+                let (name, shape) = match share.outcome {
+                    ShareOutcome::Kept => ("alone, kept", MarkerShape::Circle),
+                    ShareOutcome::Dropped | ShareOutcome::Failed => {
+                        ("alone, left out", MarkerShape::Cross)
+                    }
                 };
                 let radius = 3.0 + 6.0 * share.weight.sqrt() as f32;
                 mark(
@@ -195,7 +197,7 @@ fn map(ui: &mut Ui, scope: &Scope<'_>, method: Method, fused: &[&ReferencesFused
                     8.0,
                 );
             }
-            if let Some(truth) = scope.truth() {
+            if let Some(truth) = context.truth() {
                 mark(
                     plot,
                     "truth",

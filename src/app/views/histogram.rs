@@ -7,7 +7,7 @@ mod residuals;
 use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::{Scope, Shown};
+use crate::app::{ShownView, ViewContext};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
@@ -16,31 +16,31 @@ use crate::method::Method;
 
 /// The joint histogram, or the residuals, of the synthetic view that is shown.
 #[derive(Default)]
-pub struct Histogram {
+pub struct HistogramView {
     /// The method that was asked for; that at the cursor otherwise.
     method: Option<Method>,
     /// The method at the cursor when `method` was asked for.
     asked_at: Option<Method>,
 }
 
-impl View for Histogram {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+impl View for HistogramView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            let method = self.choose(ui, scope);
-            let Some(shown) = scope.shown(method) else {
+            let method = self.choose(ui, context);
+            let Some(shown) = context.shown(method) else {
                 ui.weak(
                     "No synthetic view yet: PM (2) and MI (3) render some, and so does a camera \
                      in hand",
                 );
                 return;
             };
-            caption(ui, scope, &shown);
+            caption(ui, context, &shown);
             match &shown.comparison.explanation {
                 Some(Explanation::JointHistogram(histogram)) => {
-                    joint::ui(ui, scope, method, &shown.comparison, histogram);
+                    joint::ui(ui, context, method, &shown.comparison, histogram);
                 }
                 Some(Explanation::Weights(weights)) => {
-                    residuals::ui(ui, scope, method, &shown.comparison, weights);
+                    residuals::ui(ui, context, method, &shown.comparison, weights);
                 }
                 None => {
                     ui.weak("This view has no cost: too little of it is covered, or it is all of one grey");
@@ -50,16 +50,16 @@ impl View for Histogram {
     }
 }
 
-impl Histogram {
+impl HistogramView {
     /// What a person chose holds until the cursor comes to another method.
-    fn choose(&mut self, ui: &mut Ui, scope: &Scope<'_>) -> Method {
-        if self.asked_at != scope.method() {
-            self.asked_at = scope.method();
+    fn choose(&mut self, ui: &mut Ui, context: &ViewContext<'_>) -> Method {
+        if self.asked_at != context.method() {
+            self.asked_at = context.method();
             self.method = None;
         }
-        let shown = self.method.unwrap_or_else(|| scope.direct_method());
+        let shown = self.method.unwrap_or_else(|| context.direct_method());
         ui.horizontal_wrapped(|ui| {
-            for method in scope.direct_methods() {
+            for method in context.direct_methods() {
                 let what = match explains(method) {
                     Some(ExplanationKind::Weights) => "residuals",
                     _ => "joint histogram",
@@ -81,10 +81,10 @@ pub(super) fn explains(method: Method) -> Option<ExplanationKind> {
 }
 
 /// Why this view is shown, and where its camera is.
-fn caption(ui: &mut Ui, scope: &Scope<'_>, shown: &Shown) {
+fn caption(ui: &mut Ui, context: &ViewContext<'_>, shown: &ShownView) {
     ui.horizontal_wrapped(|ui| {
-        let mut words = shown.at.name().to_owned();
-        if let Some(problem) = scope.problem() {
+        let mut words = shown.reason.name().to_owned();
+        if let Some(problem) = context.problem() {
             let offset = Offset::of(&problem.reference_from_query(&shown.pose));
             let numbers = [
                 offset.right_m,
@@ -98,11 +98,10 @@ fn caption(ui: &mut Ui, scope: &Scope<'_>, shown: &Shown) {
             ));
         }
         ui.weak(words);
-        let is_old = scope
-            .desk
+        let is_old = context
             .looking_at()
             .is_some_and(|(pose, _)| pose != shown.pose);
-        if is_old && scope.desk.is_probing() {
+        if is_old && context.is_probing() {
             ui.label(RichText::new("the next one is worked out").italics());
         }
     });
@@ -115,12 +114,12 @@ type Quality = (&'static str, fn(f64) -> f64);
 /// with it, if anything is.
 fn comparison(
     ui: &mut Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     method: Method,
     cost: Option<f64>,
     quality: Option<Quality>,
 ) {
-    let bounds = scope.cost_bounds(method);
+    let bounds = context.cost_bounds(method);
     let rows = [
         ("here", cost),
         ("result of the search", bounds.best),

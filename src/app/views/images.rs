@@ -6,61 +6,60 @@ mod funnel;
 mod lidar;
 mod marks;
 mod photos;
-mod sight;
-mod story;
+mod progress;
 mod truth;
+mod visible;
 
 use egui::{Ui, UiBuilder};
 
 pub(super) use self::arrangement::Arrangement;
 use self::detail::{Detail, Subject};
 use self::marks::draw_truth;
-use self::photos::{Lenses, Photos, Shown};
-use self::sight::Sights;
-use self::story::{KINDS, Story};
+use self::photos::{PhotoOnScreen, PhotoPanZoom, Photos};
+use self::progress::{FeatureProgress, KINDS};
 use self::truth::TrueMatch;
+use self::visible::VisibleFeatures;
 use super::View;
-use super::ink::Ink;
-use crate::app::{Command, Scope};
+use super::mesh_painter::MeshPainter;
+use crate::app::{Command, ViewContext};
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::session::Run;
 
 /// How strong features are drawn while the pointer is on another one.
 const PALE: f32 = 0.2;
 
 /// Query above or beside reference.
-pub struct Images {
+pub struct ImagesView {
     /// Which states are shown.
     shown: [bool; KINDS],
-    lenses: Lenses,
+    pan_zoom: PhotoPanZoom,
     detail: Detail,
 }
 
-impl Default for Images {
+impl Default for ImagesView {
     fn default() -> Self {
         let mut shown = [true; KINDS];
         // Most features fail the first two tests; their lines would bury all others.
         shown[..2].fill(false);
         Self {
             shown,
-            lenses: Lenses::default(),
+            pan_zoom: PhotoPanZoom::default(),
             detail: Detail::default(),
         }
     }
 }
 
-impl View for Images {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(problem) = scope.problem() else {
+impl View for ImagesView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(problem) = context.problem() else {
             ui.weak("The photos are being read");
             return;
         };
-        let photos = Photos::of(ui, scope, problem);
-        let story = Story::at(scope);
-        let kinds = story.kinds();
-        let differing = differing(scope, &story);
-        self.toolbar(ui, scope, &story, differing.as_deref());
+        let photos = Photos::of(ui, context, problem);
+        let progress = FeatureProgress::at(context);
+        let kinds = progress.kinds();
+        let differing = differing(context, &progress);
+        self.toolbar(ui, context, &progress, differing.as_deref());
         if !kinds.is_empty() {
             let mut counts = [0; KINDS];
             for &kind in &kinds {
@@ -69,7 +68,10 @@ impl View for Images {
             funnel::ui(ui, &counts, &mut self.shown);
         }
 
-        let selected = scope.desk.selected_feature.filter(|&i| i < kinds.len());
+        let selected = context
+            .options
+            .selected_feature
+            .filter(|&i| i < kinds.len());
         let area = ui.available_rect_before_wrap();
         let (pictures, panel) = match selected {
             Some(_) => {
@@ -79,39 +81,39 @@ impl View for Images {
             }
             None => (area, None),
         };
-        let (query, reference) = self.lenses.show(ui, problem, &photos, pictures);
+        let (query, reference) = self.pan_zoom.show(ui, problem, &photos, pictures);
 
         let is_wanted = |feature: usize| {
             self.shown[kinds[feature]] && differing.as_ref().is_none_or(|differ| differ[feature])
         };
         let is_shown = |feature: usize| selected == Some(feature) || is_wanted(feature);
-        let sights = Sights::new(&story, &kinds, &query.at, &reference.at, is_shown);
-        let hovered = point_at(ui, scope, &sights, &story, [&query, &reference]);
-        let truth = selected.and_then(|feature| true_match(scope, &story, problem, feature));
+        let visible = VisibleFeatures::new(&progress, &kinds, &query.at, &reference.at, is_shown);
+        let hovered = point_at(ui, context, &visible, &progress, [&query, &reference]);
+        let truth = selected.and_then(|feature| true_match(context, &progress, problem, feature));
 
-        let mut ink = Ink::new(ui.pixels_per_point());
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
         let strength = if hovered.is_some() { PALE } else { 1.0 };
-        if story.is_unmatched() || self.shown[0] {
-            sights.draw_unmatched(&mut ink, &story, &reference.at, strength);
+        if progress.is_unmatched() || self.shown[0] {
+            visible.draw_unmatched(&mut mesh, &progress, &reference.at, strength);
         }
-        for sight in sights.all() {
-            sight.draw(&mut ink, strength, query.at.scale);
+        for shown in visible.all() {
+            shown.draw(&mut mesh, strength, query.at.scale);
         }
         for feature in [selected, hovered].into_iter().flatten() {
-            sights.draw_accent(&mut ink, feature);
+            visible.draw_accent(&mut mesh, feature);
         }
-        ink.dry(ui.painter());
+        mesh.paint_on(ui.painter());
         if let Some(truth) = &truth {
-            draw_truth(&mut ink, &query.at, &problem.query.intrinsics, truth);
-            ink.dry(&query.at.painter(ui.painter()));
+            draw_truth(&mut mesh, &query.at, &problem.query.intrinsics, truth);
+            mesh.paint_on(&query.at.painter(ui.painter()));
         }
         photos::name(ui, problem, &query.at, &reference.at);
 
         if let (Some(feature), Some(panel)) = (selected, panel) {
-            let params = &scope.run.params.fb;
+            let params = &context.run.params.fb;
             let subject = Subject {
                 feature,
-                story: &story,
+                progress: &progress,
                 problem,
                 photos: &photos,
                 truth,
@@ -120,25 +122,25 @@ impl View for Images {
             };
             ui.scope_builder(UiBuilder::new().max_rect(panel.area), |ui| {
                 ui.shrink_clip_rect(panel.area);
-                self.detail.ui(ui, scope, &subject, panel.is_wide);
+                self.detail.ui(ui, context, &subject, panel.is_wide);
             });
         }
         ui.advance_cursor_after_rect(area);
     }
 }
 
-impl Images {
+impl ImagesView {
     fn toolbar(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
-        story: &Story<'_>,
+        context: &ViewContext<'_>,
+        progress: &FeatureProgress<'_>,
         differing: Option<&[bool]>,
     ) {
         ui.horizontal_wrapped(|ui| {
-            ui.label(summary(story));
-            self.lenses.ui(ui);
-            if scope.desk.only_differences {
+            ui.label(summary(progress));
+            self.pan_zoom.ui(ui);
+            if context.options.only_differences {
                 ui.weak(match differing {
                     Some(differing) => {
                         let count = differing.iter().filter(|differs| **differs).count();
@@ -152,9 +154,9 @@ impl Images {
 }
 
 /// What was found, in words.
-fn summary(story: &Story<'_>) -> String {
-    let (query, reference) = (story.query().len(), story.reference().len());
-    let by = match story.method {
+fn summary(progress: &FeatureProgress<'_>) -> String {
+    let (query, reference) = (progress.query().len(), progress.reference().len());
+    let by = match progress.method {
         Some(method) if method != Method::FB => format!("FB within {}", method.label()),
         _ => "FB".to_owned(),
     };
@@ -164,39 +166,28 @@ fn summary(story: &Story<'_>) -> String {
     }
 }
 
-/// The run that this one is compared with.
-fn other_run<'a>(scope: &Scope<'a>) -> Option<&'a Run> {
-    let desk = scope.desk;
-    let kept = &desk.kept.as_ref()?.run;
-    Some(if std::ptr::eq(scope.run, desk.run()) {
-        kept
-    } else {
-        desk.run()
-    })
-}
-
 /// Which features differ from the other run, where only those are wanted.
-fn differing(scope: &Scope<'_>, story: &Story<'_>) -> Option<Vec<bool>> {
-    let wanted = scope.desk.only_differences;
-    let other = other_run(scope).filter(|_| wanted)?;
-    let other = Story::counterpart(scope, story.method?, other)?;
-    Some(story.differing(&other))
+fn differing(context: &ViewContext<'_>, progress: &FeatureProgress<'_>) -> Option<Vec<bool>> {
+    let wanted = context.options.only_differences;
+    let other = context.other_run().filter(|_| wanted)?;
+    let other = FeatureProgress::counterpart(context, progress.method?, other)?;
+    Some(progress.differing(&other))
 }
 
 /// What the ground truth says about a feature's match, if it is shown.
 fn true_match(
-    scope: &Scope<'_>,
-    story: &Story<'_>,
+    context: &ViewContext<'_>,
+    progress: &FeatureProgress<'_>,
     problem: &Problem,
     feature: usize,
 ) -> Option<TrueMatch> {
-    let found = story.matched(feature)?;
-    let lifted = story.lifted(feature);
+    let found = progress.matched(feature)?;
+    let lifted = progress.lifted(feature);
     Some(TrueMatch::of(
         problem,
-        scope.truth()?,
-        &story.query().get(feature)?.pixel(),
-        &story.reference().get(found.reference)?.pixel(),
+        context.truth()?,
+        &progress.query().get(feature)?.pixel(),
+        &progress.reference().get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
     ))
 }
@@ -204,19 +195,19 @@ fn true_match(
 /// The feature under the pointer; a click selects it.
 fn point_at(
     ui: &Ui,
-    scope: &Scope<'_>,
-    sights: &Sights,
-    story: &Story<'_>,
-    photos: [&Shown; 2],
+    context: &ViewContext<'_>,
+    visible: &VisibleFeatures,
+    progress: &FeatureProgress<'_>,
+    photos: [&PhotoOnScreen; 2],
 ) -> Option<usize> {
     let over = photos.into_iter().find(|photo| photo.response.hovered())?;
-    let hovered = sights.nearest(over.response.hover_pos()?);
-    if over.response.clicked() && scope.desk.selected_feature != hovered {
-        scope.send(Command::SelectFeature(hovered));
+    let hovered = visible.nearest(over.response.hover_pos()?);
+    if over.response.clicked() && context.options.selected_feature != hovered {
+        context.send(Command::SelectFeature(hovered));
     }
     if let Some(feature) = hovered {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-        let words = story.words(feature);
+        let words = progress.words(feature);
         let response = over.response.clone();
         response.on_hover_text_at_pointer(format!("query feature {feature}, {words}"));
     }

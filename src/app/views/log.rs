@@ -3,22 +3,22 @@
 use egui::{RichText, ScrollArea, TextStyle, Ui};
 
 use super::View;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::event::Event;
 use crate::narration;
 
 /// The decisions up to the end of the run; those behind the cursor are pale.
 #[derive(Default)]
-pub struct Log {
+pub struct LogView {
     /// Sentences with their positions, and how many records they were made from.
     lines: Vec<(usize, String)>,
     told: usize,
     cursor_shown: Option<usize>,
 }
 
-impl Log {
-    fn take_in(&mut self, scope: &Scope<'_>) {
-        let records = scope.run.records();
+impl LogView {
+    fn take_in(&mut self, context: &ViewContext<'_>) {
+        let records = context.run.records();
         if records.len() < self.told {
             *self = Self::default();
         }
@@ -39,18 +39,18 @@ impl Log {
     }
 }
 
-impl View for Log {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        self.take_in(scope);
+impl View for LogView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        self.take_in(context);
         if self.lines.is_empty() {
             ui.weak("Nothing was told yet");
             return;
         }
-        let here = self.lines.partition_point(|(at, _)| *at <= scope.cursor);
+        let here = self.lines.partition_point(|(at, _)| *at <= context.cursor);
         let height = ui.text_style_height(&TextStyle::Monospace);
         let mut area = ScrollArea::both().auto_shrink(false);
-        if self.cursor_shown != Some(scope.cursor) {
-            self.cursor_shown = Some(scope.cursor);
+        if self.cursor_shown != Some(context.cursor) {
+            self.cursor_shown = Some(context.cursor);
             let spacing = ui.spacing().item_spacing.y;
             let above = (here as f32 * (height + spacing) - 0.5 * ui.available_height()).max(0.0);
             area = area.vertical_scroll_offset(above);
@@ -66,7 +66,7 @@ impl View for Log {
                 }
                 let label = egui::Label::new(text).sense(egui::Sense::click()).extend();
                 if ui.add(label).on_hover_text(format!("step {at}")).clicked() {
-                    scope.send(Command::MoveCursor(*at));
+                    context.send(Command::MoveCursor(*at));
                 }
             }
         });

@@ -5,56 +5,52 @@ use std::ops::RangeInclusive;
 use egui::{ComboBox, DragValue, RichText, ScrollArea, TextEdit, Ui};
 
 use super::View;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::describe::{About, Choice, Described, ParamVisitor};
 use crate::params::Params;
 
 /// The list of parameters.
 #[derive(Default)]
-pub struct Parameters {
+pub struct ParametersView {
     filter: String,
 }
 
-impl View for Parameters {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let present = std::ptr::eq(scope.run, scope.desk.run());
+impl View for ParametersView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let present = context.is_present();
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.filter).hint_text("Filter (/)");
             let response = ui.add(edit.desired_width(150.0));
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Filter parameters")
             });
-            if scope.desk.wants_filter {
+            if context.options.wants_filter {
                 response.request_focus();
             }
             let help = "All parameters to their defaults";
             if ui.button("Reset all").on_hover_text(help).clicked() {
-                scope.send(Command::ResetParams);
+                context.send(Command::ResetParams);
             }
         });
         let mut params = match present {
-            true => scope.desk.setup.task.params.clone(),
-            false => scope.run.params.clone(),
+            true => context.setup.task.params.clone(),
+            false => context.run.params.clone(),
         };
-        let other = match (&scope.desk.kept, present) {
-            (Some(kept), true) => Some(kept.run.params.clone()),
-            (Some(_), false) => Some(scope.desk.run().params.clone()),
-            (None, _) => None,
-        };
+        let other = context.other_run().map(|run| run.params.clone());
         let reference = other.clone().unwrap_or_default();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.add_enabled_ui(present, |ui| {
-                self.list(ui, scope, &mut params, &reference, other.is_some());
+                self.list(ui, context, &mut params, &reference, other.is_some());
             });
         });
     }
 }
 
-impl Parameters {
+impl ParametersView {
     fn list(
         &self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         params: &mut Params,
         reference: &Params,
         is_compared: bool,
@@ -68,7 +64,7 @@ impl Parameters {
             let differs = row.value != references[index].value;
             (row.key.to_lowercase().contains(&filter)
                 || row.about.help().to_lowercase().contains(&filter))
-                && (differs || !scope.desk.only_differences)
+                && (differs || !context.options.only_differences)
         };
         let shown: Vec<bool> = (0..rows.len()).map(is_shown).collect();
         if !shown.contains(&true) {
@@ -78,7 +74,7 @@ impl Parameters {
         params.visit_groups(|group, described| {
             let mut editor = Editor {
                 ui,
-                scope,
+                context,
                 group,
                 index: &mut index,
                 shown: &shown,
@@ -94,7 +90,7 @@ impl Parameters {
 /// Draws one row per parameter and asks for the change.
 struct Editor<'a, 'b> {
     ui: &'a mut Ui,
-    scope: &'a Scope<'b>,
+    context: &'a ViewContext<'b>,
     group: &'static str,
     index: &'a mut usize,
     shown: &'a [bool],
@@ -123,7 +119,7 @@ impl Editor<'_, '_> {
         }
         let Self {
             ui,
-            scope,
+            context,
             group,
             defaults,
             references,
@@ -147,7 +143,7 @@ impl Editor<'_, '_> {
                 let reset = egui::Button::new("↺").small();
                 let reset = ui.add_enabled(!is_default, reset);
                 if reset.on_hover_text(format!("Back to {default}")).clicked() {
-                    scope.send(Command::SetParam {
+                    context.send(Command::SetParam {
                         key: key.clone(),
                         value: default.clone(),
                     });
@@ -155,7 +151,7 @@ impl Editor<'_, '_> {
                 if let Some(value) = edit(ui, label.id)
                     && value != present
                 {
-                    scope.send(Command::SetParam { key, value });
+                    context.send(Command::SetParam { key, value });
                 }
             });
         });

@@ -4,23 +4,21 @@ use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
-use crate::app::desk::Desk;
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::estimator;
 use crate::event::Side;
 use crate::localize::{QueryResult, Verdict};
 
 /// The list of queries.
 #[derive(Default)]
-pub struct QueryList {
+pub struct QueriesView {
     only_failures: bool,
 }
 
-impl View for QueryList {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let desk = scope.desk;
+impl View for QueriesView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ui.horizontal(|ui| {
-            let (text, help) = match desk.queries.progress() {
+            let (text, help) = match context.queries.progress() {
                 Some((done, all)) => (format!("Stop ({done} of {all})"), "Stop"),
                 None => (
                     "Run all".to_owned(),
@@ -28,19 +26,22 @@ impl View for QueryList {
                 ),
             };
             if ui.button(text).on_hover_text(help).clicked() {
-                scope.send(Command::RunAllQueries);
+                context.send(Command::RunAllQueries);
             }
             ui.checkbox(&mut self.only_failures, "Failures only");
-            let failed = desk.results.keys().filter(|query| desk.has_failed(**query));
+            let failed = context
+                .results
+                .keys()
+                .filter(|query| context.has_failed(**query));
             let failed = failed.count();
-            ui.weak(format!("{failed} of {} failed", desk.results.len()));
+            ui.weak(format!("{failed} of {} failed", context.results.len()));
         });
-        let shown: Vec<usize> = desk
+        let shown: Vec<usize> = context
             .setup
             .offered
             .iter()
             .copied()
-            .filter(|query| !self.only_failures || desk.has_failed(*query))
+            .filter(|query| !self.only_failures || context.has_failed(*query))
             .collect();
         ScrollArea::vertical().auto_shrink(false).show_rows(
             ui,
@@ -48,33 +49,32 @@ impl View for QueryList {
             shown.len(),
             |ui, rows| {
                 for &query in &shown[rows] {
-                    row(ui, scope, query);
+                    row(ui, context, query);
                 }
             },
         );
     }
 }
 
-fn row(ui: &mut Ui, scope: &Scope<'_>, query: usize) {
-    let desk = scope.desk;
-    let name = &desk.setup.queries.frames()[query];
-    let is_here = query == desk.setup.query;
+fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize) {
+    let name = &context.setup.queries.frames()[query];
+    let is_here = query == context.setup.query;
     ui.horizontal(|ui| {
-        thumbnail(ui, desk, Side::Query, query);
+        thumbnail(ui, context, Side::Query, query);
         ui.vertical(|ui| {
             let text = RichText::new(name).monospace();
             if ui.selectable_label(is_here, text).clicked() {
-                scope.send(Command::SelectQuery(query));
+                context.send(Command::SelectQuery(query));
             }
-            let results = desk.results.get(&query).map_or(&[][..], Vec::as_slice);
-            ui.horizontal(|ui| dots(ui, desk, results));
+            let results = context.results.get(&query).map_or(&[][..], Vec::as_slice);
+            ui.horizontal(|ui| dots(ui, context, results));
         });
     });
 }
 
 /// One mark per method: what it is tells the shape too.
-pub(super) fn dots(ui: &mut Ui, desk: &Desk, results: &[QueryResult]) {
-    let failure_radius_m = desk.setup.failure_radius_m;
+pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
+    let failure_radius_m = context.setup.failure_radius_m;
     ui.spacing_mut().item_spacing.x = 2.0;
     for method in estimator::methods() {
         for result in results.iter().filter(|r| r.method == method) {
@@ -84,7 +84,7 @@ pub(super) fn dots(ui: &mut Ui, desk: &Desk, results: &[QueryResult]) {
                 Verdict::Near => ("●", theme::TRUTH),
                 Verdict::Unmeasured => ("●", theme::REFERENCE),
             };
-            let words = match desk.shows_truth {
+            let words = match context.options.shows_truth {
                 true => format!("{}: {}", method.name(), result.words(failure_radius_m)),
                 false => method.name().to_owned(),
             };

@@ -10,7 +10,7 @@ use egui::{Color32, Ui};
 use egui_plot::{GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
 
 use super::View;
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::event::HypothesisTried;
 use crate::method::Method;
 use crate::session::{Loaded, Span};
@@ -19,26 +19,26 @@ use trials::Trials;
 
 /// Likelihood and inliers by hypothesis, the sample at the cursor, and the test of the result.
 #[derive(Default)]
-pub struct Ransac {
-    known: Option<(Key, Trials)>,
+pub struct RansacView {
+    known: Option<(TrialsKey, Trials)>,
 }
 
 /// What the trials were read from.
-struct Key {
+struct TrialsKey {
     /// Kept alive, so that its address stays its own: each run has one.
     loaded: Arc<Loaded>,
     records: Range<usize>,
 }
 
-/// Which numbers of the trials a plot shows.
+/// The number of each trial that a plot shows.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Shows {
+enum PlotQuantity {
     Likelihood,
     Inliers,
     Needed,
 }
 
-impl Shows {
+impl PlotQuantity {
     const ALL: [Self; 3] = [Self::Likelihood, Self::Inliers, Self::Needed];
 
     fn name(self) -> &'static str {
@@ -50,51 +50,51 @@ impl Shows {
     }
 }
 
-impl View for Ransac {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+impl View for RansacView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         egui::ScrollArea::vertical()
             .auto_shrink(false)
             .show(ui, |ui| {
-                let source = source(scope);
+                let source = source(context);
                 let trials =
-                    source.and_then(|(span, end)| self.read(scope, span.records.start..end));
+                    source.and_then(|(span, end)| self.read(context, span.records.start..end));
                 let (Some((span, end)), Some(trials)) = (source, trials) else {
                     ui.weak("No hypothesis yet: FB (1) tries some in its stage ransac");
                     return;
                 };
-                head(ui, scope, span, trials);
-                plots(ui, scope, trials);
-                verdict::ui(ui, scope, span, end, trials);
+                head(ui, context, span, trials);
+                plots(ui, context, trials);
+                verdict::ui(ui, context, span, end, trials);
             });
     }
 }
 
 /// Where the trials of the cursor are: the part of the run, and behind its last record to show. That
 /// of FB, unless the cursor is in the hybrid, which runs FB inside itself.
-fn source<'a>(scope: &Scope<'a>) -> Option<(&'a Span, usize)> {
+fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
     let is_inside =
-        scope.is_inside_hybrid(Method::FB) && scope.latest::<HypothesisTried>().is_some();
+        context.is_inside_hybrid(Method::FB) && context.latest::<HypothesisTried>().is_some();
     let (span, cursor) = match is_inside {
-        true => (scope.span()?, scope.cursor),
-        false => scope.of(Method::FB)?,
+        true => (context.span()?, context.cursor),
+        false => context.part_of(Method::FB)?,
     };
     Some((span, span.records.end.min(cursor + 1)))
 }
 
-impl Ransac {
+impl RansacView {
     /// The trials among some records. They are read once as long as the cursor stays.
-    fn read(&mut self, scope: &Scope<'_>, records: Range<usize>) -> Option<&Trials> {
-        let loaded = scope.run.loaded.as_ref()?;
+    fn read(&mut self, context: &ViewContext<'_>, records: Range<usize>) -> Option<&Trials> {
+        let loaded = context.run.loaded.as_ref()?;
         let is_known = self
             .known
             .as_ref()
             .is_some_and(|(key, _)| Arc::ptr_eq(&key.loaded, loaded) && key.records == records);
         if !is_known {
-            let key = Key {
+            let key = TrialsKey {
                 loaded: Arc::clone(loaded),
                 records: records.clone(),
             };
-            let trials = Trials::read(scope.run.records().get(records.clone())?, records.start);
+            let trials = Trials::read(context.run.records().get(records.clone())?, records.start);
             self.known = Some((key, trials));
         }
         let (_, trials) = self.known.as_ref()?;
@@ -102,14 +102,14 @@ impl Ransac {
     }
 }
 
-fn head(ui: &mut Ui, scope: &Scope<'_>, span: &Span, trials: &Trials) {
+fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
     ui.horizontal_wrapped(|ui| {
         if let Some(method) = span.part.method().filter(|method| *method != Method::FB) {
             ui.weak(format!("inside {}", method.label()));
         }
         let needed = trials
             .needed()
-            .unwrap_or(scope.run.params.fb.mlesac.max_trials);
+            .unwrap_or(context.run.params.fb.mlesac.max_trials);
         ui.label(format!("{} trials made, {needed} needed", trials.made()));
         if trials.without_pose > 0 {
             ui.weak(format!("{} samples have no pose", trials.without_pose));
@@ -132,27 +132,31 @@ fn hypothesis_color() -> Color32 {
     theme::method(Method::FB)
 }
 
-fn plots(ui: &mut Ui, scope: &Scope<'_>, trials: &Trials) {
+fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
     let group = ui.make_persistent_id("trials");
-    for shows in Shows::ALL {
-        let height = if shows == Shows::Needed { 110.0 } else { 130.0 };
-        let is_last = shows == Shows::Needed;
-        let mut plot = Plot::new(shows.name())
+    for quantity in PlotQuantity::ALL {
+        let height = if quantity == PlotQuantity::Needed {
+            110.0
+        } else {
+            130.0
+        };
+        let is_last = quantity == PlotQuantity::Needed;
+        let mut plot = Plot::new(quantity.name())
             .height(height)
             .link_axis(group, [true, false])
             .allow_scroll(false)
             .show_x(false)
             .show_y(false)
             .y_axis_min_width(62.0)
-            .y_axis_label(shows.name());
+            .y_axis_label(quantity.name());
         if is_last {
             plot = plot
                 .x_axis_label("trial")
                 .y_grid_spacer(decades)
                 .y_axis_formatter(|mark, _| format!("{:.0}", 10_f64.powf(mark.value)));
         }
-        let answer = plot.show(ui, |plot| draw(plot, trials, shows));
-        let name = format!("{} by trial, {} trials", shows.name(), trials.made());
+        let answer = plot.show(ui, |plot| draw(plot, trials, quantity));
+        let name = format!("{} by trial, {} trials", quantity.name(), trials.made());
         answer
             .response
             .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
@@ -164,23 +168,23 @@ fn plots(ui: &mut Ui, scope: &Scope<'_>, trials: &Trials) {
                 let point = PlotPoint::new(trial, value);
                 answer.transform.position_from_point(&point).distance_sq(at)
             };
-            if let Some(record) = trials.nearest(points_of(trials, shows), distance) {
-                scope.send(Command::MoveCursor(record));
+            if let Some(record) = trials.nearest(points_of(trials, quantity), distance) {
+                context.send(Command::MoveCursor(record));
             }
         }
     }
 }
 
 /// The drawn points of a plot; the last one has none, and is clicked at its line.
-fn points_of(trials: &Trials, shows: Shows) -> &[[f64; 2]] {
-    match shows {
-        Shows::Likelihood => &trials.likelihood.points,
-        Shows::Inliers => &trials.inliers.points,
-        Shows::Needed => &trials.needed_steps,
+fn points_of(trials: &Trials, quantity: PlotQuantity) -> &[[f64; 2]] {
+    match quantity {
+        PlotQuantity::Likelihood => &trials.likelihood.points,
+        PlotQuantity::Inliers => &trials.inliers.points,
+        PlotQuantity::Needed => &trials.needed_steps,
     }
 }
 
-fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, shows: Shows) {
+fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, quantity: PlotQuantity) {
     let line = |name: &str, points: &'p [[f64; 2]]| // Bands would fill the corners of steps.
         Line::new(name, points.to_vec())
             .allow_band(false)
@@ -190,10 +194,10 @@ fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, shows: Shows) {
         let cursor = VLine::new("cursor", trial.index as f64).color(color);
         plot.vline(cursor.width(1.0).allow_hover(false));
     }
-    let series = match shows {
-        Shows::Likelihood => &trials.likelihood,
-        Shows::Inliers => &trials.inliers,
-        Shows::Needed => {
+    let series = match quantity {
+        PlotQuantity::Likelihood => &trials.likelihood,
+        PlotQuantity::Inliers => &trials.inliers,
+        PlotQuantity::Needed => {
             let needed = line("needed", &trials.needed_steps);
             plot.line(needed.color(theme::ESTIMATE).width(1.5));
             let made = line("made", &trials.made_curve);

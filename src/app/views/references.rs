@@ -5,7 +5,7 @@ use egui::{ComboBox, DragValue, RichText, ScrollArea, Ui};
 use super::View;
 use super::queries::dots;
 use super::thumbnail::{THUMBNAIL, thumbnail};
-use crate::app::{Command, ReferencePick, Scope, theme};
+use crate::app::{Command, ReferencePick, ViewContext, theme};
 use crate::event::Side;
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
@@ -21,7 +21,7 @@ const WAYS: [(&str, Selection); 4] = [
 
 /// The frames around a query, and which of them are its references.
 #[derive(Default)]
-pub struct References {
+pub struct ReferencesView {
     nearby: Option<Nearby>,
 }
 
@@ -33,13 +33,13 @@ struct Nearby {
     frames: Vec<usize>,
 }
 
-impl View for References {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        choice(ui, scope);
-        fusions(ui, scope);
+impl View for ReferencesView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        choice(ui, context);
+        fusions(ui, context);
         ui.separator();
-        let setup = &scope.desk.setup;
-        let nearby = self.nearby(scope);
+        let setup = context.setup;
+        let nearby = self.nearby(context);
         let (frames, radius_m) = (&nearby.frames, nearby.radius_m);
         // Those that were named may be farther away than the radius.
         let mut shown: Vec<usize> = setup.chosen.frames.clone();
@@ -56,17 +56,17 @@ impl View for References {
             shown.len(),
             |ui, rows| {
                 for &frame in &shown[rows] {
-                    row(ui, scope, frame);
+                    row(ui, context, frame);
                 }
             },
         );
     }
 }
 
-impl References {
+impl ReferencesView {
     /// Looking for them in a long scene at every frame would be too slow.
-    fn nearby(&mut self, scope: &Scope<'_>) -> &Nearby {
-        let setup = &scope.desk.setup;
+    fn nearby(&mut self, context: &ViewContext<'_>) -> &Nearby {
+        let setup = context.setup;
         let radius_m = setup.task.reach_m();
         let is_known = self.nearby.as_ref().is_some_and(|nearby| {
             nearby.query == setup.query
@@ -83,8 +83,8 @@ impl References {
     }
 }
 
-fn choice(ui: &mut Ui, scope: &Scope<'_>) {
-    let setup = &scope.desk.setup;
+fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
+    let setup = context.setup;
     let name = |pick: ReferencePick| match pick {
         ReferencePick::ByHand => "by hand",
         ReferencePick::By(selection) => WAYS
@@ -107,7 +107,7 @@ fn choice(ui: &mut Ui, scope: &Scope<'_>) {
                         .selectable_label(setup.pick() == pick, name(pick))
                         .clicked()
                     {
-                        scope.send(Command::PickReferences(pick));
+                        context.send(Command::PickReferences(pick));
                     }
                 }
             })
@@ -122,14 +122,14 @@ fn choice(ui: &mut Ui, scope: &Scope<'_>) {
             let is_done = !response.dragged() || response.drag_stopped();
             if wanted != count && is_done {
                 let pick = ReferencePick::By(selection.with_count(wanted));
-                scope.send(Command::PickReferences(pick));
+                context.send(Command::PickReferences(pick));
             }
         }
     });
 }
 
-fn fusions(ui: &mut Ui, scope: &Scope<'_>) {
-    let setup = &scope.desk.setup;
+fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
+    let setup = context.setup;
     ui.horizontal(|ui| {
         ui.label("Fuse");
         let present = &setup.task.protocol.fusions;
@@ -142,15 +142,14 @@ fn fusions(ui: &mut Ui, scope: &Scope<'_>) {
                     true => !is_on,
                     false => present.contains(other),
                 });
-                scope.send(Command::SetFusions(wanted.collect()));
+                context.send(Command::SetFusions(wanted.collect()));
             }
         }
     });
 }
 
-fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
-    let desk = scope.desk;
-    let setup = &desk.setup;
+fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
+    let setup = context.setup;
     let name = &setup.references.frames()[frame];
     ui.horizontal(|ui| {
         let mut is_used = setup.chosen.frames.contains(&frame);
@@ -163,20 +162,20 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
                 true => frames.push(frame),
                 false => frames.retain(|other| *other != frame),
             }
-            scope.send(Command::SetReferences(frames));
+            context.send(Command::SetReferences(frames));
         }
-        thumbnail(ui, desk, Side::Reference, frame);
+        thumbnail(ui, context, Side::Reference, frame);
         ui.vertical(|ui| {
             ui.label(RichText::new(name).monospace().color(theme::REFERENCE));
             ui.horizontal(|ui| {
-                let results: Vec<QueryResult> = scope
+                let results: Vec<QueryResult> = context
                     .run
                     .results()
                     .filter(|result| result.fusion.is_none() && result.references == [name.clone()])
                     .cloned()
                     .collect();
-                dots(ui, desk, &results);
-                if let Some(words) = distance(scope, frame) {
+                dots(ui, context, &results);
+                if let Some(words) = distance(context, frame) {
                     ui.weak(words);
                 }
             });
@@ -185,13 +184,13 @@ fn row(ui: &mut Ui, scope: &Scope<'_>, frame: usize) {
 }
 
 /// How far a reference is from the query, which tells the truth.
-fn distance(scope: &Scope<'_>, frame: usize) -> Option<String> {
-    let setup = &scope.desk.setup;
+fn distance(context: &ViewContext<'_>, frame: usize) -> Option<String> {
+    let setup = context.setup;
     let reference = setup.references.pose(frame)?;
     let query = setup.queries.pose(setup.query)?;
     let error = PoseError::between(&query, &reference);
-    scope
-        .desk
+    context
+        .options
         .shows_truth
         .then(|| format!("{}, {} away", error.translation(), error.rotation()))
 }

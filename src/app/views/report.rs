@@ -3,40 +3,34 @@
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::desk::{Comparing, Desk};
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::localize::{QueryResult, Verdict};
 use crate::session::Span;
 
 /// The report of the run, so far.
 #[derive(Default)]
-pub struct Report {}
+pub struct ReportView {}
 
-impl View for Report {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
+impl View for ReportView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-            if scope.run.spans().is_empty() {
+            if context.run.spans().is_empty() {
                 ui.weak("Nothing has run yet");
                 return;
             }
-            let others: Vec<&QueryResult> = other_results(scope);
-            verdicts(ui, scope, &others);
-            features(ui, scope, &others);
-            costs(ui, scope, &others);
-            times(ui, scope);
-            changes(ui, scope);
+            let others: Vec<&QueryResult> = other_results(context);
+            verdicts(ui, context, &others);
+            features(ui, context, &others);
+            costs(ui, context, &others);
+            times(ui, context);
+            changes(ui, context);
         });
     }
 }
 
 /// The results of the run that this one is compared with.
-fn other_results<'a>(scope: &Scope<'a>) -> Vec<&'a QueryResult> {
-    let desk = scope.desk;
-    let other = match &desk.kept {
-        Some(kept) if std::ptr::eq(scope.run, desk.run()) => Some(&kept.run),
-        Some(_) if desk.comparing != Comparing::Present => Some(desk.run()),
-        _ => None,
-    };
+fn other_results<'a>(context: &ViewContext<'a>) -> Vec<&'a QueryResult> {
+    let other = context.other_run();
     other.map_or(Vec::new(), |run| run.results().collect())
 }
 
@@ -88,22 +82,22 @@ fn name(ui: &mut Ui, span: &Span) {
 }
 
 /// The verdict in words and its colour. An error tells the ground truth, which may be hidden.
-fn verdict(result: &QueryResult, desk: &Desk) -> (String, Option<Color32>) {
-    let failure_radius_m = desk.setup.failure_radius_m;
+fn verdict(result: &QueryResult, context: &ViewContext<'_>) -> (String, Option<Color32>) {
+    let failure_radius_m = context.setup.failure_radius_m;
     let words = result.words(failure_radius_m);
     match result.verdict(failure_radius_m) {
         Verdict::NoPose => (format!("× {words}"), Some(theme::ESTIMATE)),
-        _ if !desk.shows_truth => ("a pose".to_owned(), None),
+        _ if !context.options.shows_truth => ("a pose".to_owned(), None),
         Verdict::Far => (format!("▲ {words}"), Some(theme::FAR)),
         Verdict::Near | Verdict::Unmeasured => (words, None),
     }
 }
 
-fn verdicts(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
-    let shows_truth = scope.desk.shows_truth;
+fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
+    let shows_truth = context.options.shows_truth;
     Grid::new("verdicts").striped(true).show(ui, |ui| {
         heading(ui, &["method", "reference", "result"]);
-        let parts = scope.run.spans().iter();
+        let parts = context.run.spans().iter();
         for span in parts.filter(|span| span.part.method().is_some()) {
             name(ui, span);
             let Some(result) = &span.result else {
@@ -112,26 +106,29 @@ fn verdicts(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
                 continue;
             };
             ui.label(result.references.join(", "));
-            let (text, color) = verdict(result, scope.desk);
-            let other = counterpart(span, others).map(|other| verdict(other, scope.desk).0);
+            let (text, color) = verdict(result, context);
+            let other = counterpart(span, others).map(|other| verdict(other, context).0);
             let marked = other.is_some_and(|other| other != text);
             let text = RichText::new(if marked { format!("{text} ≠") } else { text });
             ui.label(color.map_or(text.clone(), |color| text.color(color)));
             ui.end_row();
         }
     });
-    let initial = scope.run.results().find_map(|result| result.initial_error);
+    let initial = context
+        .run
+        .results()
+        .find_map(|result| result.initial_error);
     if let (Some(error), true) = (initial, shows_truth) {
         ui.weak(format!("The reference itself, from the truth: {error}"));
     }
-    for finding in scope.run.results().flat_map(|result| &result.diagnosis) {
+    for finding in context.run.results().flat_map(|result| &result.diagnosis) {
         ui.label(format!("{} {}", finding.code, finding.text));
     }
     ui.separator();
 }
 
-fn features(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
-    let mut spans = with_result(scope, |result| result.counts.is_some()).peekable();
+fn features(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
+    let mut spans = with_result(context, |result| result.counts.is_some()).peekable();
     if spans.peek().is_none() {
         return;
     }
@@ -166,12 +163,12 @@ fn features(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
     ui.separator();
 }
 
-fn costs(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
-    let mut spans = with_result(scope, |result| result.cost.is_some()).peekable();
+fn costs(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
+    let mut spans = with_result(context, |result| result.cost.is_some()).peekable();
     if spans.peek().is_none() {
         return;
     }
-    let shows_truth = scope.desk.shows_truth;
+    let shows_truth = context.options.shows_truth;
     Grid::new("costs").striped(true).show(ui, |ui| {
         let columns = [
             "costs",
@@ -204,10 +201,10 @@ fn costs(ui: &mut Ui, scope: &Scope<'_>, others: &[&QueryResult]) {
 }
 
 fn with_result<'a>(
-    scope: &Scope<'a>,
+    context: &ViewContext<'a>,
     wanted: impl Fn(&QueryResult) -> bool,
 ) -> impl Iterator<Item = &'a Span> {
-    scope
+    context
         .run
         .spans()
         .iter()
@@ -229,11 +226,11 @@ fn row<const N: usize>(
     ui.end_row();
 }
 
-fn times(ui: &mut Ui, scope: &Scope<'_>) {
+fn times(ui: &mut Ui, context: &ViewContext<'_>) {
     ui.collapsing("Timings", |ui| {
         Grid::new("times").striped(true).show(ui, |ui| {
             heading(ui, &["stage", "ms"]);
-            for span in scope.run.spans() {
+            for span in context.run.spans() {
                 let Some(times) = &span.times else { continue };
                 for (stage, time) in times.iter() {
                     ui.monospace(stage);
@@ -246,8 +243,8 @@ fn times(ui: &mut Ui, scope: &Scope<'_>) {
     });
 }
 
-fn changes(ui: &mut Ui, scope: &Scope<'_>) {
-    let changes = scope.run.params.changes();
+fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
+    let changes = context.run.params.changes();
     if changes.is_empty() {
         ui.weak("All parameters at their defaults");
     } else {

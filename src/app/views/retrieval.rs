@@ -3,11 +3,11 @@
 use egui::{Color32, Grid, RichText, ScrollArea, Ui, pos2, vec2};
 
 use super::View;
-use super::canvas::{Lens, Placement, tag};
+use super::canvas::{PanZoom, Placement, tag};
 use super::images::Arrangement;
-use super::ink::{Ink, Mark};
+use super::mesh_painter::{MarkShape, MeshPainter};
 use crate::app::textures::color_image;
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesRanked};
 use crate::geometry::PoseError;
 use crate::picture;
@@ -19,13 +19,13 @@ const TABLE_HEIGHT: f32 = 170.0;
 
 /// The ranking, and one of its frames beside the query.
 #[derive(Default)]
-pub struct Retrieval {
+pub struct RetrievalView {
     looked_at: usize,
 }
 
-impl View for Retrieval {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(event) = told(scope) else {
+impl View for RetrievalView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(event) = told(context) else {
             ui.weak(
                 "The references were not chosen by what they look like. Choose those with the most \
                  matches, or those that the index ranks, in the view References.",
@@ -45,27 +45,27 @@ impl View for Retrieval {
         ScrollArea::both()
             .auto_shrink([false, true])
             .max_height(TABLE_HEIGHT)
-            .show(ui, |ui| self.table(ui, scope, event));
+            .show(ui, |ui| self.table(ui, context, event));
         ui.separator();
         if let Some(frame) = ranking.frames.get(self.looked_at) {
-            photos(ui, scope, event, self.looked_at, frame);
+            photos(ui, context, event, self.looked_at, frame);
         }
     }
 }
 
 /// The ranking of the run, once the cursor has come so far.
-fn told<'a>(scope: &Scope<'a>) -> Option<&'a ReferencesRanked> {
-    let span = scope.run.span_of(Part::Retrieval)?;
-    let end = span.records.end.min(scope.cursor + 1);
-    let records = &scope.run.records()[span.records.start.min(end)..end];
+fn told<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
+    let span = context.run.span_of(Part::Retrieval)?;
+    let end = span.records.end.min(context.cursor + 1);
+    let records = &context.run.records()[span.records.start.min(end)..end];
     records.iter().find_map(|record| match &record.event {
         Event::ReferencesRanked(event) => Some(event),
         _ => None,
     })
 }
 
-impl Retrieval {
-    fn table(&mut self, ui: &mut Ui, scope: &Scope<'_>, event: &ReferencesRanked) {
+impl RetrievalView {
+    fn table(&mut self, ui: &mut Ui, context: &ViewContext<'_>, event: &ReferencesRanked) {
         let ranking = &event.ranking;
         let score = match ranking.criterion {
             Criterion::Words => "score",
@@ -92,7 +92,7 @@ impl Retrieval {
                     Criterion::Matches => format!("{:.0}", frame.ranked.score),
                 });
                 ui.label(geometry(frame));
-                ui.label(distance(scope, frame));
+                ui.label(distance(context, frame));
                 ui.end_row();
             }
         });
@@ -107,8 +107,8 @@ fn geometry(frame: &RankedReference) -> String {
     }
 }
 
-fn distance(scope: &Scope<'_>, frame: &RankedReference) -> String {
-    match (scope.truth(), &frame.world_from_camera) {
+fn distance(context: &ViewContext<'_>, frame: &RankedReference) -> String {
+    match (context.truth(), &frame.world_from_camera) {
         (Some(truth), Some(pose)) => {
             let error = PoseError::between(truth, pose);
             format!("{}, {}", error.translation(), error.rotation())
@@ -120,12 +120,12 @@ fn distance(scope: &Scope<'_>, frame: &RankedReference) -> String {
 /// The query and a ranked frame, with lines between what lies alike.
 fn photos(
     ui: &mut Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     event: &ReferencesRanked,
     index: usize,
     frame: &RankedReference,
 ) {
-    let loaded = scope.run.loaded.as_deref();
+    let loaded = context.run.loaded.as_deref();
     let Some(problem) = loaded.and_then(|loaded| loaded.problems.first()) else {
         return;
     };
@@ -133,7 +133,7 @@ fn photos(
         ui.weak("There is no picture of this frame");
         return;
     };
-    let (ctx, textures) = (ui.ctx(), &scope.desk.textures);
+    let (ctx, textures) = (ui.ctx(), context.textures);
     let query = textures.of(ctx, "photo", &problem.query, |query| {
         color_image(&picture::photo(&query.photo))
     });
@@ -150,24 +150,24 @@ fn photos(
     });
     let sizes = [query.size_vec2(), reference.size_vec2()];
     let arrangement = Arrangement::new(area, sizes[0], sizes[1]);
-    let lens = Lens::default();
-    let of_query = arrangement.place(0, &lens, sizes[0]);
-    let of_reference = arrangement.place(1, &lens, sizes[1]);
+    let pan_zoom = PanZoom::default();
+    let of_query = arrangement.place(0, &pan_zoom, sizes[0]);
+    let of_reference = arrangement.place(1, &pan_zoom, sizes[1]);
     of_query.paint(ui.painter(), query.id(), Color32::WHITE);
     of_reference.paint(ui.painter(), reference.id(), Color32::WHITE);
     let spot = |at: &Placement, pixel: &nalgebra::Point2<f64>| {
         at.on_screen([pixel.x as f32, pixel.y as f32])
     };
-    let mut ink = Ink::new(ui.pixels_per_point());
+    let mut mesh = MeshPainter::new(ui.pixels_per_point());
     let color = theme::state(4);
     for pair in matches {
         let from = spot(&of_query, &pair.query_pixel);
         let to = spot(&of_reference, &pair.reference_pixel);
-        ink.line(from, to, 1.0, color.gamma_multiply(0.6));
-        ink.mark(Mark::Ring, from, 3.0, color);
-        ink.mark(Mark::Ring, to, 3.0, color);
+        mesh.line(from, to, 1.0, color.gamma_multiply(0.6));
+        mesh.mark(MarkShape::Ring, from, 3.0, color);
+        mesh.mark(MarkShape::Ring, to, 3.0, color);
     }
-    ink.dry(ui.painter());
+    mesh.paint_on(ui.painter());
     let corner = |at: &Placement| at.visible().min + vec2(4.0, 4.0);
     tag(ui.painter(), corner(&of_query), "query", theme::ESTIMATE);
     let name = format!("rank {}: {}", index + 1, frame.name);

@@ -1,17 +1,17 @@
 //! The scene in space: the cloud, the cameras, the rays, the search on the ground.
 
+mod camera_drag;
 mod cameras;
 mod cloud;
 mod controls;
 mod gpu;
 mod ground;
-mod hand;
 mod labels;
-mod lens;
 mod orbit;
+mod progress;
 mod rays;
-mod site;
-mod story;
+mod scene_geometry;
+mod view_camera;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,35 +21,35 @@ use egui::{Color32, Rect, Response, Role, Sense, Stroke, StrokeKind, Ui, Vec2, W
 use nalgebra::Point2;
 
 use super::View;
-use crate::app::camera::Place;
+use crate::app::camera::NamedPose;
 use crate::app::textures::color_image;
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::picture;
-use cameras::{Camera, Who};
-use cloud::{Cloud, Coloring};
-use controls::{Layers, Wish};
+use camera_drag::CameraDrag;
+use cameras::{CameraKind, SceneCamera};
+use cloud::{Coloring, PreparedCloud};
+use controls::{Layers, ViewRequest};
 use gpu::{Frame, Painter, Points};
 use ground::CostGround;
-use hand::Hand;
 use labels::Bar;
-use lens::Lens;
 use orbit::Orbit;
+use progress::{LiftedFeatures, SearchProgress};
 use rays::Rays;
-use site::Site;
-use story::{FeatureStory, SearchStory};
+use scene_geometry::SceneGeometry;
+use view_camera::ViewCamera;
 
 /// How long one of two poses is shown while they blink.
 const BLINK: Duration = Duration::from_millis(600);
 
-/// The view.
-pub struct Space {
+/// The view of the scene in space.
+pub struct SpaceView {
     /// `None` where there is no graphics card to draw with.
     painter: Option<Painter>,
     layers: Layers,
     orbit: Option<Orbit>,
-    through: Option<Through>,
-    hand: Hand,
-    cloud: Option<Cloud>,
+    through: Option<LookThrough>,
+    camera_drag: CameraDrag,
+    cloud: Option<PreparedCloud>,
     /// The points of no cloud.
     nothing: Arc<Points>,
     /// When the camera in hand changes its pose next, in egui's time \[s\]; `None` while it does not.
@@ -58,21 +58,21 @@ pub struct Space {
 
 /// A camera that one looks through, and how much the picture is magnified and shifted.
 #[derive(Clone, Copy)]
-struct Through {
-    who: Who,
+struct LookThrough {
+    kind: CameraKind,
     magnified: f64,
     shifted: Vec2,
 }
 
 /// All that is there to be drawn at the cursor.
-struct Content {
-    cameras: Vec<Camera>,
+struct SceneContent {
+    cameras: Vec<SceneCamera>,
     search: CostGround,
     path: Vec<crate::grid::Offset>,
     rays: Rays,
 }
 
-impl Space {
+impl SpaceView {
     /// A view for a window, with a graphics card or without.
     pub fn new(state: Option<&RenderState>) -> Self {
         Self {
@@ -80,7 +80,7 @@ impl Space {
             layers: Layers::default(),
             orbit: None,
             through: None,
-            hand: Hand::default(),
+            camera_drag: CameraDrag::default(),
             cloud: None,
             nothing: Arc::default(),
             next_flip: None,
@@ -88,71 +88,71 @@ impl Space {
     }
 }
 
-impl View for Space {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(site) = Site::of(scope) else {
+impl View for SpaceView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(geometry) = SceneGeometry::of(context) else {
             ui.weak("There is no scene before the query and its reference are read");
             return;
         };
-        let content = self.content(scope, &site);
-        let through = self.through.map(|through| through.who);
+        let content = self.content(context, &geometry);
+        let through = self.through.map(|through| through.kind);
         let looks = ui.horizontal_wrapped(|ui| {
             controls::looks(
                 ui,
-                &scope.desk.setup.task.protocol.methods,
+                &context.setup.task.protocol.methods,
                 &mut self.layers,
                 &content.cameras,
                 through,
             )
         });
         let jumps =
-            ui.horizontal_wrapped(|ui| controls::jumps(ui, scope, self.next_flip.is_some()));
-        if let Some(wish) = looks.inner.or(jumps.inner) {
-            self.grant(wish, &site);
+            ui.horizontal_wrapped(|ui| controls::jumps(ui, context, self.next_flip.is_some()));
+        if let Some(request) = looks.inner.or(jumps.inner) {
+            self.apply(request, &geometry);
         }
-        self.blink(ui, scope);
+        self.blink(ui, context);
         self.say_trouble(ui);
-        self.pane(ui, scope, &site, &content);
+        self.pane(ui, context, &geometry, &content);
     }
 }
 
-impl Space {
-    fn content(&self, scope: &Scope<'_>, site: &Site) -> Content {
-        let features = FeatureStory::at(scope);
-        let search = SearchStory::at(scope);
+impl SpaceView {
+    fn content(&self, context: &ViewContext<'_>, geometry: &SceneGeometry) -> SceneContent {
+        let features = LiftedFeatures::at(context);
+        let search = SearchProgress::at(context);
         let relief_m = if self.layers.relief {
-            0.2 * site.radius_m
+            0.2 * geometry.radius_m
         } else {
             0.0
         };
-        Content {
-            cameras: cameras::cameras(scope, site, &features, &search),
-            rays: rays::rays(site, &features, scope.desk.selected_feature),
-            search: CostGround::new(&search, &scope.run.params.grid).with_relief(relief_m),
+        SceneContent {
+            cameras: cameras::cameras(context, geometry, &features, &search),
+            rays: rays::rays(geometry, &features, context.options.selected_feature),
+            search: CostGround::new(&search, &context.run.params.grid).with_relief(relief_m),
             path: search.path,
         }
     }
 
-    fn grant(&mut self, wish: Wish, site: &Site) {
-        let middle = site.on_ground(0.0, 0.2 * site.radius_m, 0.0);
-        match wish {
-            Wish::Reset => {
-                self.orbit = Some(Orbit::overview(middle, site.radius_m));
+    fn apply(&mut self, request: ViewRequest, geometry: &SceneGeometry) {
+        let middle = geometry.on_ground(0.0, 0.2 * geometry.radius_m, 0.0);
+        match request {
+            ViewRequest::Reset => {
+                self.orbit = Some(Orbit::overview(middle, geometry.radius_m));
                 self.through = None;
             }
-            Wish::Top => {
-                self.orbit = Some(Orbit::from_above(middle, site.radius_m));
+            ViewRequest::Top => {
+                self.orbit = Some(Orbit::from_above(middle, geometry.radius_m));
                 self.through = None;
             }
-            Wish::Through(who) => {
-                let is_new = self.through.is_none_or(|through| through.who != who);
-                self.through = is_new.then_some(Through {
-                    who,
+            ViewRequest::Through(kind) => {
+                let is_new = self.through.is_none_or(|through| through.kind != kind);
+                self.through = is_new.then_some(LookThrough {
+                    kind,
                     magnified: 1.0,
                     shifted: Vec2::ZERO,
                 });
             }
-            Wish::Blink => {
+            ViewRequest::Blink => {
                 self.next_flip = match self.next_flip {
                     Some(_) => None,
                     None => Some(0.0),
@@ -161,15 +161,15 @@ impl Space {
         }
     }
 
-    fn blink(&mut self, ui: &Ui, scope: &Scope<'_>) {
+    fn blink(&mut self, ui: &Ui, context: &ViewContext<'_>) {
         let Some(next) = self.next_flip else { return };
-        if scope.desk.camera.is_none() || scope.desk.place(Place::Last).is_none() {
+        if context.camera().is_none() || context.named_pose(NamedPose::Last).is_none() {
             self.next_flip = None;
             return;
         }
         let now = ui.input(|input| input.time);
         if now >= next {
-            scope.send(Command::JumpCamera(Place::Last));
+            context.send(Command::JumpCamera(NamedPose::Last));
             self.next_flip = Some(now + BLINK.as_secs_f64());
         }
         ui.ctx().request_repaint_after(BLINK);
@@ -190,34 +190,43 @@ impl Space {
         }
     }
 
-    fn pane(&mut self, ui: &mut Ui, scope: &Scope<'_>, site: &Site, content: &Content) {
+    fn pane(
+        &mut self,
+        ui: &mut Ui,
+        context: &ViewContext<'_>,
+        geometry: &SceneGeometry,
+        content: &SceneContent,
+    ) {
         let size = ui.available_size().max(Vec2::splat(60.0));
         let (pane, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
-        self.steer(ui, site, &response, &content.cameras);
-        let lens = self.lens(site, size, &content.cameras);
+        self.steer(ui, geometry, &response, &content.cameras);
+        let view_camera = self.view_camera(geometry, size, &content.cameras);
 
-        let points = self.points(scope, site);
+        let points = self.points(context, geometry);
         let count = points.len();
-        let marks = self.draw(ui, pane, site, content, &lens, points);
+        let marks = self.draw(ui, pane, geometry, content, &view_camera, points);
         let through = self.looked_through(&content.cameras);
         if let Some(camera) = through {
-            self.photo(ui, scope, pane, &lens, camera);
+            self.photo(ui, context, pane, &view_camera, camera);
         }
-        labels::marks(ui, pane, &lens, &marks);
-        self.legend(ui, pane, scope, content);
-        let headline = self.headline(&lens, &response, site, content);
+        labels::marks(ui, pane, &view_camera, &marks);
+        self.legend(ui, pane, context, content);
+        let headline = self.headline(&view_camera, &response, geometry, content);
         labels::headline(ui, pane, &headline);
 
         let hand = content
             .cameras
             .iter()
-            .find(|camera| camera.who == Who::Hand);
-        let held = hand.and_then(|camera| self.hand.ui(ui, pane, &lens, site, camera));
+            .find(|camera| camera.kind == CameraKind::Hand);
+        let held = hand.and_then(|camera| {
+            self.camera_drag
+                .ui(ui, pane, &view_camera, geometry, camera)
+        });
         if let Some(pose) = held {
-            scope.send(Command::TakeCamera(Some(pose)));
+            context.send(Command::TakeCamera(Some(pose)));
         }
-        if let Some(who) = labels::cameras(ui, pane, &lens, &content.cameras) {
-            self.grant(Wish::Through(who), site);
+        if let Some(kind) = labels::cameras(ui, pane, &view_camera, &content.cameras) {
+            self.apply(ViewRequest::Through(kind), geometry);
         }
         response.widget_info(|| {
             let words = format!("3-D view of {count} points. {headline}");
@@ -226,7 +235,13 @@ impl Space {
     }
 
     /// Turns, shifts and zooms as the pointer says.
-    fn steer(&mut self, ui: &Ui, site: &Site, response: &Response, cameras: &[Camera]) {
+    fn steer(
+        &mut self,
+        ui: &Ui,
+        geometry: &SceneGeometry,
+        response: &Response,
+        cameras: &[SceneCamera],
+    ) {
         let size = response.rect.size();
         let delta = response.drag_delta();
         let shifts = response.dragged_by(egui::PointerButton::Secondary)
@@ -238,7 +253,7 @@ impl Space {
             .map(|camera| camera.scene_from_camera);
         if let (true, false, Some(pose)) = (is_dragged, shifts, pose) {
             // Whoever turns leaves the camera.
-            self.orbit = Some(Orbit::leaving(&pose, 4.0 * site.camera_m()));
+            self.orbit = Some(Orbit::leaving(&pose, 4.0 * geometry.camera_m()));
             self.through = None;
         }
         let zoomed = response.hover_pos().and_then(|at| {
@@ -260,8 +275,10 @@ impl Space {
                 }
             }
             _ => {
-                let overview =
-                    Orbit::overview(site.on_ground(0.0, 0.2 * site.radius_m, 0.0), site.radius_m);
+                let overview = Orbit::overview(
+                    geometry.on_ground(0.0, 0.2 * geometry.radius_m, 0.0),
+                    geometry.radius_m,
+                );
                 let orbit = self.orbit.get_or_insert(overview);
                 match (is_dragged, shifts) {
                     (true, true) => orbit.pan(delta, size),
@@ -275,34 +292,40 @@ impl Space {
         }
     }
 
-    fn looked_through<'a>(&self, cameras: &'a [Camera]) -> Option<&'a Camera> {
-        let wanted = self.through?.who;
-        cameras.iter().find(|camera| camera.who == wanted)
+    fn looked_through<'a>(&self, cameras: &'a [SceneCamera]) -> Option<&'a SceneCamera> {
+        let wanted = self.through?.kind;
+        cameras.iter().find(|camera| camera.kind == wanted)
     }
 
-    fn lens(&self, site: &Site, size: Vec2, cameras: &[Camera]) -> Lens {
+    fn view_camera(
+        &self,
+        geometry: &SceneGeometry,
+        size: Vec2,
+        cameras: &[SceneCamera],
+    ) -> ViewCamera {
         match (self.through, self.looked_through(cameras)) {
             (Some(through), Some(camera)) => {
-                Lens::of_camera(camera.scene_from_camera, &camera.intrinsics, size)
+                ViewCamera::of_camera(camera.scene_from_camera, &camera.intrinsics, size)
                     .magnified(through.magnified, (0.5 * size).to_pos2())
                     .shifted(through.shifted)
             }
             _ => {
-                let middle = site.on_ground(0.0, 0.2 * site.radius_m, 0.0);
-                let overview = || Orbit::overview(middle, site.radius_m);
-                self.orbit.unwrap_or_else(overview).lens(size)
+                let middle = geometry.on_ground(0.0, 0.2 * geometry.radius_m, 0.0);
+                let overview = || Orbit::overview(middle, geometry.radius_m);
+                self.orbit.unwrap_or_else(overview).view_camera(size)
             }
         }
     }
 
     /// The cloud's points, made ready once.
-    fn points(&mut self, scope: &Scope<'_>, site: &Site) -> Arc<Points> {
-        self.cloud = match scope.problem().filter(|_| self.layers.cloud) {
+    fn points(&mut self, context: &ViewContext<'_>, geometry: &SceneGeometry) -> Arc<Points> {
+        self.cloud = match context.problem().filter(|_| self.layers.cloud) {
             Some(problem) => {
-                let (reference, colored) = (&problem.reference, story::colored(scope));
+                let (reference, colored) = (&problem.reference, progress::colored(context));
                 let wanted = self.layers.coloring;
-                let is_current = |cloud: &Cloud| cloud.is(site, reference, colored, wanted);
-                let made = || Cloud::new(site, reference, colored, wanted);
+                let is_current =
+                    |cloud: &PreparedCloud| cloud.is(geometry, reference, colored, wanted);
+                let made = || PreparedCloud::new(geometry, reference, colored, wanted);
                 Some(self.cloud.take().filter(is_current).unwrap_or_else(made))
             }
             None => None,
@@ -319,41 +342,44 @@ impl Space {
         &self,
         ui: &Ui,
         pane: Rect,
-        site: &Site,
-        content: &Content,
-        lens: &Lens,
+        geometry: &SceneGeometry,
+        content: &SceneContent,
+        view_camera: &ViewCamera,
         points: Arc<Points>,
-    ) -> Vec<ground::Mark> {
+    ) -> Vec<ground::GridLabel> {
         let visuals = ui.visuals();
         let mut lines = Vec::new();
         let mut faces = Vec::new();
         let mut marks = Vec::new();
         if self.layers.grid {
             let text = visuals.text_color();
-            let (grid, beside) =
-                ground::grid(site, text.gamma_multiply(0.25), text.gamma_multiply(0.6));
+            let (grid, beside) = ground::grid(
+                geometry,
+                text.gamma_multiply(0.25),
+                text.gamma_multiply(0.6),
+            );
             lines.extend(grid);
             marks = beside;
         }
         if self.layers.cost {
-            faces = content.search.faces(site);
+            faces = content.search.faces(geometry);
         }
         if self.layers.path {
-            lines.extend(ground::path(site, &content.path, theme::ESTIMATE));
+            lines.extend(ground::path(geometry, &content.path, theme::ESTIMATE));
         }
         if self.layers.rays {
             lines.extend_from_slice(&content.rays.lines);
         }
         let through = self.looked_through(&content.cameras);
         for camera in &content.cameras {
-            if through.is_none_or(|through| through.who != camera.who) {
+            if through.is_none_or(|through| through.kind != camera.kind) {
                 lines.extend(camera.lines());
             }
         }
         match &self.painter {
             Some(painter) => {
                 let frame = Frame {
-                    lens: *lens,
+                    view_camera: *view_camera,
                     background: visuals.extreme_bg_color,
                     points,
                     lines,
@@ -370,12 +396,19 @@ impl Space {
     }
 
     /// The photo over what its camera sees, and the border of its image.
-    fn photo(&self, ui: &Ui, scope: &Scope<'_>, pane: Rect, lens: &Lens, camera: &Camera) {
-        let Some(problem) = scope.problem() else {
+    fn photo(
+        &self,
+        ui: &Ui,
+        context: &ViewContext<'_>,
+        pane: Rect,
+        view_camera: &ViewCamera,
+        camera: &SceneCamera,
+    ) {
+        let Some(problem) = context.problem() else {
             return;
         };
-        let (ctx, textures) = (ui.ctx(), &scope.desk.textures);
-        let texture = match camera.who.is_query() {
+        let (ctx, textures) = (ui.ctx(), context.textures);
+        let texture = match camera.kind.is_query() {
             true => textures.of(ctx, "photo in space", &problem.query, |query| {
                 color_image(&picture::photo(&query.photo))
             }),
@@ -384,19 +417,20 @@ impl Space {
             }),
         };
         let intrinsics = &camera.intrinsics;
-        let corner =
-            |x: f64, y: f64| lens.place_pixel(intrinsics, &Point2::new(x, y)) + pane.min.to_vec2();
+        let corner = |x: f64, y: f64| {
+            view_camera.place_pixel(intrinsics, &Point2::new(x, y)) + pane.min.to_vec2()
+        };
         let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
         let image = Rect::from_two_pos(corner(-0.5, -0.5), corner(width - 0.5, height - 0.5));
         let painter = ui.painter_at(pane);
         let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
         let tint = Color32::WHITE.gamma_multiply(self.layers.photo);
         painter.image(texture.id(), image, uv, tint);
-        let border = Stroke::new(2.0, camera.who.color());
+        let border = Stroke::new(2.0, camera.kind.color());
         painter.rect_stroke(image, 0.0, border, StrokeKind::Outside);
     }
 
-    fn legend(&self, ui: &Ui, pane: Rect, scope: &Scope<'_>, content: &Content) {
+    fn legend(&self, ui: &Ui, pane: Rect, context: &ViewContext<'_>, content: &SceneContent) {
         let mut bars = Vec::new();
         if let Some(cloud) = &self.cloud
             && cloud.coloring != Coloring::Photo
@@ -414,7 +448,7 @@ impl Space {
             });
         }
         if let Some((least, greatest)) = content.search.costs().filter(|_| self.layers.cost) {
-            let method = scope.searching_method();
+            let method = context.searching_method();
             bars.push(Bar {
                 title: format!("cost of {}; grey: no say", method.name().to_uppercase()),
                 ends: [format!("{greatest:.4}"), format!("{least:.4}")],
@@ -439,17 +473,23 @@ impl Space {
     }
 
     /// Where one looks from, and what is under the pointer.
-    fn headline(&self, lens: &Lens, response: &Response, site: &Site, content: &Content) -> String {
+    fn headline(
+        &self,
+        view_camera: &ViewCamera,
+        response: &Response,
+        geometry: &SceneGeometry,
+        content: &SceneContent,
+    ) -> String {
         let mut words = match (self.through, self.looked_through(&content.cameras)) {
-            (Some(through), Some(_)) => format!("Through {}", through.who.name()),
-            (Some(through), None) => format!("{} has no pose at this step", through.who.name()),
+            (Some(through), Some(_)) => format!("Through {}", through.kind.name()),
+            (Some(through), None) => format!("{} has no pose at this step", through.kind.name()),
             (None, _) => "From outside".to_owned(),
         };
         let under = response.hover_pos().and_then(|at| {
-            let ray = lens.ray(at - response.rect.min.to_vec2());
-            let met = ray.meets(&site.on_ground(0.0, 0.0, 0.0), &site.up())?;
-            let place = site.scene_from_reference.inverse() * met;
-            (place.coords.norm() < 3.0 * site.radius_m).then_some(place)
+            let ray = view_camera.ray(at - response.rect.min.to_vec2());
+            let met = ray.meets(&geometry.on_ground(0.0, 0.0, 0.0), &geometry.up())?;
+            let place = geometry.scene_from_reference.inverse() * met;
+            (place.coords.norm() < 3.0 * geometry.radius_m).then_some(place)
         });
         if let Some(place) = under {
             let cell = content.search.cell_at(place.x, place.z);

@@ -10,12 +10,12 @@ use egui::{ScrollArea, Slider, Ui};
 
 use super::View;
 use super::readout::Readout;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::method::Method;
 
-use maps::{Maps, Shown, progress};
-use marks::{Mark, legend, moved, place};
+use maps::{MapContent, Maps, progress};
+use marks::{MapMark, legend, moved, place};
 use scale::{NO_SAY, Scale, number, swatch};
 use search::Search;
 
@@ -24,7 +24,7 @@ const HELP: &str = "Point at a cell; click, drag: camera; wheel: zoom; Shift+dra
 
 /// Maps of a direct method's search, and slices through its minimum.
 #[derive(Default)]
-pub struct Surface {
+pub struct SurfaceView {
     /// The method that was asked for; that at the cursor otherwise.
     method: Option<Method>,
     /// The method at the cursor when `method` was asked for.
@@ -36,36 +36,42 @@ pub struct Surface {
     is_hovering: bool,
 }
 
-impl View for Surface {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let method = self.method(scope);
+impl View for SurfaceView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let method = self.method(context);
         let mut pointed_at = None;
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            let search = Search::at(scope, method);
-            self.head(ui, scope, method, search.as_ref());
+            let search = Search::at(context, method);
+            self.head(ui, context, method, search.as_ref());
             let Some(search) = search else {
                 ui.weak("Nothing is searched yet: the direct methods search, PM (2) and MI (3)");
                 return;
             };
-            pointed_at = self.content(ui, scope, &search);
+            pointed_at = self.content(ui, context, &search);
         });
-        self.hover(scope, pointed_at);
+        self.hover(context, pointed_at);
     }
 }
 
-impl Surface {
+impl SurfaceView {
     /// The method that is shown. What a person chose holds until the cursor comes to another method.
-    fn method(&mut self, scope: &Scope<'_>) -> Method {
-        if self.asked_at != scope.method() {
-            self.asked_at = scope.method();
+    fn method(&mut self, context: &ViewContext<'_>) -> Method {
+        if self.asked_at != context.method() {
+            self.asked_at = context.method();
             self.method = None;
         }
-        self.method.unwrap_or_else(|| scope.direct_method())
+        self.method.unwrap_or_else(|| context.direct_method())
     }
 
-    fn head(&mut self, ui: &mut Ui, scope: &Scope<'_>, shown: Method, search: Option<&Search<'_>>) {
+    fn head(
+        &mut self,
+        ui: &mut Ui,
+        context: &ViewContext<'_>,
+        shown: Method,
+        search: Option<&Search<'_>>,
+    ) {
         ui.horizontal_wrapped(|ui| {
-            for method in scope.direct_methods() {
+            for method in context.direct_methods() {
                 let name = method.name().to_uppercase();
                 let button = ui.selectable_label(method == shown, name);
                 if button.on_hover_text("Show this method's search").clicked() {
@@ -83,31 +89,42 @@ impl Surface {
         });
     }
 
-    fn content(&mut self, ui: &mut Ui, scope: &Scope<'_>, search: &Search<'_>) -> Option<Pose> {
-        let run_floor = scope.run.params.grid.coverage_floor;
+    fn content(
+        &mut self,
+        ui: &mut Ui,
+        context: &ViewContext<'_>,
+        search: &Search<'_>,
+    ) -> Option<Pose> {
+        let run_floor = context.run.params.grid.coverage_floor;
         let floor = self.floor.unwrap_or(run_floor);
         let width = ui.available_width();
-        let scale = Scale::of(scope.run, search);
-        let marks = Mark::all(scope, search, floor);
-        let shown = Shown {
+        let scale = Scale::of(context.run, search);
+        let marks = MapMark::all(context, search, floor);
+        let shown = MapContent {
             search,
             scale: &scale,
             marks: &marks,
             floor,
         };
         let readout = Readout::reserve(ui);
-        let under_pointer = self.maps.ui(ui, scope, &shown);
+        let under_pointer = self.maps.ui(ui, context, &shown);
         let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
         readout.say(ui, words, HELP);
-        let pointed_at = legend(ui, scope, &marks);
-        self.floor_ui(ui, scope, search, run_floor);
+        let pointed_at = legend(ui, context, &marks);
+        self.floor_ui(ui, context, search, run_floor);
         ui.separator();
-        slices::ui(ui, scope, search, floor, width);
+        slices::ui(ui, context, search, floor, width);
         under_pointer.map(|(pose, _)| pose).or(pointed_at)
     }
 
     /// The floor and what it would change.
-    fn floor_ui(&mut self, ui: &mut Ui, scope: &Scope<'_>, search: &Search<'_>, run_floor: f64) {
+    fn floor_ui(
+        &mut self,
+        ui: &mut Ui,
+        context: &ViewContext<'_>,
+        search: &Search<'_>,
+        run_floor: f64,
+    ) {
         let mut floor = self.floor.unwrap_or(run_floor);
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().slider_width = 80.0;
@@ -129,10 +146,10 @@ impl Surface {
             if ui.button("Reset floor").clicked() {
                 self.floor = None;
             }
-            let is_present = std::ptr::eq(scope.run, scope.desk.run());
+            let is_present = context.is_present();
             let apply = ui.add_enabled(is_present, egui::Button::new("Run with this floor"));
             if apply.on_hover_text("Sets grid.coverage_floor").clicked() {
-                scope.send(Command::SetParam {
+                context.send(Command::SetParam {
                     key: "grid.coverage_floor".to_owned(),
                     value: floor.to_string(),
                 });
@@ -162,13 +179,13 @@ impl Surface {
     }
 
     /// Says where the pointer is, once when it comes and once when it leaves.
-    fn hover(&mut self, scope: &Scope<'_>, pointed_at: Option<Pose>) {
+    fn hover(&mut self, context: &ViewContext<'_>, pointed_at: Option<Pose>) {
         if pointed_at.is_some() {
-            if scope.desk.hovered != pointed_at {
-                scope.send(Command::Hover(pointed_at));
+            if context.hovered() != pointed_at {
+                context.send(Command::Hover(pointed_at));
             }
         } else if self.is_hovering {
-            scope.send(Command::Hover(None));
+            context.send(Command::Hover(None));
         }
         self.is_hovering = pointed_at.is_some();
     }

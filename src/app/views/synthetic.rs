@@ -9,9 +9,9 @@ use egui::{Color32, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
 
 use self::mode::Mode;
 use super::View;
-use super::canvas::{self, Lens};
+use super::canvas::{self, PanZoom};
 use crate::app::textures::color_image;
-use crate::app::{Command, Scope, Shown};
+use crate::app::{Command, ShownView, ViewContext};
 use crate::event::{Moment, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -23,39 +23,39 @@ const BLINK_S: f64 = 0.4;
 const CHECKS: u32 = 12;
 
 /// One picture of a direct method at a time.
-pub struct Synthetic {
+pub struct SynthesisView {
     /// The method a person has chosen; `None` follows the cursor.
     chosen: Option<Method>,
     mode: Mode,
     /// Share of the view in the blend.
     blend: f32,
-    lens: Lens,
+    pan_zoom: PanZoom,
 }
 
-impl Default for Synthetic {
+impl Default for SynthesisView {
     fn default() -> Self {
         Self {
             chosen: None,
             mode: Mode::View,
             blend: 0.5,
-            lens: Lens::default(),
+            pan_zoom: PanZoom::default(),
         }
     }
 }
 
-impl View for Synthetic {
-    fn ui(&mut self, ui: &mut Ui, scope: &Scope<'_>) {
-        let Some(problem) = scope.problem() else {
+impl View for SynthesisView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let Some(problem) = context.problem() else {
             ui.weak("The photos are being read");
             return;
         };
-        let method = self.chosen.unwrap_or_else(|| scope.direct_method());
-        self.toolbar(ui, scope, method);
-        let shown = scope.shown(method);
+        let method = self.chosen.unwrap_or_else(|| context.direct_method());
+        self.toolbar(ui, context, method);
+        let shown = context.shown(method);
         match &shown {
             Some(shown) => {
-                caption(ui, scope, problem, method, shown);
-                costs(ui, scope, method, shown);
+                caption(ui, context, problem, method, shown);
+                costs(ui, context, method, shown);
             }
             None => {
                 let name = method.name().to_uppercase();
@@ -65,14 +65,14 @@ impl View for Synthetic {
             }
         }
         self.legend(ui, method, shown.as_ref());
-        self.picture(ui, scope, problem, method, shown.as_ref());
+        self.picture(ui, context, problem, method, shown.as_ref());
     }
 }
 
-impl Synthetic {
-    fn toolbar(&mut self, ui: &mut Ui, scope: &Scope<'_>, method: Method) {
+impl SynthesisView {
+    fn toolbar(&mut self, ui: &mut Ui, context: &ViewContext<'_>, method: Method) {
         ui.horizontal_wrapped(|ui| {
-            for candidate in scope.direct_methods() {
+            for candidate in context.direct_methods() {
                 let name = candidate.name().to_uppercase();
                 let response = ui.selectable_label(candidate == method, &name);
                 let help = format!("Show {name} whatever the cursor is in");
@@ -97,18 +97,18 @@ impl Synthetic {
                     self.mode = mode;
                 }
             }
-            let mut blinks = scope.desk.blinking;
+            let mut blinks = context.options.blinking;
             let blink = ui.toggle_value(&mut blinks, "Blink");
             let help = "Query and picture in turn (B)";
             let blink = blink.accessible_name("Blink pictures").on_hover_text(help);
             if blink.clicked() {
-                scope.send(Command::Blink);
+                context.send(Command::Blink);
             }
         });
     }
 
     /// What the picture's colours mean; always of one height, so that the picture stays in its place.
-    fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&Shown>) {
+    fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&ShownView>) {
         let size = Vec2::new(ui.available_width(), 24.0);
         let layout = egui::Layout::left_to_right(egui::Align::Center);
         ui.allocate_ui_with_layout(size, layout, |ui| {
@@ -127,13 +127,13 @@ impl Synthetic {
     fn picture(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         problem: &Problem,
         method: Method,
-        shown: Option<&Shown>,
+        shown: Option<&ShownView>,
     ) {
         let area = ui.available_rect_before_wrap();
-        let (mode, blinks) = match (shown, scope.desk.blinking) {
+        let (mode, blinks) = match (shown, context.options.blinking) {
             (None, _) => (Mode::Query, false),
             (Some(_), true) => (blinking(ui, self.mode), true),
             (Some(_), false) => (self.mode, false),
@@ -143,14 +143,14 @@ impl Synthetic {
         let spoken = format!("{} picture: {name}", method.name().to_uppercase());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
 
-        let query = gray_query(ui, scope, problem);
+        let query = gray_query(ui, context, problem);
         // At the top, below its legend.
-        let place = |lens: &Lens| lens.place(area, query.size_vec2(), vec2(0.5, 0.0));
-        let before = place(&self.lens);
-        self.lens.obey(ui, &response, &before);
-        let at = place(&self.lens);
+        let place = |pan_zoom: &PanZoom| pan_zoom.place(area, query.size_vec2(), vec2(0.5, 0.0));
+        let before = place(&self.pan_zoom);
+        self.pan_zoom.handle_input(ui, &response, &before);
+        let at = place(&self.pan_zoom);
         let painter = ui.painter_at(area);
-        let made = shown.and_then(|shown| mode.texture(ui, scope, problem, shown));
+        let made = shown.and_then(|shown| mode.texture(ui, context, problem, shown));
         match (mode, made) {
             (Mode::Query, _) | (_, None) => at.paint(&painter, query.id(), Color32::WHITE),
             (Mode::Blend, Some(view)) => {
@@ -188,21 +188,27 @@ fn blinking(ui: &Ui, mode: Mode) -> Mode {
 }
 
 /// The query in grey values, as the costs see it but for their smoothing.
-fn gray_query(ui: &Ui, scope: &Scope<'_>, problem: &Problem) -> TextureHandle {
-    let textures = &scope.desk.textures;
+fn gray_query(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> TextureHandle {
+    let textures = context.textures;
     textures.of(ui.ctx(), "gray photo", &problem.query, |query| {
         color_image(&query.photo.gray.clone().into())
     })
 }
 
 /// Why the view is shown, where its camera is, what it costs and covers.
-fn caption(ui: &mut Ui, scope: &Scope<'_>, problem: &Problem, method: Method, shown: &Shown) {
+fn caption(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    problem: &Problem,
+    method: Method,
+    shown: &ShownView,
+) {
     let name = method.name().to_uppercase();
     let place = place(&problem.reference_from_query(&shown.pose));
     ui.horizontal_wrapped(|ui| {
-        ui.strong(format!("{name}, {}", shown.at.name()));
+        ui.strong(format!("{name}, {}", shown.reason.name()));
         ui.label(place);
-        if scope.desk.is_probing() {
+        if context.is_probing() {
             ui.weak("the pose asked for is being worked out");
         }
     });
@@ -212,7 +218,8 @@ fn caption(ui: &mut Ui, scope: &Scope<'_>, problem: &Problem, method: Method, sh
         .map_or("no cost".to_owned(), |cost| format!("cost {cost:.4}"));
     let share = 100.0 * f64::from(score.covered) / problem.query.intrinsics.area();
     let mut covered = format!("{} px covered, {share:.2} % of the query", score.covered);
-    if let Some(at_reference) = covered_at_reference(scope, method).filter(|&covered| covered > 0) {
+    if let Some(at_reference) = covered_at_reference(context, method).filter(|&covered| covered > 0)
+    {
         let share = f64::from(score.covered) / f64::from(at_reference);
         covered.push_str(&format!(", {share:.2} of the coverage at the reference"));
     }
@@ -245,31 +252,34 @@ fn place(reference_from_camera: &Pose) -> String {
 }
 
 /// Pixels that the method's view covered at the reference pose.
-fn covered_at_reference(scope: &Scope<'_>, method: Method) -> Option<u32> {
+fn covered_at_reference(context: &ViewContext<'_>, method: Method) -> Option<u32> {
     let start = |cursor: usize| {
-        let mut events = scope.run.all_until::<ViewRendered>(cursor);
+        let mut events = context.run.all_until::<ViewRendered>(cursor);
         let start = events.find(|(_, event)| event.moment == Moment::Start)?;
         Some(start.1.comparison.score.covered)
     };
-    match scope.of(method).and_then(|(_, cursor)| start(cursor)) {
-        None => start(scope.cursor),
+    match context
+        .part_of(method)
+        .and_then(|(_, cursor)| start(cursor))
+    {
+        None => start(context.cursor),
         covered => covered,
     }
 }
 
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods
 /// where a pose of one's own was tried.
-fn costs(ui: &mut Ui, scope: &Scope<'_>, method: Method, shown: &Shown) {
-    let probe = scope.desk.looking_at().and_then(|_| scope.desk.probe());
+fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &ShownView) {
+    let probe = context.looking_at().and_then(|_| context.probe());
     match probe {
         Some(probe) => {
             for (method, comparison) in &probe.comparisons {
-                let bounds = scope.cost_bounds(*method);
+                let bounds = context.cost_bounds(*method);
                 cost_bar::ui(ui, *method, &bounds, comparison.score.cost);
             }
         }
         None => {
-            let bounds = scope.cost_bounds(method);
+            let bounds = context.cost_bounds(method);
             cost_bar::ui(ui, method, &bounds, shown.comparison.score.cost);
         }
     }

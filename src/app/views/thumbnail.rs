@@ -2,7 +2,7 @@
 
 use egui::{Sense, Ui, Vec2, vec2};
 
-use crate::app::desk::Desk;
+use crate::app::ViewContext;
 use crate::event::Side;
 
 /// Its size on the screen \[points\].
@@ -10,12 +10,12 @@ pub(super) const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 
 /// Shows the thumbnail of a frame of the queries' or the references' scene; its place stays empty
 /// until it is made.
-pub(super) fn thumbnail(ui: &mut Ui, desk: &Desk, side: Side, frame: usize) {
+pub(super) fn thumbnail(ui: &mut Ui, context: &ViewContext<'_>, side: Side, frame: usize) {
     let scene = match side {
-        Side::Query => &desk.setup.queries,
-        Side::Reference => &desk.setup.references,
+        Side::Query => &context.setup.queries,
+        Side::Reference => &context.setup.references,
     };
-    match desk.queries.thumbnail(side, frame) {
+    match context.queries.thumbnail(side, frame) {
         Some(texture) => {
             let image = egui::Image::new(texture).fit_to_exact_size(THUMBNAIL);
             ui.add(image.alt_text(&scene.frames()[frame]));

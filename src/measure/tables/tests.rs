@@ -3,7 +3,7 @@
 use super::super::metrics::{Row, measure, tests::row};
 use super::*;
 use crate::localize::{Selection, Setting};
-use crate::run::{Camera, Protocol, RUN_SCHEMA};
+use crate::run::{Protocol, QueryCamera, RUN_SCHEMA};
 
 fn fusion(name: &str) -> Fusion {
     name.parse().expect("a fusion")
@@ -43,11 +43,11 @@ fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
         shard: None,
         pairs: scenes
             .iter()
-            .map(|(scene, query_scene)| Pair {
+            .map(|(scene, query_scene)| ScenePair {
                 scene_index: 0,
                 scene: (*scene).to_owned(),
                 query_scene: (*query_scene).to_owned(),
-                camera: Camera {
+                camera: QueryCamera {
                     width: 1,
                     height: 1,
                     fx: 1.0,

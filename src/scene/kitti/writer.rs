@@ -29,7 +29,7 @@ const CAMERA_FROM_VELODYNE: Matrix3<f64> =
 pub struct SequenceWriter {
     folder: PathBuf,
     poses: PathBuf,
-    /// In the camera's frame \[m\].
+    /// The position of the scanner in the camera's frame \[m\].
     scanner: Vector3<f64>,
 }
 

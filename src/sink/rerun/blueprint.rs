@@ -5,7 +5,7 @@ use rerun::blueprint::components::{Corner2D, Eye3DKind};
 use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGrid3D, PlotLegend};
 
 use super::entities;
-use super::layout::{self, Node, View};
+use super::layout::{self, BlueprintNode, BlueprintView};
 use super::stream::Stream;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
@@ -18,7 +18,7 @@ use crate::problem::Problem;
 const RANKS_PER_ROW: usize = 3;
 
 /// What a layout follows from.
-pub(super) struct Occasion<'a> {
+pub(super) struct LayoutInput<'a> {
     /// The methods that are run.
     pub(super) methods: &'a [Method],
     /// The eyes stand where its reference does.
@@ -30,8 +30,8 @@ pub(super) struct Occasion<'a> {
 }
 
 /// Sends the layout for a run.
-pub(super) fn send(stream: &mut Stream, occasion: &Occasion<'_>) {
-    let root = root(occasion);
+pub(super) fn send(stream: &mut Stream, input: &LayoutInput<'_>) {
+    let root = root(input);
     stream.send_layout(|id, recording| layout::send(&root, id, recording));
 }
 
@@ -53,7 +53,7 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
     }
 }
 
-/// Whether anything of FB can be in the recording; a hybrid tells the stories of its methods.
+/// Whether anything of FB can be in the recording; a hybrid tells what both its methods do.
 fn shows_features(methods: &[Method]) -> bool {
     methods.iter().any(|&method| {
         let parts = estimator::find(method).and_then(Entry::hybrid);
@@ -68,43 +68,46 @@ fn has_histogram(method: Method) -> bool {
 }
 
 /// The world and the words on the left, a row per method on the right.
-fn root(occasion: &Occasion<'_>) -> Node {
-    let Occasion {
+fn root(input: &LayoutInput<'_>) -> BlueprintNode {
+    let LayoutInput {
         methods,
         first,
         references,
         ranked,
-    } = *occasion;
-    let eyes = &Eyes(first);
-    let mut words: Vec<Node> = vec![
-        View::new("TextDocument", "Report", entities::REPORT).into(),
-        View::new("TextLog", "Log", entities::LOG).into(),
-        View::new("StateTimeline", "Stages", "stage").into(),
+    } = *input;
+    let viewpoints = &Viewpoints(first);
+    let mut words: Vec<BlueprintNode> = vec![
+        BlueprintView::new("TextDocument", "Report", entities::REPORT).into(),
+        BlueprintView::new("TextLog", "Log", entities::LOG).into(),
+        BlueprintView::new("StateTimeline", "Stages", "stage").into(),
     ];
     if references > 1 {
-        words.push(View::new("TextDocument", "Fusion", entities::FUSION_TABLE).into());
+        words.push(BlueprintView::new("TextDocument", "Fusion", entities::FUSION_TABLE).into());
     }
     if ranked > 0 {
-        words.push(View::new("TextDocument", "Ranking", entities::RETRIEVAL_TABLE).into());
+        words.push(BlueprintView::new("TextDocument", "Ranking", entities::RETRIEVAL_TABLE).into());
     }
-    let left = Node::Column(vec![(3.0, overview(eyes).into()), (2.0, Node::Tabs(words))]);
+    let left = BlueprintNode::Column(vec![
+        (3.0, overview(viewpoints).into()),
+        (2.0, BlueprintNode::Tabs(words)),
+    ]);
     let mut rows = Vec::new();
     if shows_features(methods) {
         rows.push((1.0, feature_row()));
     }
-    let direct: Vec<Node> = estimator::direct_methods(methods)
+    let direct: Vec<BlueprintNode> = estimator::direct_methods(methods)
         .into_iter()
-        .map(|method| direct_row(method, eyes))
+        .map(|method| direct_row(method, viewpoints))
         .collect();
     // Three rows would leave too little height for the photos.
     if rows.is_empty() {
         rows.extend(direct.into_iter().map(|row| (1.0, row)));
     } else if !direct.is_empty() {
-        rows.push((1.2, Node::Tabs(direct)));
+        rows.push((1.2, BlueprintNode::Tabs(direct)));
     }
-    let methods = Node::Column(rows);
+    let methods = BlueprintNode::Column(rows);
     let right = if ranked > 0 {
-        Node::Tabs(vec![row("Methods", vec![(1.0, methods)]), ranks(ranked)])
+        BlueprintNode::Tabs(vec![row("Methods", vec![(1.0, methods)]), ranks(ranked)])
     } else {
         methods
     };
@@ -112,39 +115,45 @@ fn root(occasion: &Occasion<'_>) -> Node {
 }
 
 /// The ranked frames, the best at the top left.
-fn ranks(ranked: usize) -> Node {
-    let view = |rank: usize| -> (f32, Node) {
+fn ranks(ranked: usize) -> BlueprintNode {
+    let view = |rank: usize| -> (f32, BlueprintNode) {
         let name = format!("Rank {} (query above)", rank + 1);
-        (1.0, View::new("2D", name, entities::rank(rank)).into())
+        (
+            1.0,
+            BlueprintView::new("2D", name, entities::rank(rank)).into(),
+        )
     };
     let ranks: Vec<usize> = (0..ranked).collect();
     let rows = ranks.chunks(RANKS_PER_ROW).map(|chunk| {
         let views = chunk.iter().map(|&rank| view(rank)).collect();
         (1.0, row("ranks", views))
     });
-    row("Retrieval", vec![(1.0, Node::Column(rows.collect()))])
+    row(
+        "Retrieval",
+        vec![(1.0, BlueprintNode::Column(rows.collect()))],
+    )
 }
 
-fn overview(eyes: &Eyes<'_>) -> View {
-    View::new("3D", "World", "/")
+fn overview(viewpoints: &Viewpoints<'_>) -> BlueprintView {
+    BlueprintView::new("3D", "World", "/")
         // The maps of PM and MI lie in the same place: each has a view of its own.
         .of([
             "+ /world/**",
             "- /world/search/**",
             "- /world/correspondences/outlier/**",
         ])
-        .with("EyeControls3D", eyes.behind())
+        .with("EyeControls3D", viewpoints.behind())
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
 }
 
-fn feature_row() -> Node {
-    let keypoints = View::new("2D", "Query", "query");
-    let photo = View::new("2D", "Matches (query above reference)", "fb/matches/0").of([
+fn feature_row() -> BlueprintNode {
+    let keypoints = BlueprintView::new("2D", "Query", "query");
+    let photo = BlueprintView::new("2D", "Matches (query above reference)", "fb/matches/0").of([
         "+ $origin/**".to_owned(),
         format!("- $origin/{}/**", FeatureState::NAMES[0]),
         format!("- $origin/{}/**", FeatureState::NAMES[1]),
     ]);
-    let numbers = Node::Tabs(vec![
+    let numbers = BlueprintNode::Tabs(vec![
         plot("RANSAC best", entities::RANSAC_BEST).into(),
         plot("RANSAC inliers (timeline eval)", entities::RANSAC_INLIERS).into(),
         plot(
@@ -153,36 +162,42 @@ fn feature_row() -> Node {
         )
         .into(),
     ]);
-    let funnel = Node::Tabs(vec![
-        View::new("TextDocument", "Funnel", entities::FUNNEL_TABLE).into(),
-        View::new("BarChart", "Funnel chart", entities::FUNNEL).into(),
+    let funnel = BlueprintNode::Tabs(vec![
+        BlueprintView::new("TextDocument", "Funnel", entities::FUNNEL_TABLE).into(),
+        BlueprintView::new("BarChart", "Funnel chart", entities::FUNNEL).into(),
     ]);
     row(
         "FB",
         vec![
-            (3.0, Node::Tabs(vec![photo.into(), keypoints.into()])),
-            (2.0, Node::Column(vec![(1.0, numbers), (1.0, funnel)])),
+            (
+                3.0,
+                BlueprintNode::Tabs(vec![photo.into(), keypoints.into()]),
+            ),
+            (
+                2.0,
+                BlueprintNode::Column(vec![(1.0, numbers), (1.0, funnel)]),
+            ),
         ],
     )
 }
 
-fn direct_row(method: Method, eyes: &Eyes<'_>) -> Node {
+fn direct_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     let name = method.name().to_uppercase();
-    let image = |what: &str, part: &str| -> Node {
-        View::new(
+    let image = |what: &str, part: &str| -> BlueprintNode {
+        BlueprintView::new(
             "2D",
             format!("{name} {what}"),
             entities::direct(method, part),
         )
         .into()
     };
-    let query: Node = View::new("2D", "Query", entities::QUERY_IMAGE).into();
+    let query: BlueprintNode = BlueprintView::new("2D", "Query", entities::QUERY_IMAGE).into();
     let comparison = match has_histogram(method) {
-        false => Node::Tabs(vec![
+        false => BlueprintNode::Tabs(vec![
             image("residual", "residual"),
             image("weights", "weights"),
         ]),
-        true => Node::Tabs(vec![
+        true => BlueprintNode::Tabs(vec![
             image(
                 "joint histogram (right: synthetic, up: query)",
                 "joint_histogram",
@@ -194,16 +209,16 @@ fn direct_row(method: Method, eyes: &Eyes<'_>) -> Node {
             .into(),
         ]),
     };
-    let views = Node::Tabs(vec![image("synthetic", "synthetic"), query]);
-    let maps = Node::Tabs(vec![
-        map(method, "cost", eyes).into(),
-        View::new(
+    let views = BlueprintNode::Tabs(vec![image("synthetic", "synthetic"), query]);
+    let maps = BlueprintNode::Tabs(vec![
+        map(method, "cost", viewpoints).into(),
+        BlueprintView::new(
             "BarChart",
             format!("{name} yaw [°]"),
             entities::yaw_curve(method),
         )
         .into(),
-        map(method, "coverage", eyes).into(),
+        map(method, "coverage", viewpoints).into(),
         plot(format!("{name} best"), entities::direct(method, "best")).into(),
         plot(
             format!("{name} cost (timeline eval)"),
@@ -214,23 +229,26 @@ fn direct_row(method: Method, eyes: &Eyes<'_>) -> Node {
     row(
         &name,
         vec![
-            (3.0, Node::Column(vec![(1.0, views), (1.0, comparison)])),
+            (
+                3.0,
+                BlueprintNode::Column(vec![(1.0, views), (1.0, comparison)]),
+            ),
             (2.0, maps),
         ],
     )
 }
 
-fn row(name: &str, children: Vec<(f32, Node)>) -> Node {
-    Node::Row {
+fn row(name: &str, children: Vec<(f32, BlueprintNode)>) -> BlueprintNode {
+    BlueprintNode::Row {
         name: name.to_owned(),
         children,
     }
 }
 
 /// A surface of the grid search, seen from above.
-fn map(method: Method, part: &str, eyes: &Eyes<'_>) -> View {
+fn map(method: Method, part: &str, viewpoints: &Viewpoints<'_>) -> BlueprintView {
     let name = format!("{} {part}", method.name().to_uppercase());
-    View::new("3D", name, "/")
+    BlueprintView::new("3D", name, "/")
         .of([
             format!("+ /{}/**", entities::search(method, part)),
             format!("+ /{}", entities::search(method, "path")),
@@ -238,21 +256,21 @@ fn map(method: Method, part: &str, eyes: &Eyes<'_>) -> View {
             format!("+ /{}/label", entities::estimate(method)),
             format!("+ /{}/label", entities::truth()),
         ])
-        .with("EyeControls3D", eyes.above())
+        .with("EyeControls3D", viewpoints.above())
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
 }
 
-fn plot(name: impl Into<String>, origin: impl Into<String>) -> View {
-    View::new("TimeSeries", name, origin).with(
+fn plot(name: impl Into<String>, origin: impl Into<String>) -> BlueprintView {
+    BlueprintView::new("TimeSeries", name, origin).with(
         "PlotLegend",
         PlotLegend::new().with_corner(Corner2D::LeftBottom),
     )
 }
 
 /// Points of view, fixed to the first reference camera.
-struct Eyes<'a>(&'a Problem);
+struct Viewpoints<'a>(&'a Problem);
 
-impl Eyes<'_> {
+impl Viewpoints<'_> {
     /// Looks over the reference camera's shoulder.
     fn behind(&self) -> EyeControls3D {
         self.at([-2.0, -5.0, -9.0], [0.0, 0.0, 10.0], [0.0, -1.0, 0.0])

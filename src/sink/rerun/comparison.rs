@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use rerun::{Points3D, Scalars, SeriesLines, TextDocument, ViewCoordinates};
 
 use super::entities;
-use super::layout::{self, Node, View};
+use super::layout::{self, BlueprintNode, BlueprintView};
 use super::scene::Origin;
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets};
@@ -125,23 +125,26 @@ fn log(stream: &mut Stream, origin: Origin, result: &QueryResult, run: &str, col
     );
 }
 
-fn root(methods: &[Method]) -> Node {
+fn root(methods: &[Method]) -> BlueprintNode {
     let errors = methods.iter().map(|method| {
         let name = format!("{}: translation error (m)", method.name().to_uppercase());
         (
             1.0,
-            View::new("TimeSeries", name, format!("error/{method}")).into(),
+            BlueprintView::new("TimeSeries", name, format!("error/{method}")).into(),
         )
     });
-    let left = Node::Column(vec![
-        (1.0, View::new("3D", "Poses", entities::WORLD).into()),
+    let left = BlueprintNode::Column(vec![
         (
             1.0,
-            View::new("TextDocument", "Changes", entities::REPORT).into(),
+            BlueprintView::new("3D", "Poses", entities::WORLD).into(),
+        ),
+        (
+            1.0,
+            BlueprintView::new("TextDocument", "Changes", entities::REPORT).into(),
         ),
     ]);
-    Node::Row {
+    BlueprintNode::Row {
         name: "runs".to_owned(),
-        children: vec![(2.0, left), (3.0, Node::Column(errors.collect()))],
+        children: vec![(2.0, left), (3.0, BlueprintNode::Column(errors.collect()))],
     }
 }

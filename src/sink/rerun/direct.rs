@@ -4,7 +4,7 @@ use rerun::Scalars;
 
 use super::encode::png;
 use super::entities;
-use super::place::Place;
+use super::event_context::EventContext;
 use super::stream::Stream;
 use super::surface::{self, CostRange};
 use crate::cost::Explanation;
@@ -15,7 +15,7 @@ use crate::render::Comparison;
 
 /// What a direct method told so far, as far as later events refer to it.
 #[derive(Default)]
-pub(super) struct DirectStory {
+pub(super) struct DirectContext {
     /// The best-so-far offsets.
     path: Vec<Offset>,
     /// The costs that have the ends of the colour map.
@@ -24,23 +24,23 @@ pub(super) struct DirectStory {
     coverages: Vec<(i64, f64)>,
 }
 
-impl DirectStory {
+impl DirectContext {
     /// Records one event; `evals` is the number of evaluations of earlier runs.
     pub(super) fn tell(
         &mut self,
         event: &Event,
         evals: i64,
-        place: &Place<'_>,
+        context: &EventContext<'_>,
         stream: &mut Stream,
     ) {
         match event {
             Event::PoseScored(scored) => self.scored(scored, evals),
             Event::ViewRendered(view) => {
                 stream.set_eval(Some(evals + view.evaluation as i64));
-                self.rendered(view, place, stream);
+                self.rendered(view, context, stream);
                 stream.set_eval(None);
             }
-            Event::PhaseSearched(searched) => self.searched(searched, place, stream),
+            Event::PhaseSearched(searched) => self.searched(searched, context, stream),
             _ => {}
         }
     }
@@ -53,8 +53,8 @@ impl DirectStory {
         self.coverages.push((eval, event.coverage));
     }
 
-    fn rendered(&mut self, event: &ViewRendered, place: &Place<'_>, stream: &mut Stream) {
-        let path = |part| entities::direct(place.method, part);
+    fn rendered(&mut self, event: &ViewRendered, context: &EventContext<'_>, stream: &mut Stream) {
+        let path = |part| entities::direct(context.method, part);
         let Comparison {
             view,
             pairs,
@@ -85,10 +85,10 @@ impl DirectStory {
             stream.log(&path("best"), &Scalars::single(cost));
         }
         self.path.push(event.offset);
-        surface::log_path(stream, &self.path, place);
+        surface::log_path(stream, &self.path, context);
     }
 
-    fn searched(&mut self, event: &PhaseSearched, place: &Place<'_>, stream: &mut Stream) {
+    fn searched(&mut self, event: &PhaseSearched, context: &EventContext<'_>, stream: &mut Stream) {
         let surface = &event.surface;
         match surface.lattice.phase {
             Phase::PositionCoarse | Phase::PositionFine => {
@@ -98,12 +98,15 @@ impl DirectStory {
                     None => CostRange::of(surface),
                 };
                 self.range = range;
-                surface::log_maps(stream, surface, range.unwrap_or_default(), place);
+                surface::log_maps(stream, surface, range.unwrap_or_default(), context);
             }
-            Phase::YawCoarse | Phase::YawFine => surface::log_yaw(stream, surface, place),
+            Phase::YawCoarse | Phase::YawFine => surface::log_yaw(stream, surface, context),
         }
-        stream.log_scalars(&entities::direct(place.method, "cost"), &self.costs);
-        stream.log_scalars(&entities::direct(place.method, "coverage"), &self.coverages);
+        stream.log_scalars(&entities::direct(context.method, "cost"), &self.costs);
+        stream.log_scalars(
+            &entities::direct(context.method, "coverage"),
+            &self.coverages,
+        );
         self.costs.clear();
         self.coverages.clear();
     }

@@ -13,14 +13,14 @@ pub(super) type Encoded = ImageResult<EncodedImage>;
 /// 85 halves the size of 95 and shows no blocks at the viewer's magnifications.
 const JPEG_QUALITY: u8 = 85;
 
-/// As a photo.
+/// Encodes a picture as a photo, with small losses.
 pub(super) fn jpeg(image: &DynamicImage) -> Encoded {
     let mut bytes = Vec::new();
     image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;
     Ok(EncodedImage::from_file_contents(bytes).with_media_type(MediaType::jpeg()))
 }
 
-/// Exactly.
+/// Encodes a picture without losses.
 pub(super) fn png(image: impl Into<DynamicImage>) -> Encoded {
     let mut bytes = Vec::new();
     // Scattered pixels have no gradient that a filter could predict.

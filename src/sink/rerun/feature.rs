@@ -7,7 +7,7 @@ use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocume
 
 use super::encode::jpeg;
 use super::entities::{self, UNDECIDED};
-use super::place::Place;
+use super::event_context::EventContext;
 use super::scene::log_rays;
 use super::stream::Stream;
 use crate::depth::LiftedMatch;
@@ -20,7 +20,7 @@ use crate::picture;
 
 /// What FB told so far, as far as later events refer to it.
 #[derive(Default)]
-pub(super) struct FeatureStory {
+pub(super) struct FeatureContext {
     query: Arc<Features>,
     reference: Arc<Features>,
     decisions: Arc<[Option<Match>]>,
@@ -32,21 +32,21 @@ pub(super) struct FeatureStory {
     inliers: Vec<(i64, f64)>,
 }
 
-impl FeatureStory {
+impl FeatureContext {
     /// Records one event; `evals` is the number of trials of earlier runs.
     pub(super) fn tell(
         &mut self,
         event: &Event,
         evals: i64,
-        place: &Place<'_>,
+        context: &EventContext<'_>,
         stream: &mut Stream,
     ) {
         match event {
-            Event::FeaturesDetected(detected) => self.detected(detected, place, stream),
+            Event::FeaturesDetected(detected) => self.detected(detected, context, stream),
             Event::MatchesDecided(decided) => {
                 self.decisions = Arc::clone(&decided.decisions);
-                self.canvas(place, stream);
-                self.undecided(place, stream);
+                self.canvas(context, stream);
+                self.undecided(context, stream);
             }
             Event::DepthsLifted(DepthsLifted { matches }) => self.lifted = Arc::clone(matches),
             Event::HypothesisTried(tried) => self.tried(tried, evals, stream),
@@ -54,7 +54,7 @@ impl FeatureStory {
                 self.reference_from_query = Some(refined.reference_from_query);
             }
             Event::FeaturesClassified(classified) => {
-                self.classified(&classified.states, place, stream);
+                self.classified(&classified.states, context, stream);
             }
             _ => {}
         }
@@ -68,7 +68,12 @@ impl FeatureStory {
         self.inliers.clear();
     }
 
-    fn detected(&mut self, event: &FeaturesDetected, place: &Place<'_>, stream: &mut Stream) {
+    fn detected(
+        &mut self,
+        event: &FeaturesDetected,
+        context: &EventContext<'_>,
+        stream: &mut Stream,
+    ) {
         let FeaturesDetected { side, features } = event;
         match side {
             Side::Query => self.query = Arc::clone(features),
@@ -81,17 +86,17 @@ impl FeatureStory {
         let points = Points2D::new(pixels)
             .with_radii(features.keypoints.iter().map(|keypoint| keypoint.scale))
             .with_colors([super::color(palette::UNDECIDED)]);
-        stream.log(&entities::detected(*side, place.reference), &points);
+        stream.log(&entities::detected(*side, context.reference), &points);
     }
 
-    fn canvas(&mut self, place: &Place<'_>, stream: &mut Stream) {
-        let problem = place.problem;
+    fn canvas(&mut self, context: &EventContext<'_>, stream: &mut Stream) {
+        let problem = context.problem;
         let (canvas, top) = picture::stacked(&problem.query.photo, &problem.reference.photo);
         self.canvas_top = top;
-        stream.log_image(&entities::matches(place.reference), jpeg(&canvas.into()));
+        stream.log_image(&entities::matches(context.reference), jpeg(&canvas.into()));
     }
 
-    fn undecided(&self, place: &Place<'_>, stream: &mut Stream) {
+    fn undecided(&self, context: &EventContext<'_>, stream: &mut Stream) {
         let matches: Vec<usize> = self
             .decisions
             .iter()
@@ -101,7 +106,7 @@ impl FeatureStory {
             .collect();
         let lines = self.lines(&matches, palette::UNDECIDED);
         stream.log(
-            &entities::matches_in_state(place.reference, UNDECIDED),
+            &entities::matches_in_state(context.reference, UNDECIDED),
             &lines,
         );
     }
@@ -136,10 +141,10 @@ impl FeatureStory {
         }
     }
 
-    fn classified(&self, states: &[FeatureState], place: &Place<'_>, stream: &mut Stream) {
+    fn classified(&self, states: &[FeatureState], context: &EventContext<'_>, stream: &mut Stream) {
         stream.log(entities::QUERY_DETECTED, &Clear::flat());
         stream.log(
-            &entities::matches_in_state(place.reference, UNDECIDED),
+            &entities::matches_in_state(context.reference, UNDECIDED),
             &Clear::flat(),
         );
         for (index, name) in FeatureState::NAMES.into_iter().enumerate() {
@@ -150,10 +155,10 @@ impl FeatureStory {
             let points = self.points(&members, states, color);
             stream.log(&entities::query_keypoints(name), &points);
             let lines = self.lines(&members, color);
-            stream.log(&entities::matches_in_state(place.reference, name), &lines);
+            stream.log(&entities::matches_in_state(context.reference, name), &lines);
         }
         self.funnel(states, stream);
-        self.rays(states, place, stream);
+        self.rays(states, context, stream);
     }
 
     /// Keypoints in one state, with the number that decided it on the label.
@@ -180,7 +185,7 @@ impl FeatureStory {
         stream.log(entities::FUNNEL_TABLE, &TextDocument::from_markdown(table));
     }
 
-    fn rays(&self, states: &[FeatureState], place: &Place<'_>, stream: &mut Stream) {
+    fn rays(&self, states: &[FeatureState], context: &EventContext<'_>, stream: &mut Stream) {
         let Some(pose) = &self.reference_from_query else {
             return;
         };
@@ -201,8 +206,8 @@ impl FeatureStory {
             log_rays(
                 stream,
                 &path,
-                place.problem,
-                place.origin,
+                context.problem,
+                context.origin,
                 &centre,
                 &points,
                 color,

@@ -6,17 +6,17 @@ use super::entities;
 use super::scene::Origin;
 use super::stream::Stream;
 use crate::event::ReferencesFused;
-use crate::fusion::{Fate, Share};
+use crate::fusion::{Share, ShareOutcome};
 use crate::method::Method;
 use crate::palette;
 
 /// The fusions of one query so far, as a table each.
 #[derive(Default)]
-pub(super) struct FusionStory {
+pub(super) struct FusionTables {
     tables: String,
 }
 
-impl FusionStory {
+impl FusionTables {
     /// Records one fusion of a method's poses.
     pub(super) fn tell(
         &mut self,
@@ -48,9 +48,9 @@ fn candidates(event: &ReferencesFused, origin: Origin) -> Points3D {
     };
     Points3D::new(placed().map(|(_, pose)| origin.place(&pose.translation.vector)))
         .with_colors(placed().map(|(share, _)| {
-            super::color(match share.fate {
-                Fate::Kept => palette::ESTIMATE,
-                Fate::Dropped | Fate::Failed => palette::UNDECIDED,
+            super::color(match share.outcome {
+                ShareOutcome::Kept => palette::ESTIMATE,
+                ShareOutcome::Dropped | ShareOutcome::Failed => palette::UNDECIDED,
             })
         }))
         .with_radii([rerun::Radius::new_ui_points(4.0)])
@@ -87,9 +87,9 @@ fn table(event: &ReferencesFused, method: Method) -> String {
 }
 
 fn say(share: &Share) -> String {
-    match share.fate {
-        Fate::Kept => format!("{:.3}", share.weight),
-        Fate::Dropped => "dropped".to_owned(),
-        Fate::Failed => "failed".to_owned(),
+    match share.outcome {
+        ShareOutcome::Kept => format!("{:.3}", share.weight),
+        ShareOutcome::Dropped => "dropped".to_owned(),
+        ShareOutcome::Failed => "failed".to_owned(),
     }
 }

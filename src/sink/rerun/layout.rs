@@ -19,7 +19,7 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::entities::{APPLICATION_ID, STEP_TIMELINE};
 
 /// What a panel shows.
-pub(super) struct View {
+pub(super) struct BlueprintView {
     class: &'static str,
     name: String,
     origin: String,
@@ -27,7 +27,7 @@ pub(super) struct View {
     properties: Vec<(&'static str, Box<dyn AsComponents>)>,
 }
 
-impl View {
+impl BlueprintView {
     /// Everything at and below `origin`.
     pub(super) fn new(
         class: &'static str,
@@ -61,31 +61,31 @@ impl View {
 }
 
 /// A part of the layout.
-pub(super) enum Node {
+pub(super) enum BlueprintNode {
     /// Beside each other, with their shares of the width.
     Row {
         /// What a tab calls it.
         name: String,
-        /// From left to right.
-        children: Vec<(f32, Node)>,
+        /// The nodes from left to right, each with its share of the width.
+        children: Vec<(f32, BlueprintNode)>,
     },
     /// Above each other, with their shares of the height.
-    Column(Vec<(f32, Node)>),
+    Column(Vec<(f32, BlueprintNode)>),
     /// One at a time, the first one shown.
-    Tabs(Vec<Node>),
+    Tabs(Vec<BlueprintNode>),
     /// A single view.
-    View(Box<View>),
+    View(Box<BlueprintView>),
 }
 
-impl From<View> for Node {
-    fn from(view: View) -> Self {
+impl From<BlueprintView> for BlueprintNode {
+    fn from(view: BlueprintView) -> Self {
         Self::View(Box::new(view))
     }
 }
 
 /// Sends a layout along with a recording, with the time panel on `step`, at the end of the run.
 pub(super) fn send(
-    root: &Node,
+    root: &BlueprintNode,
     recording_id: &str,
     recording: &RecordingStream,
 ) -> RecordingStreamResult<()> {
@@ -124,15 +124,19 @@ pub(super) fn send(
 }
 
 /// Logs a node and what it holds; `place` says where in the tree it is. Returns its name there.
-fn log_node(stream: &RecordingStream, node: &Node, place: &str) -> RecordingStreamResult<String> {
-    let (kind, children): (_, Vec<(f32, &Node)>) = match node {
-        Node::View(view) => {
+fn log_node(
+    stream: &RecordingStream,
+    node: &BlueprintNode,
+    place: &str,
+) -> RecordingStreamResult<String> {
+    let (kind, children): (_, Vec<(f32, &BlueprintNode)>) = match node {
+        BlueprintNode::View(view) => {
             log_view(stream, view, place)?;
             return Ok(place.to_owned());
         }
-        Node::Row { children, .. } => (ContainerKind::Horizontal, shares(children)),
-        Node::Column(children) => (ContainerKind::Vertical, shares(children)),
-        Node::Tabs(children) => (
+        BlueprintNode::Row { children, .. } => (ContainerKind::Horizontal, shares(children)),
+        BlueprintNode::Column(children) => (ContainerKind::Vertical, shares(children)),
+        BlueprintNode::Tabs(children) => (
             ContainerKind::Tabs,
             children.iter().map(|child| (1.0, child)).collect(),
         ),
@@ -150,22 +154,26 @@ fn log_node(stream: &RecordingStream, node: &Node, place: &str) -> RecordingStre
             .with_col_shares(shares.into_iter().map(|share| ColumnShare(share.into()))),
     };
     let container = match node {
-        Node::Row { name, .. } => container.with_display_name(Name(name.as_str().into())),
+        BlueprintNode::Row { name, .. } => container.with_display_name(Name(name.as_str().into())),
         _ => container,
     };
     stream.log(path_of(node, place), &container.with_contents(contents))?;
     Ok(place.to_owned())
 }
 
-fn shares(children: &[(f32, Node)]) -> Vec<(f32, &Node)> {
+fn shares(children: &[(f32, BlueprintNode)]) -> Vec<(f32, &BlueprintNode)> {
     children
         .iter()
         .map(|(share, child)| (*share, child))
         .collect()
 }
 
-fn log_view(stream: &RecordingStream, view: &View, place: &str) -> RecordingStreamResult<()> {
-    let View {
+fn log_view(
+    stream: &RecordingStream,
+    view: &BlueprintView,
+    place: &str,
+) -> RecordingStreamResult<()> {
+    let BlueprintView {
         class,
         name,
         origin,
@@ -190,9 +198,9 @@ fn log_view(stream: &RecordingStream, view: &View, place: &str) -> RecordingStre
     Ok(())
 }
 
-fn path_of(node: &Node, place: &str) -> String {
+fn path_of(node: &BlueprintNode, place: &str) -> String {
     match node {
-        Node::View(_) => view_path(place),
+        BlueprintNode::View(_) => view_path(place),
         _ => format!("container/{}", uuid(place)),
     }
 }

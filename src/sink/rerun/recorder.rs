@@ -5,17 +5,17 @@ use std::sync::Arc;
 
 use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
-use super::direct::DirectStory;
-use super::feature::FeatureStory;
-use super::fusion::FusionStory;
-use super::place::Place;
-use super::scene::{self, Camera, Origin};
+use super::direct::DirectContext;
+use super::event_context::EventContext;
+use super::feature::FeatureContext;
+use super::fusion::FusionTables;
+use super::scene::{self, Origin, PlacedCamera};
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
 use crate::estimator;
 use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
-use crate::localize::{PoseReport, QueryResult, StageTimes, Watch};
+use crate::localize::{LocalizeObserver, PoseReport, QueryResult, StageTimes};
 use crate::method::Method;
 use crate::narration;
 use crate::palette;
@@ -37,35 +37,35 @@ pub struct Recorder {
     /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
     origin: Option<Origin>,
     is_laid_out: bool,
-    query: Query,
+    query: CurrentQuery,
     /// Hypotheses of each method in earlier runs: `eval` goes on where the last run ended.
     evals: BTreeMap<Method, i64>,
 }
 
-/// What was told about the query in work.
+/// What was recorded of the query at work.
 #[derive(Default)]
-struct Query {
+struct CurrentQuery {
     problems: Vec<Problem>,
     truth: Option<Pose>,
     results: Vec<QueryResult>,
     reference: usize,
     method: Option<Method>,
-    /// Estimators that told their story, by reference: the hybrid repeats those of FB and MI.
-    told: BTreeSet<(usize, Method)>,
+    /// Estimators that were recorded, by reference: the hybrid repeats what FB and MI did.
+    recorded: BTreeSet<(usize, Method)>,
     clouds: BTreeSet<usize>,
     stages: Vec<Stage>,
-    tellers: Vec<Teller>,
-    fusion: FusionStory,
+    estimators: Vec<ActiveEstimator>,
+    fusion: FusionTables,
 }
 
-/// An estimator that is telling.
-struct Teller {
+/// An estimator whose events come in.
+struct ActiveEstimator {
     method: Method,
-    /// Whether all this was told before.
+    /// Whether all its events were recorded before.
     is_repetition: bool,
     hypotheses: i64,
-    feature: FeatureStory,
-    direct: DirectStory,
+    feature: FeatureContext,
+    direct: DirectContext,
 }
 
 impl Recorder {
@@ -89,7 +89,7 @@ impl Recorder {
             methods: methods.to_vec(),
             origin: None,
             is_laid_out: false,
-            query: Query::default(),
+            query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
     }
@@ -123,13 +123,13 @@ impl Recorder {
             return;
         }
         self.is_laid_out = true;
-        let occasion = blueprint::Occasion {
+        let input = blueprint::LayoutInput {
             methods: &self.methods,
             first,
             references: self.query.problems.len(),
             ranked,
         };
-        blueprint::send(&mut self.stream, &occasion);
+        blueprint::send(&mut self.stream, &input);
     }
 
     /// Nothing of the last query must be taken for the next one's.
@@ -150,7 +150,7 @@ impl Recorder {
         let owner = entities::estimate(method);
         match pose {
             Some(pose) => {
-                let camera = Camera {
+                let camera = PlacedCamera {
                     owner: &owner,
                     world_from_camera: &pose,
                     intrinsics: &problem.query.intrinsics,
@@ -175,7 +175,7 @@ impl Recorder {
 
     fn report(&mut self) {
         let Some(origin) = self.origin else { return };
-        let Query {
+        let CurrentQuery {
             problems, results, ..
         } = &self.query;
         let text = report::markdown(
@@ -196,13 +196,13 @@ impl Recorder {
 
     fn stage_started(&mut self, stage: Stage) {
         if let Stage::Estimator(method) = stage {
-            let is_first = self.query.told.insert((self.query.reference, method));
-            self.query.tellers.push(Teller {
+            let is_first = self.query.recorded.insert((self.query.reference, method));
+            self.query.estimators.push(ActiveEstimator {
                 method,
                 is_repetition: !is_first,
                 hypotheses: 0,
-                feature: FeatureStory::default(),
-                direct: DirectStory::default(),
+                feature: FeatureContext::default(),
+                direct: DirectContext::default(),
             });
         }
         self.query.stages.push(stage);
@@ -213,14 +213,14 @@ impl Recorder {
     fn stage_ended(&mut self, stage: Stage, succeeded: bool) {
         let path = narration::stages(&self.query.stages);
         self.query.stages.pop();
-        if let Some(teller) = self.query.tellers.last_mut() {
-            teller.feature.tell_trials(&mut self.stream);
+        if let Some(estimator) = self.query.estimators.last_mut() {
+            estimator.feature.tell_trials(&mut self.stream);
         }
         if matches!(stage, Stage::Estimator(_))
-            && let Some(teller) = self.query.tellers.pop()
-            && !teller.is_repetition
+            && let Some(estimator) = self.query.estimators.pop()
+            && !estimator.is_repetition
         {
-            *self.evals.entry(teller.method).or_default() += teller.hypotheses;
+            *self.evals.entry(estimator.method).or_default() += estimator.hypotheses;
         }
         if !succeeded {
             self.say(&format!("{path} stopped here"), TextLogLevel::WARN);
@@ -244,7 +244,7 @@ impl Recorder {
         self.stream.log(&entities::stage(method), &state);
     }
 
-    /// As the direct methods colour it.
+    /// The cloud as the direct methods colour it.
     fn colored(&self, tuple: &ReferenceTuple) -> ColoredCloud {
         let ReferenceTuple {
             photo, intrinsics, ..
@@ -259,21 +259,21 @@ impl Recorder {
         self.stream.advance();
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         self.say(&format!("{}: {words}", method.name()), TextLogLevel::INFO);
-        let story = &mut self.query.fusion;
-        story.tell(event, method, origin, &mut self.stream);
+        let tables = &mut self.query.fusion;
+        tables.tell(event, method, origin, &mut self.stream);
     }
 
     fn ranked(&mut self, event: &ReferencesRanked) {
         let (Some(problem), Some(origin)) = (self.query.problems.first(), self.origin) else {
             return;
         };
-        let asked = retrieval::Asked {
+        let context = retrieval::RankingContext {
             query: &problem.query,
             truth: self.query.truth.as_ref(),
             origin,
         };
         self.stream.advance();
-        retrieval::tell(event, &asked, &mut self.stream);
+        retrieval::tell(event, &context, &mut self.stream);
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         let path = narration::stages(&self.query.stages);
         self.say(&format!("{path}: {words}"), TextLogLevel::INFO);
@@ -281,16 +281,16 @@ impl Recorder {
     }
 
     fn tell(&mut self, event: &Event) {
-        let Some(teller) = self.query.tellers.last_mut() else {
+        let Some(estimator) = self.query.estimators.last_mut() else {
             return;
         };
         if matches!(event, Event::HypothesisTried(_) | Event::PoseScored(_)) {
-            teller.hypotheses += 1;
+            estimator.hypotheses += 1;
         }
-        if teller.is_repetition {
+        if estimator.is_repetition {
             return;
         }
-        let teller_method = teller.method;
+        let told_method = estimator.method;
         if let Some(words) = narration::sentence(event) {
             self.stream.advance();
             let path = narration::stages(&self.query.stages);
@@ -311,16 +311,20 @@ impl Recorder {
         {
             scene::log_cloud(&mut self.stream, index, &problem.reference, &cloud, origin);
         }
-        let place = Place {
+        let context = EventContext {
             reference: index,
             problem,
-            method: teller_method,
+            method: told_method,
             origin,
         };
-        let evals = self.evals.get(&teller_method).copied().unwrap_or(0);
-        if let Some(teller) = self.query.tellers.last_mut() {
-            teller.feature.tell(event, evals, &place, &mut self.stream);
-            teller.direct.tell(event, evals, &place, &mut self.stream);
+        let evals = self.evals.get(&told_method).copied().unwrap_or(0);
+        if let Some(estimator) = self.query.estimators.last_mut() {
+            estimator
+                .feature
+                .tell(event, evals, &context, &mut self.stream);
+            estimator
+                .direct
+                .tell(event, evals, &context, &mut self.stream);
         }
         if matches!(event, Event::ViewRendered(_)) {
             self.stream.flush();
@@ -328,26 +332,26 @@ impl Recorder {
     }
 }
 
-impl Query {
+impl CurrentQuery {
     fn problem(&self) -> Option<&Problem> {
         self.problems.get(self.reference)
     }
 
-    /// Whether the hybrid that runs now can only repeat what was told before.
+    /// Whether the hybrid that runs now can only repeat what was recorded before.
     fn is_repeated_hybrid(&self) -> bool {
-        let was_told = |method| self.told.contains(&(self.reference, method));
+        let was_recorded = |method| self.recorded.contains(&(self.reference, method));
         let here = self.method.and_then(estimator::find);
         let parts = here.and_then(|entry| entry.hybrid());
-        parts.is_some_and(|parts| was_told(parts.first) && was_told(parts.second))
+        parts.is_some_and(|parts| was_recorded(parts.first) && was_recorded(parts.second))
     }
 }
 
-impl Watch for Recorder {
+impl LocalizeObserver for Recorder {
     fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        self.query = Query {
+        self.query = CurrentQuery {
             problems: problems.to_vec(),
             truth: truth.copied(),
-            ..Query::default()
+            ..CurrentQuery::default()
         };
         let Some(first) = problems.first() else {
             return;
@@ -367,7 +371,7 @@ impl Watch for Recorder {
             scene::log_reference(stream, index, &problem.reference, origin);
         }
         if let Some(truth) = truth {
-            let camera = Camera {
+            let camera = PlacedCamera {
                 owner: &entities::truth(),
                 world_from_camera: truth,
                 intrinsics: &first.query.intrinsics,
@@ -385,7 +389,7 @@ impl Watch for Recorder {
         self.query.reference = reference_index;
         self.query.method = Some(method);
         self.query.stages.clear();
-        self.query.tellers.clear();
+        self.query.estimators.clear();
     }
 
     fn end_method(&mut self, result: &QueryResult, _times: &StageTimes) {
@@ -394,7 +398,7 @@ impl Watch for Recorder {
         self.estimate(result);
         self.query.results.push(result.clone());
         self.report();
-        self.stream.settle();
+        self.stream.flush_blocking();
     }
 
     fn begin_fusion(&mut self, method: Method) {

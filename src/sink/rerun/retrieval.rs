@@ -22,7 +22,7 @@ use crate::retrieval::{
 const CANVAS_WIDTH: u32 = 480;
 
 /// What a ranking is shown against.
-pub(super) struct Asked<'a> {
+pub(super) struct RankingContext<'a> {
     pub(super) query: &'a Query,
     /// Where the query camera was, if that is known.
     pub(super) truth: Option<&'a Pose>,
@@ -30,31 +30,31 @@ pub(super) struct Asked<'a> {
 }
 
 /// Records a ranking.
-pub(super) fn tell(event: &ReferencesRanked, asked: &Asked<'_>, stream: &mut Stream) {
+pub(super) fn tell(event: &ReferencesRanked, context: &RankingContext<'_>, stream: &mut Stream) {
     let ranking = &event.ranking;
-    let document = TextDocument::from_markdown(table(ranking, asked.truth));
+    let document = TextDocument::from_markdown(table(ranking, context.truth));
     stream.log(entities::RETRIEVAL_TABLE, &document);
-    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, asked.origin));
+    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, context.origin));
     let pictured = ranking.pictured().iter().zip(event.photos.iter());
     for (rank, (reference, photo)) in pictured.enumerate() {
         // The frame is in the table all the same.
         let Some(photo) = photo else { continue };
-        let canvas = Canvas::of(&asked.query.photo, photo);
+        let photo_pair = PhotoPair::of(&context.query.photo, photo);
         let path = entities::rank(rank);
-        stream.log_image(&path, jpeg(&canvas.picture.clone().into()));
+        stream.log_image(&path, jpeg(&photo_pair.picture.clone().into()));
         let is_chosen = rank < ranking.chosen;
-        let label = canvas.label(&label(ranking, rank, reference), is_chosen);
+        let label = photo_pair.label(&label(ranking, rank, reference), is_chosen);
         stream.log(&entities::rank_part(rank, "label"), &label);
         if let Some(found) = reference.ranked.verification() {
             let part = |name: &str| entities::rank_part(rank, name);
-            stream.log(&part("matches"), &canvas.matches(&found.matches));
-            stream.log(&part("outline"), &canvas.outline(found));
+            stream.log(&part("matches"), &photo_pair.matches(&found.matches));
+            stream.log(&part("outline"), &photo_pair.outline(found));
         }
     }
 }
 
 /// The query above a ranked frame, small.
-struct Canvas {
+struct PhotoPair {
     picture: image::RgbImage,
     /// Pixels of the canvas per pixel of the photos, across and down.
     scale: [f64; 2],
@@ -62,7 +62,7 @@ struct Canvas {
     top: f64,
 }
 
-impl Canvas {
+impl PhotoPair {
     fn of(query: &Photo, reference: &Photo) -> Self {
         let (stacked, top) = picture::stacked(query, reference);
         let (width, height) = stacked.dimensions();
@@ -270,20 +270,26 @@ mod tests {
     #[test]
     fn pixels_of_both_photos_are_found_on_the_shrunken_canvas() {
         let photo = Photo::from_gray(GrayImage::new(960, 300));
-        let canvas = Canvas::of(&photo, &photo);
+        let photo_pair = PhotoPair::of(&photo, &photo);
         // 960 × (300 + 4 + 300) at half the size.
-        assert_eq!(canvas.picture.dimensions(), (480, 302));
-        assert_eq!(canvas.of_query(&Point2::new(-0.5, -0.5)), [0.0, 0.0]);
-        assert_eq!(canvas.of_query(&Point2::new(959.5, 299.5)), [480.0, 150.0]);
-        assert_eq!(canvas.of_reference(&Point2::new(-0.5, -0.5)), [0.0, 152.0]);
+        assert_eq!(photo_pair.picture.dimensions(), (480, 302));
+        assert_eq!(photo_pair.of_query(&Point2::new(-0.5, -0.5)), [0.0, 0.0]);
         assert_eq!(
-            canvas.of_reference(&Point2::new(959.5, 299.5)),
+            photo_pair.of_query(&Point2::new(959.5, 299.5)),
+            [480.0, 150.0]
+        );
+        assert_eq!(
+            photo_pair.of_reference(&Point2::new(-0.5, -0.5)),
+            [0.0, 152.0]
+        );
+        assert_eq!(
+            photo_pair.of_reference(&Point2::new(959.5, 299.5)),
             [480.0, 302.0]
         );
         // A small photo is not blown up.
         let small = Photo::from_gray(GrayImage::new(96, 30));
-        let canvas = Canvas::of(&small, &small);
-        assert_eq!(canvas.picture.dimensions(), (96, 64));
+        let photo_pair = PhotoPair::of(&small, &small);
+        assert_eq!(photo_pair.picture.dimensions(), (96, 64));
     }
 
     #[test]

@@ -38,7 +38,7 @@ impl Origin {
     }
 }
 
-/// The query's photo.
+/// Records the query's photo.
 pub(super) fn log_query(stream: &mut Stream, query: &Query) {
     stream.log_image(entities::QUERY_IMAGE, jpeg(&picture::photo(&query.photo)));
 }
@@ -51,7 +51,7 @@ pub(super) fn log_reference(
     origin: Origin,
 ) {
     let owner = entities::reference(index);
-    let camera = Camera {
+    let camera = PlacedCamera {
         owner: &owner,
         world_from_camera: &tuple.world_from_camera,
         intrinsics: &tuple.intrinsics,
@@ -66,7 +66,7 @@ pub(super) fn log_reference(
 }
 
 /// A camera of the query: where it was, or where a method says that it was.
-pub(super) struct Camera<'a> {
+pub(super) struct PlacedCamera<'a> {
     pub(super) owner: &'a str,
     pub(super) world_from_camera: &'a Pose,
     pub(super) intrinsics: &'a Intrinsics,
@@ -74,7 +74,7 @@ pub(super) struct Camera<'a> {
     pub(super) label: String,
 }
 
-impl Camera<'_> {
+impl PlacedCamera<'_> {
     pub(super) fn log(&self, stream: &mut Stream, origin: Origin) {
         let path = entities::camera(self.owner);
         stream.log(&path, &origin.transform(self.world_from_camera));

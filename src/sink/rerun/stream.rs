@@ -86,7 +86,7 @@ impl Stream {
         self.eval = eval;
     }
 
-    /// The next decision.
+    /// Goes on to the next decision of the timeline.
     pub(super) fn advance(&mut self) {
         self.step += 1;
     }
@@ -145,8 +145,8 @@ impl Stream {
         self.ask_file();
     }
 
-    /// As [`Self::flush`], and waits until the targets have it.
-    pub(super) fn settle(&mut self) {
+    /// Hands out what was recorded as [`Self::flush`] does, and waits until the targets have it.
+    pub(super) fn flush_blocking(&mut self) {
         let flushed = self.recording.flush_blocking();
         self.ask_file();
         if let Err(error) = flushed
@@ -159,7 +159,7 @@ impl Stream {
 
     /// The end of the recording, with the first error of its life.
     pub(super) fn close(mut self) -> Result<(), RecordError> {
-        self.settle();
+        self.flush_blocking();
         let finished = self.file.as_ref().map_or(Ok(()), RecordingFile::finish);
         if self.serves {
             log::warn!("serving the recording to viewers; press Ctrl-C to end");

@@ -9,7 +9,7 @@ use rerun::{
 };
 
 use super::entities;
-use super::place::Place;
+use super::event_context::EventContext;
 use super::stream::Stream;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
 use crate::palette::{self, Rgb};
@@ -59,7 +59,7 @@ pub(super) fn log_maps(
     stream: &mut Stream,
     surface: &ScoredLattice,
     range: CostRange,
-    place: &Place<'_>,
+    context: &EventContext<'_>,
 ) {
     let most = surface
         .scores
@@ -83,16 +83,20 @@ pub(super) fn log_maps(
         true => format!("{name}/fine"),
         false => name.to_owned(),
     };
-    let path = |name: &str| entities::search(place.method, &part(name));
-    stream.log(&path("cost"), &grid_map(&surface.lattice, place, cost));
+    let path = |name: &str| entities::search(context.method, &part(name));
+    stream.log(&path("cost"), &grid_map(&surface.lattice, context, cost));
     stream.log(
         &path("coverage"),
-        &grid_map(&surface.lattice, place, coverage),
+        &grid_map(&surface.lattice, context, coverage),
     );
 }
 
 /// A lattice of positions as a map; `color` answers `None` where there is nothing to show.
-fn grid_map(lattice: &Lattice, place: &Place<'_>, color: impl Fn(usize) -> Option<Rgb>) -> GridMap {
+fn grid_map(
+    lattice: &Lattice,
+    context: &EventContext<'_>,
+    color: impl Fn(usize) -> Option<Rgb>,
+) -> GridMap {
     let (columns, rows) = (lattice.columns, lattice.rows);
     // The first row of an image is the one farthest ahead.
     let cells = (0..rows)
@@ -119,42 +123,42 @@ fn grid_map(lattice: &Lattice, place: &Place<'_>, color: impl Fn(usize) -> Optio
         .with_translation(on_ground(
             &corner,
             if is_fine { FINE_ABOVE_M } else { 0.0 },
-            place,
+            context,
         ))
-        .with_quaternion(Quaternion::from_xyzw(map_rotation(place)))
+        .with_quaternion(Quaternion::from_xyzw(map_rotation(context)))
         .with_opacity(Opacity::from(0.9))
         .with_draw_order(DrawOrder::from(if is_fine { 1.0 } else { 0.0 }))
 }
 
 /// A map's x axis is the reference camera's right, its y axis the camera's forward.
-fn map_rotation(place: &Place<'_>) -> [f32; 4] {
+fn map_rotation(context: &EventContext<'_>) -> [f32; 4] {
     let axes = [Vector3::x(), Vector3::z(), -Vector3::y()];
     let camera_from_map =
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_basis_unchecked(&axes));
-    let world_from_map = place.problem.reference.world_from_camera.rotation * camera_from_map;
+    let world_from_map = context.problem.reference.world_from_camera.rotation * camera_from_map;
     world_from_map.coords.cast::<f32>().into()
 }
 
-fn on_ground(offset: &Offset, above_m: f64, place: &Place<'_>) -> [f32; 3] {
+fn on_ground(offset: &Offset, above_m: f64, context: &EventContext<'_>) -> [f32; 3] {
     let point = Point3::new(offset.right_m, GROUND_M - above_m, offset.forward_m);
-    let world = place.problem.reference.world_from_camera * point;
-    place.origin.place(&world.coords)
+    let world = context.problem.reference.world_from_camera * point;
+    context.origin.place(&world.coords)
 }
 
 /// The way of the best-so-far hypothesis.
-pub(super) fn log_path(stream: &mut Stream, path: &[Offset], place: &Place<'_>) {
+pub(super) fn log_path(stream: &mut Stream, path: &[Offset], context: &EventContext<'_>) {
     let places = path
         .iter()
-        .map(|offset| on_ground(offset, PATH_ABOVE_M, place));
+        .map(|offset| on_ground(offset, PATH_ABOVE_M, context));
     let strip = LineStrips3D::new([places.collect::<Vec<_>>()])
         .with_colors([super::color(palette::ESTIMATE)])
         .with_radii([Radius::new_ui_points(2.0)]);
-    stream.log(&entities::search(place.method, "path"), &strip);
+    stream.log(&entities::search(context.method, "path"), &strip);
 }
 
 /// How much less each yaw angle costs than the worst one: the best is the highest bar. Bars of the
 /// costs themselves would all look alike, because costs of neighbours differ by a few per cent.
-pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, place: &Place<'_>) {
+pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, context: &EventContext<'_>) {
     let Some(range) = CostRange::of(surface) else {
         return;
     };
@@ -177,7 +181,7 @@ pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, place: &Plac
     let chart = BarChart::new(vector(gains))
         .with_abscissa(vector(angles))
         .with_color(super::color(color));
-    let path = entities::yaw_curve(place.method);
+    let path = entities::yaw_curve(context.method);
     match is_fine {
         true => stream.log(&format!("{path}/fine"), &chart),
         false => stream.log(&path, &chart),

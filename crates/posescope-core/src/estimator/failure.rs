@@ -99,7 +99,7 @@ pub enum Failure {
         /// Where references were sought, around the query's known position \[m\].
         radius_m: Option<f64>,
     },
-    /// Of several references that were to be fused, each failed by itself.
+    /// Several references were to be fused, and each failed by itself.
     #[error(
         "none of {weighed} references gave a pose (of {references}, the others have too few matches); \
          the best, {best}: {failure}"

@@ -1,15 +1,15 @@
 //! FB, the indirect feature-based method (paper, section 2.2 and appendix A).
 
-mod journey;
 mod params;
+mod states;
 
 use std::convert::Infallible;
 use std::sync::Arc;
 
 use nalgebra::Point2;
 
-use self::journey::Journey;
 pub use self::params::{DepthRule, FeatureParams};
+use self::states::FeatureStates;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
@@ -135,13 +135,12 @@ impl FeatureBased {
             counts.reference_keypoints = reference.keypoints.len();
             Ok::<_, Halt>((query, reference))
         })?;
-        let mut journey = Journey::new(query.keypoints.len());
-        let outcome =
-            self.match_and_solve(problem, &query, &reference, &mut journey, counts, trace);
+        let mut states = FeatureStates::new(query.keypoints.len());
+        let outcome = self.match_and_solve(problem, &query, &reference, &mut states, counts, trace);
         // The states are told for a failed query too: they show where its features went.
         if !matches!(outcome, Err(Halt::Cancelled)) {
             trace.emit(|| FeaturesClassified {
-                states: journey.states(),
+                states: states.shared(),
             })?;
         }
         outcome
@@ -152,7 +151,7 @@ impl FeatureBased {
         problem: &Problem,
         query: &Features,
         reference: &Features,
-        journey: &mut Journey,
+        states: &mut FeatureStates,
         counts: &mut FeatureCounts,
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
@@ -170,9 +169,9 @@ impl FeatureBased {
             trace.emit(|| MatchesDecided {
                 decisions: Arc::clone(decisions),
             })?;
-            Ok::<_, Halt>(journey.after_matching(decisions))
+            Ok::<_, Halt>(states.after_matching(decisions))
         })?;
-        counts.ratio_passed = journey.passed_ratio_test();
+        counts.ratio_passed = states.passed_ratio_test();
         counts.unique = matches.len();
         if matches.len() < MINIMUM {
             return Err(Halt::from(Failure::TooFewMatches {
@@ -188,7 +187,7 @@ impl FeatureBased {
             })?;
             Ok::<_, Halt>(lifted)
         })?;
-        journey.after_depth_lift(&lifted);
+        states.after_depth_lift(&lifted);
         let (members, correspondences): (Vec<usize>, Vec<Correspondence>) = lifted
             .iter()
             .filter_map(|lifted| {
@@ -215,7 +214,7 @@ impl FeatureBased {
             })?;
             Ok::<_, Halt>(consensus)
         })?;
-        journey.after_consensus(&members, &consensus);
+        states.after_consensus(&members, &consensus);
         counts.inliers = consensus.inliers.len();
 
         trace.stage(Stage::Accept, |trace| {

@@ -15,7 +15,7 @@ use crate::trace::{Cancelled, Trace};
 /// The two methods of a hybrid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HybridParts {
-    /// Runs first.
+    /// The method that runs first.
     pub first: Method,
     /// Runs where the first has no pose.
     pub second: Method,

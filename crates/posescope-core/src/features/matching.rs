@@ -60,11 +60,11 @@ pub fn nearest_neighbours(
     found
 }
 
-/// As [`nearest_neighbours`]. `checkpoint` is called on the caller's thread every four million pairs,
-/// or every block for each thread where that is more, and can stop the search.
+/// Finds what [`nearest_neighbours`] does. `checkpoint` is called on the caller's thread every four
+/// million pairs, or every block for each thread where that is more, and can stop the search.
 ///
 /// # Errors
-/// Those of `checkpoint`.
+/// The errors of `checkpoint`.
 pub fn nearest_neighbours_interruptible<E>(
     query: &[Descriptor],
     reference: &[Descriptor],

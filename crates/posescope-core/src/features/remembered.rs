@@ -20,10 +20,10 @@ pub fn remembered(image: &GrayImage, memo: &Memo, params: &SurfParams) -> Recall
     memo.recall(Exact::of(params), || surf(image, params))
 }
 
-/// As [`remembered`], of which `checkpoint` can stop the search as in [`surf_interruptible`].
+/// Returns what [`remembered`] does; `checkpoint` can stop the search as in [`surf_interruptible`].
 ///
 /// # Errors
-/// Those of `checkpoint`.
+/// The errors of `checkpoint`.
 pub fn remembered_interruptible<E>(
     image: &GrayImage,
     memo: &Memo,

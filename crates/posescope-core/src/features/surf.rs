@@ -40,11 +40,11 @@ pub fn surf(image: &GrayImage, params: &SurfParams) -> Features {
 /// filter over a photo of 1241 × 376 px, and dozens for each of sixteen threads.
 const KEYPOINTS_AT_A_TIME: usize = 1024;
 
-/// As [`surf`]. `checkpoint` is called on the caller's thread before each pass over the image and
-/// each thousand keypoints, and can stop the search.
+/// Finds what [`surf`] does. `checkpoint` is called on the caller's thread before each pass over
+/// the image and each thousand keypoints, and can stop the search.
 ///
 /// # Errors
-/// Those of `checkpoint`.
+/// The errors of `checkpoint`.
 pub fn surf_interruptible<E>(
     image: &GrayImage,
     params: &SurfParams,

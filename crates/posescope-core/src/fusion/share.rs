@@ -2,9 +2,9 @@
 
 use crate::geometry::Pose;
 
-/// What became of a candidate.
+/// Whether a candidate is part of the fused pose, and why not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
+pub enum ShareOutcome {
     /// It is part of the fused pose.
     Kept,
     /// The fusion gives it no weight.
@@ -18,12 +18,12 @@ pub enum Fate {
 pub struct Share {
     /// The reference frame's name.
     pub reference: String,
-    /// Its feature matches.
+    /// How many feature matches it has with the query.
     pub matches: usize,
     /// Its share of the fused pose. Those of all references add up to 1, or to 0 without a pose.
     pub weight: f64,
-    /// Whether it is part of the pose.
-    pub fate: Fate,
+    /// Whether it is part of the fused pose, and why not.
+    pub outcome: ShareOutcome,
     /// The pose that this reference alone gave.
     pub pose: Option<Pose>,
 }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::observer::checkpoint;
 use super::select::{ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within};
-use super::watch::checkpoint;
-use super::{Localizer, Watch};
+use super::{LocalizeObserver, Localizer};
 use crate::params::Params;
 use crate::retrieval::{RankedReference, ReferenceRanking};
 
@@ -14,19 +14,19 @@ pub struct Chooser<'a> {
     pub localizer: &'a Localizer<'a>,
     /// Parameters of features and matching.
     pub params: &'a Params,
-    /// How.
+    /// How references are chosen, and how many.
     pub selection: Selection,
     /// How far from the query's known position a reference may be \[m\].
     pub radius_m: f64,
     /// Seed of the draw.
     pub seed: u64,
-    /// What [`Selection::Retrieved`] asks.
+    /// The index that [`Selection::Retrieved`] asks.
     pub index: Option<&'a dyn Ranking>,
 }
 
 impl Chooser<'_> {
     /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
-    /// that it must not be one; the query itself never is. `watch` hears nothing, but can stop it.
+    /// that it must not be one; the query itself never is. `observer` hears nothing, but can stop it.
     ///
     /// # Errors
     /// [`ChoiceError`].
@@ -34,7 +34,7 @@ impl Chooser<'_> {
         &self,
         query: usize,
         left_out: &dyn Fn(usize) -> bool,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
@@ -66,11 +66,11 @@ impl Chooser<'_> {
                     scene: references,
                     params: self.params,
                 };
-                self.ranked(query, &within, &by_matches, watch)?
+                self.ranked(query, &within, &by_matches, observer)?
             }
             Selection::Retrieved(_) => {
                 let index = self.index.ok_or(ChoiceError::NoIndex)?;
-                self.ranked(query, &within, index, watch)?
+                self.ranked(query, &within, index, observer)?
             }
         };
         Ok(References {
@@ -84,14 +84,14 @@ impl Chooser<'_> {
         query: usize,
         candidates: &[usize],
         by: &dyn Ranking,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let count = self.selection.count();
         let depth = ReferenceRanking::depth(count);
         let frames: Vec<RankedReference> = by
             .rank(&*queries.query(query)?, candidates, depth, &mut || {
-                checkpoint(watch)
+                checkpoint(observer)
             })?
             .into_iter()
             .map(|ranked| RankedReference {

@@ -5,10 +5,10 @@
 
 use std::sync::Arc;
 
-use super::watch::checkpoint;
+use super::observer::checkpoint;
 use super::{
-    QueryResult, References, Setting, StageTimes, StageTimings, Watch, evaluate, localize_traced,
-    tell_ranking,
+    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, evaluate,
+    localize_traced, tell_ranking,
 };
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::KindSet;
@@ -19,7 +19,7 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, Query};
 use crate::retrieval::ReferenceRanking;
-use crate::scene::{AtHand, Scene, SceneError};
+use crate::scene::{CachedScene, Scene, SceneError};
 use crate::trace::Fanout;
 use crate::trace::{Cancelled, Sink, Trace};
 
@@ -29,7 +29,7 @@ pub enum LocalizeError {
     /// A frame cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The watcher asked the run to stop.
+    /// The observer asked the run to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -53,44 +53,45 @@ pub struct Request {
 /// The frames that were used last are at hand for the next method and the next query, with all that
 /// was worked out about them.
 pub struct Localizer<'a> {
-    references: AtHand<'a>,
-    queries: AtHand<'a>,
+    references: CachedScene<'a>,
+    queries: CachedScene<'a>,
     params: &'a Params,
     seed: u64,
 }
 
 /// What one method made of one problem.
-struct Candidate {
+struct MethodOutcome {
     outcome: Outcome,
     result: QueryResult,
     times: StageTimes,
 }
 
-/// A query with all that was found out about it.
-struct Work<'a> {
+/// A query at work, with all that was found out about it.
+struct QueryWork<'a> {
     query: &'a Query,
     truth: Option<Pose>,
     problems: Vec<Problem>,
     /// Feature matches by problem, once they are known.
     matches: Vec<Option<usize>>,
-    /// By method, in the order of [`estimator::methods`], and problem.
-    candidates: Vec<Vec<Option<Candidate>>>,
+    /// What each method made of each problem, in the order of [`estimator::methods`].
+    candidates: Vec<Vec<Option<MethodOutcome>>>,
 }
 
 impl<'a> Localizer<'a> {
-    /// For these scenes, which may be the same.
+    /// A localizer for these scenes, which may be the same.
     pub fn new(
         references: &'a dyn Scene,
         queries: &'a dyn Scene,
         params: &'a Params,
         seed: u64,
     ) -> Self {
-        Self::at_hand(AtHand::pair(references, queries), params, seed)
+        Self::with_cached_scenes(CachedScene::pair(references, queries), params, seed)
     }
 
-    /// For scenes, references and queries, whose frames are remembered for longer than this.
-    pub fn at_hand(
-        (references, queries): (AtHand<'a>, AtHand<'a>),
+    /// A localizer for scenes, references and queries, whose frames are remembered for longer than
+    /// it lives.
+    pub fn with_cached_scenes(
+        (references, queries): (CachedScene<'a>, CachedScene<'a>),
         params: &'a Params,
         seed: u64,
     ) -> Self {
@@ -118,14 +119,14 @@ impl<'a> Localizer<'a> {
     /// A panic of an estimator becomes the result of the query that it met.
     ///
     /// # Errors
-    /// Data that cannot be read, a run that its watcher cancelled, and what `hand_out` returns.
+    /// Data that cannot be read, a run that its observer cancelled, and what `hand_out` returns.
     pub fn localize<E: From<SceneError> + From<Cancelled>>(
         &self,
         index: usize,
         query: usize,
         requests: &[Request],
         methods: &[Method],
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
         mut hand_out: impl FnMut(QueryResult, StageTimes) -> Result<(), E>,
     ) -> Result<(), E> {
         let loaded = self.queries.query(query)?;
@@ -141,7 +142,7 @@ impl<'a> Localizer<'a> {
                     Some(problem) => problem,
                     None => {
                         places.push(place);
-                        checkpoint(watch)?;
+                        checkpoint(observer)?;
                         problems.push(Problem {
                             query: Arc::clone(&loaded),
                             reference: self.references.reference(reference)?,
@@ -154,7 +155,7 @@ impl<'a> Localizer<'a> {
             }
             members.push(of_request);
         }
-        let mut work = Work {
+        let mut work = QueryWork {
             query: &loaded,
             truth: self.queries.pose(query),
             matches: vec![None; problems.len()],
@@ -163,8 +164,8 @@ impl<'a> Localizer<'a> {
                 .collect(),
             problems,
         };
-        watch.begin_query(index, &work.problems, work.truth.as_ref());
-        self.tell_rankings(requests, watch)?;
+        observer.begin_query(index, &work.problems, work.truth.as_ref());
+        self.tell_rankings(requests, observer)?;
         for &method in methods {
             for (request, members) in requests.iter().zip(&members) {
                 let mut emit = |result: QueryResult, times: StageTimes| {
@@ -187,7 +188,7 @@ impl<'a> Localizer<'a> {
                     continue;
                 }
                 for &problem in members {
-                    self.solve(&mut work, problem, method, watch)?;
+                    self.solve(&mut work, problem, method, observer)?;
                     if let (true, Some(candidate)) =
                         (request.fusions.is_empty(), work.candidate(problem, method))
                     {
@@ -195,10 +196,10 @@ impl<'a> Localizer<'a> {
                     }
                 }
                 if !request.fusions.is_empty() {
-                    self.count_matches(&mut work, members, watch)?;
+                    self.count_matches(&mut work, members, observer)?;
                 }
                 for &fusion in &request.fusions {
-                    let (result, times) = self.fuse(&work, members, method, fusion, watch)?;
+                    let (result, times) = self.fuse(&work, members, method, fusion, observer)?;
                     emit(result, times)?;
                 }
             }
@@ -207,15 +208,19 @@ impl<'a> Localizer<'a> {
     }
 
     /// Each ranking once, though several requests may take their references from it.
-    fn tell_rankings(&self, requests: &[Request], watch: &mut dyn Watch) -> Result<(), Cancelled> {
+    fn tell_rankings(
+        &self,
+        requests: &[Request],
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(), Cancelled> {
         let mut told: Vec<&Arc<ReferenceRanking>> = Vec::new();
         for ranking in requests
             .iter()
             .filter_map(|r| r.references.ranking.as_ref())
         {
             if !told.iter().any(|known| Arc::ptr_eq(known, ranking)) {
-                watch.begin_retrieval();
-                let sink: &mut dyn Sink = &mut *watch;
+                observer.begin_retrieval();
+                let sink: &mut dyn Sink = &mut *observer;
                 tell_ranking(ranking, &self.references, &mut Trace::to(sink))?;
                 told.push(ranking);
             }
@@ -234,7 +239,7 @@ impl<'a> Localizer<'a> {
 
     fn without_pose(
         &self,
-        work: &Work<'_>,
+        work: &QueryWork<'_>,
         method: Method,
         fusion: Option<Fusion>,
         failure: &Failure,
@@ -255,31 +260,31 @@ impl<'a> Localizer<'a> {
     /// Solves one problem, unless it was solved before.
     fn solve(
         &self,
-        work: &mut Work<'_>,
+        work: &mut QueryWork<'_>,
         problem: usize,
         method: Method,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
         if work.candidate(problem, method).is_some() {
             return Ok(());
         }
-        watch.begin_method(problem, method);
+        observer.begin_method(problem, method);
         let candidate = match work.hybrid_parts(problem, method) {
             Some((feature, direct)) => {
                 let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
                 let times = StageTimes::inside(method.name(), runs.into_iter().take(used));
-                let outcome = match watch.wanted() == KindSet::NONE {
+                let outcome = match observer.wanted() == KindSet::NONE {
                     true => hybrid_outcome(&feature.outcome, &direct.outcome),
                     // Whoever watches wants to see the hybrid at work. It has everything at hand, so
                     // what it takes now says nothing.
-                    false => self.estimate(work, problem, method, watch)?.outcome,
+                    false => self.estimate(work, problem, method, observer)?.outcome,
                 };
                 self.judged(work, problem, method, outcome, times)
             }
-            None => self.estimate(work, problem, method, watch)?,
+            None => self.estimate(work, problem, method, observer)?,
         };
-        watch.end_method(&candidate.result, &candidate.times);
+        observer.end_method(&candidate.result, &candidate.times);
         let row = estimator::methods().position(|known| known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
@@ -289,14 +294,14 @@ impl<'a> Localizer<'a> {
 
     fn estimate(
         &self,
-        work: &Work<'_>,
+        work: &QueryWork<'_>,
         problem: usize,
         method: Method,
-        watch: &mut dyn Watch,
-    ) -> Result<Candidate, Cancelled> {
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<MethodOutcome, Cancelled> {
         let mut timings = StageTimings::default();
-        let attention = watch.attention();
-        let sinks: Vec<&mut dyn Sink> = vec![&mut timings, watch];
+        let attention = observer.attention();
+        let sinks: Vec<&mut dyn Sink> = vec![&mut timings, observer];
         let mut fanout = Fanout::new(sinks);
         let mut trace = match &attention {
             Some(flag) => Trace::watched(&mut fanout, flag),
@@ -308,12 +313,12 @@ impl<'a> Localizer<'a> {
 
     fn judged(
         &self,
-        work: &Work<'_>,
+        work: &QueryWork<'_>,
         problem: usize,
         method: Method,
         outcome: Outcome,
         times: StageTimes,
-    ) -> Candidate {
+    ) -> MethodOutcome {
         let result = evaluate(
             self.references.name(),
             &work.problems[problem],
@@ -322,7 +327,7 @@ impl<'a> Localizer<'a> {
             &outcome,
             work.truth.as_ref(),
         );
-        Candidate {
+        MethodOutcome {
             outcome,
             result,
             times,
@@ -332,15 +337,15 @@ impl<'a> Localizer<'a> {
     /// FB counts them anyway; for the direct methods the same features are matched.
     fn count_matches(
         &self,
-        work: &mut Work<'_>,
+        work: &mut QueryWork<'_>,
         members: &[usize],
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
         for &problem in members {
             if work.matches[problem].is_some() {
                 continue;
             }
-            checkpoint(watch)?;
+            checkpoint(observer)?;
             let counted = estimator::methods().find_map(|method| {
                 let candidate = work.candidate(problem, method)?;
                 candidate.outcome.counts
@@ -363,13 +368,13 @@ impl<'a> Localizer<'a> {
 
     fn fuse(
         &self,
-        work: &Work<'_>,
+        work: &QueryWork<'_>,
         members: &[usize],
         method: Method,
         fusion: Fusion,
-        watch: &mut dyn Watch,
+        observer: &mut dyn LocalizeObserver,
     ) -> Result<(QueryResult, StageTimes), Cancelled> {
-        let solved: Vec<(&Problem, usize, &Candidate)> = members
+        let solved: Vec<(&Problem, usize, &MethodOutcome)> = members
             .iter()
             .filter_map(|&problem| {
                 let matches = work.matches[problem].unwrap_or_default();
@@ -385,8 +390,8 @@ impl<'a> Localizer<'a> {
                 pose: candidate.outcome.pose.as_ref(),
             })
             .collect();
-        watch.begin_fusion(method);
-        let sink: &mut dyn Sink = watch;
+        observer.begin_fusion(method);
+        let sink: &mut dyn Sink = observer;
         let pose = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
         let truth = work.truth.as_ref();
         // Where one would start from with a single reference: the one with the most matches.
@@ -415,25 +420,30 @@ impl<'a> Localizer<'a> {
                 truth,
             )
         };
-        watch.end_fusion(&result);
+        observer.end_fusion(&result);
         let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
         Ok((result, times))
     }
 }
 
-impl Work<'_> {
-    fn candidate(&self, problem: usize, method: Method) -> Option<&Candidate> {
+impl QueryWork<'_> {
+    fn candidate(&self, problem: usize, method: Method) -> Option<&MethodOutcome> {
         let row = estimator::methods().position(|known| known == method)?;
         self.candidates.get(row)?.get(problem)?.as_ref()
     }
 
     /// The candidates of a hybrid's methods, where it can be made of them.
-    fn hybrid_parts(&self, problem: usize, method: Method) -> Option<(&Candidate, &Candidate)> {
+    fn hybrid_parts(
+        &self,
+        problem: usize,
+        method: Method,
+    ) -> Option<(&MethodOutcome, &MethodOutcome)> {
         let parts = estimator::find(method)?.hybrid()?;
         let first = self.candidate(problem, parts.first)?;
         let second = self.candidate(problem, parts.second)?;
-        let panicked =
-            |candidate: &Candidate| matches!(candidate.outcome.pose, Err(Failure::Internal { .. }));
+        let panicked = |candidate: &MethodOutcome| {
+            matches!(candidate.outcome.pose, Err(Failure::Internal { .. }))
+        };
         (!panicked(first) && !panicked(second)).then_some((first, second))
     }
 }

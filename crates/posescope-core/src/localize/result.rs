@@ -20,7 +20,7 @@ pub const SCHEMA: &str = "posescope.result/1";
 /// What one method made of one query. It holds no clock, so that equal runs give equal bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QueryResult {
-    /// [`SCHEMA`].
+    /// The version of the form, [`SCHEMA`].
     pub schema: String,
     /// The name of the references' scene.
     pub scene: String,
@@ -80,10 +80,10 @@ pub enum Status {
 }
 
 impl Status {
-    /// Both.
+    /// Both statuses.
     pub const ALL: [Self; 2] = [Self::Ok, Self::Failed];
 
-    /// In one word.
+    /// The status in one word.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -114,7 +114,7 @@ crate::serde_as_text!(Status);
 pub struct Reason {
     /// The code, such as `R3`.
     pub code: String,
-    /// One sentence with the numbers.
+    /// The reason in one sentence with the numbers.
     pub text: String,
 }
 
@@ -123,7 +123,7 @@ pub struct Reason {
 pub struct Diagnosis {
     /// The code, such as `D2`.
     pub code: String,
-    /// One sentence.
+    /// The finding in one sentence.
     pub text: String,
     /// The numbers behind it.
     pub evidence: serde_json::Value,
@@ -167,15 +167,15 @@ impl PoseReport {
 /// The cost of a direct method at the poses that matter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CostReport {
-    /// At the reference pose.
+    /// The cost at the reference pose.
     pub initial: Option<f64>,
-    /// At the estimate.
+    /// The cost at the estimate.
     pub best: f64,
-    /// At the true pose, where it is known.
+    /// The cost at the true pose, where that is known.
     pub truth: Option<f64>,
-    /// At the estimate with the view's pixels shuffled.
+    /// The cost at the estimate with the view's pixels shuffled.
     pub shuffled: Option<f64>,
-    /// At the second-best local minimum.
+    /// The cost at the second-best local minimum.
     pub runner_up: Option<f64>,
     /// Share of the image that is covered at the estimate.
     pub coverage_best: f64,

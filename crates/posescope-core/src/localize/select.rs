@@ -45,7 +45,7 @@ impl Selection {
         }
     }
 
-    /// K.
+    /// How many references are chosen: the K of its name.
     pub fn count(self) -> usize {
         self.parts().1
     }
@@ -116,7 +116,7 @@ pub trait Ranking: Send + Sync {
 /// The references of a query.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct References {
-    /// Their positions in their scene.
+    /// The positions of the references in their scene.
     pub frames: Vec<usize>,
     /// How they were found, where something ranked them.
     pub ranking: Option<Arc<ReferenceRanking>>,
@@ -204,7 +204,7 @@ pub enum ChoiceError {
     /// A frame cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The watcher asked the run to stop.
+    /// The observer asked the run to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -19,7 +19,8 @@ pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
         .unwrap_or_else(|Cancelled| unreachable!("a trace that is off cancels nothing"))
 }
 
-/// As [`localize`], and tells every decision to a trace; that changes nothing of the answer.
+/// Localises as [`localize`] does, and tells every decision to a trace; that changes nothing of the
+/// answer.
 ///
 /// # Errors
 /// [`Cancelled`] when whoever listens asks the run to stop.
@@ -37,8 +38,8 @@ pub fn localize_traced(
     }
 }
 
-/// As [`localize_traced`], by an estimator that somebody made. A panic in it is an outcome,
-/// [`Failure::Internal`].
+/// Localises as [`localize_traced`] does, by an estimator that somebody made. A panic in it is an
+/// outcome, [`Failure::Internal`].
 ///
 /// # Errors
 /// [`Cancelled`] when whoever listens asks the run to stop.

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::error::BuildError;
-use super::layout::{Counts, Description, IndexedFeature, Writer};
-use super::tf_idf::Occurrences;
+use super::layout::{Description, IndexWriter, IndexedFeature, RecordCounts};
+use super::tf_idf::InvertedIndexBuilder;
 use super::vocabulary::{Clustering, Vocabulary};
 use crate::features::{Descriptor, Features};
 use crate::files::write_whole_with;
@@ -26,7 +26,7 @@ const NUMBERS: usize = 4 + 64;
 
 /// What is to be indexed, and how.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Request {
+pub struct BuildRequest {
     /// The scene's name.
     pub scene: String,
     /// Changes with the scene's frames.
@@ -35,15 +35,15 @@ pub struct Request {
     pub frames: Vec<usize>,
     /// Number of visual words.
     pub words: usize,
-    /// Of every random choice.
+    /// The seed of every random choice.
     pub seed: u64,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub sample: usize,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub iterations: usize,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub trees: usize,
-    /// As in [`super::RetrievalParams`].
+    /// See [`super::RetrievalParams`].
     pub checks: usize,
     /// All that decides what the index holds, by name; kept with it and compared when it is used.
     pub recipe: BTreeMap<String, String>,
@@ -51,7 +51,7 @@ pub struct Request {
 
 /// A part of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum BuildStep {
     /// Features of each frame.
     Features,
     /// Rounds of k-means.
@@ -60,7 +60,7 @@ pub enum Step {
     Words,
 }
 
-impl Step {
+impl BuildStep {
     /// What is being done.
     pub fn name(self) -> &'static str {
         match self {
@@ -71,23 +71,23 @@ impl Step {
     }
 }
 
-/// How far the work is.
+/// How far the building of an index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// The part.
-    pub step: Step,
-    /// Of the part.
+pub struct BuildProgress {
+    /// The part of the work that is being done.
+    pub step: BuildStep,
+    /// How much of the part is done.
     pub done: usize,
-    /// Of the part; k-means may settle sooner.
+    /// How much the part has in all; k-means may converge sooner.
     pub total: usize,
 }
 
-/// What came of it.
+/// What an index was built of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Summary {
+pub struct BuildSummary {
     /// Frames in the index.
     pub frames: usize,
-    /// Their features.
+    /// Features of these frames.
     pub features: usize,
     /// Visual words.
     pub words: usize,
@@ -106,10 +106,10 @@ pub struct Summary {
 /// written.
 pub fn build<E: std::error::Error + Send + 'static>(
     path: &Path,
-    request: &Request,
+    request: &BuildRequest,
     features_of: impl Fn(usize) -> Result<Features, E> + Sync,
-    mut progress: impl FnMut(Progress),
-) -> Result<Summary, BuildError<E>> {
+    mut progress: impl FnMut(BuildProgress),
+) -> Result<BuildSummary, BuildError<E>> {
     let io = |source| BuildError::Io {
         path: path.to_owned(),
         source,
@@ -120,7 +120,7 @@ pub fn build<E: std::error::Error + Send + 'static>(
         None => Path::new("."),
     };
     fs::create_dir_all(folder).map_err(io)?;
-    let mut waiting = Waiting::new(folder).map_err(io)?;
+    let mut waiting = FeatureSpool::new(folder).map_err(io)?;
     let total = request.frames.len();
     for batch in request.frames.chunks(BATCH) {
         let features: Result<Vec<_>, _> =
@@ -129,8 +129,8 @@ pub fn build<E: std::error::Error + Send + 'static>(
             waiting.push(&features).map_err(io)?;
         }
         let done = waiting.counts.len();
-        progress(Progress {
-            step: Step::Features,
+        progress(BuildProgress {
+            step: BuildStep::Features,
             done,
             total,
         });
@@ -148,7 +148,7 @@ pub fn build<E: std::error::Error + Send + 'static>(
         write(file, waiting, request, &vocabulary, &mut progress)
     })
     .map_err(io)?;
-    Ok(Summary {
+    Ok(BuildSummary {
         frames: total,
         features: found,
         words: vocabulary.words().len(),
@@ -163,9 +163,9 @@ pub(super) fn seed_for(seed: u64, purpose: &str) -> u64 {
 
 /// Words from a sample of the descriptors, drawn without regard to frames.
 fn learn(
-    waiting: &mut Complete,
-    request: &Request,
-    progress: &mut impl FnMut(Progress),
+    waiting: &mut SpooledFeatures,
+    request: &BuildRequest,
+    progress: &mut impl FnMut(BuildProgress),
 ) -> io::Result<Vocabulary> {
     let total: usize = waiting.counts.iter().sum();
     let wanted = request.words.saturating_mul(request.sample.max(1));
@@ -193,8 +193,8 @@ fn learn(
         seed: seed_for(request.seed, "vocabulary"),
     };
     Ok(Vocabulary::learn(&sample, &clustering, |done| {
-        progress(Progress {
-            step: Step::Vocabulary,
+        progress(BuildProgress {
+            step: BuildStep::Vocabulary,
             done,
             total: request.iterations,
         });
@@ -203,18 +203,18 @@ fn learn(
 
 fn write(
     file: &mut File,
-    mut waiting: Complete,
-    request: &Request,
+    mut waiting: SpooledFeatures,
+    request: &BuildRequest,
     vocabulary: &Vocabulary,
-    progress: &mut impl FnMut(Progress),
+    progress: &mut impl FnMut(BuildProgress),
 ) -> io::Result<()> {
-    let mut writer = Writer::new(BufWriter::new(file))?;
-    let mut counts = Counts {
+    let mut writer = IndexWriter::new(BufWriter::new(file))?;
+    let mut counts = RecordCounts {
         documents: request.frames.len(),
         words: vocabulary.words().len(),
-        ..Counts::default()
+        ..RecordCounts::default()
     };
-    let mut occurrences = Occurrences::new(counts.words);
+    let mut occurrences = InvertedIndexBuilder::new(counts.words);
     let mut starts = vec![0];
     waiting.rewind()?;
     for done in 0..counts.documents {
@@ -242,8 +242,8 @@ fn write(
         occurrences.push(&words);
         counts.features += features.len();
         starts.push(number(counts.features)?);
-        progress(Progress {
-            step: Step::Words,
+        progress(BuildProgress {
+            step: BuildStep::Words,
             done: done + 1,
             total: counts.documents,
         });
@@ -274,12 +274,12 @@ fn write(
     })
 }
 
-/// As a description has it.
+/// The fingerprint as a description writes it.
 pub(super) fn fingerprint_text(fingerprint: u64) -> String {
     format!("{fingerprint:016x}")
 }
 
-/// As a record has it.
+/// The number as a record writes it.
 fn number(count: usize) -> io::Result<u32> {
     u32::try_from(count).map_err(|_| {
         io::Error::new(
@@ -290,13 +290,13 @@ fn number(count: usize) -> io::Result<u32> {
 }
 
 /// Features that wait on disk, in a file without a name.
-struct Waiting {
+struct FeatureSpool {
     file: BufWriter<File>,
     /// Features of each frame.
     counts: Vec<usize>,
 }
 
-impl Waiting {
+impl FeatureSpool {
     fn new(folder: &Path) -> io::Result<Self> {
         Ok(Self {
             file: BufWriter::new(tempfile::tempfile_in(folder)?),
@@ -316,8 +316,8 @@ impl Waiting {
         Ok(())
     }
 
-    fn complete(self) -> io::Result<Complete> {
-        Ok(Complete {
+    fn complete(self) -> io::Result<SpooledFeatures> {
+        Ok(SpooledFeatures {
             file: BufReader::new(self.file.into_inner()?),
             counts: self.counts,
         })
@@ -325,12 +325,12 @@ impl Waiting {
 }
 
 /// The features of all frames, to be read in their order.
-struct Complete {
+struct SpooledFeatures {
     file: BufReader<File>,
     counts: Vec<usize>,
 }
 
-impl Complete {
+impl SpooledFeatures {
     fn rewind(&mut self) -> io::Result<()> {
         self.file.rewind()
     }

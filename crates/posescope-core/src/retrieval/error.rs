@@ -9,7 +9,7 @@ pub enum IndexError {
     /// There is no file.
     #[error("{}: there is no retrieval index", .path.display())]
     NotFound {
-        /// Where it should be.
+        /// Where the index should be.
         path: PathBuf,
     },
     /// A file that cannot be opened or read.
@@ -41,7 +41,7 @@ pub enum IndexError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// How it shows.
+        /// How the damage shows.
         what: &'static str,
     },
     /// An index of something else.
@@ -49,7 +49,7 @@ pub enum IndexError {
     Stale {
         /// The file.
         path: PathBuf,
-        /// What differs.
+        /// What differs from what is asked for.
         why: String,
     },
 }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::build::{Request, fingerprint_text};
+use super::build::{BuildRequest, fingerprint_text};
 use super::error::IndexError;
-use super::layout::{Description, Stored};
+use super::layout::{Description, MappedIndex};
 use super::params::RetrievalParams;
 use super::tf_idf::query_weights;
-use super::verification::{Pair, Verification, verify};
+use super::verification::{Verification, WordMatch, verify};
 use super::vocabulary::Vocabulary;
 use crate::features::Features;
 
@@ -63,7 +63,7 @@ pub struct Retrieval {
 /// An index, open to queries from any thread.
 pub struct Index {
     path: PathBuf,
-    stored: Stored,
+    stored: MappedIndex,
     vocabulary: Vocabulary,
 }
 
@@ -74,7 +74,7 @@ impl Index {
     /// # Errors
     /// [`IndexError`] when there is none, or it is damaged or of another layout.
     pub fn open(path: &Path, checks: usize) -> Result<Self, IndexError> {
-        let stored = Stored::open(path)?;
+        let stored = MappedIndex::open(path)?;
         let Description { trees, seed, .. } = *stored.description();
         Ok(Self {
             path: path.to_owned(),
@@ -88,7 +88,7 @@ impl Index {
         self.stored.description()
     }
 
-    /// Where it is.
+    /// The file of the index.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -129,7 +129,7 @@ impl Index {
     ///
     /// # Errors
     /// [`IndexError::Stale`] names what differs.
-    pub fn check_request(&self, request: &Request) -> Result<(), IndexError> {
+    pub fn check_request(&self, request: &BuildRequest) -> Result<(), IndexError> {
         self.check(&request.scene, request.fingerprint, &request.recipe)
     }
 
@@ -201,7 +201,12 @@ impl Index {
     }
 
     /// The features of query and document that share a word, those of one query feature together.
-    fn pairs(&self, features: &Features, by_word: &[(u32, u32)], document: usize) -> Vec<Pair> {
+    fn pairs(
+        &self,
+        features: &Features,
+        by_word: &[(u32, u32)],
+        document: usize,
+    ) -> Vec<WordMatch> {
         let theirs: Vec<_> = self.stored.features(document).collect();
         let mut theirs = theirs.chunk_by(|a, b| a.word == b.word).peekable();
         let mut pairs = Vec::new();
@@ -215,7 +220,7 @@ impl Index {
                 continue;
             }
             for &(_, query) in ours {
-                pairs.extend(run.iter().map(|feature| Pair {
+                pairs.extend(run.iter().map(|feature| WordMatch {
                     query,
                     query_keypoint: features.keypoints[query as usize],
                     reference_keypoint: feature.keypoint(),

@@ -48,15 +48,15 @@ pub struct Description {
     pub recipe: BTreeMap<String, String>,
     /// Trees of the forest.
     pub trees: usize,
-    /// Of the forest.
+    /// The seed of the forest.
     pub seed: u64,
     /// Numbers of records.
-    pub counts: Counts,
+    pub counts: RecordCounts,
 }
 
 /// Numbers of records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counts {
+pub struct RecordCounts {
     /// Features of all documents.
     pub features: usize,
     /// Documents.
@@ -70,15 +70,15 @@ pub struct Counts {
 /// A feature of an indexed frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IndexedFeature {
-    /// Its word.
+    /// The visual word of the feature.
     pub word: u32,
-    /// Column \[px\].
+    /// The column of its keypoint \[px\].
     pub x: f32,
-    /// Row \[px\].
+    /// The row of its keypoint \[px\].
     pub y: f32,
-    /// As [`Keypoint::scale`].
+    /// See [`Keypoint::scale`].
     pub scale: f32,
-    /// As [`Keypoint::angle`].
+    /// See [`Keypoint::angle`].
     pub angle: f32,
 }
 
@@ -97,12 +97,12 @@ impl IndexedFeature {
 }
 
 /// Writes an index from front to back and sums it up.
-pub struct Writer<W> {
+pub struct IndexWriter<W> {
     out: W,
     sum: Xxh3,
 }
 
-impl<W: Write> Writer<W> {
+impl<W: Write> IndexWriter<W> {
     /// Begins with the magic.
     pub fn new(out: W) -> io::Result<Self> {
         let mut writer = Self {
@@ -127,7 +127,7 @@ impl<W: Write> Writer<W> {
         self.bytes(&record)
     }
 
-    /// A feature.
+    /// Writes a feature.
     pub fn feature(&mut self, feature: &IndexedFeature) -> io::Result<()> {
         let IndexedFeature {
             word,
@@ -142,7 +142,7 @@ impl<W: Write> Writer<W> {
             .try_for_each(|number| self.bytes(&number.to_le_bytes()))
     }
 
-    /// A word.
+    /// Writes a visual word.
     pub fn word(&mut self, word: &Descriptor) -> io::Result<()> {
         word.iter()
             .try_for_each(|number| self.bytes(&number.to_le_bytes()))
@@ -160,7 +160,7 @@ impl<W: Write> Writer<W> {
 }
 
 /// An index in its file, of which what is asked for comes into memory.
-pub struct Stored {
+pub struct MappedIndex {
     map: Mmap,
     description: Description,
     features: Range<usize>,
@@ -170,7 +170,7 @@ pub struct Stored {
     postings: Range<usize>,
 }
 
-impl Stored {
+impl MappedIndex {
     /// Maps a file whose every byte was checked before.
     pub fn open(path: &Path) -> Result<Self, IndexError> {
         let io = |source: io::Error| match source.kind() {
@@ -344,8 +344,8 @@ fn numbers(record: &[u8; 8]) -> (u32, u32) {
     )
 }
 
-/// Of the next `length` bytes. Read and not mapped, so that checking a large index does not bring all
-/// of it into the memory of the process.
+/// The checksum of the next `length` bytes. Read and not mapped, so that checking a large index
+/// does not bring all of it into the memory of the process.
 fn checksum(file: &mut File, length: usize) -> io::Result<u64> {
     let mut sum = Xxh3::new();
     let mut block = vec![0; BLOCK.min(length)];

@@ -1,6 +1,6 @@
 //! The parameters of retrieval.
 
-use super::verification::Tolerance;
+use super::verification::VerificationLimits;
 use crate::describe::parameters;
 use crate::features::SurfParams;
 
@@ -47,9 +47,9 @@ impl RetrievalParams {
     /// The names of those that decide what an index holds; the others only how it is asked.
     pub const BUILDING: [&'static str; 5] = ["features", "sample", "iterations", "trees", "checks"];
 
-    /// What verification allows.
-    pub fn tolerance(&self) -> Tolerance {
-        Tolerance {
+    /// The limits of verification.
+    pub fn tolerance(&self) -> VerificationLimits {
+        VerificationLimits {
             inlier_px: self.inlier_px,
             min_inliers: self.min_inliers,
         }

@@ -37,8 +37,8 @@ fn view(place: usize, seed: u64) -> Features {
     }
 }
 
-fn request() -> Request {
-    Request {
+fn request() -> BuildRequest {
+    BuildRequest {
         scene: "landmarks".to_owned(),
         fingerprint: 42,
         // Every other place, so that positions in the index differ from those in the scene.
@@ -55,7 +55,7 @@ fn request() -> Request {
     }
 }
 
-fn built(request: &Request) -> (TempDir, PathBuf) {
+fn built(request: &BuildRequest) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder
         .path()
@@ -153,7 +153,7 @@ fn the_bytes_do_not_depend_on_the_number_of_threads_and_do_on_the_seed() {
     let on = |threads, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("a thread pool").install(|| {
-            let request = Request { seed, ..request() };
+            let request = BuildRequest { seed, ..request() };
             let (_folder, path) = built(&request);
             fs::read(path).expect("just written")
         })
@@ -175,7 +175,7 @@ fn the_file_gives_back_what_went_in() {
     assert_eq!(description.counts.documents, FRAMES / 2);
     assert_eq!(description.counts.features, FRAMES / 2 * SEEN);
     assert_eq!(description.counts.words, 200);
-    let stored = super::layout::Stored::open(&path).expect("just opened");
+    let stored = super::layout::MappedIndex::open(&path).expect("just opened");
     for document in 0..FRAMES / 2 {
         assert_eq!(stored.frame(document), Some(2 * document));
         let written = view(2 * document, 0);
@@ -203,24 +203,24 @@ fn an_index_of_something_else_is_stale_and_says_why() {
     let (_folder, path) = built(&request);
     let index = open(&path);
     assert!(index.check_request(&request).is_ok());
-    let why = |changed: Request| {
+    let why = |changed: BuildRequest| {
         let error = index.check_request(&changed).expect_err("is stale");
         error.to_string()
     };
     let scene = "street".to_owned();
-    let message = why(Request {
+    let message = why(BuildRequest {
         scene,
         ..request.clone()
     });
     assert!(message.contains("of landmarks, not of street"), "{message}");
-    let message = why(Request {
+    let message = why(BuildRequest {
         fingerprint: 43,
         ..request.clone()
     });
     assert!(message.contains("have changed since"), "{message}");
     let mut recipe = request.recipe.clone();
     recipe.insert("features".to_owned(), "500".to_owned());
-    let message = why(Request { recipe, ..request });
+    let message = why(BuildRequest { recipe, ..request });
     assert!(
         message.contains("made with features = 1000, not 500"),
         "{message}"
@@ -231,7 +231,7 @@ fn an_index_of_something_else_is_stale_and_says_why() {
 fn a_vocabulary_too_large_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.posescope-index");
-    let request = Request {
+    let request = BuildRequest {
         words: 5000,
         ..request()
     };
@@ -259,13 +259,13 @@ fn a_frame_that_cannot_be_read_ends_the_work() {
 fn progress_goes_through_all_steps_to_their_ends() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.posescope-index");
-    let mut told: Vec<Progress> = Vec::new();
+    let mut told: Vec<BuildProgress> = Vec::new();
     let tell = |progress| told.push(progress);
     build(&path, &request(), |f| Ok::<_, Infallible>(view(f, 0)), tell).expect("is built");
     let mut steps: Vec<&str> = told.iter().map(|progress| progress.step.name()).collect();
     steps.dedup();
     assert_eq!(steps, ["features", "vocabulary", "words"]);
-    for step in [Step::Features, Step::Words] {
+    for step in [BuildStep::Features, BuildStep::Words] {
         let last = told.iter().rev().find(|progress| progress.step == step);
         assert!(last.is_some_and(|last| last.done == last.total));
     }
@@ -308,7 +308,7 @@ fn another_layout_is_named() {
 }
 
 fn small_file() -> Vec<u8> {
-    let request = Request {
+    let request = BuildRequest {
         frames: (0..3).collect(),
         words: 8,
         ..request()

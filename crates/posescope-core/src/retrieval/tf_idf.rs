@@ -6,22 +6,22 @@
 //! cosine of their weights, in which `n_d` cancels out.
 
 /// The inverted index while it grows: who has a word, and how often.
-pub struct Occurrences {
+pub struct InvertedIndexBuilder {
     /// By word: document and count, in the order of the documents.
     lists: Vec<Vec<(u32, u32)>>,
     documents: u32,
 }
 
 /// The inverted index: who has a word, and how much it weighs there.
-pub struct Inverted {
+pub struct InvertedIndex {
     /// By word, `ln(N / N_w)`; 0 for a word that nobody has.
     pub idf: Vec<f32>,
     /// By word: document and its weight, over the norm of all weights of the document.
     pub lists: Vec<Vec<(u32, f32)>>,
 }
 
-impl Occurrences {
-    /// No document yet.
+impl InvertedIndexBuilder {
+    /// An index without a document yet.
     pub fn new(words: usize) -> Self {
         Self {
             lists: vec![Vec::new(); words],
@@ -38,7 +38,7 @@ impl Occurrences {
     }
 
     /// The weights. Words of no weight have an empty list.
-    pub fn weighted(self) -> Inverted {
+    pub fn weighted(self) -> InvertedIndex {
         let documents = f64::from(self.documents);
         let idf: Vec<f64> = self
             .lists
@@ -64,7 +64,7 @@ impl Occurrences {
             };
             list.into_iter().map(weight).collect()
         };
-        Inverted {
+        InvertedIndex {
             lists: self.lists.into_iter().zip(&idf).map(weighted).collect(),
             idf: idf.iter().map(|&idf| idf as f32).collect(),
         }
@@ -92,15 +92,15 @@ mod tests {
 
     use super::*;
 
-    fn inverted(documents: &[&[u32]], words: usize) -> Inverted {
-        let mut occurrences = Occurrences::new(words);
+    fn inverted(documents: &[&[u32]], words: usize) -> InvertedIndex {
+        let mut occurrences = InvertedIndexBuilder::new(words);
         for document in documents {
             occurrences.push(document);
         }
         occurrences.weighted()
     }
 
-    fn score(index: &Inverted, query: &[u32], document: u32) -> f32 {
+    fn score(index: &InvertedIndex, query: &[u32], document: u32) -> f32 {
         query_weights(query, |word| index.idf[word as usize])
             .iter()
             .flat_map(|&(word, weight)| {

@@ -21,7 +21,7 @@ const SCALE_CHANGE: f64 = 1.5;
 
 /// Two features with the same word.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair {
+pub struct WordMatch {
     /// Index of the query's feature.
     pub query: u32,
     /// The query's feature.
@@ -30,9 +30,9 @@ pub struct Pair {
     pub reference_keypoint: Keypoint,
 }
 
-/// What verification allows.
+/// The limits within which verification takes features to agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance {
+pub struct VerificationLimits {
     /// Greatest distance of an inlier in the reference \[px\].
     pub inlier_px: f64,
     /// Fewest inliers of a verified image.
@@ -63,12 +63,12 @@ pub struct Verification {
 
 /// The transform that most features agree with, if they are enough. Pairs of one feature of the
 /// query stand together.
-pub fn verify(pairs: &[Pair], tolerance: &Tolerance) -> Option<Verification> {
+pub fn verify(pairs: &[WordMatch], tolerance: &VerificationLimits) -> Option<Verification> {
     let points: Vec<_> = pairs
         .iter()
         .map(|pair| (pair.query_keypoint.pixel(), pair.reference_keypoint.pixel()))
         .collect();
-    let consensus = Consensus {
+    let fit = AffineFit {
         pairs,
         points: &points,
         limit: tolerance.inlier_px * tolerance.inlier_px,
@@ -77,13 +77,13 @@ pub fn verify(pairs: &[Pair], tolerance: &Tolerance) -> Option<Verification> {
     let stride = pairs.len().div_ceil(HYPOTHESES).max(1);
     for pair in pairs.iter().step_by(stride) {
         let hypothesis = Affine::from_features(&pair.query_keypoint, &pair.reference_keypoint);
-        let inliers = consensus.count(&hypothesis);
+        let inliers = fit.count(&hypothesis);
         if best.is_none_or(|(most, _)| inliers > most) {
-            best = Some(consensus.refined(inliers, hypothesis));
+            best = Some(fit.refined(inliers, hypothesis));
         }
     }
     let (_, reference_from_query) = best?;
-    let matches = consensus.matches(&reference_from_query);
+    let matches = fit.matches(&reference_from_query);
     (matches.len() >= tolerance.min_inliers).then_some(Verification {
         inliers: matches.len(),
         reference_from_query,
@@ -91,14 +91,15 @@ pub fn verify(pairs: &[Pair], tolerance: &Tolerance) -> Option<Verification> {
     })
 }
 
-struct Consensus<'a> {
-    pairs: &'a [Pair],
+/// Pairs of features against which affine transforms are held.
+struct AffineFit<'a> {
+    pairs: &'a [WordMatch],
     points: &'a [(Point2<f64>, Point2<f64>)],
     /// Squared distance \[px²\].
     limit: f64,
 }
 
-impl Consensus<'_> {
+impl AffineFit<'_> {
     /// Squared distance of a pair; infinite where it cannot be told.
     fn residual(&self, affine: &Affine, pair: usize) -> f64 {
         let (query, reference) = &self.points[pair];
@@ -157,7 +158,7 @@ impl Consensus<'_> {
         let mut matches: Vec<VerifiedMatch> = agreeing
             .into_iter()
             .filter_map(|(_, i)| {
-                let Pair {
+                let WordMatch {
                     query,
                     reference_keypoint: Keypoint { x, y, scale, .. },
                     ..
@@ -190,7 +191,7 @@ mod tests {
 
     use super::*;
 
-    const TOLERANCE: Tolerance = Tolerance {
+    const TOLERANCE: VerificationLimits = VerificationLimits {
         inlier_px: 4.0,
         min_inliers: 6,
     };
@@ -208,7 +209,13 @@ mod tests {
 
     /// Pairs of which the first follow the transform, with up to 1 px of noise and scales and
     /// angles that are a little off, and the others lie anywhere.
-    fn pairs(truth: &Affine, angle: f64, inliers: usize, outliers: usize, seed: u64) -> Vec<Pair> {
+    fn pairs(
+        truth: &Affine,
+        angle: f64,
+        inliers: usize,
+        outliers: usize,
+        seed: u64,
+    ) -> Vec<WordMatch> {
         let mut rng = Pcg64::seed_from_u64(seed);
         (0..inliers + outliers)
             .map(|i| {
@@ -224,7 +231,7 @@ mod tests {
                 } else {
                     keypoint(elsewhere, 3.0 * (1.0 + draw(0.5)), draw(3.0))
                 };
-                Pair {
+                WordMatch {
                     query: i as u32,
                     query_keypoint: keypoint(query, 3.0, 0.0),
                     reference_keypoint: reference,
@@ -264,7 +271,7 @@ mod tests {
             .iter()
             .map(|pair| {
                 let affine = Affine::from_features(&pair.query_keypoint, &pair.reference_keypoint);
-                let error = |pair: &&Pair| {
+                let error = |pair: &&WordMatch| {
                     let seen = affine.apply(&pair.query_keypoint.pixel());
                     (seen - pair.reference_keypoint.pixel()).norm() <= TOLERANCE.inlier_px
                 };
@@ -289,7 +296,7 @@ mod tests {
     fn a_feature_counts_once() {
         let one = pairs(&similarity(1.0, 0.0), 0.0, 1, 0, 1)[0];
         // Twenty features of the reference at about one place, all of the same word.
-        let crowd: Vec<Pair> = (0..20)
+        let crowd: Vec<WordMatch> = (0..20)
             .map(|i| {
                 let mut pair = one;
                 pair.reference_keypoint.x += 0.01 * i as f32;
@@ -298,7 +305,7 @@ mod tests {
             .collect();
         assert_eq!(verify(&crowd, &TOLERANCE), None);
         // Twenty features of the query on one feature of the reference.
-        let crowd: Vec<Pair> = (0..20).map(|query| Pair { query, ..one }).collect();
+        let crowd: Vec<WordMatch> = (0..20).map(|query| WordMatch { query, ..one }).collect();
         assert_eq!(verify(&crowd, &TOLERANCE), None);
     }
 
@@ -329,14 +336,14 @@ mod tests {
         fn nonsense_never_panics(
             numbers in prop::collection::vec(prop::array::uniform8(prop::num::f32::ANY), 0..30),
         ) {
-            let pairs: Vec<Pair> = numbers
+            let pairs: Vec<WordMatch> = numbers
                 .iter()
                 .zip(0..)
                 .map(|(&[a, b, c, d, e, f, g, h], query)| {
                     let keypoint = |x, y, scale, angle| Keypoint {
                         x, y, scale, angle, response: 1.0, laplacian_positive: false,
                     };
-                    Pair {
+                    WordMatch {
                         query,
                         query_keypoint: keypoint(a, b, c, d),
                         reference_keypoint: keypoint(e, f, g, h),

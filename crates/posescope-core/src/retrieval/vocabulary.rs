@@ -18,13 +18,13 @@ const SETTLED: usize = 1000;
 pub struct Clustering {
     /// Number of words.
     pub words: usize,
-    /// Rounds at most.
+    /// Rounds of k-means at most.
     pub iterations: usize,
     /// Trees of the forest.
     pub trees: usize,
     /// Centres that a search compares.
     pub checks: usize,
-    /// Of the first centres, and of the forests.
+    /// The seed of the first centres, and of the forests.
     pub seed: u64,
 }
 

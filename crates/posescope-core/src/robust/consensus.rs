@@ -1,6 +1,6 @@
 //! What MLESAC tells on the way and in the end.
 
-use super::likelihood::Score;
+use super::likelihood::LikelihoodScore;
 use super::params::SAMPLE;
 use crate::geometry::Pose;
 use crate::solver::Refinement;
@@ -11,7 +11,7 @@ pub struct Hypothesis {
     /// `camera_from_points`.
     pub pose: Pose,
     /// Its likelihood, mixing and number of inliers.
-    pub score: Score,
+    pub score: LikelihoodScore,
 }
 
 /// One random sample, told to the observer of [`super::mlesac()`].

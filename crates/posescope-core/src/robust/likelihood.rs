@@ -13,7 +13,7 @@ const NEGLIGIBLE: f64 = 1e-5;
 
 /// How well a pose explains all correspondences.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Score {
+pub struct LikelihoodScore {
     /// Logarithm of the likelihood of the residuals, each a density per px².
     pub log_likelihood: f64,
     /// γ, the estimated share of true matches.
@@ -98,7 +98,7 @@ impl Likelihood {
     }
 
     /// The score of a pose `camera_from_points`.
-    pub(super) fn score(&mut self, pose: &Pose) -> Score {
+    pub(super) fn score(&mut self, pose: &Pose) -> LikelihoodScore {
         self.collect_near(pose);
         let inliers = self
             .near
@@ -133,7 +133,7 @@ impl Likelihood {
         if far > 0 {
             log_likelihood += far as f64 * false_match.ln();
         }
-        Score {
+        LikelihoodScore {
             log_likelihood,
             mixing,
             inliers,

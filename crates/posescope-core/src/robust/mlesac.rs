@@ -147,7 +147,7 @@ fn trials_for(inliers: usize, total: usize, confidence: f64) -> usize {
 mod tests {
     use super::*;
     use crate::geometry::Pose;
-    use crate::robust::Score;
+    use crate::robust::LikelihoodScore;
     use nalgebra::{Point2, Point3, Vector2, Vector3};
     use rand::RngExt;
 
@@ -324,7 +324,7 @@ mod tests {
     fn a_solution_without_a_likelihood_does_not_hide_the_others_of_its_sample() {
         let solution = |log_likelihood| Hypothesis {
             pose: truth(),
-            score: Score {
+            score: LikelihoodScore {
                 log_likelihood,
                 mixing: 0.5,
                 inliers: 10,

@@ -23,7 +23,7 @@ pub enum SceneError {
     /// `--format` with an unknown name.
     #[error("there is no scene format `{format}`; there are {known}")]
     UnknownFormat {
-        /// As given.
+        /// The format as it was given.
         format: String,
         /// Names of all formats.
         known: String,
@@ -65,7 +65,7 @@ pub enum SceneError {
     Line {
         /// The file.
         path: PathBuf,
-        /// From 1.
+        /// The line, counted from 1.
         line: usize,
         /// What was expected and what was found.
         expected: String,
@@ -75,7 +75,7 @@ pub enum SceneError {
     UnknownFrame {
         /// The scene's name.
         scene: String,
-        /// As given.
+        /// The frame as it was given.
         frame: String,
         /// Which frames there are.
         known: String,

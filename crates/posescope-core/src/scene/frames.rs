@@ -15,9 +15,9 @@ use crate::recent::{Limit, Recent};
 /// Frames that are kept unless others hold them anyway: a query, its references, and the candidates
 /// that were looked at to choose them.
 const FRAMES: usize = 64;
-/// Memory that frames may take unless others hold them anyway \[bytes\]: that of 38 candidates within
-/// 15 m of a query on the street, each with its features. A frame with its cloud and all that the four
-/// estimators remember takes three times as much.
+/// Memory that frames may take unless others hold them anyway \[bytes\]: that of 38 candidates
+/// within 15 m of a query on the street, each with its features. A frame with its cloud and all
+/// that the four estimators remember takes three times as much.
 const BYTES: usize = 96 << 20;
 /// Values that one frame's memo keeps: some settings of each stage with several references, so that
 /// going back to the last setting costs nothing either.
@@ -29,7 +29,7 @@ const VALUES: usize = 256;
 /// No lock is held while a frame is read. Two threads that ask for the same one may both read it, and
 /// get the same.
 pub struct FrameStore {
-    frames: Recent<Place, Arc<Frame>>,
+    frames: Recent<FrameKey, Arc<Frame>>,
     /// Held, so that none is taken for another at the same address.
     scenes: Mutex<Vec<(Arc<dyn Scene>, SceneId)>>,
 }
@@ -39,7 +39,7 @@ pub struct FrameStore {
 struct SceneId(u64);
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Place {
+struct FrameKey {
     scene: SceneId,
     frame: usize,
 }
@@ -96,7 +96,7 @@ impl FrameStore {
     }
 
     /// The scene with its frames remembered here, those from before too.
-    pub fn of<'a>(self: &Arc<Self>, scene: &'a Arc<dyn Scene>) -> AtHand<'a> {
+    pub fn of<'a>(self: &Arc<Self>, scene: &'a Arc<dyn Scene>) -> CachedScene<'a> {
         let mut scenes = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         let known = scenes.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
         let id = known.map(|(_, id)| *id).unwrap_or_else(|| {
@@ -104,7 +104,7 @@ impl FrameStore {
             scenes.push((Arc::clone(scene), id));
             id
         });
-        AtHand {
+        CachedScene {
             scene: scene.as_ref(),
             id,
             store: Arc::clone(self),
@@ -114,13 +114,13 @@ impl FrameStore {
 
 /// A scene whose frames are remembered in a [`FrameStore`], with all that is worked out about them.
 #[derive(Clone)]
-pub struct AtHand<'a> {
+pub struct CachedScene<'a> {
     scene: &'a dyn Scene,
     id: SceneId,
     store: Arc<FrameStore>,
 }
 
-impl<'a> AtHand<'a> {
+impl<'a> CachedScene<'a> {
     /// The scenes of references and of queries, which may be the same, with a store of their own.
     pub fn pair(references: &'a dyn Scene, queries: &'a dyn Scene) -> (Self, Self) {
         let references = Self {
@@ -147,12 +147,12 @@ impl<'a> AtHand<'a> {
     }
 
     fn frame(&self, frame: usize) -> Result<Arc<Frame>, SceneError> {
-        let place = Place {
+        let key = FrameKey {
             scene: self.id,
             frame,
         };
         let frames = &self.store.frames;
-        if let Some(known) = frames.get(&place) {
+        if let Some(known) = frames.get(&key) {
             // It has grown since, by what was worked out about it.
             frames.trim();
             return Ok(known);
@@ -165,11 +165,11 @@ impl<'a> AtHand<'a> {
             query: Arc::new(query),
             reference: OnceLock::new(),
         };
-        Ok(frames.insert(place, Arc::new(made)))
+        Ok(frames.insert(key, Arc::new(made)))
     }
 }
 
-impl Scene for AtHand<'_> {
+impl Scene for CachedScene<'_> {
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::clone(&self.frame(frame)?.query))
     }

@@ -7,7 +7,7 @@ use crate::trace::{Cancelled, Record, Sink};
 pub struct Fanout<'a>(Vec<&'a mut dyn Sink>);
 
 impl<'a> Fanout<'a> {
-    /// All of these.
+    /// A fanout to all of these sinks.
     pub fn new(sinks: Vec<&'a mut dyn Sink>) -> Self {
         Self(sinks)
     }

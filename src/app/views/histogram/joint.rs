@@ -7,7 +7,7 @@ use egui_plot::{Bar, BarChart, GridInput, GridMark, Plot, PlotImage, PlotPoint};
 
 use super::comparison;
 use crate::app::views::readout::Readout;
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::cost::JointHistogram;
 use crate::cost::Similarity;
 use crate::estimator::{self, Entry};
@@ -24,7 +24,7 @@ const MARGIN_LENGTH: f64 = 52.0;
 /// Draws the histogram of a comparison.
 pub(super) fn ui(
     ui: &mut Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     method: Method,
     shown: &Arc<Comparison>,
     histogram: &JointHistogram,
@@ -32,8 +32,7 @@ pub(super) fn ui(
     let cost = estimator::find(method).and_then(Entry::cost);
     let sees = cost.map_or("value", |cost| cost.sees);
     let margins = Margins::of(histogram);
-    let texture = scope
-        .desk
+    let texture = context
         .textures
         .of(ui.ctx(), "joint histogram", shown, |_| {
             let picture = picture::joint_histogram(histogram).into();
@@ -98,7 +97,7 @@ pub(super) fn ui(
         words,
         "Point at a bin; bright: many pairs (logarithmic)",
     );
-    numbers(ui, scope, method, shown, histogram);
+    numbers(ui, context, method, shown, histogram);
 }
 
 fn ui_color(ctx: &egui::Context) -> Color32 {
@@ -234,7 +233,7 @@ fn greys(bin: usize, bins: usize) -> String {
 /// The formula with its numbers.
 fn numbers(
     ui: &mut Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     method: Method,
     shown: &Comparison,
     histogram: &JointHistogram,
@@ -276,7 +275,7 @@ fn numbers(
             .strong(),
     );
     let quality = similarity.map(|similarity| (similarity.name, quality));
-    comparison(ui, scope, method, shown.score.cost, quality);
+    comparison(ui, context, method, shown.score.cost, quality);
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use egui::{Color32, Ui};
 use egui_plot::{Bar, BarChart, HoverPosition, LineStyle, Plot, VLine};
 
 use super::comparison;
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::cost::{IntensityPair, PhotometricWeights};
 use crate::method::Method;
 use crate::render::Comparison;
@@ -17,7 +17,7 @@ const BARS: usize = 512 / WIDTH;
 /// Draws the residuals of a comparison.
 pub(super) fn ui(
     ui: &mut Ui,
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     method: Method,
     shown: &Comparison,
     weights: &PhotometricWeights,
@@ -76,7 +76,7 @@ pub(super) fn ui(
     }
     ui.separator();
     ui.label(egui::RichText::new(method.label()).color(counted).strong());
-    comparison(ui, scope, method, shown.score.cost, None);
+    comparison(ui, context, method, shown.score.cost, None);
 }
 
 fn legend(ui: &mut Ui, color: Color32, words: &str) {

@@ -2,7 +2,7 @@
 
 use egui::{Rect, Vec2, pos2, vec2};
 
-use crate::app::views::canvas::{Lens, Placement};
+use crate::app::views::canvas::{PanZoom, Placement};
 
 /// Between the photos, so that lines can be seen apart \[points\].
 const GAP: f32 = 24.0;
@@ -49,15 +49,20 @@ impl Arrangement {
         }
     }
 
-    /// Where the query (0) or the reference (1) is, looked at through a lens.
-    pub(in crate::app::views) fn place(&self, photo: usize, lens: &Lens, size: Vec2) -> Placement {
-        lens.place(self.areas[photo], size, self.aligns[photo])
+    /// Where the query (0) or the reference (1) is, zoomed and dragged.
+    pub(in crate::app::views) fn place(
+        &self,
+        photo: usize,
+        pan_zoom: &PanZoom,
+        size: Vec2,
+    ) -> Placement {
+        pan_zoom.place(self.areas[photo], size, self.aligns[photo])
     }
 }
 
 /// Where the panel about one feature is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Panel {
+pub(super) struct DetailPanel {
     pub(super) area: Rect,
     /// Whether its words are beside the patches, not below them.
     pub(super) is_wide: bool,
@@ -65,7 +70,7 @@ pub(super) struct Panel {
 
 /// The part for the photos and that for the panel: the panel goes below or beside the photos, where
 /// it leaves them larger.
-pub(super) fn split(area: Rect, query: Vec2, reference: Vec2) -> (Rect, Panel) {
+pub(super) fn split(area: Rect, query: Vec2, reference: Vec2) -> (Rect, DetailPanel) {
     let is_wide = area.width() >= NARROW;
     let wanted = if is_wide {
         PANEL_HEIGHT
@@ -77,15 +82,15 @@ pub(super) fn split(area: Rect, query: Vec2, reference: Vec2) -> (Rect, Panel) {
     let beside = area.split_left_right_at_x(area.right() - PANEL_WIDTH.min(0.6 * area.width()));
     let size = |photos: Rect| {
         let arrangement = Arrangement::new(photos, query, reference);
-        arrangement.place(0, &Lens::default(), query).scale
+        arrangement.place(0, &PanZoom::default(), query).scale
     };
     const MARGIN: f32 = 6.0;
     if size(below.0) >= size(beside.0) {
         let area = below.1.with_min_y(below.1.top() + MARGIN);
-        (below.0, Panel { area, is_wide })
+        (below.0, DetailPanel { area, is_wide })
     } else {
         let area = beside.1.with_min_x(beside.1.left() + MARGIN);
-        let panel = Panel {
+        let panel = DetailPanel {
             area,
             is_wide: false,
         };
@@ -107,7 +112,11 @@ mod tests {
     fn wide_photos_are_stacked_in_a_square_and_abreast_in_a_band() {
         let place = |area: Rect| {
             let arrangement = Arrangement::new(area, KITTI, KITTI);
-            [0, 1].map(|photo| arrangement.place(photo, &Lens::default(), KITTI).visible())
+            [0, 1].map(|photo| {
+                arrangement
+                    .place(photo, &PanZoom::default(), KITTI)
+                    .visible()
+            })
         };
         let [query, reference] = place(area(700.0, 700.0));
         assert!((query.width() - 700.0).abs() < 1e-2);
@@ -129,7 +138,7 @@ mod tests {
     fn an_area_without_room_is_no_trouble() {
         let (photos, _) = split(area(0.0, 0.0), KITTI, KITTI);
         let arrangement = Arrangement::new(photos, KITTI, KITTI);
-        let at = arrangement.place(1, &Lens::default(), KITTI);
+        let at = arrangement.place(1, &PanZoom::default(), KITTI);
         assert!(at.scale.is_finite() && at.visible().min.x.is_finite());
     }
 }

@@ -9,12 +9,12 @@ use super::arrangement::PATCH;
 use super::lidar::{self, SeenPoint};
 use super::marks::{color, draw_truth, mark, position};
 use super::photos::{PhotoTexture, Photos};
-use super::story::{Story, UNDECIDED, name};
+use super::progress::{FeatureProgress, UNDECIDED, name};
 use super::truth::TrueMatch;
 use crate::app::views::canvas::Placement;
-use crate::app::views::ink::Ink;
 use crate::app::views::legend;
-use crate::app::{Command, Scope, theme};
+use crate::app::views::mesh_painter::MeshPainter;
+use crate::app::{Command, ViewContext, theme};
 use crate::features::FeatureState;
 use crate::features::Keypoint;
 use crate::palette;
@@ -37,7 +37,7 @@ pub(super) struct Detail {
 /// What the panel is about.
 pub(super) struct Subject<'a> {
     pub(super) feature: usize,
-    pub(super) story: &'a Story<'a>,
+    pub(super) progress: &'a FeatureProgress<'a>,
     pub(super) problem: &'a Problem,
     pub(super) photos: &'a Photos,
     /// What the ground truth says, if it is shown.
@@ -50,16 +50,16 @@ pub(super) struct Subject<'a> {
 
 impl Subject<'_> {
     fn query(&self) -> &Keypoint {
-        &self.story.query()[self.feature]
+        &self.progress.query()[self.feature]
     }
 
     fn reference(&self) -> Option<&Keypoint> {
-        let found = self.story.matched(self.feature)?;
-        self.story.reference().get(found.reference)
+        let found = self.progress.matched(self.feature)?;
+        self.progress.reference().get(found.reference)
     }
 
     fn kind(&self) -> usize {
-        let state = self.story.state(self.feature);
+        let state = self.progress.state(self.feature);
         state.map_or(UNDECIDED, |state| state.index())
     }
 
@@ -74,7 +74,7 @@ impl Subject<'_> {
     }
 
     fn about_match(&self) -> Vec<String> {
-        let Some(found) = self.story.matched(self.feature) else {
+        let Some(found) = self.progress.matched(self.feature) else {
             return Vec::new();
         };
         vec![
@@ -85,7 +85,7 @@ impl Subject<'_> {
     }
 
     fn about_depth(&self) -> Vec<String> {
-        let Some(lifted) = self.story.lifted(self.feature) else {
+        let Some(lifted) = self.progress.lifted(self.feature) else {
             return Vec::new();
         };
         let mut facts = vec![format!("LiDAR {:.2} px away", lifted.lidar_distance_px)];
@@ -101,7 +101,7 @@ impl Subject<'_> {
 
     fn about_pose(&self) -> Vec<String> {
         let mut facts = Vec::new();
-        match self.story.state(self.feature) {
+        match self.progress.state(self.feature) {
             Some(FeatureState::Outlier { residual_px }) if residual_px.is_infinite() => {
                 facts.push("no pose to explain it".to_owned());
             }
@@ -125,13 +125,13 @@ impl Detail {
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         subject: &Subject<'_>,
         is_wide: bool,
     ) {
         const LEGEND: f32 = 190.0;
         ui.horizontal(|ui| {
-            heading(ui, scope, subject);
+            heading(ui, context, subject);
             if is_wide {
                 legend::depth_bar(ui, LEGEND);
                 ui.weak("LiDAR depth");
@@ -140,12 +140,12 @@ impl Detail {
         if is_wide {
             ui.horizontal_top(|ui| {
                 self.patches(ui, subject);
-                ui.vertical(|ui| words(ui, scope, subject));
+                ui.vertical(|ui| words(ui, context, subject));
             });
         } else {
             ui.horizontal_top(|ui| self.patches(ui, subject));
             legend::depth_bar(ui, LEGEND.min(ui.available_width()));
-            words(ui, scope, subject);
+            words(ui, context, subject);
         }
     }
 
@@ -166,9 +166,9 @@ impl Detail {
         );
         if let (Some(at), Some(truth)) = (at, &subject.truth) {
             let painter = at.painter(ui.painter());
-            let mut ink = Ink::new(ui.pixels_per_point());
-            draw_truth(&mut ink, &at, &subject.problem.query.intrinsics, truth);
-            ink.dry(&painter);
+            let mut mesh = MeshPainter::new(ui.pixels_per_point());
+            draw_truth(&mut mesh, &at, &subject.problem.query.intrinsics, truth);
+            mesh.paint_on(&painter);
         }
 
         let Some(reference) = reference else {
@@ -192,39 +192,39 @@ impl Detail {
             let seen = lidar::around(tuple, &pixel, LIDAR_RADIUS_PX);
             self.seen = Some((Arc::clone(tuple), pixel, seen));
         }
-        let mut ink = Ink::new(ui.pixels_per_point());
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
         let radius = (0.35 * at.scale).clamp(1.5, 4.0);
         let seen = self.seen.iter().flat_map(|(_, _, seen)| seen);
         for (rank, point) in seen.enumerate() {
             let place = at.on_screen(point.pixel.cast::<f32>().into());
             let color = theme::rgb(palette::depth(point.depth_m));
-            ink.disc(place, radius + 0.8, Color32::from_black_alpha(150));
-            ink.disc(place, radius, color);
+            mesh.disc(place, radius + 0.8, Color32::from_black_alpha(150));
+            mesh.disc(place, radius, color);
             if rank == 0 {
-                ink.ring(place, radius + 2.0, 1.2, Color32::WHITE);
+                mesh.ring(place, radius + 2.0, 1.2, Color32::WHITE);
             }
         }
         let radius = subject.depth_radius_px as f32 * at.scale;
         let middle = at.on_screen(position(keypoint));
-        ink.ring(middle, radius, 1.0, Color32::WHITE.gamma_multiply(0.8));
-        ink.dry(&at.painter(ui.painter()));
+        mesh.ring(middle, radius, 1.0, Color32::WHITE.gamma_multiply(0.8));
+        mesh.paint_on(&at.painter(ui.painter()));
     }
 }
 
-fn heading(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
+fn heading(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     let kind = subject.kind();
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
-    let mut ink = Ink::new(ui.pixels_per_point());
-    ink.mark(mark(kind), rect.center(), 4.5, color(kind));
-    ink.dry(ui.painter());
+    let mut mesh = MeshPainter::new(ui.pixels_per_point());
+    mesh.mark(mark(kind), rect.center(), 4.5, color(kind));
+    mesh.paint_on(ui.painter());
     ui.strong(format!("query feature {}: {}", subject.feature, name(kind)));
     let close = ui.add(Button::new("×").small()).on_hover_text("Close");
     if close.accessible_name("Close feature").clicked() {
-        scope.send(Command::SelectFeature(None));
+        context.send(Command::SelectFeature(None));
     }
 }
 
-fn words(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
+fn words(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     let area = ScrollArea::vertical().id_salt("facts").auto_shrink(false);
     area.show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 2.0;
@@ -232,7 +232,7 @@ fn words(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
         ui.horizontal_top(|ui| {
             ui.vertical(|ui| {
                 group(ui, &matching);
-                rival(ui, scope, subject);
+                rival(ui, context, subject);
             });
             ui.add_space(8.0);
             ui.vertical(|ui| group(ui, &depth));
@@ -252,14 +252,14 @@ fn group(ui: &mut Ui, (title, facts): &(&str, Vec<String>)) {
 }
 
 /// The query feature that the nearest reference feature resembles more.
-fn rival(ui: &mut Ui, scope: &Scope<'_>, subject: &Subject<'_>) {
-    let Some(FeatureState::NotUnique { rival }) = subject.story.state(subject.feature) else {
+fn rival(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
+    let Some(FeatureState::NotUnique { rival }) = subject.progress.state(subject.feature) else {
         return;
     };
     let help = "The reference feature resembles this query feature more; click to look at it";
     let link = ui.link(format!("rival: query feature {rival}"));
     if link.on_hover_text(help).clicked() {
-        scope.send(Command::SelectFeature(Some(rival)));
+        context.send(Command::SelectFeature(Some(rival)));
     }
 }
 
@@ -284,11 +284,11 @@ fn patch(
     ui.painter()
         .rect_filled(rect, 0.0, theme::rgb(palette::NOTHING));
     at.paint(ui.painter(), photo.id(), Color32::WHITE);
-    let mut ink = Ink::new(ui.pixels_per_point());
+    let mut mesh = MeshPainter::new(ui.pixels_per_point());
     let middle = rect.center();
     let radius = (keypoint.scale * at.scale).max(2.0);
     for (width, color) in [(3.0, Color32::from_black_alpha(120)), (1.4, Color32::WHITE)] {
-        ink.ring(middle, radius, width, color);
+        mesh.ring(middle, radius, width, color);
         let reach = 10.0 * keypoint.scale * at.scale;
         let corner = |x: f32, y: f32| {
             let turn = egui::emath::Rot2::from_angle(keypoint.angle);
@@ -297,11 +297,11 @@ fn patch(
         let corners =
             [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| corner(x, y));
         for side in 0..4 {
-            ink.line(corners[side], corners[(side + 1) % 4], 0.5 * width, color);
+            mesh.line(corners[side], corners[(side + 1) % 4], 0.5 * width, color);
         }
     }
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-    ink.dry(&painter);
+    mesh.paint_on(&painter);
     outline(ui, rect);
     Some(at)
 }

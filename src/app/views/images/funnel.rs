@@ -3,8 +3,8 @@
 use egui::{Align2, Role, Sense, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2};
 
 use super::marks::{color, mark};
-use super::story::{KINDS, UNDECIDED, name};
-use crate::app::views::ink::Ink;
+use super::progress::{KINDS, UNDECIDED, name};
+use crate::app::views::mesh_painter::MeshPainter;
 
 /// Height of the bar \[points\].
 const HEIGHT: f32 = 34.0;
@@ -98,19 +98,19 @@ impl Segment {
         let small = TextStyle::Small.resolve(ui.style());
         let body = TextStyle::Body.resolve(ui.style());
         let (upper, lower) = (rect.top() + 10.0, rect.bottom() - 9.0);
-        let mut ink = Ink::new(ui.pixels_per_point());
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
         // Pale colours are hard to see on their own tints.
         let mark_color = match is_shown {
             true => color.lerp_to_gamma(visuals.strong_text_color(), 0.3),
             false => visuals.weak_text_color(),
         };
-        ink.mark(
+        mesh.mark(
             mark(self.kind),
             pos2(rect.left() + 10.0, upper),
             4.0,
             mark_color,
         );
-        ink.dry(&painter);
+        mesh.paint_on(&painter);
         let write = |at, anchor, words: &str, font: &egui::FontId, color| {
             painter.text(at, anchor, words, font.clone(), color)
         };

@@ -7,9 +7,9 @@ use crate::problem::ReferenceTuple;
 /// One point of the scan, seen by the reference camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SeenPoint {
-    /// Where \[px\].
+    /// Where the point is seen \[px\].
     pub(super) pixel: Point2<f64>,
-    /// How deep \[m\].
+    /// How deep the point is \[m\].
     pub(super) depth_m: f64,
 }
 

@@ -2,11 +2,11 @@
 
 use egui::Color32;
 
-use super::story::UNDECIDED;
+use super::progress::UNDECIDED;
 use super::truth::TrueMatch;
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
-use crate::app::views::ink::{Ink, Mark};
+use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 use crate::camera::Intrinsics;
 use crate::features::Keypoint;
 
@@ -20,15 +20,15 @@ pub(super) fn color(kind: usize) -> Color32 {
 }
 
 /// The mark of a state, or of none yet.
-pub(super) fn mark(kind: usize) -> Mark {
-    const MARKS: [Mark; UNDECIDED] = [
-        Mark::Cross,
-        Mark::Triangle,
-        Mark::Ring,
-        Mark::Diamond,
-        Mark::Disc,
+pub(super) fn mark(kind: usize) -> MarkShape {
+    const MARKS: [MarkShape; UNDECIDED] = [
+        MarkShape::Cross,
+        MarkShape::Triangle,
+        MarkShape::Ring,
+        MarkShape::Diamond,
+        MarkShape::Disc,
     ];
-    MARKS.get(kind).copied().unwrap_or(Mark::Square)
+    MARKS.get(kind).copied().unwrap_or(MarkShape::Square)
 }
 
 /// Where a keypoint is \[px\].
@@ -37,15 +37,20 @@ pub(super) fn position(keypoint: &Keypoint) -> [f32; 2] {
 }
 
 /// The epipolar line, and where the true pose sees the lifted point.
-pub(super) fn draw_truth(ink: &mut Ink, at: &Placement, camera: &Intrinsics, truth: &TrueMatch) {
+pub(super) fn draw_truth(
+    mesh: &mut MeshPainter,
+    at: &Placement,
+    camera: &Intrinsics,
+    truth: &TrueMatch,
+) {
     let place = |pixel: &nalgebra::Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
     let shade = Color32::from_black_alpha(140);
     if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
-        ink.line(place(&from), place(&to), 3.5, shade);
-        ink.line(place(&from), place(&to), 1.8, theme::TRUTH);
+        mesh.line(place(&from), place(&to), 3.5, shade);
+        mesh.line(place(&from), place(&to), 1.8, theme::TRUTH);
     }
     if let Some(pixel) = &truth.place {
-        ink.disc(place(pixel), 8.0, shade);
-        ink.mark(Mark::Plus, place(pixel), 6.0, theme::TRUTH);
+        mesh.disc(place(pixel), 8.0, shade);
+        mesh.mark(MarkShape::Plus, place(pixel), 6.0, theme::TRUTH);
     }
 }

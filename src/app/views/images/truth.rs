@@ -9,11 +9,11 @@ use crate::problem::Problem;
 /// A line in an image: `normal · (u, v, 1) = 0`, the normal's first two entries of unit length, so
 /// that the product is a distance \[px\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line {
+pub(super) struct ImageLine {
     normal: Vector3<f64>,
 }
 
-impl Line {
+impl ImageLine {
     /// The query pixels at which the point behind a reference pixel may be seen, whatever its depth:
     /// `l = K_Q⁻ᵀ (t × R x)` with `query_from_reference = [R|t]` and the bearing `x` of the pixel
     /// (Hartley and Zisserman, *Multiple View Geometry*, section 9.2). `None` where the cameras share
@@ -65,7 +65,7 @@ impl Line {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TrueMatch {
     /// Where the reference keypoint may be seen in the query.
-    pub(super) line: Option<Line>,
+    pub(super) line: Option<ImageLine>,
     /// How far the query keypoint is from that line \[px\].
     pub(super) line_px: Option<f64>,
     /// Where the lifted point is seen in the query.
@@ -86,7 +86,7 @@ impl TrueMatch {
     ) -> Self {
         let query_from_reference = problem.reference_from_query(truth).inverse();
         let camera = &problem.query.intrinsics;
-        let line = Line::epipolar(
+        let line = ImageLine::epipolar(
             camera,
             &problem.reference.intrinsics,
             &query_from_reference,
@@ -112,7 +112,7 @@ impl TrueMatch {
         }
     }
 
-    /// The same in words.
+    /// What the true pose says of the match, in words.
     pub(super) fn verdict(&self, within_px: f64) -> String {
         let seen = self
             .place_px
@@ -151,7 +151,7 @@ mod tests {
     fn a_sideways_camera_sees_the_row_and_one_that_turns_in_place_no_line() {
         let sideways = Pose::translation(-1.0, 0.0, 0.0);
         let pixel = Point2::new(300.0, 100.0);
-        let line = Line::epipolar(&CAMERA, &CAMERA, &sideways, &pixel).expect("a line");
+        let line = ImageLine::epipolar(&CAMERA, &CAMERA, &sideways, &pixel).expect("a line");
         assert!(line.distance_px(&Point2::new(900.0, 100.0)) < 1e-9);
         assert!((line.distance_px(&Point2::new(900.0, 107.0)) - 7.0).abs() < 1e-9);
         let [from, to] = line.within(&CAMERA).expect("in the image");
@@ -160,14 +160,14 @@ mod tests {
         assert!((ends[0] + 0.5).abs() < 1e-9 && (ends[1] - 1240.5).abs() < 1e-9);
 
         let turned = Pose::rotation(Vector3::new(0.0, 0.1, 0.0));
-        assert_eq!(Line::epipolar(&CAMERA, &CAMERA, &turned, &pixel), None);
+        assert_eq!(ImageLine::epipolar(&CAMERA, &CAMERA, &turned, &pixel), None);
     }
 
     #[test]
     fn a_line_beside_the_image_has_no_part_in_it() {
         let sideways = Pose::translation(-1.0, 0.0, 0.0);
         let above = Point2::new(300.0, -40.0);
-        let line = Line::epipolar(&CAMERA, &CAMERA, &sideways, &above).expect("a line");
+        let line = ImageLine::epipolar(&CAMERA, &CAMERA, &sideways, &above).expect("a line");
         assert_eq!(line.within(&CAMERA), None);
     }
 
@@ -218,7 +218,7 @@ mod tests {
             let seen = query_from_reference * CAMERA.unproject(&pixel, depth);
             let (Some(seen), Some(line)) = (
                 CAMERA.project(&seen),
-                Line::epipolar(&CAMERA, &CAMERA, &query_from_reference, &pixel),
+                ImageLine::epipolar(&CAMERA, &CAMERA, &query_from_reference, &pixel),
             ) else {
                 return Ok(());
             };

@@ -14,14 +14,14 @@ pub(super) struct Trials {
     pub(super) inliers: Series,
     /// Logarithm to base ten of the trials needed, as steps over the trials.
     pub(super) needed_steps: Vec<[f64; 2]>,
-    /// The same of the trials made.
+    /// Logarithm to base ten of the trials made, by trial.
     pub(super) made_curve: Vec<[f64; 2]>,
     /// Samples for which the solver had no pose.
     pub(super) without_pose: usize,
     /// The best trial: that whose hypothesis was refined last.
     pub(super) best: Option<Trial>,
     last: Option<Trial>,
-    /// Where each trial was told.
+    /// The record at which each trial was told.
     records: Vec<usize>,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct Series {
 }
 
 impl Trials {
-    /// Those among records, the first of which is at `start` in its run.
+    /// The trials among records, the first of which is at `start` in its run.
     pub(super) fn read(records: &[Record], start: usize) -> Self {
         let mut all = Self::default();
         let [mut likelihoods, mut inliers] = [Vec::new(), Vec::new()];
@@ -124,7 +124,7 @@ fn step(curve: &mut Vec<[f64; 2]>, x: f64, value: f64) {
     curve.push([x, value]);
 }
 
-/// Of each stretch of the points the least and the greatest, in the points' order.
+/// The least and the greatest of each stretch of the points, in the points' order.
 fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     if points.len() <= 2 * STRETCHES {
         return points.to_vec();

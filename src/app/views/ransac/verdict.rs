@@ -4,7 +4,7 @@ use egui::{Grid, RichText, Ui};
 use nalgebra::{Point2, Point3};
 
 use super::trials::Trials;
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::depth::LiftedMatch;
 use crate::event::{ConsensusJudged, DepthsLifted, FeaturesDetected, PoseRefined, Side};
 use crate::geometry::Pose;
@@ -13,17 +13,17 @@ use crate::robust::{AcceptanceRule, Hypothesis, Trial};
 use crate::session::Span;
 
 /// Draws what is known at the end of the records that are shown.
-pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trials: &Trials) {
+pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trials: &Trials) {
     ui.separator();
     if let Some(trial) = trials.at_cursor() {
-        sample(ui, scope, span, end, trial);
+        sample(ui, context, span, end, trial);
     }
-    if let Some(refined) = scope.run.latest_in::<PoseRefined>(span, end - 1) {
+    if let Some(refined) = context.run.latest_in::<PoseRefined>(span, end - 1) {
         ui.separator();
         refinement(ui, refined, trials.best.as_ref());
     }
-    if let Some(judged) = scope.run.latest_in::<ConsensusJudged>(span, end - 1) {
-        acceptance(ui, scope, span, judged);
+    if let Some(judged) = context.run.latest_in::<ConsensusJudged>(span, end - 1) {
+        acceptance(ui, context, span, judged);
     } else if let Some(result) = &span.result
         && end == span.records.end
         && result.status == Status::Failed
@@ -33,7 +33,7 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trials
     }
 }
 
-fn sample(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trial: &Trial) {
+fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial: &Trial) {
     let score = |hypothesis: &Option<Hypothesis>| match hypothesis {
         Some(Hypothesis { score, .. }) => format!(
             "log likelihood {:.1}, {} inliers, share of true matches {:.2}",
@@ -51,7 +51,7 @@ fn sample(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trial: &Trial
         ui.label(score(&trial.best));
         ui.end_row();
     });
-    let Some(lifted) = scope.run.latest_in::<DepthsLifted>(span, end - 1) else {
+    let Some(lifted) = context.run.latest_in::<DepthsLifted>(span, end - 1) else {
         return;
     };
     let correspondences: Vec<&LiftedMatch> = lifted
@@ -59,7 +59,7 @@ fn sample(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trial: &Trial
         .iter()
         .filter(|lifted| lifted.point.is_some())
         .collect();
-    let features = Features::of(scope, span, end);
+    let features = SampleKeypoints::of(context, span, end);
     Grid::new("sample").striped(true).show(ui, |ui| {
         let columns = [
             "sample",
@@ -83,9 +83,9 @@ fn sample(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trial: &Trial
                 .on_hover_text(help)
                 .clicked()
             {
-                scope.send(Command::SelectFeature(Some(lifted.query)));
+                context.send(Command::SelectFeature(Some(lifted.query)));
             }
-            row(ui, scope, &features, lifted, trial);
+            row(ui, context, &features, lifted, trial);
             ui.end_row();
         }
     });
@@ -93,14 +93,14 @@ fn sample(ui: &mut Ui, scope: &Scope<'_>, span: &Span, end: usize, trial: &Trial
 }
 
 /// The keypoints that a sample's indices refer to.
-struct Features<'a> {
+struct SampleKeypoints<'a> {
     query: Option<&'a FeaturesDetected>,
     reference: Option<&'a FeaturesDetected>,
 }
 
-impl<'a> Features<'a> {
-    fn of(scope: &Scope<'a>, span: &Span, end: usize) -> Self {
-        let records = scope.run.records().get(span.records.start..end);
+impl<'a> SampleKeypoints<'a> {
+    fn of(context: &ViewContext<'a>, span: &Span, end: usize) -> Self {
+        let records = context.run.records().get(span.records.start..end);
         let of = |side: Side| {
             let mut detected = records.unwrap_or_default().iter().filter_map(|record| {
                 let detected: &FeaturesDetected =
@@ -123,25 +123,28 @@ impl<'a> Features<'a> {
 
 fn row(
     ui: &mut Ui,
-    scope: &Scope<'_>,
-    features: &Features<'_>,
+    context: &ViewContext<'_>,
+    features: &SampleKeypoints<'_>,
     lifted: &LiftedMatch,
     trial: &Trial,
 ) {
-    let seen = Features::pixel(features.query, lifted.query);
+    let seen = SampleKeypoints::pixel(features.query, lifted.query);
     let pixel = |pixel: Option<Point2<f64>>| {
         pixel.map_or("–".to_owned(), |p| format!("({:.0}, {:.0})", p.x, p.y))
     };
     ui.label(pixel(seen));
-    ui.label(pixel(Features::pixel(features.reference, lifted.reference)));
+    ui.label(pixel(SampleKeypoints::pixel(
+        features.reference,
+        lifted.reference,
+    )));
     let Some(point) = lifted.point else { return };
     ui.label(format!("{:.1}", point.z));
     for hypothesis in [&trial.hypothesis, &trial.best] {
         let error = hypothesis
             .as_ref()
             .zip(seen)
-            .and_then(|(hypothesis, seen)| residual_px(scope, &hypothesis.pose, &point, &seen));
-        let inlier_px = scope.run.params.fb.mlesac.inlier_threshold_px;
+            .and_then(|(hypothesis, seen)| residual_px(context, &hypothesis.pose, &point, &seen));
+        let inlier_px = context.run.params.fb.mlesac.inlier_threshold_px;
         ui.label(match error {
             Some(error) if error <= inlier_px => format!("{error:.1} inlier"),
             Some(error) => format!("{error:.1} outlier"),
@@ -152,12 +155,12 @@ fn row(
 
 /// The reprojection error of a point \[px\]; `None` behind the camera.
 fn residual_px(
-    scope: &Scope<'_>,
+    context: &ViewContext<'_>,
     camera_from_points: &Pose,
     point: &Point3<f64>,
     seen: &Point2<f64>,
 ) -> Option<f64> {
-    let intrinsics = &scope.problem()?.query.intrinsics;
+    let intrinsics = &context.problem()?.query.intrinsics;
     let projected = intrinsics.project(&(camera_from_points * point))?;
     Some((projected - seen).norm())
 }
@@ -175,7 +178,7 @@ fn refinement(ui: &mut Ui, refined: &PoseRefined, best: Option<&Trial>) {
     ));
 }
 
-fn acceptance(ui: &mut Ui, scope: &Scope<'_>, span: &Span, judged: &ConsensusJudged) {
+fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &ConsensusJudged) {
     let verdict = if judged.accepted {
         "Accepted"
     } else {
@@ -187,7 +190,7 @@ fn acceptance(ui: &mut Ui, scope: &Scope<'_>, span: &Span, judged: &ConsensusJud
         distance_m,
         ..
     } = judged;
-    let params = &scope.run.params.fb;
+    let params = &context.run.params.fb;
     let compared = |is_met| if is_met { "≥" } else { "<" };
     let inliers = acceptance.inliers;
     let is_met = params.accept.accepts(acceptance);
@@ -205,7 +208,7 @@ fn acceptance(ui: &mut Ui, scope: &Scope<'_>, span: &Span, judged: &ConsensusJud
             format!("{inliers} inliers {} 4, the paper's rule", compared(is_met))
         }
     });
-    let Some(problem) = scope
+    let Some(problem) = context
         .run
         .loaded
         .as_deref()

@@ -4,9 +4,9 @@ use egui::Color32;
 use nalgebra::{Point2, Point3};
 
 use super::gpu::Line;
-use super::site::{Site, spot};
-use super::story::{FeatureStory, SearchStory};
-use crate::app::{Scope, theme};
+use super::progress::{LiftedFeatures, SearchProgress};
+use super::scene_geometry::{SceneGeometry, spot};
+use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
 use crate::estimator::{self, Parts};
 use crate::geometry::{Pose, PoseError};
@@ -14,7 +14,7 @@ use crate::method::Method;
 
 /// Whose camera it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Who {
+pub(super) enum CameraKind {
     Reference,
     Truth,
     Estimate(Method),
@@ -26,7 +26,7 @@ pub(super) enum Who {
     Pointer,
 }
 
-impl Who {
+impl CameraKind {
     /// All that one may want to look through, in the order of the buttons.
     pub(super) fn to_look_through(methods: &[Method]) -> Vec<Self> {
         let estimates = methods.iter().map(|&method| Self::Estimate(method));
@@ -104,8 +104,8 @@ fn place(method: Method) -> usize {
 
 /// A camera somewhere in the scene.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Camera {
-    pub(super) who: Who,
+pub(super) struct SceneCamera {
+    pub(super) kind: CameraKind,
     /// `world_from_camera`.
     pub(super) world: Pose,
     pub(super) scene_from_camera: Pose,
@@ -116,7 +116,7 @@ pub(super) struct Camera {
     pub(super) about: String,
 }
 
-impl Camera {
+impl SceneCamera {
     pub(super) fn centre(&self) -> Point3<f64> {
         self.scene_from_camera.translation.vector.into()
     }
@@ -142,8 +142,8 @@ impl Camera {
         let roof = middle + up;
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
             ends: [spot(&from), spot(&to)],
-            color: self.who.color(),
-            width: self.who.stroke_width(),
+            color: self.kind.color(),
+            width: self.kind.stroke_width(),
         };
         let mut lines = Vec::with_capacity(10);
         for side in 0..4 {
@@ -158,17 +158,17 @@ impl Camera {
 
 /// Every camera there is at the cursor.
 pub(super) fn cameras(
-    scope: &Scope<'_>,
-    site: &Site,
-    features: &FeatureStory<'_>,
-    search: &SearchStory<'_>,
-) -> Vec<Camera> {
-    let Some(problem) = scope.problem() else {
+    context: &ViewContext<'_>,
+    geometry: &SceneGeometry,
+    features: &LiftedFeatures<'_>,
+    search: &SearchProgress<'_>,
+) -> Vec<SceneCamera> {
+    let Some(problem) = context.problem() else {
         return Vec::new();
     };
-    let truth = scope.truth();
-    let camera = |who: Who, world: Pose| {
-        let offset = site.offset(&world);
+    let truth = context.truth();
+    let camera = |kind: CameraKind, world: Pose| {
+        let offset = geometry.offset(&world);
         let mut about = format!(
             "{:.2} m right, {:.2} m ahead, {:.2}° left of the reference",
             offset.right_m,
@@ -176,57 +176,64 @@ pub(super) fn cameras(
             offset.yaw_rad.to_degrees()
         );
         if let Some(truth) = truth
-            && who != Who::Truth
+            && kind != CameraKind::Truth
         {
             let error = PoseError::between(truth, &world);
             about.push_str(&format!("; from the truth {error}"));
         }
-        Camera {
-            who,
+        SceneCamera {
+            kind,
             world,
-            scene_from_camera: site.scene_from_world * world,
-            intrinsics: match who.is_query() {
+            scene_from_camera: geometry.scene_from_world * world,
+            intrinsics: match kind.is_query() {
                 true => problem.query.intrinsics,
                 false => problem.reference.intrinsics,
             },
-            depth_m: who.size() * site.camera_m(),
+            depth_m: kind.size() * geometry.camera_m(),
             about,
         }
     };
-    let mut all = vec![camera(Who::Reference, problem.reference.world_from_camera)];
-    all.extend(truth.map(|pose| camera(Who::Truth, *pose)));
-    for &method in &scope.desk.setup.task.protocol.methods {
-        if let Some(pose) = estimate(scope, method) {
-            all.push(camera(Who::Estimate(method), pose));
+    let mut all = vec![camera(
+        CameraKind::Reference,
+        problem.reference.world_from_camera,
+    )];
+    all.extend(truth.map(|pose| camera(CameraKind::Truth, *pose)));
+    for &method in &context.setup.task.protocol.methods {
+        if let Some(pose) = estimate(context, method) {
+            all.push(camera(CameraKind::Estimate(method), pose));
         }
     }
     all.extend(
-        best_so_far(scope, features, search).map(|(method, reference_from_query)| {
+        best_so_far(context, features, search).map(|(method, reference_from_query)| {
             let pose = problem.world_from_query(&reference_from_query);
-            camera(Who::BestSoFar(method), pose)
+            camera(CameraKind::BestSoFar(method), pose)
         }),
     );
-    all.extend(scope.desk.hovered.map(|pose| camera(Who::Pointer, pose)));
-    all.extend(scope.desk.camera.map(|pose| camera(Who::Hand, pose)));
+    all.extend(
+        context
+            .hovered()
+            .map(|pose| camera(CameraKind::Pointer, pose)),
+    );
+    all.extend(context.camera().map(|pose| camera(CameraKind::Hand, pose)));
     all
 }
 
 /// The estimate of a method: of that at the cursor only once the cursor has come to its end.
-fn estimate(scope: &Scope<'_>, method: Method) -> Option<Pose> {
-    let (span, cursor) = scope.of(method)?;
+fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
+    let (span, cursor) = context.part_of(method)?;
     (cursor + 1 >= span.records.end)
-        .then(|| scope.estimate(method))
+        .then(|| context.estimate(method))
         .flatten()
 }
 
 /// Where the estimator at the cursor stands, in the reference camera's frame, until it has ended.
 fn best_so_far(
-    scope: &Scope<'_>,
-    features: &FeatureStory<'_>,
-    search: &SearchStory<'_>,
+    context: &ViewContext<'_>,
+    features: &LiftedFeatures<'_>,
+    search: &SearchProgress<'_>,
 ) -> Option<(Method, Pose)> {
-    let span = scope.span()?;
-    if span.result.is_some() && scope.cursor + 1 >= span.records.end {
+    let span = context.span()?;
+    if span.result.is_some() && context.cursor + 1 >= span.records.end {
         return None;
     }
     let by_search = search.path.last().map(|best| best.reference_from_camera());

@@ -6,8 +6,8 @@ use egui::Color32;
 use nalgebra::Point3;
 
 use super::gpu::{Points, Spot};
-use super::site::{GROUND_M, Site};
-use super::story::ends;
+use super::progress::ends;
+use super::scene_geometry::{GROUND_M, SceneGeometry};
 use crate::app::theme;
 use crate::problem::ReferenceTuple;
 use crate::render::ColoredCloud;
@@ -37,11 +37,11 @@ impl Coloring {
 }
 
 /// A cloud that was made ready to be drawn, and what it was made from.
-pub(super) struct Cloud {
+pub(super) struct PreparedCloud {
     reference: Arc<ReferenceTuple>,
     colored: Option<Arc<ColoredCloud>>,
     wanted: Coloring,
-    site: Site,
+    geometry: SceneGeometry,
     pub(super) points: Arc<Points>,
     /// What the colours tell. By height instead of the photo as long as there are no such colours.
     pub(super) coloring: Coloring,
@@ -49,11 +49,11 @@ pub(super) struct Cloud {
     pub(super) range_m: (f64, f64),
 }
 
-impl Cloud {
+impl PreparedCloud {
     /// Whether this is what is wanted.
     pub(super) fn is(
         &self,
-        site: &Site,
+        geometry: &SceneGeometry,
         reference: &Arc<ReferenceTuple>,
         colored: Option<&Arc<ColoredCloud>>,
         wanted: Coloring,
@@ -65,13 +65,13 @@ impl Cloud {
         };
         let needs_colors = wanted == Coloring::Photo;
         Arc::ptr_eq(&self.reference, reference)
-            && self.site == *site
+            && self.geometry == *geometry
             && self.wanted == wanted
             && (same_colors || !needs_colors)
     }
 
     pub(super) fn new(
-        site: &Site,
+        geometry: &SceneGeometry,
         reference: &Arc<ReferenceTuple>,
         colored: Option<&Arc<ColoredCloud>>,
         wanted: Coloring,
@@ -88,7 +88,7 @@ impl Cloud {
             Coloring::Photo => (0.0, 0.0),
             _ => inner_range(reference.cloud.points.iter().map(measure)),
         };
-        let place = |point: &Point3<f32>| site.spot(&point.cast());
+        let place = |point: &Point3<f32>| geometry.spot(&point.cast());
         let points = match (coloring, colored) {
             (Coloring::Photo, Some(colored)) => {
                 Points::new(by_photo(reference, colored).map(|(point, color)| Spot {
@@ -105,7 +105,7 @@ impl Cloud {
             reference: Arc::clone(reference),
             colored: colored.map(Arc::clone),
             wanted,
-            site: *site,
+            geometry: *geometry,
             points: Arc::new(points),
             coloring,
             range_m,

@@ -3,13 +3,13 @@
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{PopupCloseBehavior, RichText, Slider, Ui};
 
-use super::cameras::{Camera, Who};
+use super::cameras::{CameraKind, SceneCamera};
 use super::cloud::Coloring;
-use crate::app::camera::Place;
-use crate::app::{Command, Scope, shortcuts};
+use crate::app::camera::NamedPose;
+use crate::app::{Command, ViewContext, shortcuts};
 use crate::method::Method;
 
-/// What is shown.
+/// What of the scene is shown.
 #[derive(Clone, Debug)]
 pub(super) struct Layers {
     pub(super) cloud: bool,
@@ -40,40 +40,40 @@ impl Default for Layers {
 
 /// What a button asks of the view itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Wish {
-    /// The first look.
+pub(super) enum ViewRequest {
+    /// Look at the scene as at first.
     Reset,
-    /// From above.
+    /// Look from above.
     Top,
-    /// Through a camera.
-    Through(Who),
-    /// Blink, or stop to.
+    /// Look through a camera.
+    Through(CameraKind),
+    /// Blink between two poses, or stop blinking.
     Blink,
 }
 
-/// Where one looks from.
+/// The buttons for where one looks from.
 pub(super) fn looks(
     ui: &mut Ui,
     methods: &[Method],
     layers: &mut Layers,
-    cameras: &[Camera],
-    through: Option<Who>,
-) -> Option<Wish> {
-    let mut wish = None;
-    let mut button = |ui: &mut Ui, text: &str, help: &str, wanted: Wish| {
+    cameras: &[SceneCamera],
+    through: Option<CameraKind>,
+) -> Option<ViewRequest> {
+    let mut request = None;
+    let mut button = |ui: &mut Ui, text: &str, help: &str, wanted: ViewRequest| {
         if ui.button(text).on_hover_text(help).clicked() {
-            wish = Some(wanted);
+            request = Some(wanted);
         }
     };
     layers_menu(ui, layers);
     let help = "From behind and above. Drag to turn, with Shift or the right button to shift, wheel to zoom";
-    button(ui, "Reset view", help, Wish::Reset);
-    button(ui, "Top", "From straight above", Wish::Top);
+    button(ui, "Reset view", help, ViewRequest::Reset);
+    button(ui, "Top", "From straight above", ViewRequest::Top);
     ui.weak("through");
-    for who in Who::to_look_through(methods) {
-        let camera = cameras.iter().find(|camera| camera.who == who);
-        let text = format!("{} {}", who.shape(), who.name());
-        let selected = through == Some(who);
+    for kind in CameraKind::to_look_through(methods) {
+        let camera = cameras.iter().find(|camera| camera.kind == kind);
+        let text = format!("{} {}", kind.shape(), kind.name());
+        let selected = through == Some(kind);
         let response = ui.add_enabled(
             camera.is_some() || selected,
             egui::Button::selectable(selected, text),
@@ -83,7 +83,7 @@ pub(super) fn looks(
             None => response.on_disabled_hover_text("There is no such pose at this step"),
         };
         if response.clicked() {
-            wish = Some(Wish::Through(who));
+            request = Some(ViewRequest::Through(kind));
         }
     }
     if through.is_some() {
@@ -93,7 +93,7 @@ pub(super) fn looks(
         ui.add(slider)
             .on_hover_text("How much of the photo lies over the cloud");
     }
-    wish
+    request
 }
 
 fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
@@ -119,21 +119,21 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
     });
 }
 
-/// Where the camera in hand goes.
-pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish> {
+/// The buttons for where the camera in hand goes.
+pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<ViewRequest> {
     let keys = shortcuts();
     ui.weak("camera to");
-    for place in Place::ALL {
-        let command = Command::JumpCamera(place);
+    for target in NamedPose::ALL {
+        let command = Command::JumpCamera(target);
         let key = keys.iter().find(|shortcut| shortcut.command == command);
         let key = key.map_or(String::new(), |shortcut| {
             ui.ctx().format_shortcut(&shortcut.keys)
         });
-        let is_there =
-            scope.desk.place(place).is_some() && (place != Place::Truth || scope.desk.shows_truth);
+        let is_there = context.named_pose(target).is_some()
+            && (target != NamedPose::Truth || context.options.shows_truth);
         let mut text = egui::text::LayoutJob::default();
         let style = ui.style();
-        RichText::new(place.name()).append_to(
+        RichText::new(target.name()).append_to(
             &mut text,
             style,
             egui::FontSelection::Default,
@@ -148,11 +148,11 @@ pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish
         let response = ui.add_enabled(is_there, egui::Button::new(text));
         let response = response.on_disabled_hover_text("There is no such pose at this step");
         if response.clicked() {
-            scope.send(command);
+            context.send(command);
         }
     }
-    let mut wish = None;
-    let can_blink = scope.desk.camera.is_some() && scope.desk.place(Place::Last).is_some();
+    let mut request = None;
+    let can_blink = context.camera().is_some() && context.named_pose(NamedPose::Last).is_some();
     let response = ui.add_enabled(
         can_blink || blinks,
         egui::Button::selectable(blinks, "Blink poses"),
@@ -163,12 +163,12 @@ pub(super) fn jumps(ui: &mut Ui, scope: &Scope<'_>, blinks: bool) -> Option<Wish
         .on_disabled_hover_text("Jump to two poses first")
         .clicked()
     {
-        wish = Some(Wish::Blink);
+        request = Some(ViewRequest::Blink);
     }
-    let release = ui.add_enabled(scope.desk.camera.is_some(), egui::Button::new("Let go"));
+    let release = ui.add_enabled(context.camera().is_some(), egui::Button::new("Let go"));
     let release = release.on_hover_text("Put the camera in hand away (Esc)");
     if release.clicked() {
-        scope.send(Command::TakeCamera(None));
+        context.send(Command::TakeCamera(None));
     }
-    wish
+    request
 }

@@ -57,7 +57,7 @@ impl Painter {
     pub(super) fn paint(&self, painter: &egui::Painter, rect: Rect, frame: Frame) {
         painter.add(Callback::new_paint_callback(
             rect,
-            Job {
+            PaintCallback {
                 pipelines: Arc::clone(&self.pipelines),
                 picture: Arc::clone(&self.picture),
                 rect,
@@ -68,14 +68,14 @@ impl Painter {
 }
 
 /// A frame on its way to the screen.
-struct Job {
+struct PaintCallback {
     pipelines: Arc<Pipelines>,
     picture: Arc<Mutex<Picture>>,
     rect: Rect,
     frame: Frame,
 }
 
-impl CallbackTrait for Job {
+impl CallbackTrait for PaintCallback {
     fn prepare(
         &self,
         device: &wgpu::Device,

@@ -5,8 +5,8 @@ use nalgebra::Point3;
 
 use super::cloud::share;
 use super::gpu::{Line, Spot};
-use super::site::{Site, spot};
-use super::story::SearchStory;
+use super::progress::SearchProgress;
+use super::scene_geometry::{SceneGeometry, spot};
 use crate::app::theme;
 use crate::grid::{Offset, Phase, ScoredLattice};
 
@@ -41,20 +41,20 @@ pub(super) struct CostGround {
 impl CostGround {
     /// The latest coarse positions and, where they came later, the fine ones; of a phase that is
     /// not complete, what is scored so far.
-    pub(super) fn new(story: &SearchStory<'_>, params: &crate::grid::GridParams) -> Self {
+    pub(super) fn new(progress: &SearchProgress<'_>, params: &crate::grid::GridParams) -> Self {
         let is_coarse = |surface: &&std::sync::Arc<ScoredLattice>| {
             surface.lattice.phase == Phase::PositionCoarse
         };
-        let begin = story.surfaces.iter().rposition(is_coarse).unwrap_or(0);
+        let begin = progress.surfaces.iter().rposition(is_coarse).unwrap_or(0);
         let mut cells = Vec::new();
-        let under_way = story.scored.first().map(|scored| scored.phase);
+        let under_way = progress.scored.first().map(|scored| scored.phase);
         // A new round begins with an empty ground.
         if under_way != Some(Phase::PositionCoarse) {
-            for surface in &story.surfaces[begin..] {
+            for surface in &progress.surfaces[begin..] {
                 cells.extend(complete(surface));
             }
         }
-        cells.extend(story.scored.iter().filter_map(|scored| {
+        cells.extend(progress.scored.iter().filter_map(|scored| {
             let (is_fine, step_m) = match scored.phase {
                 Phase::PositionCoarse => (false, params.coarse_step_m),
                 Phase::PositionFine => (true, params.fine_step_m),
@@ -70,7 +70,7 @@ impl CostGround {
         }));
         Self {
             cells,
-            costs: story.costs,
+            costs: progress.costs,
             relief_m: 0.0,
         }
     }
@@ -97,7 +97,7 @@ impl CostGround {
     }
 
     /// The squares, as two triangles each; raised ones with their walls.
-    pub(super) fn faces(&self, site: &Site) -> Vec<Spot> {
+    pub(super) fn faces(&self, geometry: &SceneGeometry) -> Vec<Spot> {
         let mut faces = Vec::with_capacity(6 * self.cells.len());
         for cell in &self.cells {
             let Offset {
@@ -107,7 +107,7 @@ impl CostGround {
             let height = self.height(cell);
             let place = |right: f64, forward: f64, above: f64| {
                 let (x, z) = (right_m + right * half, forward_m + forward * half);
-                spot(&site.on_ground(x, z, above))
+                spot(&geometry.on_ground(x, z, above))
             };
             let color = self.color(cell);
             let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
@@ -180,18 +180,22 @@ fn quad(faces: &mut Vec<Spot>, corners: [[f32; 3]; 4], color: Color32) {
 }
 
 /// A number to be written beside the grid.
-pub(super) struct Mark {
+pub(super) struct GridLabel {
     pub(super) at: Point3<f64>,
     pub(super) text: String,
 }
 
 /// Lines on the ground in round distances, and the circle within which the query is sought.
-pub(super) fn grid(site: &Site, color: Color32, strong: Color32) -> (Vec<Line>, Vec<Mark>) {
-    let step = site.grid_m();
-    let count = (site.radius_m / step).ceil() as i32;
+pub(super) fn grid(
+    geometry: &SceneGeometry,
+    color: Color32,
+    strong: Color32,
+) -> (Vec<Line>, Vec<GridLabel>) {
+    let step = geometry.grid_m();
+    let count = (geometry.radius_m / step).ceil() as i32;
     let reach = f64::from(count) * step;
     let line = |from: (f64, f64), to: (f64, f64), color| Line {
-        ends: [from, to].map(|(x, z)| spot(&site.on_ground(x, z, GRID_ABOVE_M))),
+        ends: [from, to].map(|(x, z)| spot(&geometry.on_ground(x, z, GRID_ABOVE_M))),
         color,
         width: 1.0,
     };
@@ -210,8 +214,8 @@ pub(super) fn grid(site: &Site, color: Color32, strong: Color32) -> (Vec<Line>, 
                     (true, true) => positive,
                     (true, false) => negative,
                 };
-                marks.push(Mark {
-                    at: site.on_ground(x, z, GRID_ABOVE_M),
+                marks.push(GridLabel {
+                    at: geometry.on_ground(x, z, GRID_ABOVE_M),
                     text: format!("{} m{side}", at.abs()),
                 });
             };
@@ -222,16 +226,16 @@ pub(super) fn grid(site: &Site, color: Color32, strong: Color32) -> (Vec<Line>, 
     const SIDES: i32 = 72;
     let on_circle = |side: i32| {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(side) / f64::from(SIDES)).sin_cos();
-        (site.radius_m * sin, site.radius_m * cos)
+        (geometry.radius_m * sin, geometry.radius_m * cos)
     };
     lines.extend((0..SIDES).map(|side| line(on_circle(side), on_circle(side + 1), strong)));
     (lines, marks)
 }
 
 /// The way of the search from best to best.
-pub(super) fn path(site: &Site, offsets: &[Offset], color: Color32) -> Vec<Line> {
+pub(super) fn path(geometry: &SceneGeometry, offsets: &[Offset], color: Color32) -> Vec<Line> {
     let place =
-        |offset: &Offset| spot(&site.on_ground(offset.right_m, offset.forward_m, PATH_ABOVE_M));
+        |offset: &Offset| spot(&geometry.on_ground(offset.right_m, offset.forward_m, PATH_ABOVE_M));
     offsets
         .windows(2)
         .map(|pair| Line {
@@ -249,8 +253,8 @@ mod tests {
 
     const SITE: f64 = 5.0;
 
-    fn site() -> Site {
-        Site {
+    fn geometry() -> SceneGeometry {
+        SceneGeometry {
             scene_from_world: Pose::identity(),
             scene_from_reference: Pose::identity(),
             radius_m: SITE,
@@ -295,7 +299,7 @@ mod tests {
 
     #[test]
     fn low_costs_are_bright_and_on_the_ground_and_silent_cells_grey() {
-        let flat = ground().faces(&site());
+        let flat = ground().faces(&geometry());
         assert_eq!(flat.len(), 4 * 6);
         assert_eq!(flat[0].color, theme::viridis(1.0));
         assert_eq!(flat[6].color, theme::viridis(0.0));
@@ -303,15 +307,15 @@ mod tests {
         let ground = ground().with_relief(3.0);
         let highest = |faces: &[Spot]| faces.iter().map(|f| -f.at[1]).fold(f32::MIN, f32::max);
         // The cell of the greatest cost stands 3 m above the ground, 1.6 m below the camera.
-        assert!((highest(&ground.faces(&site())) - (3.0 - 1.6)).abs() < 1e-6);
+        assert!((highest(&ground.faces(&geometry())) - (3.0 - 1.6)).abs() < 1e-6);
         assert!((highest(&flat) - (0.02 - 1.6)).abs() < 1e-6);
         // Two cells have walls: the greatest and the middle cost.
-        assert_eq!(ground.faces(&site()).len(), 4 * 6 + 2 * 4 * 6);
+        assert_eq!(ground.faces(&geometry()).len(), 4 * 6 + 2 * 4 * 6);
     }
 
     #[test]
     fn the_grid_tells_its_metres() {
-        let (lines, marks) = grid(&site(), Color32::GRAY, Color32::WHITE);
+        let (lines, marks) = grid(&geometry(), Color32::GRAY, Color32::WHITE);
         let texts: Vec<_> = marks.iter().map(|mark| mark.text.as_str()).collect();
         assert!(
             texts.contains(&"1 m") && texts.contains(&"5 m ahead"),

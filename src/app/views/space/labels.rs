@@ -6,17 +6,22 @@ use egui::{
     WidgetInfo, vec2,
 };
 
-use super::cameras::{Camera, Who};
-use super::ground::Mark;
-use super::lens::Lens;
+use super::cameras::{CameraKind, SceneCamera};
+use super::ground::GridLabel;
+use super::view_camera::ViewCamera;
 
 /// Labels of cameras, none over another; a click on one answers with its camera.
-pub(super) fn cameras(ui: &Ui, pane: Rect, lens: &Lens, cameras: &[Camera]) -> Option<Who> {
-    let seen = |camera: &Camera| {
-        let at = lens.project(&camera.centre())? + pane.min.to_vec2();
+pub(super) fn cameras(
+    ui: &Ui,
+    pane: Rect,
+    view_camera: &ViewCamera,
+    cameras: &[SceneCamera],
+) -> Option<CameraKind> {
+    let seen = |camera: &SceneCamera| {
+        let at = view_camera.project(&camera.centre())? + pane.min.to_vec2();
         pane.shrink(4.0).contains(at).then_some(at)
     };
-    let mut shown: Vec<(Pos2, &Camera)> = cameras
+    let mut shown: Vec<(Pos2, &SceneCamera)> = cameras
         .iter()
         .filter_map(|camera| Some((seen(camera)?, camera)))
         .collect();
@@ -32,12 +37,16 @@ pub(super) fn cameras(ui: &Ui, pane: Rect, lens: &Lens, cameras: &[Camera]) -> O
             place = place.translate(vec2(0.0, other.bottom() - place.top() + 1.0));
         }
         taken.push(place);
-        let response = ui.interact(place, ui.scope_id().with(camera.who.name()), Sense::click());
-        let words = format!("{}: {}", camera.who.name(), camera.about);
+        let response = ui.interact(
+            place,
+            ui.scope_id().with(camera.kind.name()),
+            Sense::click(),
+        );
+        let words = format!("{}: {}", camera.kind.name(), camera.about);
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &words));
         let visuals = ui.visuals();
         let painter = ui.painter_at(pane);
-        let color = camera.who.color();
+        let color = camera.kind.color();
         painter.line_segment([at, place.left_center()], Stroke::new(1.0, color));
         painter.circle_filled(at, 2.5, color);
         let fill = visuals.window_fill.gamma_multiply(0.85);
@@ -55,19 +64,19 @@ pub(super) fn cameras(ui: &Ui, pane: Rect, lens: &Lens, cameras: &[Camera]) -> O
         painter.galley(place.min + vec2(4.0, 2.0), galley, visuals.text_color());
         let response = response.on_hover_text(format!("{words}\nClick to look through it"));
         if response.clicked() {
-            clicked = Some(camera.who);
+            clicked = Some(camera.kind);
         }
     }
     clicked
 }
 
-fn name(ui: &Ui, camera: &Camera) -> LayoutJob {
+fn name(ui: &Ui, camera: &SceneCamera) -> LayoutJob {
     let format = |color| TextFormat::simple(FontId::proportional(12.0), color);
     let mut job = LayoutJob::default();
-    let shape = camera.who.shape();
-    job.append(shape, 0.0, format(camera.who.color()));
+    let shape = camera.kind.shape();
+    job.append(shape, 0.0, format(camera.kind.color()));
     let color = ui.visuals().strong_text_color();
-    job.append(&camera.who.name(), 4.0, format(color));
+    job.append(&camera.kind.name(), 4.0, format(color));
     job
 }
 
@@ -78,11 +87,11 @@ fn inside(place: Rect, pane: Rect) -> Rect {
 }
 
 /// The metres of the grid; those that would lie over another are left out.
-pub(super) fn marks(ui: &Ui, pane: Rect, lens: &Lens, marks: &[Mark]) {
+pub(super) fn marks(ui: &Ui, pane: Rect, view_camera: &ViewCamera, marks: &[GridLabel]) {
     let painter = ui.painter_at(pane);
     let mut taken: Vec<Rect> = Vec::new();
     for mark in marks {
-        let Some(at) = lens.project(&mark.at) else {
+        let Some(at) = view_camera.project(&mark.at) else {
             continue;
         };
         let at = at + pane.min.to_vec2();

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 use egui::{Pos2, Vec2};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use super::lens::Lens;
+use super::view_camera::ViewCamera;
 use crate::geometry::Pose;
 
 /// Vertical angle of view \[rad\].
@@ -27,7 +27,7 @@ pub(super) struct Orbit {
     pub(super) heading: f64,
     /// How steeply it looks down \[rad\].
     pub(super) descent: f64,
-    /// From eye to target \[m\].
+    /// The distance from eye to target \[m\].
     pub(super) distance: f64,
 }
 
@@ -70,9 +70,9 @@ impl Orbit {
         Pose::from_parts(eye.coords.into(), rotation)
     }
 
-    /// The lens for a pane.
-    pub(super) fn lens(&self, size: Vec2) -> Lens {
-        Lens::centred(self.scene_from_eye(), VIEW_RAD, size)
+    /// The camera that fills a pane with what the eye sees.
+    pub(super) fn view_camera(&self, size: Vec2) -> ViewCamera {
+        ViewCamera::centred(self.scene_from_eye(), VIEW_RAD, size)
     }
 
     /// Turns about the target, as if the pointer held the scene.
@@ -84,23 +84,23 @@ impl Orbit {
 
     /// Moves the target across the pane, so that it stays under the pointer.
     pub(super) fn pan(&mut self, by: Vec2, size: Vec2) {
-        let lens = self.lens(size);
+        let view_camera = self.view_camera(size);
         let in_eye = Vector3::new(
-            f64::from(by.x) * self.distance / lens.focal[0],
-            f64::from(by.y) * self.distance / lens.focal[1],
+            f64::from(by.x) * self.distance / view_camera.focal[0],
+            f64::from(by.y) * self.distance / view_camera.focal[1],
             0.0,
         );
-        self.target -= lens.scene_from_eye.rotation * in_eye;
+        self.target -= view_camera.scene_from_eye.rotation * in_eye;
     }
 
     /// Goes nearer (below 1) or farther, towards what is seen at `at`.
     pub(super) fn zoom(&mut self, factor: f64, at: Pos2, size: Vec2) {
         let distance = (factor * self.distance).clamp(*DISTANCE_M.start(), *DISTANCE_M.end());
         let factor = distance / self.distance;
-        let lens = self.lens(size);
-        let ray = lens.ray(at);
+        let view_camera = self.view_camera(size);
+        let ray = view_camera.ray(at);
         // The place at the target's depth; any other on the ray would stay where it is as well.
-        let ahead = lens.scene_from_eye.rotation * Vector3::z();
+        let ahead = view_camera.scene_from_eye.rotation * Vector3::z();
         let reach = self.distance / ahead.dot(&ray.direction);
         let fixed = ray.origin + reach * ray.direction.into_inner();
         self.target = fixed + factor * (self.target - fixed);
@@ -135,22 +135,22 @@ mod tests {
         fn the_target_is_in_the_middle_and_the_horizon_level(orbit in orbit(), by in (-500.0_f32..500.0, -500.0_f32..500.0)) {
             let mut orbit = orbit;
             orbit.turn(by.into());
-            let lens = orbit.lens(SIZE);
-            let at = lens.project(&orbit.target).expect("in front");
+            let view_camera = orbit.view_camera(SIZE);
+            let at = view_camera.project(&orbit.target).expect("in front");
             prop_assert!((at - (0.5 * SIZE).to_pos2()).length() < 1e-3);
-            let right = lens.scene_from_eye.rotation * Vector3::x();
+            let right = view_camera.scene_from_eye.rotation * Vector3::x();
             prop_assert!(right.y.abs() < 1e-12);
-            let down = lens.scene_from_eye.rotation * Vector3::y();
+            let down = view_camera.scene_from_eye.rotation * Vector3::y();
             prop_assert!(down.y > -1e-9, "it never stands on its head");
         }
 
         #[test]
         fn what_is_at_the_targets_depth_goes_with_the_pointer(orbit in orbit(), by in (-200.0_f32..200.0, -200.0_f32..200.0)) {
             let by = Vec2::from(by);
-            let before = orbit.lens(SIZE).project(&orbit.target).expect("in front");
+            let before = orbit.view_camera(SIZE).project(&orbit.target).expect("in front");
             let mut moved = orbit;
             moved.pan(by, SIZE);
-            let after = moved.lens(SIZE).project(&orbit.target).expect("in front");
+            let after = moved.view_camera(SIZE).project(&orbit.target).expect("in front");
             prop_assert!((after - before - by).length() < 1e-2);
         }
 
@@ -159,12 +159,12 @@ mod tests {
             orbit in orbit(), at in (0.0_f32..640.0, 0.0_f32..480.0), factor in 0.2..5.0, far in 5.0..200.0,
         ) {
             let at = Pos2::from(at);
-            let ray = orbit.lens(SIZE).ray(at);
+            let ray = orbit.view_camera(SIZE).ray(at);
             // Beyond the place that the eye comes to.
             let seen = ray.origin + (orbit.distance * 2.0 + far) * ray.direction.into_inner();
             let mut zoomed = orbit;
             zoomed.zoom(factor, at, SIZE);
-            let now = zoomed.lens(SIZE).project(&seen).expect("in front");
+            let now = zoomed.view_camera(SIZE).project(&seen).expect("in front");
             prop_assert!((now - at).length() < 0.1, "{now:?} {at:?}");
         }
 
@@ -181,8 +181,12 @@ mod tests {
 
     #[test]
     fn from_above_ahead_is_up_and_right_is_right() {
-        let lens = Orbit::from_above(Point3::new(0.0, 1.6, 0.0), 10.0).lens(SIZE);
-        let at = |x, z| lens.project(&Point3::new(x, 1.6, z)).expect("in front");
+        let view_camera = Orbit::from_above(Point3::new(0.0, 1.6, 0.0), 10.0).view_camera(SIZE);
+        let at = |x, z| {
+            view_camera
+                .project(&Point3::new(x, 1.6, z))
+                .expect("in front")
+        };
         assert!(at(0.0, 5.0).y < at(0.0, 0.0).y);
         assert!(at(5.0, 0.0).x > at(0.0, 0.0).x);
     }

@@ -4,8 +4,8 @@ use egui::Color32;
 use nalgebra::Point3;
 
 use super::gpu::Line;
-use super::site::Site;
-use super::story::FeatureStory;
+use super::progress::LiftedFeatures;
+use super::scene_geometry::SceneGeometry;
 use crate::app::theme;
 use crate::features::FeatureState;
 
@@ -19,14 +19,18 @@ pub(super) struct Rays {
 }
 
 /// From the estimated camera; before there is one, from the reference camera that saw the points.
-/// Those of inliers are drawn through, those of outliers dashed. `selected` is drawn broad.
-pub(super) fn rays(site: &Site, story: &FeatureStory<'_>, selected: Option<usize>) -> Rays {
-    let centre = match &story.reference_from_query {
+/// The rays of inliers are drawn through, those of outliers dashed. `selected` is drawn broad.
+pub(super) fn rays(
+    geometry: &SceneGeometry,
+    progress: &LiftedFeatures<'_>,
+    selected: Option<usize>,
+) -> Rays {
+    let centre = match &progress.reference_from_query {
         Some(pose) => Point3::from(pose.translation.vector),
         None => Point3::origin(),
     };
     let mut rays = Rays::default();
-    for ray in story.rays() {
+    for ray in progress.rays() {
         let is_selected = selected == Some(ray.query);
         let (color, count) = match ray.is_inlier {
             Some(true) => (inlier_color(), &mut rays.inliers),
@@ -38,7 +42,7 @@ pub(super) fn rays(site: &Site, story: &FeatureStory<'_>, selected: Option<usize
             true => (color, 4.0),
             false => (color.gamma_multiply(0.55), 1.0),
         };
-        let along = |share: f64| site.spot(&(centre + share * (ray.point - centre)));
+        let along = |share: f64| geometry.spot(&(centre + share * (ray.point - centre)));
         let mut piece = |from: f64, to: f64| {
             rays.lines.push(Line {
                 ends: [along(from), along(to)],

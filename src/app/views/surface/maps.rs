@@ -4,10 +4,10 @@
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
-use super::marks::{Mark, place};
+use super::marks::{MapMark, place};
 use super::scale::{NO_SAY, Scale, bar, number};
 use super::search::{Search, Searched};
-use crate::app::{Command, Scope};
+use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset};
 use crate::render::Score;
@@ -62,10 +62,10 @@ struct Cell {
 }
 
 /// What the maps are drawn from.
-pub(super) struct Shown<'a> {
+pub(super) struct MapContent<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) scale: &'a Scale,
-    pub(super) marks: &'a [Mark],
+    pub(super) marks: &'a [MapMark],
     /// The floor of the slider.
     pub(super) floor: f64,
 }
@@ -75,8 +75,8 @@ impl Maps {
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
-        scope: &Scope<'_>,
-        shown: &Shown<'_>,
+        context: &ViewContext<'_>,
+        shown: &MapContent<'_>,
     ) -> Option<(Pose, String)> {
         let gap = ui.spacing().item_spacing.x;
         let side = ((ui.available_width() - LEFT_AXIS - 2.0 * gap - 2.0) / 3.0).max(60.0);
@@ -125,8 +125,8 @@ impl Maps {
             offset,
         } = pointed_at?;
         let pose = shown.search.pose(&offset);
-        if takes_camera && scope.desk.camera != Some(pose) {
-            scope.send(Command::TakeCamera(Some(pose)));
+        if takes_camera && context.camera() != Some(pose) {
+            context.send(Command::TakeCamera(Some(pose)));
         }
         let searched = shown.search.positions().nth(lattice)?;
         let least_covered = shown.search.least_covered(shown.floor);
@@ -138,7 +138,7 @@ impl Maps {
     fn images(
         &mut self,
         ui: &Ui,
-        shown: &Shown<'_>,
+        shown: &MapContent<'_>,
         map: Map,
         texture: &mut usize,
     ) -> Vec<PlotImage> {
@@ -205,7 +205,7 @@ fn picture(searched: &Searched, color: impl Fn(&Score) -> Color32) -> ColorImage
 /// One map. The wheel zooms, Shift and drag or the middle button pan.
 fn plot(
     ui: &mut Ui,
-    shown: &Shown<'_>,
+    shown: &MapContent<'_>,
     map: Map,
     group: Id,
     side: f32,
@@ -270,7 +270,7 @@ fn small(ui: &Ui, text: &str) -> egui::RichText {
         .color(ui.visuals().weak_text_color())
 }
 
-/// How far a lattice is.
+/// How much of a lattice is scored, in words.
 pub(super) fn progress(searched: &Searched) -> String {
     let all = searched.surface.lattice.hypotheses().count();
     format!(
@@ -368,7 +368,7 @@ fn colours(ui: &mut Ui, scale: &Scale, map: Map, width: f32) {
 }
 
 /// Outlines and marks on top of a map.
-fn overlay(ui: &Ui, shown: &Shown<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
+fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
     let painter = ui
         .painter()
         .with_clip_rect(transform.frame().intersect(ui.clip_rect()));

@@ -4,14 +4,14 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec
 
 use super::scale::number;
 use super::search::{Minimum, Search};
-use crate::app::{Command, Scope, theme};
+use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase};
 use crate::method::Method;
 
 /// What is at a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MarkKind {
     Start,
     Coarse,
     Fine,
@@ -30,16 +30,16 @@ const REACH: f32 = 5.0;
 const RANKED: usize = 5;
 
 /// A place on the maps.
-pub(super) struct Mark {
-    pub(super) kind: Kind,
+pub(super) struct MapMark {
+    pub(super) kind: MarkKind,
     pub(super) offset: Offset,
     pose: Pose,
     words: String,
 }
 
-impl Mark {
+impl MapMark {
     /// Everything that is to be marked, what matters most last. `floor` is what the slider says.
-    pub(super) fn all(scope: &Scope<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
+    pub(super) fn all(context: &ViewContext<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
         let mut marks = Vec::new();
         let mut add = |kind, offset, pose, name: &str, note: String| {
             marks.push(Self {
@@ -51,21 +51,27 @@ impl Mark {
         };
         let start = Offset::default();
         add(
-            Kind::Start,
+            MarkKind::Start,
             start,
             search.pose(&start),
             "start",
             String::new(),
         );
-        let own_floor = search.least_covered(scope.run.params.grid.coverage_floor);
+        let own_floor = search.least_covered(context.run.params.grid.coverage_floor);
         for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
             let note = format!(", +{}", number(margin));
             let pose = search.pose(&minimum.offset);
-            add(Kind::Ranked(rank), minimum.offset, pose, "minimum", note);
+            add(
+                MarkKind::Ranked(rank),
+                minimum.offset,
+                pose,
+                "minimum",
+                note,
+            );
         }
         let phases = [
-            (Kind::Coarse, Phase::PositionCoarse, "coarse minimum"),
-            (Kind::Fine, Phase::PositionFine, "fine minimum"),
+            (MarkKind::Coarse, Phase::PositionCoarse, "coarse minimum"),
+            (MarkKind::Fine, Phase::PositionFine, "fine minimum"),
         ];
         for (kind, phase, name) in phases {
             if let Some(searched) = search.last(phase)
@@ -86,7 +92,7 @@ impl Mark {
             let note = format!(", {}", number(moved.cost));
             let pose = search.pose(&moved.offset);
             add(
-                Kind::Floored,
+                MarkKind::Floored,
                 moved.offset,
                 pose,
                 "minimum at this floor",
@@ -94,9 +100,13 @@ impl Mark {
             );
         }
         let cameras = [
-            (Kind::Feature, scope.estimate(Method::FB), "FB's estimate"),
-            (Kind::Truth, scope.truth().copied(), "truth"),
-            (Kind::Camera, scope.desk.camera, "camera in hand"),
+            (
+                MarkKind::Feature,
+                context.estimate(Method::FB),
+                "FB's estimate",
+            ),
+            (MarkKind::Truth, context.truth().copied(), "truth"),
+            (MarkKind::Camera, context.camera(), "camera in hand"),
         ];
         for (kind, pose, name) in cameras {
             if let Some(pose) = pose {
@@ -108,7 +118,10 @@ impl Mark {
 
     /// Paints the mark with its heading; `reach` is half its size \[points\].
     pub(super) fn paint(&self, painter: &Painter, at: Pos2, reach: f32) {
-        if matches!(self.kind, Kind::Feature | Kind::Truth | Kind::Camera) {
+        if matches!(
+            self.kind,
+            MarkKind::Feature | MarkKind::Truth | MarkKind::Camera
+        ) {
             let (sin, cos) = (self.offset.yaw_rad as f32).sin_cos();
             let tip = at + 2.4 * reach * vec2(-sin, -cos);
             painter.line_segment([at, tip], Stroke::new(3.0, Color32::WHITE));
@@ -164,7 +177,7 @@ pub(super) fn place(offset: &Offset) -> String {
     }
 }
 
-impl Kind {
+impl MarkKind {
     fn color(self) -> Color32 {
         match self {
             Self::Start => theme::REFERENCE,
@@ -229,7 +242,7 @@ impl Kind {
 
 /// The marks in words. Pointing at one looks at its pose, which is answered; a click takes the
 /// camera there.
-pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<Pose> {
+pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) -> Option<Pose> {
     let mut pointed_at = None;
     ui.horizontal_wrapped(|ui| {
         // The room for the mark is part of the button, so that both wrap together.
@@ -248,7 +261,7 @@ pub(super) fn legend(ui: &mut Ui, scope: &Scope<'_>, marks: &[Mark]) -> Option<P
                 pointed_at = Some(mark.pose);
             }
             if response.clicked() {
-                scope.send(Command::TakeCamera(Some(mark.pose)));
+                context.send(Command::TakeCamera(Some(mark.pose)));
             }
         }
     });

@@ -20,8 +20,8 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Of everything that the method has told, behind the cursor too: looking back must not change
-    /// what a colour means.
+    /// The scale of everything that the method has told, behind the cursor too: looking back must
+    /// not change what a colour means.
     pub(super) fn of(run: &Run, search: &Search<'_>) -> Self {
         let floor = run.params.grid.coverage_floor;
         let least_covered = search.least_covered(floor);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::event::{Event, MinimumAssessed, Moment, PoseScored};
 use crate::geometry::Pose;
 use crate::grid::{self, Lattice, Offset, Phase, ScoredLattice};
@@ -36,12 +36,12 @@ pub(super) struct Searched {
 
 impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
-    pub(super) fn at(scope: &Scope<'a>, method: Method) -> Option<Self> {
-        let (span, cursor) = part(scope, method)?;
-        let problems = &scope.run.loaded.as_deref()?.problems;
+    pub(super) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
+        let (span, cursor) = part(context, method)?;
+        let problems = &context.run.loaded.as_deref()?.problems;
         let problem = problems.get(span.part.reference()?)?;
         let end = span.records.end.min(cursor + 1);
-        let records = scope.run.records().get(span.records.start..end)?;
+        let records = context.run.records().get(span.records.start..end)?;
         let mut events = records.iter().map(|record| &record.event);
         let covered_at_reference = events.find_map(|event| match event {
             Event::ViewRendered(view) if view.moment == Moment::Start => {
@@ -58,7 +58,7 @@ impl<'a> Search<'a> {
             hypothesis: None,
             assessed: None,
         };
-        let params = &scope.run.params.grid;
+        let params = &context.run.params.grid;
         let least_covered = grid::least_covered(params.coverage_floor, covered_at_reference);
         let mut centre = Offset::default();
         let mut filling: Option<Filling> = None;
@@ -161,11 +161,11 @@ pub(super) struct Minimum {
 
 /// The part of the run to read a direct method's search from, and the cursor in it. A hybrid runs
 /// others inside itself, one of which is then the one at the cursor.
-fn part<'a>(scope: &Scope<'a>, method: Method) -> Option<(&'a Span, usize)> {
-    let is_inside = scope.is_inside_hybrid(method) && scope.latest::<PoseScored>().is_some();
+fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usize)> {
+    let is_inside = context.is_inside_hybrid(method) && context.latest::<PoseScored>().is_some();
     match is_inside {
-        true => Some((scope.span()?, scope.cursor)),
-        false => scope.of(method),
+        true => Some((context.span()?, context.cursor)),
+        false => context.part_of(method),
     }
 }
 

@@ -5,19 +5,19 @@ use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotUi, VLine};
 
 use super::scale::number;
 use super::search::{Search, Searched};
-use crate::app::{Scope, theme};
+use crate::app::{ViewContext, theme};
 use crate::grid::{Lattice, Offset, Phase};
 use crate::method::Method;
 
 /// What changes along a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Along {
+enum SliceAxis {
     Right,
     Forward,
     Yaw,
 }
 
-impl Along {
+impl SliceAxis {
     const ALL: [Self; 3] = [Self::Right, Self::Forward, Self::Yaw];
 
     fn name(self) -> &'static str {
@@ -35,7 +35,7 @@ impl Along {
         }
     }
 
-    /// In the unit of the axis.
+    /// The coordinate along the axis, in its unit.
     fn of(self, offset: &Offset) -> f64 {
         match self {
             Self::Right => offset.right_m,
@@ -69,14 +69,14 @@ impl Along {
 
 /// What costs are made comparable by: 0 and 1 on the axis of the slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Range {
+struct CostScale {
     zero: f64,
     one: f64,
     /// Whether these are the result and its shuffled pixels, or else the least and greatest so far.
     is_assessed: bool,
 }
 
-impl Range {
+impl CostScale {
     /// From the best cost to that of shuffled pixels. Before the search is assessed, and where the
     /// best is no better than shuffled pixels, from the least to the greatest cost.
     fn of(assessed: Option<(f64, f64)>, costs: impl Iterator<Item = f64>) -> Option<Self> {
@@ -121,13 +121,13 @@ impl Range {
 /// A method's search with what its costs are measured by.
 struct Curve<'a> {
     search: Search<'a>,
-    range: Range,
+    range: CostScale,
     least_covered: u32,
 }
 
 impl<'a> Curve<'a> {
-    fn of(scope: &Scope<'a>, method: Method, floor: f64) -> Option<Self> {
-        let search = Search::at(scope, method)?;
+    fn of(context: &ViewContext<'a>, method: Method, floor: f64) -> Option<Self> {
+        let search = Search::at(context, method)?;
         let least_covered = search.least_covered(floor);
         let assessed = search
             .assessed
@@ -138,14 +138,14 @@ impl<'a> Curve<'a> {
             .flat_map(|searched| searched.surface.scores.iter().flatten());
         let costs = scores.filter_map(|score| score.eligible_cost(least_covered));
         Some(Self {
-            range: Range::of(assessed, costs)?,
+            range: CostScale::of(assessed, costs)?,
             least_covered,
             search,
         })
     }
 
     /// The stretches of a lattice's slice that may win.
-    fn stretches(&self, along: Along, searched: &Searched) -> Vec<Vec<[f64; 2]>> {
+    fn stretches(&self, along: SliceAxis, searched: &Searched) -> Vec<Vec<[f64; 2]>> {
         let Some(minimum) = searched.minimum(self.least_covered) else {
             return Vec::new();
         };
@@ -162,7 +162,7 @@ impl<'a> Curve<'a> {
             .collect()
     }
 
-    fn draw<'p>(&self, plot: &mut PlotUi<'p>, along: Along) {
+    fn draw<'p>(&self, plot: &mut PlotUi<'p>, along: SliceAxis) {
         let name = self.search.method.name().to_uppercase();
         let color = theme::method(self.search.method);
         for (phase, width) in along.phases().into_iter().zip([1.0, 2.5]) {
@@ -179,11 +179,17 @@ impl<'a> Curve<'a> {
 
 /// Draws the slices. `shown` is the method of the maps, whose minimum is marked; the floor is that
 /// of the slider.
-pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64, width: f32) {
-    let methods = scope.direct_methods();
+pub(super) fn ui(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    shown: &Search<'_>,
+    floor: f64,
+    width: f32,
+) {
+    let methods = context.direct_methods();
     let curves: Vec<Curve<'_>> = methods
         .into_iter()
-        .filter_map(|method| Curve::of(scope, method, floor))
+        .filter_map(|method| Curve::of(context, method, floor))
         .collect();
     ui.label("Slices through each minimum");
     for curve in &curves {
@@ -195,11 +201,11 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64,
             ui.weak(curve.range.words());
         });
     }
-    let marks = marks(ui, scope, shown, floor);
+    let marks = marks(ui, context, shown, floor);
     let gap = ui.spacing().item_spacing.x;
     let width = ((width - 2.0 * gap - 2.0) / 3.0).max(60.0);
     ui.horizontal_top(|ui| {
-        for along in Along::ALL {
+        for along in SliceAxis::ALL {
             slice(ui, along, width, &curves, &marks);
         }
     });
@@ -214,7 +220,7 @@ pub(super) fn ui(ui: &mut Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64,
 
 type LineMark = (&'static str, Color32, LineStyle, Offset);
 
-fn marks(ui: &Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) -> Vec<LineMark> {
+fn marks(ui: &Ui, context: &ViewContext<'_>, shown: &Search<'_>, floor: f64) -> Vec<LineMark> {
     let least_covered = shown.least_covered(floor);
     let minimum = |phases: [Phase; 2]| {
         let searched = phases.into_iter().find_map(|phase| shown.last(phase))?;
@@ -226,9 +232,9 @@ fn marks(ui: &Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) -> Vec<Line
         yaw_rad: yaw.map_or(position.yaw_rad, |yaw| yaw.yaw_rad),
         ..position
     });
-    let truth = scope.truth().map(|pose| shown.offset(pose));
+    let truth = context.truth().map(|pose| shown.offset(pose));
     let hypothesis = shown.hypothesis.map(|scored| scored.offset);
-    let camera = scope.desk.camera.map(|pose| shown.offset(&pose));
+    let camera = context.camera().map(|pose| shown.offset(&pose));
     let strong = ui.visuals().strong_text_color();
     let dashed = LineStyle::dashed_loose();
     [
@@ -247,7 +253,7 @@ fn marks(ui: &Ui, scope: &Scope<'_>, shown: &Search<'_>, floor: f64) -> Vec<Line
     .collect()
 }
 
-fn slice(ui: &mut Ui, along: Along, width: f32, curves: &[Curve<'_>], marks: &[LineMark]) {
+fn slice(ui: &mut Ui, along: SliceAxis, width: f32, curves: &[Curve<'_>], marks: &[LineMark]) {
     const HEIGHT: f32 = 130.0;
     let cost_of = |name: &str, place: f64| {
         let curve = curves
@@ -324,22 +330,22 @@ mod tests {
         let params = GridParams::default();
         let lattice =
             Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params).expect("small");
-        assert_eq!(Along::Right.cells(&lattice, 5), [3, 4, 5]);
-        assert_eq!(Along::Forward.cells(&lattice, 5), [2, 5, 8]);
+        assert_eq!(SliceAxis::Right.cells(&lattice, 5), [3, 4, 5]);
+        assert_eq!(SliceAxis::Forward.cells(&lattice, 5), [2, 5, 8]);
         let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params).expect("small");
-        assert_eq!(Along::Yaw.cells(&yaw, 5).len(), yaw.columns);
+        assert_eq!(SliceAxis::Yaw.cells(&yaw, 5).len(), yaw.columns);
     }
 
     #[test]
     fn a_range_that_means_nothing_gives_way_to_that_of_the_costs() {
         let costs = || [3.0, 1.0, 2.0].into_iter();
-        let assessed = Range::of(Some((1.0, 5.0)), costs()).expect("costs");
+        let assessed = CostScale::of(Some((1.0, 5.0)), costs()).expect("costs");
         assert_eq!((assessed.place(3.0), assessed.cost(0.5)), (0.5, 3.0));
-        let worse_than_shuffled = Range::of(Some((5.0, 1.0)), costs()).expect("costs");
+        let worse_than_shuffled = CostScale::of(Some((5.0, 1.0)), costs()).expect("costs");
         assert!(!worse_than_shuffled.is_assessed);
         assert_eq!(worse_than_shuffled.place(2.0), 0.5);
-        assert_eq!(Range::of(None, std::iter::empty()), None);
-        let flat = Range::of(None, [4.0, 4.0].into_iter()).expect("costs");
+        assert_eq!(CostScale::of(None, std::iter::empty()), None);
+        let flat = CostScale::of(None, [4.0, 4.0].into_iter()).expect("costs");
         assert_eq!(flat.place(4.0), 0.0);
     }
 }

@@ -2,9 +2,9 @@
 
 use egui::{Color32, Mesh, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 
-use crate::app::scope::CostBounds;
 use crate::app::theme;
-use crate::app::views::ink::{Ink, Mark};
+use crate::app::view_context::CostBounds;
+use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 use crate::method::Method;
 
 /// Height of the bar with its marks \[points\].
@@ -14,18 +14,20 @@ const BEYOND: f64 = 0.04;
 
 /// A bar from the cost of shuffled pixels to the least known cost, with a mark for each cost.
 pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Option<f64>) {
-    let range = Range::of(bounds);
+    let range = BarRange::of(bounds);
     let costs = [
-        Named::new("shuffled", "■", Mark::Square, bounds.shuffled, |ui| {
+        NamedCost::new("shuffled", "■", MarkShape::Square, bounds.shuffled, |ui| {
             ui.visuals().text_color()
         }),
-        Named::new("best", "▲", Mark::Triangle, bounds.best, |_| {
+        NamedCost::new("best", "▲", MarkShape::Triangle, bounds.best, |_| {
             theme::ESTIMATE
         }),
-        Named::new("truth", "◆", Mark::Diamond, bounds.truth, |_| {
+        NamedCost::new("truth", "◆", MarkShape::Diamond, bounds.truth, |_| {
             theme::TRUTH
         }),
-        Named::new("present", "○", Mark::Ring, present, |_| theme::CAMERA),
+        NamedCost::new("present", "○", MarkShape::Ring, present, |_| {
+            theme::CAMERA
+        }),
     ];
     let name = method.name().to_uppercase();
     if let Some(range) = &range {
@@ -56,19 +58,19 @@ pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Opti
 }
 
 /// A cost with its mark.
-struct Named {
+struct NamedCost {
     name: &'static str,
     glyph: &'static str,
-    mark: Mark,
+    mark: MarkShape,
     value: Option<f64>,
     color: fn(&Ui) -> Color32,
 }
 
-impl Named {
+impl NamedCost {
     fn new(
         name: &'static str,
         glyph: &'static str,
-        mark: Mark,
+        mark: MarkShape,
         value: Option<f64>,
         color: fn(&Ui) -> Color32,
     ) -> Self {
@@ -84,12 +86,12 @@ impl Named {
 
 /// The costs at the ends of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Range {
+struct BarRange {
     shuffled: f64,
     least: f64,
 }
 
-impl Range {
+impl BarRange {
     /// From shuffled pixels to the truth, or to the best where that costs less still; `None` before
     /// they are known, and where nothing lies between them.
     fn of(bounds: &CostBounds) -> Option<Self> {
@@ -105,7 +107,7 @@ impl Range {
     }
 }
 
-fn bar(ui: &mut Ui, name: &str, range: &Range, costs: &[Named]) {
+fn bar(ui: &mut Ui, name: &str, range: &BarRange, costs: &[NamedCost]) {
     let size = vec2(ui.available_width(), HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let spoken = format!("{name} cost from shuffled pixels to the least");
@@ -132,19 +134,19 @@ fn bar(ui: &mut Ui, name: &str, range: &Range, costs: &[Named]) {
         }
     }
     ui.painter().add(mesh);
-    let mut ink = Ink::new(ui.pixels_per_point());
+    let mut mesh = MeshPainter::new(ui.pixels_per_point());
     for cost in costs {
         let Some(value) = cost.value else { continue };
         let place = at(range.share(value));
         // The present cost goes around those that it equals.
-        if cost.mark == Mark::Ring {
-            ink.ring(place, 7.0, 2.2, (cost.color)(ui));
+        if cost.mark == MarkShape::Ring {
+            mesh.ring(place, 7.0, 2.2, (cost.color)(ui));
         } else {
-            ink.disc(place, 7.0, ui.visuals().panel_fill);
-            ink.mark(cost.mark, place, 4.5, (cost.color)(ui));
+            mesh.disc(place, 7.0, ui.visuals().panel_fill);
+            mesh.mark(cost.mark, place, 4.5, (cost.color)(ui));
         }
     }
-    ink.dry(ui.painter());
+    mesh.paint_on(ui.painter());
 }
 
 #[cfg(test)]
@@ -158,10 +160,10 @@ mod tests {
             best: Some(0.7),
             truth: None,
         };
-        let range = Range::of(&bounds).expect("both are known");
+        let range = BarRange::of(&bounds).expect("both are known");
         assert!((range.share(0.8) - 0.5).abs() < 1e-12);
         bounds.truth = Some(0.5);
-        let range = Range::of(&bounds).expect("all are known");
+        let range = BarRange::of(&bounds).expect("all are known");
         assert!((range.share(0.7) - 0.5).abs() < 1e-12);
         assert!(range.share(1.1) < 0.0);
     }
@@ -173,7 +175,7 @@ mod tests {
             best: Some(0.5),
             truth: None,
         };
-        assert_eq!(Range::of(&flat), None);
-        assert_eq!(Range::of(&CostBounds::default()), None);
+        assert_eq!(BarRange::of(&flat), None);
+        assert_eq!(BarRange::of(&CostBounds::default()), None);
     }
 }

@@ -8,7 +8,7 @@ use image::DynamicImage;
 use crate::app::textures::color_image;
 use crate::app::views::histogram::explains;
 use crate::app::views::legend;
-use crate::app::{Scope, Shown, theme};
+use crate::app::{ShownView, ViewContext, theme};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::method::Method;
@@ -16,7 +16,7 @@ use crate::problem::Problem;
 use crate::render::Comparison;
 use crate::{palette, picture};
 
-/// What is shown.
+/// What the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
     Query,
@@ -79,12 +79,12 @@ impl Mode {
     pub(super) fn texture(
         self,
         ui: &Ui,
-        scope: &Scope<'_>,
+        context: &ViewContext<'_>,
         problem: &Problem,
-        shown: &Shown,
+        shown: &ShownView,
     ) -> Option<TextureHandle> {
         let of = |what, make: &dyn Fn(&Comparison) -> DynamicImage| {
-            let textures = &scope.desk.textures;
+            let textures = context.textures;
             let made = |comparison: &Comparison| color_image(&make(comparison));
             textures.of(ui.ctx(), what, &shown.comparison, made)
         };
@@ -110,7 +110,7 @@ impl Mode {
         Some(picture)
     }
 
-    pub(super) fn legend(self, ui: &mut Ui, method: Method, shown: Option<&Shown>) {
+    pub(super) fn legend(self, ui: &mut Ui, method: Method, shown: Option<&ShownView>) {
         let explanation = shown.and_then(|shown| shown.comparison.explanation.as_ref());
         match (self, explanation) {
             (Self::Residual, _) => {

@@ -6,7 +6,7 @@ use crate::robust::{AcceptanceRule, MlesacParams};
 /// Which depth a reference keypoint takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthRule {
-    /// That of the nearest projected point.
+    /// The depth of the nearest projected point.
     Nearest,
     /// The same, refused where the depths around it differ too much: near a depth edge the nearest
     /// point may belong to the other surface.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::Color32;
 
-use crate::app::views::space::lens::{Lens, NEAR_M};
+use crate::app::views::space::view_camera::{NEAR_M, ViewCamera};
 
 /// A corner of a face, or a point of the cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ fn write_floats(bytes: &mut Vec<u8>, floats: &[f32]) {
 /// All that one picture shows.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
-    pub(crate) lens: Lens,
+    pub(crate) view_camera: ViewCamera,
     pub(crate) background: Color32,
     /// The cloud. It is uploaded again only when it is another one.
     pub(crate) points: Arc<Points>,
@@ -80,7 +80,7 @@ pub(crate) struct Frame {
 impl PartialEq for Frame {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.points, &other.points)
-            && self.lens == other.lens
+            && self.view_camera == other.view_camera
             && self.background == other.background
             && self.lines == other.lines
             && self.faces == other.faces
@@ -94,9 +94,12 @@ impl Frame {
         const POINT: [f32; 2] = [1.5, 3.0];
         /// Size of a point of the cloud \[m\], where it comes out between the two.
         const POINT_M: f32 = 0.06;
-        let focal_px = self.lens.focal[0] as f32 * scale;
+        let focal_px = self.view_camera.focal[0] as f32 * scale;
         let mut bytes = Vec::new();
-        write_floats(&mut bytes, self.lens.clip_from_scene().as_flattened());
+        write_floats(
+            &mut bytes,
+            self.view_camera.clip_from_scene().as_flattened(),
+        );
         write_floats(&mut bytes, &size_px.map(|side| side as f32));
         write_floats(&mut bytes, &POINT.map(|side| side * scale));
         write_floats(&mut bytes, &[POINT_M * focal_px, scale, NEAR_M as f32, 0.0]);

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use super::frame::{Frame, Points};
 use super::guard::guarded;
-use super::pipelines::{COLOR, DEPTH, Made, Pipelines, SAMPLES};
+use super::pipelines::{COLOR, DEPTH, PipelineSet, Pipelines, SAMPLES};
 
 /// The picture and what is needed to draw it anew.
 #[derive(Default)]
 pub(super) struct Picture {
-    target: Option<Target>,
-    cloud: Option<Cloud>,
+    target: Option<RenderTarget>,
+    cloud: Option<UploadedCloud>,
     /// What the picture shows, and how many pixels one of egui's points has.
     shown: Option<(Frame, f32)>,
     trouble: Option<String>,
@@ -27,7 +27,7 @@ pub(super) struct Picture {
 ///
 /// The points have a layer of their own, which stays while only lines and faces change: a hundred
 /// thousand of them take a software adapter longer than all the rest.
-struct Target {
+struct RenderTarget {
     size: [u32; 2],
     cloud_color: wgpu::TextureView,
     cloud_depth: wgpu::TextureView,
@@ -40,7 +40,7 @@ struct Target {
 
 /// A cloud on the graphics card, with the points that it was made from: they stay alive, so that
 /// their address stays their own.
-struct Cloud {
+struct UploadedCloud {
     points: Arc<Points>,
     buffer: wgpu::Buffer,
 }
@@ -85,7 +85,7 @@ impl Picture {
 
     fn submit(
         &mut self,
-        made: &Made,
+        made: &PipelineSet,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         frame: &Frame,
@@ -96,7 +96,7 @@ impl Picture {
             Some(target) if target.size == size => target,
             _ => {
                 self.shown = None;
-                Target::new(device, made, size)
+                RenderTarget::new(device, made, size)
             }
         };
         let cloud = match self.cloud.take() {
@@ -106,7 +106,7 @@ impl Picture {
                 {
                     self.uploaded += 1;
                 }
-                Cloud {
+                UploadedCloud {
                     points: Arc::clone(&frame.points),
                     buffer: filled(
                         device,
@@ -136,7 +136,7 @@ impl Picture {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let has_points = self.shown.as_ref().is_some_and(|(shown, at)| {
             *at == scale
-                && shown.lens == frame.lens
+                && shown.view_camera == frame.view_camera
                 && shown.background == frame.background
                 && Arc::ptr_eq(&shown.points, &frame.points)
         });
@@ -187,8 +187,8 @@ impl Picture {
     }
 }
 
-impl Target {
-    fn new(device: &wgpu::Device, made: &Made, size: [u32; 2]) -> Self {
+impl RenderTarget {
+    fn new(device: &wgpu::Device, made: &PipelineSet, size: [u32; 2]) -> Self {
         let texture = |format, sample_count, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("space"),

@@ -13,11 +13,11 @@ pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// The pipelines of a device, unless it refused them.
 pub(super) struct Pipelines {
-    made: Result<Made, String>,
+    made: Result<PipelineSet, String>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
-pub(super) struct Made {
+pub(super) struct PipelineSet {
     pub(super) points: wgpu::RenderPipeline,
     pub(super) lines: wgpu::RenderPipeline,
     pub(super) faces: wgpu::RenderPipeline,
@@ -38,12 +38,12 @@ impl Pipelines {
             *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(why.trim().to_owned());
         });
         Self {
-            made: guarded(device, || Made::new(device, target)),
+            made: guarded(device, || PipelineSet::new(device, target)),
             lost,
         }
     }
 
-    pub(super) fn made(&self) -> Option<&Made> {
+    pub(super) fn made(&self) -> Option<&PipelineSet> {
         self.made.as_ref().ok()
     }
 
@@ -54,7 +54,7 @@ impl Pipelines {
     }
 }
 
-impl Made {
+impl PipelineSet {
     fn new(device: &wgpu::Device, target: wgpu::TextureFormat) -> Self {
         let scene = device.create_shader_module(wgpu::include_wgsl!("../scene.wgsl"));
         let blit = device.create_shader_module(wgpu::include_wgsl!("../blit.wgsl"));
@@ -83,14 +83,14 @@ impl Made {
         ];
         let instance = wgpu::VertexStepMode::Instance;
         let strip = wgpu::PrimitiveTopology::TriangleStrip;
-        let part = |name, topology, buffer, onto| {
-            let drawn = Drawn {
+        let part = |name, topology, buffer, target| {
+            let drawn = PipelineSpec {
                 layout: &view_layout,
                 vertex: (&scene, name),
                 fragment: (&scene, "paint"),
                 buffer: Some(buffer),
                 topology,
-                onto,
+                target,
             };
             drawn.pipeline(device)
         };
@@ -99,30 +99,30 @@ impl Made {
                 "point",
                 strip,
                 buffer(Spot::BYTES, instance, &spot),
-                Onto::Cloud,
+                TargetKind::Cloud,
             ),
             lines: part(
                 "line",
                 strip,
                 buffer(Line::BYTES, instance, &line),
-                Onto::Picture,
+                TargetKind::Picture,
             ),
             faces: part(
                 "face",
                 wgpu::PrimitiveTopology::TriangleList,
                 buffer(Spot::BYTES, wgpu::VertexStepMode::Vertex, &spot),
-                Onto::Picture,
+                TargetKind::Picture,
             ),
-            backdrop: Drawn {
+            backdrop: PipelineSpec {
                 layout: &backdrop_layout,
                 vertex: (&blit, "cover"),
                 fragment: (&blit, "backdrop"),
                 buffer: None,
                 topology: wgpu::PrimitiveTopology::TriangleList,
-                onto: Onto::Picture,
+                target: TargetKind::Picture,
             }
             .pipeline(device),
-            blit: Drawn {
+            blit: PipelineSpec {
                 layout: &blit_layout,
                 vertex: (&blit, "cover"),
                 fragment: match target.is_srgb() {
@@ -131,7 +131,7 @@ impl Made {
                 },
                 buffer: None,
                 topology: wgpu::PrimitiveTopology::TriangleList,
-                onto: Onto::Pane(target),
+                target: TargetKind::Pane(target),
             }
             .pipeline(device),
             view_layout,
@@ -174,18 +174,18 @@ fn layout(
 }
 
 /// One pipeline in words.
-struct Drawn<'a> {
+struct PipelineSpec<'a> {
     layout: &'a wgpu::BindGroupLayout,
     vertex: (&'a wgpu::ShaderModule, &'a str),
     fragment: (&'a wgpu::ShaderModule, &'a str),
     buffer: Option<wgpu::VertexBufferLayout<'a>>,
     topology: wgpu::PrimitiveTopology,
-    onto: Onto,
+    target: TargetKind,
 }
 
 /// What is drawn into.
 #[derive(Clone, Copy)]
-enum Onto {
+enum TargetKind {
     /// The layer of the points alone. They are squares, which more samples would only blur.
     Cloud,
     /// The whole picture.
@@ -194,7 +194,7 @@ enum Onto {
     Pane(wgpu::TextureFormat),
 }
 
-impl Onto {
+impl TargetKind {
     fn format(self) -> wgpu::TextureFormat {
         match self {
             Self::Cloud | Self::Picture => COLOR,
@@ -210,7 +210,7 @@ impl Onto {
     }
 }
 
-impl Drawn<'_> {
+impl PipelineSpec<'_> {
     fn pipeline(self, device: &wgpu::Device) -> wgpu::RenderPipeline {
         let label = Some(self.vertex.1);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -232,15 +232,17 @@ impl Drawn<'_> {
                 topology: self.topology,
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: (!matches!(self.onto, Onto::Pane(_))).then(|| wgpu::DepthStencilState {
-                format: DEPTH,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
+            depth_stencil: (!matches!(self.target, TargetKind::Pane(_))).then(|| {
+                wgpu::DepthStencilState {
+                    format: DEPTH,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }
             }),
             multisample: wgpu::MultisampleState {
-                count: self.onto.samples(),
+                count: self.target.samples(),
                 ..wgpu::MultisampleState::default()
             },
             fragment: Some(wgpu::FragmentState {
@@ -248,7 +250,7 @@ impl Drawn<'_> {
                 entry_point: Some(self.fragment.1),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: self.onto.format(),
+                    format: self.target.format(),
                     blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
                     write_mask: wgpu::ColorWrites::ALL,
                 })],

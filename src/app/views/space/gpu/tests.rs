@@ -8,7 +8,7 @@ use proptest::test_runner::{Config, TestRunner};
 use super::guard::at_once;
 use super::pipelines::COLOR;
 use super::*;
-use crate::app::views::space::lens::Lens;
+use crate::app::views::space::view_camera::ViewCamera;
 use crate::geometry::Pose;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -92,15 +92,15 @@ impl Card {
     }
 }
 
-fn lens() -> Lens {
+fn view_camera() -> ViewCamera {
     let size = egui::vec2(SIZE[0] as f32, SIZE[1] as f32);
     let eye = Pose::new([1.0, -2.0, -5.0].into(), [-0.2, 0.3, 0.1].into());
-    Lens::centred(eye, 0.9, size)
+    ViewCamera::centred(eye, 0.9, size)
 }
 
 fn frame(points: &[Spot], lines: Vec<Line>) -> Frame {
     Frame {
-        lens: lens(),
+        view_camera: view_camera(),
         background: BLACK,
         points: Arc::new(Points::new(points.iter().copied())),
         lines,
@@ -108,15 +108,18 @@ fn frame(points: &[Spot], lines: Vec<Line>) -> Frame {
     }
 }
 
-/// Where a lens sees its point at `x`, `y` \[pixels\] and a depth.
+/// The point of the scene that the view camera sees at `x`, `y` \[pixels\] and a depth.
 fn place(x: f64, y: f64, depth: f64) -> [f32; 3] {
-    let lens = lens();
+    let view_camera = view_camera();
     let in_eye = Point3::new(
-        (x - lens.centre[0]) / lens.focal[0] * depth,
-        (y - lens.centre[1]) / lens.focal[1] * depth,
+        (x - view_camera.centre[0]) / view_camera.focal[0] * depth,
+        (y - view_camera.centre[1]) / view_camera.focal[1] * depth,
         depth,
     );
-    (lens.scene_from_eye * in_eye).coords.cast::<f32>().into()
+    (view_camera.scene_from_eye * in_eye)
+        .coords
+        .cast::<f32>()
+        .into()
 }
 
 fn near_pixel(picture: &image::RgbaImage, x: f64, y: f64) -> Color32 {
@@ -175,7 +178,7 @@ fn a_line_from_behind_the_eye_is_drawn_as_far_as_it_is_seen() {
     let pixels = card.pixels(&picture);
     for share in [0.8, 1.0, 1.5] {
         let place: [f32; 3] = on(share);
-        let at = lens()
+        let at = view_camera()
             .project(&Point3::from(place).cast())
             .expect("in front");
         let seen = near_pixel(&pixels, f64::from(at.x), f64::from(at.y));
@@ -197,7 +200,7 @@ fn a_picture_is_drawn_again_only_if_something_changed() {
     card.draw(&mut picture, &first.clone());
     assert_eq!((picture.drawn, picture.uploaded), (1, 1));
     let mut moved = first.clone();
-    moved.lens = moved.lens.shifted(egui::vec2(3.0, 0.0));
+    moved.view_camera = moved.view_camera.shifted(egui::vec2(3.0, 0.0));
     card.draw(&mut picture, &moved);
     assert_eq!((picture.drawn, picture.uploaded), (2, 1));
     card.draw(&mut picture, &frame(&[point], Vec::new()));

@@ -1,4 +1,4 @@
-//! Those who follow queries being localised.
+//! Observers of queries that are localised.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,8 +10,8 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink, Trace};
 
-/// Somebody who watches queries being localised: a recording, a progress bar, nobody.
-pub trait Watch: Sink {
+/// An observer of queries that are localised: a recording, a progress bar, a session.
+pub trait LocalizeObserver: Sink {
     /// A query begins, with one problem per reference.
     fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
         let _ = (index, problems, truth);
@@ -47,19 +47,19 @@ pub trait Watch: Sink {
 }
 
 /// Between two steps that tell nothing: calls [`Sink::attend`] where the flag is up.
-pub(super) fn checkpoint(watch: &mut dyn Watch) -> Result<(), Cancelled> {
-    let attention = watch.attention();
+pub(super) fn checkpoint(observer: &mut dyn LocalizeObserver) -> Result<(), Cancelled> {
+    let attention = observer.attention();
     match &attention {
-        Some(flag) => Trace::watched(watch, flag).checkpoint(),
+        Some(flag) => Trace::watched(observer, flag).checkpoint(),
         None => Ok(()),
     }
 }
 
-/// Nobody watches.
+/// An observer that wants to hear nothing, for queries that nobody watches.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Unwatched;
+pub struct NoObserver;
 
-impl Sink for Unwatched {
+impl Sink for NoObserver {
     fn wanted(&self) -> KindSet {
         KindSet::NONE
     }
@@ -69,4 +69,4 @@ impl Sink for Unwatched {
     }
 }
 
-impl Watch for Unwatched {}
+impl LocalizeObserver for NoObserver {}

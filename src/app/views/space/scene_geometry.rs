@@ -1,12 +1,13 @@
-//! Where things are in the scene.
+//! The frame that the scene is drawn in, and where things are in it.
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::geometry::Pose;
 use crate::grid::Offset;
 
-/// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's camera.
+/// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's
+/// camera.
 pub(super) const GROUND_M: f64 = 1.6;
 
 /// The scene's frame, seen from the world and from the reference at the cursor.
@@ -14,18 +15,18 @@ pub(super) const GROUND_M: f64 = 1.6;
 /// It is that of the first reference camera, so that it stays while the cursor moves, and so that
 /// single precision suffices for what is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Site {
+pub(super) struct SceneGeometry {
     pub(super) scene_from_world: Pose,
     pub(super) scene_from_reference: Pose,
     /// How far from the reference the query may be \[m\].
     pub(super) radius_m: f64,
 }
 
-impl Site {
-    /// The site of a run; `None` before its frames are read.
-    pub(super) fn of(scope: &Scope<'_>) -> Option<Self> {
-        let first = scope.run.loaded.as_deref()?.problems.first()?;
-        let here = scope.problem()?;
+impl SceneGeometry {
+    /// The geometry of a run's scene; `None` before its frames are read.
+    pub(super) fn of(context: &ViewContext<'_>) -> Option<Self> {
+        let first = context.run.loaded.as_deref()?.problems.first()?;
+        let here = context.problem()?;
         let scene_from_world = first.reference.world_from_camera.inverse();
         Some(Self {
             scene_from_world,
@@ -78,7 +79,7 @@ impl Site {
     }
 }
 
-/// As the graphics card takes it.
+/// A place in the scene as the graphics card takes it.
 pub(super) fn spot(in_scene: &Point3<f64>) -> [f32; 3] {
     in_scene.coords.cast::<f32>().into()
 }
@@ -88,8 +89,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn site(radius_m: f64) -> Site {
-        Site {
+    fn geometry(radius_m: f64) -> SceneGeometry {
+        SceneGeometry {
             scene_from_world: Pose::new([3.0, 1.0, -2.0].into(), [0.1, 0.7, 0.0].into()),
             scene_from_reference: Pose::new([1.0, 0.0, 5.0].into(), [0.0, 0.3, 0.02].into()),
             radius_m,
@@ -102,9 +103,9 @@ mod tests {
             right_m in -20.0..20.0, forward_m in -20.0..20.0, yaw_rad in -3.0..3.0,
         ) {
             let offset = Offset { right_m, forward_m, yaw_rad };
-            let site = site(15.0);
-            let scene_from_camera = site.scene_from_reference * offset.reference_from_camera();
-            let found = site.offset(&(site.scene_from_world.inverse() * scene_from_camera));
+            let geometry = geometry(15.0);
+            let scene_from_camera = geometry.scene_from_reference * offset.reference_from_camera();
+            let found = geometry.offset(&(geometry.scene_from_world.inverse() * scene_from_camera));
             prop_assert!((found.right_m - right_m).abs() < 1e-9);
             prop_assert!((found.forward_m - forward_m).abs() < 1e-9);
             prop_assert!((found.yaw_rad - yaw_rad).abs() < 1e-9);
@@ -112,15 +113,15 @@ mod tests {
 
         #[test]
         fn the_grid_has_a_few_lines_for_any_radius(radius_m in 0.01..2000.0) {
-            let lines = radius_m / site(radius_m).grid_m();
+            let lines = radius_m / geometry(radius_m).grid_m();
             prop_assert!((2.0..=6.0 + 1e-9).contains(&lines), "{lines}");
         }
     }
 
     #[test]
     fn the_grid_is_round() {
-        assert_eq!(site(15.0).grid_m(), 5.0);
-        assert_eq!(site(3.0).grid_m(), 0.5);
-        assert_eq!(site(10.0).grid_m(), 2.0);
+        assert_eq!(geometry(15.0).grid_m(), 5.0);
+        assert_eq!(geometry(3.0).grid_m(), 0.5);
+        assert_eq!(geometry(10.0).grid_m(), 2.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Holding a run back between two events.
+//! Pausing a run between two of its events.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
@@ -10,7 +10,7 @@ use super::message::Message;
 use super::run::Part;
 use crate::event::{Event, StageEnded};
 use crate::geometry::Pose;
-use crate::localize::{QueryResult, StageTimes, Watch};
+use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
@@ -18,30 +18,31 @@ use crate::trace::{Cancelled, Record, Sink};
 /// How a run goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunMode {
-    /// Not at all: it waits behind the next event, or within a loop that tells nothing.
+    /// It does not: it waits behind the next event, or within a loop that tells nothing.
     Paused,
-    /// To the next event.
+    /// It runs to the next event.
     StepInto,
-    /// Behind the stage that begins here, or to the next event.
+    /// It runs behind the stage that begins here, or to the next event.
     StepOver,
-    /// To the end of the stage around it.
+    /// It runs to the end of the stage around it.
     StepOut,
-    /// To the next breakpoint, or to the end.
+    /// It runs to the next breakpoint, or to the end.
     Running,
 }
 
-/// The watcher's end: what is wanted of the run.
+/// What whoever steps through the run holds: the mode, the breakpoints, whether to cancel.
 pub(super) struct Control {
-    wishes: Mutex<Wishes>,
+    state: Mutex<ControlState>,
     changed: Condvar,
     /// Raised with every change, so that a run without events notices it too.
     pub(super) attention: Arc<AtomicBool>,
 }
 
-struct Wishes {
+/// What is asked of the run at present.
+struct ControlState {
     mode: RunMode,
     /// Counts the calls of [`Control::set_mode`], so that two equal steps are two.
-    orders: u64,
+    mode_changes: u64,
     breakpoints: Breakpoints,
     cancelled: bool,
 }
@@ -49,9 +50,9 @@ struct Wishes {
 impl Control {
     pub(super) fn new(mode: RunMode, breakpoints: Breakpoints) -> Self {
         Self {
-            wishes: Mutex::new(Wishes {
+            state: Mutex::new(ControlState {
                 mode,
-                orders: 0,
+                mode_changes: 0,
                 breakpoints,
                 cancelled: false,
             }),
@@ -61,59 +62,60 @@ impl Control {
     }
 
     pub(super) fn set_mode(&self, mode: RunMode) {
-        let mut wishes = self.wishes();
-        wishes.mode = mode;
-        wishes.orders += 1;
-        self.tell(wishes);
+        let mut state = self.lock();
+        state.mode = mode;
+        state.mode_changes += 1;
+        self.notify(state);
     }
 
     pub(super) fn set_breakpoints(&self, breakpoints: Breakpoints) {
-        let mut wishes = self.wishes();
-        wishes.breakpoints.replace(breakpoints);
-        self.tell(wishes);
+        let mut state = self.lock();
+        state.breakpoints.replace(breakpoints);
+        self.notify(state);
     }
 
     /// The flag is set under the mutex of the condition, or a worker that is about to wait would
     /// miss the call that wakes it.
     pub(super) fn cancel(&self) {
-        let mut wishes = self.wishes();
-        wishes.cancelled = true;
-        self.tell(wishes);
+        let mut state = self.lock();
+        state.cancelled = true;
+        self.notify(state);
     }
 
-    fn tell(&self, wishes: MutexGuard<'_, Wishes>) {
+    fn notify(&self, state: MutexGuard<'_, ControlState>) {
         self.attention.store(true, Ordering::Release);
-        drop(wishes);
+        drop(state);
         self.changed.notify_all();
     }
 
-    fn wishes(&self) -> MutexGuard<'_, Wishes> {
-        self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, ControlState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The worker's end: passes every event on and waits where it was asked to.
-pub(super) struct Gate {
+/// What the worker holds: it passes every event on and waits where the [`Control`] asks it to.
+pub(super) struct PausingObserver {
     control: Arc<Control>,
     outbox: Sender<Message>,
     wake: Arc<dyn Fn() + Send + Sync>,
-    /// What the present order waits for.
-    until: Until,
-    /// The order that `until` was made for.
-    order: u64,
+    /// Where the run waits next in the present mode.
+    pause_at: PauseAt,
+    /// The change of mode that `pause_at` was made for.
+    seen_mode_change: u64,
     /// The event that was passed on last, as the stepping sees it.
-    last: Option<Place>,
+    last: Option<EventPosition>,
 }
 
 /// Where an event is among the stages.
 #[derive(Clone, Copy)]
-struct Place {
+struct EventPosition {
     depth: usize,
-    kind: PlaceKind,
+    boundary: StageBoundary,
 }
 
+/// Whether an event begins a stage, ends one, or is inside.
 #[derive(Clone, Copy, PartialEq)]
-enum PlaceKind {
+enum StageBoundary {
     StageStarts,
     StageEnds,
     Inside,
@@ -121,40 +123,42 @@ enum PlaceKind {
 
 /// When to wait next, breakpoints aside.
 #[derive(Clone, Copy, PartialEq)]
-enum Until {
+enum PauseAt {
     NextEvent,
     /// The end of a stage at this depth or further out.
     EndOfStage(usize),
     Never,
 }
 
-impl Place {
+impl EventPosition {
     fn of(record: &Record) -> Self {
         Self {
             depth: record.depth,
-            kind: match record.event {
-                Event::StageStarted(_) => PlaceKind::StageStarts,
-                Event::StageEnded(_) => PlaceKind::StageEnds,
-                _ => PlaceKind::Inside,
+            boundary: match record.event {
+                Event::StageStarted(_) => StageBoundary::StageStarts,
+                Event::StageEnded(_) => StageBoundary::StageEnds,
+                _ => StageBoundary::Inside,
             },
         }
     }
 }
 
-impl Until {
+impl PauseAt {
     /// `from` is where the run stands when it is told to go on; `None` before the first event.
-    fn new(mode: RunMode, from: Option<Place>) -> Self {
+    fn new(mode: RunMode, from: Option<EventPosition>) -> Self {
         match (mode, from) {
             (RunMode::Running, _) => Self::Never,
             (RunMode::Paused | RunMode::StepInto, _) | (_, None) => Self::NextEvent,
-            (RunMode::StepOver, Some(place)) => match place.kind {
-                PlaceKind::StageStarts => Self::EndOfStage(place.depth),
-                PlaceKind::StageEnds | PlaceKind::Inside => Self::NextEvent,
+            (RunMode::StepOver, Some(position)) => match position.boundary {
+                StageBoundary::StageStarts => Self::EndOfStage(position.depth),
+                StageBoundary::StageEnds | StageBoundary::Inside => Self::NextEvent,
             },
-            (RunMode::StepOut, Some(place)) => match place.kind {
+            (RunMode::StepOut, Some(position)) => match position.boundary {
                 // Whoever stands at the end of a stage wants out of the one around it.
-                PlaceKind::StageEnds => Self::EndOfStage(place.depth.saturating_sub(1)),
-                PlaceKind::StageStarts | PlaceKind::Inside => Self::EndOfStage(place.depth),
+                StageBoundary::StageEnds => Self::EndOfStage(position.depth.saturating_sub(1)),
+                StageBoundary::StageStarts | StageBoundary::Inside => {
+                    Self::EndOfStage(position.depth)
+                }
             },
         }
     }
@@ -171,90 +175,92 @@ impl Until {
     }
 }
 
-impl Gate {
+impl PausingObserver {
     pub(super) fn new(
         control: Arc<Control>,
         outbox: Sender<Message>,
         wake: Arc<dyn Fn() + Send + Sync>,
     ) -> Self {
-        let (mode, order) = {
-            let wishes = control.wishes();
-            (wishes.mode, wishes.orders)
+        let (mode, seen_mode_change) = {
+            let state = control.lock();
+            (state.mode, state.mode_changes)
         };
         Self {
             control,
             outbox,
             wake,
-            until: Until::new(mode, None),
-            order,
+            pause_at: PauseAt::new(mode, None),
+            seen_mode_change,
             last: None,
         }
     }
 
-    /// Tells the watcher. A watcher who is gone has cancelled.
-    pub(super) fn tell(&self, message: Message) -> Result<(), Cancelled> {
+    /// Sends to the session. A session that is gone has cancelled.
+    pub(super) fn send(&self, message: Message) -> Result<(), Cancelled> {
         self.outbox.send(message).map_err(|_| Cancelled)?;
         (self.wake)();
         Ok(())
     }
 
-    /// Waits for an order to go on. To pause is none.
+    /// Waits for a mode to go on in. To pause is none.
     fn wait(&mut self) -> Result<(), Cancelled> {
         let control = Arc::clone(&self.control);
-        let mut wishes = control.wishes();
-        while !wishes.cancelled && (wishes.orders == self.order || wishes.mode == RunMode::Paused) {
-            wishes = control
+        let mut state = control.lock();
+        while !state.cancelled
+            && (state.mode_changes == self.seen_mode_change || state.mode == RunMode::Paused)
+        {
+            state = control
                 .changed
-                .wait(wishes)
+                .wait(state)
                 .unwrap_or_else(PoisonError::into_inner);
         }
-        if wishes.cancelled {
+        if state.cancelled {
             return Err(Cancelled);
         }
-        self.listen(&wishes);
+        self.take_over_mode(&state);
         Ok(())
     }
 
-    /// Takes over a new order, if there is one.
-    fn listen(&mut self, wishes: &Wishes) {
-        if wishes.orders != self.order {
-            self.order = wishes.orders;
-            self.until = Until::new(wishes.mode, self.last);
+    /// Takes over a new mode, if one was set.
+    fn take_over_mode(&mut self, state: &ControlState) {
+        if state.mode_changes != self.seen_mode_change {
+            self.seen_mode_change = state.mode_changes;
+            self.pause_at = PauseAt::new(state.mode, self.last);
         }
     }
 }
 
 /// Nobody to tell means that the session was dropped, which the next event answers.
-impl Watch for Gate {
+impl LocalizeObserver for PausingObserver {
     fn begin_query(&mut self, _index: usize, problems: &[Problem], truth: Option<&Pose>) {
         let loaded = Loaded {
             problems: problems.to_vec(),
             truth: truth.copied(),
         };
-        let _ = self.tell(Message::Loaded(Arc::new(loaded)));
+        let _ = self.send(Message::Loaded(Arc::new(loaded)));
     }
 
     fn begin_retrieval(&mut self) {
-        let _ = self.tell(Message::Began(Part::Retrieval));
+        let _ = self.send(Message::Began(Part::Retrieval));
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
-        let _ = self.tell(Message::Began(Part::Reference(method, problem)));
+        let _ = self.send(Message::Began(Part::Reference(method, problem)));
     }
 
     fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
-        let _ = self.tell(Message::Ended {
+        let _ = self.send(Message::Ended {
             result: Box::new(result.clone()),
             times: Some(times.clone()),
         });
     }
 
     fn begin_fusion(&mut self, method: Method) {
-        let _ = self.tell(Message::Began(Part::Fusion(method)));
+        let _ = self.send(Message::Began(Part::Fusion(method)));
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {
-        let _ = self.tell(Message::Ended {
+        let _ = self.send(Message::Ended {
             result: Box::new(result.clone()),
             times: None,
         });
@@ -265,26 +271,26 @@ impl Watch for Gate {
     }
 }
 
-impl Sink for Gate {
+impl Sink for PausingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        self.tell(Message::Told(Box::new(record.clone())))?;
+        self.send(Message::Told(Box::new(record.clone())))?;
         let breakpoint = {
             let control = Arc::clone(&self.control);
-            let mut wishes = control.wishes();
-            // An order that came before this event starts from the event before it.
-            self.listen(&wishes);
-            self.last = Some(Place::of(record));
-            if wishes.cancelled {
+            let mut state = control.lock();
+            // A mode that was set before this event starts from the event before it.
+            self.take_over_mode(&state);
+            self.last = Some(EventPosition::of(record));
+            if state.cancelled {
                 return Err(Cancelled);
             }
-            wishes.breakpoints.reached(record)
+            state.breakpoints.reached(record)
         };
-        if breakpoint.is_none() && !self.until.is_reached(record) {
+        if breakpoint.is_none() && !self.pause_at.is_reached(record) {
             return Ok(());
         }
-        self.tell(Message::Waits { breakpoint })?;
+        self.send(Message::Waits { breakpoint })?;
         self.wait()?;
-        self.tell(Message::Goes)
+        self.send(Message::Goes)
     }
 
     /// A run that was told to pause need not come to its next event first. One that told nothing yet
@@ -292,17 +298,17 @@ impl Sink for Gate {
     fn attend(&mut self) -> Result<(), Cancelled> {
         let control = Arc::clone(&self.control);
         let is_paused = {
-            let wishes = control.wishes();
-            if wishes.cancelled {
+            let state = control.lock();
+            if state.cancelled {
                 return Err(Cancelled);
             }
-            self.listen(&wishes);
-            wishes.mode == RunMode::Paused
+            self.take_over_mode(&state);
+            state.mode == RunMode::Paused
         };
         if is_paused && self.last.is_some() {
-            self.tell(Message::Waits { breakpoint: None })?;
+            self.send(Message::Waits { breakpoint: None })?;
             self.wait()?;
-            self.tell(Message::Goes)?;
+            self.send(Message::Goes)?;
         }
         Ok(())
     }

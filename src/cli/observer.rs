@@ -1,8 +1,8 @@
-//! Who watches the command line's queries: a progress bar, and perhaps a recording.
+//! The observer of the command line's queries: a progress bar, and perhaps a recording.
 
 use posescope::event::{Event, KindSet};
 use posescope::geometry::Pose;
-use posescope::localize::{QueryResult, StageTimes, Watch};
+use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
 use posescope::session::StopAtBreakpoint;
@@ -11,7 +11,7 @@ use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
 
 /// A bar that moves on with every method that is done, and a recorder.
-pub struct Audience {
+pub struct CliObserver {
     pub recorder: Option<Recorder>,
     /// Ends the run at a breakpoint, if there are any.
     pub stop: Option<StopAtBreakpoint>,
@@ -21,7 +21,7 @@ pub struct Audience {
     tasks: Vec<String>,
 }
 
-impl Audience {
+impl CliObserver {
     pub fn new(bar: indicatif::ProgressBar, recorder: Option<Recorder>) -> Self {
         Self {
             recorder,
@@ -33,7 +33,7 @@ impl Audience {
     }
 }
 
-impl Sink for Audience {
+impl Sink for CliObserver {
     fn wanted(&self) -> KindSet {
         if self.stop.is_some() {
             return KindSet::ALL;
@@ -60,7 +60,7 @@ impl Sink for Audience {
     }
 }
 
-impl Watch for Audience {
+impl LocalizeObserver for CliObserver {
     fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
         let name =
             |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);

@@ -1,11 +1,11 @@
-//! What an event is about.
+//! What a recorded event belongs to: its reference, problem and estimator.
 
 use super::scene::Origin;
 use crate::method::Method;
 use crate::problem::Problem;
 
-/// The surroundings of an event.
-pub(super) struct Place<'a> {
+/// What a recorded event belongs to.
+pub(super) struct EventContext<'a> {
     /// Position of the reference among those of the query.
     pub(super) reference: usize,
     /// The problem being solved.

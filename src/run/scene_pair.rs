@@ -7,7 +7,7 @@ use crate::scene::Scene;
 
 /// A scene of references with one of queries, perhaps the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Pair {
+pub struct ScenePair {
     /// Position of the references' scene among the scenes.
     pub scene_index: usize,
     /// The name of the references' scene.
@@ -15,10 +15,10 @@ pub struct Pair {
     /// The name of the queries' scene.
     pub query_scene: String,
     /// The camera of the queries; the first one's where they have several.
-    pub camera: Camera,
+    pub camera: QueryCamera,
     /// The camera of each query, where they have several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cameras: Vec<Camera>,
+    pub cameras: Vec<QueryCamera>,
     /// Frames that were drawn as queries; where the scenes are the same, none is a reference.
     pub drawn: Vec<String>,
     /// The queries: all that were drawn, or those of them that were named.
@@ -29,7 +29,7 @@ pub struct Pair {
 
 /// Intrinsics \[px\], with the centre of the top-left pixel at (0, 0).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Camera {
+pub struct QueryCamera {
     /// Image width.
     pub width: u32,
     /// Image height.
@@ -51,17 +51,17 @@ pub(super) fn times_of(scene: &dyn Scene, queries: &[usize]) -> Vec<f64> {
 }
 
 /// The camera of the first of some frames, and that of each where they have several.
-pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (Camera, Vec<Camera>) {
-    let camera = |frame: usize| Camera::from(scene.intrinsics(frame));
+pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (QueryCamera, Vec<QueryCamera>) {
+    let camera = |frame: usize| QueryCamera::from(scene.intrinsics(frame));
     let first = camera(frames.first().copied().unwrap_or(0));
-    let cameras: Vec<Camera> = frames.iter().map(|&frame| camera(frame)).collect();
+    let cameras: Vec<QueryCamera> = frames.iter().map(|&frame| camera(frame)).collect();
     match cameras.iter().all(|camera| *camera == first) {
         true => (first, Vec::new()),
         false => (first, cameras),
     }
 }
 
-impl From<Intrinsics> for Camera {
+impl From<Intrinsics> for QueryCamera {
     fn from(intrinsics: Intrinsics) -> Self {
         let Intrinsics {
             fx,

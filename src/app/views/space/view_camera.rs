@@ -1,4 +1,4 @@
-//! How the view projects: an eye in the scene, and where in the pane it sees what.
+//! The camera that the pane shows the scene through: an eye in the scene, and its projection.
 
 use egui::{Pos2, Vec2, pos2};
 use nalgebra::{Point2, Point3, Unit, Vector3};
@@ -14,7 +14,7 @@ pub(super) const NEAR_M: f64 = 0.05;
 /// Positions in the pane are in egui's points from its upper left corner; a pixel of a photo covers
 /// an area there, so that its centre lies half a pixel inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lens {
+pub(super) struct ViewCamera {
     /// Where the eye is: x right, y down, z ahead, like every camera.
     pub(super) scene_from_eye: Pose,
     /// Focal lengths \[points\].
@@ -25,8 +25,8 @@ pub(super) struct Lens {
     pub(super) size: Vec2,
 }
 
-impl Lens {
-    /// A lens with the optical axis in the middle, for a vertical angle of view.
+impl ViewCamera {
+    /// A camera with the optical axis in the middle, for a vertical angle of view.
     pub(super) fn centred(scene_from_eye: Pose, vertical_rad: f64, size: Vec2) -> Self {
         let focal = 0.5 * f64::from(size.y) / (0.5 * vertical_rad).tan();
         Self {
@@ -37,7 +37,7 @@ impl Lens {
         }
     }
 
-    /// The lens of a camera: its whole image in the middle of the pane, as large as fits.
+    /// A camera that shows the whole image of another in the middle of the pane, as large as fits.
     pub(super) fn of_camera(scene_from_eye: Pose, intrinsics: &Intrinsics, size: Vec2) -> Self {
         let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
         let (across, down) = (f64::from(size.x), f64::from(size.y));
@@ -179,11 +179,14 @@ mod tests {
     }
 
     /// Where the matrix puts a point, in points of the pane, and its depth.
-    fn by_matrix(lens: &Lens, point: &Point3<f64>) -> (Pos2, f32) {
-        let matrix = nalgebra::Matrix4::from(lens.clip_from_scene());
+    fn by_matrix(view_camera: &ViewCamera, point: &Point3<f64>) -> (Pos2, f32) {
+        let matrix = nalgebra::Matrix4::from(view_camera.clip_from_scene());
         let clip = matrix * Vector4::from(point.to_homogeneous().cast::<f32>());
         let [x, y] = [clip.x / clip.w, clip.y / clip.w];
-        let at = pos2(0.5 * (x + 1.0) * lens.size.x, 0.5 * (1.0 - y) * lens.size.y);
+        let at = pos2(
+            0.5 * (x + 1.0) * view_camera.size.x,
+            0.5 * (1.0 - y) * view_camera.size.y,
+        );
         (at, clip.z / clip.w)
     }
 
@@ -198,7 +201,7 @@ mod tests {
         ) {
             let scene_from_camera = pose(shift, turn);
             let size = Vec2::from(size);
-            let lens = Lens::of_camera(scene_from_camera, &KITTI, size);
+            let view_camera = ViewCamera::of_camera(scene_from_camera, &KITTI, size);
             let in_camera = Point3::new(x, y, z);
             let pixel = KITTI.project(&in_camera).expect("in front");
             let scale = (size.x / 1241.0).min(size.y / 376.0);
@@ -207,13 +210,13 @@ mod tests {
                 0.5 * size.x + scale * (pixel.x as f32 + 0.5 - 620.5),
                 0.5 * size.y + scale * (pixel.y as f32 + 0.5 - 188.0),
             );
-            let (seen, _) = by_matrix(&lens, &(scene_from_camera * in_camera));
+            let (seen, _) = by_matrix(&view_camera, &(scene_from_camera * in_camera));
             // Half a pixel of the photo; far outside of the pane single precision is coarser.
             let near = 0.5 * scale * (1.0 + 1e-3 * (expected - size.to_pos2()).length() / scale);
             prop_assert!((seen - expected).length() < near, "{seen:?} {expected:?}");
-            let straight = lens.project(&(scene_from_camera * in_camera)).expect("in front");
+            let straight = view_camera.project(&(scene_from_camera * in_camera)).expect("in front");
             prop_assert!((straight - expected).length() < near);
-            prop_assert!((lens.place_pixel(&KITTI, &pixel) - expected).length() < near);
+            prop_assert!((view_camera.place_pixel(&KITTI, &pixel) - expected).length() < near);
         }
 
         /// A ray goes through all that is seen where it begins.
@@ -225,13 +228,13 @@ mod tests {
             let eye = Pose::translation(1.0, -height, -3.0)
                 * crate::geometry::yaw(turn)
                 * nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -down);
-            let lens = Lens::centred(eye, 0.9, Vec2::new(640.0, 480.0));
+            let view_camera = ViewCamera::centred(eye, 0.9, Vec2::new(640.0, 480.0));
             let ground = Point3::new(x, 1.6, z);
-            if let Some(at) = lens.project(&ground)
-                && egui::Rect::from_min_size(Pos2::ZERO, lens.size).contains(at)
-                && let Some(met) = lens.ray(at).meets(&Point3::new(0.0, 1.6, 0.0), &Vector3::y_axis())
+            if let Some(at) = view_camera.project(&ground)
+                && egui::Rect::from_min_size(Pos2::ZERO, view_camera.size).contains(at)
+                && let Some(met) = view_camera.ray(at).meets(&Point3::new(0.0, 1.6, 0.0), &Vector3::y_axis())
             {
-                let far = (ground - lens.ray(at).origin).norm();
+                let far = (ground - view_camera.ray(at).origin).norm();
                 prop_assert!((met - ground).norm() < 1e-3 * far, "{met} {ground}");
             }
         }
@@ -241,7 +244,7 @@ mod tests {
             at in (0.0_f32..640.0, 0.0_f32..480.0), factor in 0.2..5.0,
         ) {
             let at = Pos2::from(at);
-            let before = Lens::of_camera(Pose::identity(), &KITTI, Vec2::new(640.0, 480.0));
+            let before = ViewCamera::of_camera(Pose::identity(), &KITTI, Vec2::new(640.0, 480.0));
             let after = before.magnified(factor, at);
             let seen = before.ray(at).direction.into_inner();
             prop_assert!((after.ray(at).direction.into_inner() - seen).norm() < 1e-9);
@@ -264,8 +267,8 @@ mod tests {
 
     #[test]
     fn nearer_things_have_the_greater_depth() {
-        let lens = Lens::centred(Pose::identity(), 1.0, Vec2::new(100.0, 100.0));
-        let depth = |z: f64| by_matrix(&lens, &Point3::new(0.0, 0.0, z)).1;
+        let view_camera = ViewCamera::centred(Pose::identity(), 1.0, Vec2::new(100.0, 100.0));
+        let depth = |z: f64| by_matrix(&view_camera, &Point3::new(0.0, 0.0, z)).1;
         assert!((depth(NEAR_M) - 1.0).abs() < 1e-6);
         assert!(depth(1.0) > depth(1.001) && depth(900.0) > depth(901.0));
         assert!(depth(1e6) > 0.0);

@@ -3,122 +3,129 @@
 use std::path::Path;
 
 use super::App;
-use super::camera::Place;
+use super::camera::NamedPose;
 use super::command::Command;
-use super::desk::{Comparing, Desk, Kept};
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
+use super::state::{AppState, KeptRun};
+use super::view_options::CompareMode;
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::localize::References;
 use crate::method::Method;
-use crate::session::{Breakpoint, Breakpoints, Part, RunMode, State};
+use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 use crate::sink::rerun::Targets;
 
 impl App {
     /// Does one thing. What cannot be done is said, not ignored.
-    pub(super) fn obey(&mut self, command: Command, ctx: &egui::Context) {
-        let desk = &mut self.desk;
+    pub(super) fn dispatch(&mut self, command: Command, ctx: &egui::Context) {
+        let state = &mut self.state;
         match command {
-            Command::RunOrPause => match desk.state() {
-                State::Running | State::Loading => desk.session.set_mode(RunMode::Paused),
-                State::Paused { .. } => desk.go(RunMode::Running),
-                _ => desk.begin(RunMode::Running),
+            Command::RunOrPause => match state.run_state() {
+                RunState::Running | RunState::Loading => state.session.set_mode(RunMode::Paused),
+                RunState::Paused { .. } => state.resume(RunMode::Running),
+                _ => state.start_run(RunMode::Running),
             },
-            Command::Run => match desk.state() {
-                State::Paused { .. } | State::Running | State::Loading => desk.go(RunMode::Running),
-                _ => desk.begin(RunMode::Running),
+            Command::Run => match state.run_state() {
+                RunState::Paused { .. } | RunState::Running | RunState::Loading => {
+                    state.resume(RunMode::Running)
+                }
+                _ => state.start_run(RunMode::Running),
             },
-            Command::StepInto => desk.go(RunMode::StepInto),
-            Command::StepOver => desk.go(RunMode::StepOver),
-            Command::StepOut => desk.go(RunMode::StepOut),
+            Command::StepInto => state.resume(RunMode::StepInto),
+            Command::StepOver => state.resume(RunMode::StepOver),
+            Command::StepOut => state.resume(RunMode::StepOut),
             Command::RunToEnd => {
-                desk.session.set_breakpoints(Breakpoints::default());
-                desk.go(RunMode::Running);
+                state.session.set_breakpoints(Breakpoints::default());
+                state.resume(RunMode::Running);
             }
-            Command::Restart => desk.begin(RunMode::Paused),
-            Command::Forward(steps) => desk.forward(steps),
-            Command::Back(steps) => desk.move_cursor(desk.cursor.saturating_sub(steps)),
-            Command::First => desk.move_cursor(0),
+            Command::Restart => state.start_run(RunMode::Paused),
+            Command::Forward(steps) => state.forward(steps),
+            Command::Back(steps) => state.move_cursor(state.cursor().saturating_sub(steps)),
+            Command::First => state.move_cursor(0),
             Command::Last => {
-                desk.move_cursor(desk.run().len());
-                desk.follows = true;
+                state.move_cursor(state.run().len());
+                state.navigation.follow();
             }
-            Command::MoveCursor(cursor) => desk.move_cursor(cursor),
-            Command::SelectMethod(method) => desk.select_method(method),
-            Command::SelectQuery(query) => desk.select_query(query),
-            Command::NextQuery { back } => desk.next_query(back, |_, _| true),
-            Command::NextFailure { back } => desk.next_failure(back),
-            Command::RunAllQueries => desk.queries.run_all(&desk.setup),
-            Command::PickReferences(pick) => desk.pick_references(pick),
-            Command::SetReferences(frames) => desk.set_references(frames),
+            Command::MoveCursor(cursor) => state.move_cursor(cursor),
+            Command::SelectMethod(method) => state.select_method(method),
+            Command::SelectQuery(query) => state.select_query(query),
+            Command::NextQuery { back } => state.next_query(back, |_, _| true),
+            Command::NextFailure { back } => state.next_failure(back),
+            Command::RunAllQueries => state.queries.run_all(&state.setup),
+            Command::PickReferences(pick) => state.pick_references(pick),
+            Command::SetReferences(frames) => state.set_references(frames),
             Command::SetFusions(fusions) => {
-                desk.setup.task.protocol.fusions = fusions;
-                desk.begin_again();
+                state.setup.task.protocol.fusions = fusions;
+                state.restart_run();
             }
             Command::SetRadius(radius_m) => {
-                desk.setup.task.radius_m = radius_m;
-                desk.setup.go_to(desk.setup.query);
-                desk.begin_again();
+                state.setup.task.radius_m = radius_m;
+                state.setup.go_to(state.setup.query);
+                state.restart_run();
             }
             Command::SetSeed(seed) => {
-                desk.setup.task.protocol.seed = seed;
-                desk.setup.go_to(desk.setup.query);
-                desk.begin_again();
+                state.setup.task.protocol.seed = seed;
+                state.setup.go_to(state.setup.query);
+                state.restart_run();
             }
-            Command::SetParam { key, value } => match desk.setup.task.params.set(&key, &value) {
-                Ok(()) if desk.setup.task.params != *desk.params => desk.begin_again(),
+            Command::SetParam { key, value } => match state.setup.task.params.set(&key, &value) {
+                Ok(()) if state.setup.task.params != *state.params => state.restart_run(),
                 Ok(()) => {}
-                Err(error) => desk.note(error.to_string(), true),
+                Err(error) => state.note(error.to_string(), true),
             },
             Command::ResetParams => {
-                desk.setup.task.params = crate::params::Params::default();
-                desk.begin_again();
+                state.setup.task.params = crate::params::Params::default();
+                state.restart_run();
             }
-            Command::SetBreakpoints(texts) => desk.set_breakpoints(texts),
+            Command::SetBreakpoints(texts) => state.set_breakpoints(texts),
             Command::Pin => {
-                desk.kept = Some(Kept {
-                    run: desk.run().clone(),
-                    cursor: desk.cursor,
+                state.kept = Some(KeptRun {
+                    run: state.run().clone(),
+                    cursor: state.cursor(),
                 });
-                desk.note(
+                state.note(
                     "This run is kept as A; change a parameter to compare",
                     false,
                 );
             }
             Command::Unpin => {
-                desk.kept = None;
-                desk.comparing = Comparing::Present;
+                state.kept = None;
+                state.options.compare_mode = CompareMode::Present;
             }
-            Command::Compare(_) | Command::Flip if desk.kept.is_none() => {
-                desk.note("There is no run A; keep one first (P)", true);
+            Command::Compare(_) | Command::Flip if state.kept.is_none() => {
+                state.note("There is no run A; keep one first (P)", true);
             }
-            Command::Compare(comparing) => desk.comparing = comparing,
+            Command::Compare(compare_mode) => state.options.compare_mode = compare_mode,
             Command::Flip => {
-                desk.comparing = match desk.comparing {
-                    Comparing::Kept => Comparing::Present,
-                    Comparing::Present | Comparing::SideBySide => Comparing::Kept,
+                state.options.compare_mode = match state.options.compare_mode {
+                    CompareMode::Kept => CompareMode::Present,
+                    CompareMode::Present | CompareMode::SideBySide => CompareMode::Kept,
                 }
             }
-            Command::Blink => desk.blinking = !desk.blinking,
-            Command::OnlyDifferences => desk.only_differences = !desk.only_differences,
-            Command::ShowTruth => desk.shows_truth = !desk.shows_truth,
+            Command::Blink => state.options.blinking = !state.options.blinking,
+            Command::OnlyDifferences => {
+                state.options.only_differences = !state.options.only_differences
+            }
+            Command::ShowTruth => state.options.shows_truth = !state.options.shows_truth,
             Command::Filter => {
-                desk.wants_filter = true;
+                state.options.wants_filter = true;
                 self.layout.show(super::views::PARAMETERS);
             }
-            Command::SelectFeature(feature) => desk.selected_feature = feature,
-            Command::Hover(pose) => desk.hovered = pose,
-            Command::TakeCamera(pose) => desk.camera = pose,
-            Command::JumpCamera(place) => desk.jump_camera(place),
-            Command::MoveCamera(nudge) => match desk.camera.or_else(|| desk.place(Place::Start)) {
-                Some(pose) => desk.camera = Some(nudge.apply(&pose)),
-                None => desk.note("There is no camera before the query is loaded", true),
-            },
+            Command::SelectFeature(feature) => state.options.selected_feature = feature,
+            Command::Hover(pose) => state.hovered = pose,
+            Command::TakeCamera(pose) => state.camera = pose,
+            Command::JumpCamera(target) => state.jump_camera(target),
+            Command::MoveCamera(nudge) => {
+                match state.camera.or_else(|| state.named_pose(NamedPose::Start)) {
+                    Some(pose) => state.camera = Some(nudge.apply(&pose)),
+                    None => state.note("There is no camera before the query is loaded", true),
+                }
+            }
             Command::CopyCommandLine => {
-                ctx.copy_text(desk.setup.command_line());
-                desk.note("The command line is on the clipboard", false);
+                ctx.copy_text(state.setup.command_line());
+                state.note("The command line is on the clipboard", false);
             }
             Command::ShowView(name) => self.layout.show(name),
             Command::Maximize(view) => {
@@ -136,14 +143,14 @@ impl App {
             }
             Command::Help => self.help = !self.help,
             Command::Dismiss(note) => {
-                if note < desk.notes.len() {
-                    desk.notes.remove(note);
+                if note < state.notes.len() {
+                    state.notes.remove(note);
                 }
             }
             Command::SaveRecording(path) => {
                 let done = format!("Recording: {}", path.display());
                 let save = Some(path);
-                desk.record_to(
+                state.record_to(
                     &Targets {
                         save,
                         ..Targets::default()
@@ -154,7 +161,7 @@ impl App {
             Command::StreamRecording => {
                 let connect = Some(String::new());
                 let done = "The run was sent to the Rerun viewer".to_owned();
-                desk.record_to(
+                state.record_to(
                     &Targets {
                         connect,
                         ..Targets::default()
@@ -164,7 +171,7 @@ impl App {
             }
             Command::SpawnViewer => {
                 let done = "A Rerun viewer shows the run".to_owned();
-                desk.record_to(
+                state.record_to(
                     &Targets {
                         spawn: true,
                         ..Targets::default()
@@ -176,10 +183,10 @@ impl App {
                 let part = view.and_then(|view| self.layout.place_of(view));
                 let name = view.unwrap_or("window");
                 if view.is_some() && part.is_none() {
-                    desk.note(format!("The view {name} is not in sight"), true);
+                    state.note(format!("The view {name} is not in sight"), true);
                     return;
                 }
-                let path = desk.setup.folder.join(format!("{name}.png"));
+                let path = state.setup.folder.join(format!("{name}.png"));
                 self.pictures.ask(ctx, path, part);
             }
             Command::SaveSession(path) => self.save_session(&path),
@@ -192,20 +199,20 @@ impl App {
     fn save_session(&mut self, path: &Path) {
         let layout = match self.layout.to_json() {
             Ok(layout) => layout,
-            Err(error) => return self.desk.note(error.to_string(), true),
+            Err(error) => return self.state.note(error.to_string(), true),
         };
-        let saved = SavedSession::new(&self.desk.setup, self.desk.cursor, layout);
+        let saved = SavedSession::new(&self.state.setup, self.state.cursor(), layout);
         match saved.write(path) {
             Ok(()) => self
-                .desk
+                .state
                 .note(format!("Session: {}", path.display()), false),
-            Err(why) => self.desk.note(why, true),
+            Err(why) => self.state.note(why, true),
         }
     }
 
     fn restore_session(&mut self, path: &Path) {
         let restored = SavedSession::read(path).and_then(|saved| {
-            let setup = saved.setup(&self.desk.setup)?;
+            let setup = saved.setup(&self.state.setup)?;
             let layout = saved.layout.clone();
             self.layout
                 .restore(layout)
@@ -213,45 +220,43 @@ impl App {
             Ok((setup, saved.cursor))
         });
         match restored {
-            Ok((setup, cursor)) => self.desk.restore(setup, cursor),
-            Err(why) => self.desk.note(why, true),
+            Ok((setup, cursor)) => self.state.restore(setup, cursor),
+            Err(why) => self.state.note(why, true),
         }
     }
 }
 
-impl Desk {
+impl AppState {
     /// Goes on from where the run stands.
-    fn go(&mut self, mode: RunMode) {
+    fn resume(&mut self, mode: RunMode) {
         if !self.session.is_alive() {
             self.note("The run is over; restart it (Shift+F5)", false);
             return;
         }
-        self.follows = true;
+        self.navigation.follow();
         self.session.set_mode(mode);
     }
 
     fn forward(&mut self, steps: usize) {
         let last = self.run().len().saturating_sub(1);
-        if self.cursor < last {
-            self.move_cursor(self.cursor + steps);
-        } else if matches!(self.state(), State::Paused { .. }) {
-            self.go(RunMode::StepInto);
+        if self.cursor() < last {
+            self.move_cursor(self.cursor() + steps);
+        } else if matches!(self.run_state(), RunState::Paused { .. }) {
+            self.resume(RunMode::StepInto);
         }
     }
 
     fn move_cursor(&mut self, cursor: usize) {
-        self.cursor = cursor.min(self.run().len().saturating_sub(1));
-        self.follows = false;
-        self.anchor = None;
+        self.navigation.move_to(cursor, self.session.run());
     }
 
     fn select_method(&mut self, method: Method) {
         let run = self.run();
-        let here = run.span_at(self.cursor).map(|span| span.part);
+        let here = run.span_at(self.cursor()).map(|span| span.part);
         let part = match here {
             // From fusion to fusion, and from a reference to the same one.
             Some(Part::Fusion(_)) => Part::Fusion(method),
-            _ => Part::Reference(method, run.reference_at(self.cursor)),
+            _ => Part::Reference(method, run.reference_at(self.cursor())),
         };
         let span = run.span_of(part);
         match span.and_then(|span| span.records.end.checked_sub(1)) {
@@ -266,7 +271,7 @@ impl Desk {
     fn select_query(&mut self, query: usize) {
         self.setup.go_to(query);
         self.camera = None;
-        self.begin(RunMode::Running);
+        self.start_run(RunMode::Running);
     }
 
     /// The next query in the list that is `wanted`, round the end.
@@ -308,7 +313,7 @@ impl Desk {
         if let ReferencePick::By(selection) = pick {
             self.setup.task.protocol.references = selection;
             self.setup.chosen = References::default();
-            self.begin(RunMode::Running);
+            self.start_run(RunMode::Running);
         }
     }
 
@@ -320,7 +325,7 @@ impl Desk {
         self.stop_queries();
         self.setup.task.by_hand = true;
         self.setup.chosen = frames.into();
-        self.begin(RunMode::Running);
+        self.start_run(RunMode::Running);
     }
 
     fn set_breakpoints(&mut self, texts: Vec<String>) {
@@ -335,24 +340,24 @@ impl Desk {
         }
     }
 
-    fn jump_camera(&mut self, place: Place) {
-        let Some(pose) = self.place(place) else {
-            let name = place.name().to_lowercase();
+    fn jump_camera(&mut self, target: NamedPose) {
+        let Some(pose) = self.named_pose(target) else {
+            let name = target.name().to_lowercase();
             self.note(format!("There is no pose for {name} here"), false);
             return;
         };
-        self.camera_before = self.camera.or_else(|| self.place(Place::Start));
+        self.camera_before = self.camera.or_else(|| self.named_pose(NamedPose::Start));
         self.camera = Some(pose);
     }
 
     /// The pose of a place of the search (`world_from_camera`).
-    pub(super) fn place(&self, place: Place) -> Option<Pose> {
+    pub(super) fn named_pose(&self, target: NamedPose) -> Option<Pose> {
         let run = self.run();
         let loaded = run.loaded.as_deref()?;
-        let span = run.span_at(self.cursor);
-        let problem = loaded.problems.get(run.reference_at(self.cursor))?;
+        let span = run.span_at(self.cursor());
+        let problem = loaded.problems.get(run.reference_at(self.cursor()))?;
         let minimum = |wanted: Phase| {
-            let events = run.all_until::<PhaseSearched>(self.cursor);
+            let events = run.all_until::<PhaseSearched>(self.cursor());
             let mut latest = events.rev();
             let best = latest
                 .find(|(_, event)| event.surface.lattice.phase == wanted)?
@@ -360,13 +365,13 @@ impl Desk {
                 .best?;
             Some(problem.world_from_query(&best.reference_from_camera()))
         };
-        match place {
-            Place::Start => Some(problem.reference.world_from_camera),
-            Place::Coarse => minimum(Phase::PositionCoarse),
-            Place::Fine => minimum(Phase::PositionFine),
-            Place::Estimate => span?.result.as_ref()?.pose.as_ref()?.to_pose(),
-            Place::Truth => loaded.truth,
-            Place::Last => self.camera_before,
+        match target {
+            NamedPose::Start => Some(problem.reference.world_from_camera),
+            NamedPose::Coarse => minimum(Phase::PositionCoarse),
+            NamedPose::Fine => minimum(Phase::PositionFine),
+            NamedPose::Estimate => span?.result.as_ref()?.pose.as_ref()?.to_pose(),
+            NamedPose::Truth => loaded.truth,
+            NamedPose::Last => self.camera_before,
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::depth::LiftedMatch;
 use crate::estimator::{self, Parts};
 use crate::event::{Event, Side};
@@ -27,7 +27,7 @@ pub(super) fn name(kind: usize) -> &'static str {
 
 /// The features of both photos, and how far each has come.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Story<'a> {
+pub(super) struct FeatureProgress<'a> {
     /// The estimator whose features these are: FB, or the hybrid around it.
     pub(super) method: Option<Method>,
     query: Option<&'a Arc<Features>>,
@@ -37,10 +37,10 @@ pub(super) struct Story<'a> {
     states: Option<&'a [FeatureState]>,
 }
 
-impl<'a> Story<'a> {
-    /// The story at the cursor; for the direct methods that of FB, or of the hybrid where FB was
+impl<'a> FeatureProgress<'a> {
+    /// The progress at the cursor; for the direct methods that of FB, or of the hybrid where FB was
     /// not asked to run.
-    pub(super) fn at(scope: &Scope<'a>) -> Self {
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
         let with_features = |method: Method| {
             let Some(entry) = estimator::find(method) else {
                 return false;
@@ -50,26 +50,30 @@ impl<'a> Story<'a> {
                 .is_some_and(|parts| parts.first == Method::FB);
             inside || matches!(entry.parts, Parts::Features)
         };
-        let part = match scope.method().filter(|&here| with_features(here)) {
-            Some(here) => scope.of(here),
+        let part = match context.method().filter(|&here| with_features(here)) {
+            Some(here) => context.part_of(here),
             None => {
-                let mut asked = scope.desk.setup.task.protocol.methods.iter().copied();
-                asked.find_map(|method| with_features(method).then(|| scope.of(method))?)
+                let mut asked = context.setup.task.protocol.methods.iter().copied();
+                asked.find_map(|method| with_features(method).then(|| context.part_of(method))?)
             }
         };
         part.map_or_else(Self::default, |(span, cursor)| {
-            Self::until(scope.run, span, cursor)
+            Self::until(context.run, span, cursor)
         })
     }
 
-    /// The whole story of the same estimator and reference in another run.
-    pub(super) fn counterpart(scope: &Scope<'_>, method: Method, other: &'a Run) -> Option<Self> {
-        let span = other.span_of(Part::Reference(method, scope.reference()))?;
+    /// The progress at the end of the same estimator and reference in another run.
+    pub(super) fn counterpart(
+        context: &ViewContext<'_>,
+        method: Method,
+        other: &'a Run,
+    ) -> Option<Self> {
+        let span = other.span_of(Part::Reference(method, context.reference()))?;
         Some(Self::until(other, span, span.records.end.checked_sub(1)?))
     }
 
     fn until(run: &'a Run, span: &Span, cursor: usize) -> Self {
-        let mut story = Self {
+        let mut progress = Self {
             method: span.part.method(),
             ..Self::default()
         };
@@ -77,16 +81,16 @@ impl<'a> Story<'a> {
         for record in &run.records()[span.records.start.min(end)..end] {
             match &record.event {
                 Event::FeaturesDetected(detected) => match detected.side {
-                    Side::Query => story.query = Some(&detected.features),
-                    Side::Reference => story.reference = Some(&detected.features),
+                    Side::Query => progress.query = Some(&detected.features),
+                    Side::Reference => progress.reference = Some(&detected.features),
                 },
-                Event::MatchesDecided(decided) => story.decisions = Some(&decided.decisions),
-                Event::DepthsLifted(lifted) => story.lifted = Some(&lifted.matches),
-                Event::FeaturesClassified(classified) => story.states = Some(&classified.states),
+                Event::MatchesDecided(decided) => progress.decisions = Some(&decided.decisions),
+                Event::DepthsLifted(lifted) => progress.lifted = Some(&lifted.matches),
+                Event::FeaturesClassified(classified) => progress.states = Some(&classified.states),
                 _ => {}
             }
         }
-        story
+        progress
     }
 
     /// Query keypoints; none before they are detected.
@@ -168,9 +172,9 @@ impl<'a> Story<'a> {
             .collect()
     }
 
-    /// Which query features have ended in another state than in another story, or do not occur in it.
+    /// Which query features have ended in another state than in another run, or do not occur in it.
     /// Features are told apart by their keypoints, because other settings may find others.
-    pub(super) fn differing(&self, other: &Story<'_>) -> Vec<bool> {
+    pub(super) fn differing(&self, other: &FeatureProgress<'_>) -> Vec<bool> {
         let (mine, theirs) = (self.query(), other.query());
         let same_keypoints = mine == theirs;
         let places: HashMap<[u32; 3], usize> = match same_keypoints {
@@ -237,13 +241,13 @@ mod tests {
             decision(3, MatchVerdict::Candidate),
             None,
         ];
-        let mut story = Story {
+        let mut progress = FeatureProgress {
             query: Some(&query),
-            ..Story::default()
+            ..FeatureProgress::default()
         };
-        assert_eq!(story.kinds(), [UNDECIDED; 5]);
-        story.decisions = Some(&decisions);
-        assert_eq!(story.kinds(), [0, 1, UNDECIDED, UNDECIDED, 0]);
+        assert_eq!(progress.kinds(), [UNDECIDED; 5]);
+        progress.decisions = Some(&decisions);
+        assert_eq!(progress.kinds(), [0, 1, UNDECIDED, UNDECIDED, 0]);
         let lifted = [2, 3].map(|feature| LiftedMatch {
             query: feature,
             reference: 0,
@@ -251,8 +255,8 @@ mod tests {
             depth_range_m: None,
             point: (feature == 3).then(|| Point3::new(0.0, 0.0, 9.0)),
         });
-        story.lifted = Some(&lifted);
-        assert_eq!(story.kinds(), [0, 1, 2, UNDECIDED, 0]);
+        progress.lifted = Some(&lifted);
+        assert_eq!(progress.kinds(), [0, 1, 2, UNDECIDED, 0]);
     }
 
     #[test]
@@ -260,15 +264,15 @@ mod tests {
         let (mine, theirs) = (features(&[1.0, 2.0, 3.0]), features(&[2.0, 1.0]));
         let inlier = FeatureState::Inlier { residual_px: 0.5 };
         let outlier = FeatureState::Outlier { residual_px: 9.0 };
-        let here = Story {
+        let here = FeatureProgress {
             query: Some(&mine),
             states: Some(&[inlier, outlier, inlier]),
-            ..Story::default()
+            ..FeatureProgress::default()
         };
-        let there = Story {
+        let there = FeatureProgress {
             query: Some(&theirs),
             states: Some(&[inlier, inlier]),
-            ..Story::default()
+            ..FeatureProgress::default()
         };
         assert_eq!(here.differing(&there), [false, true, true]);
         assert_eq!(here.differing(&here), [false; 3]);

@@ -1,30 +1,20 @@
-//! What lies on the desk: the run, where a person looks at it, what is switched on.
+//! The application's state: the run, the cursor in it, the camera in hand, what is switched on.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::navigation::Navigation;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
 use super::setup::Setup;
-use super::shown::ShownAt;
+use super::shown::ShownReason;
 use super::textures::Textures;
+use super::view_options::{CompareMode, ViewOptions};
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Part, Run, RunMode, Session, State};
-
-/// Which of two runs is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Comparing {
-    /// The present run, B.
-    #[default]
-    Present,
-    /// The run that was kept, A.
-    Kept,
-    /// Both, beside each other.
-    SideBySide,
-}
+use crate::session::{Breakpoints, Run, RunMode, RunState, Session};
 
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,15 +26,18 @@ pub struct Note {
 }
 
 /// A run that was kept to be compared with.
-pub struct Kept {
+pub struct KeptRun {
     /// The run as it was kept.
     pub run: Run,
     /// Where the cursor was.
     pub cursor: usize,
 }
 
-/// Everything that the views draw from.
-pub struct Desk {
+/// Results by query.
+pub type Results = BTreeMap<usize, Vec<QueryResult>>;
+
+/// The state of the application: everything that the views draw from.
+pub struct AppState {
     /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
     /// The parameters of the setup, shared with the prober.
@@ -53,26 +46,11 @@ pub struct Desk {
     frames: Arc<FrameStore>,
     pub(super) session: Session,
     pub(super) ctx: egui::Context,
-    /// Position among the records of the present run.
-    pub cursor: usize,
-    /// Whether the cursor goes along with new records.
-    pub follows: bool,
-    /// Where the cursor is to be once the new run has come so far.
-    pub(super) anchor: Option<Anchor>,
+    pub(super) navigation: Navigation,
     /// The run A, if one was kept.
-    pub kept: Option<Kept>,
-    /// Which of the runs is shown.
-    pub comparing: Comparing,
-    /// Whether the ground truth is shown.
-    pub shows_truth: bool,
-    /// Whether only what differs is shown.
-    pub only_differences: bool,
-    /// Whether the picture blinks, and which of the two it shows now.
-    pub blinking: bool,
-    /// Whether the keyboard is wanted by the filter.
-    pub wants_filter: bool,
-    /// The query feature that is looked at.
-    pub selected_feature: Option<usize>,
+    pub kept: Option<KeptRun>,
+    /// What is switched on and selected.
+    pub options: ViewOptions,
     /// The pose under the pointer (`world_from_camera`).
     pub hovered: Option<Pose>,
     /// The camera in hand (`world_from_camera`).
@@ -87,84 +65,12 @@ pub struct Desk {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: BTreeMap<usize, Vec<QueryResult>>,
+    pub results: Results,
+    /// The results that the window was opened with, which a restored session goes back to.
+    first_results: Results,
 }
 
-/// A place in a run that can be found again in another one.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Anchor {
-    /// The place by what it means to the estimator.
-    Meaning(Meaning),
-    /// The place by the number of its record.
-    Record(usize),
-}
-
-impl Anchor {
-    fn find(&self, run: &Run) -> Option<usize> {
-        match self {
-            Self::Meaning(meaning) => meaning.find(run),
-            Self::Record(record) => (*record < run.len()).then_some(*record),
-        }
-    }
-}
-
-/// What an estimator was doing at a record.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Meaning {
-    part: Part,
-    /// The stages around it, by name, the outermost first.
-    stages: Vec<&'static str>,
-    /// How many records into the innermost stage.
-    records_in: usize,
-    /// Whether it was the last record of the stage.
-    is_end: bool,
-}
-
-impl Meaning {
-    fn of(run: &Run, cursor: usize) -> Option<Self> {
-        let span = run.span_at(cursor)?;
-        let stages: Vec<_> = run.stages_at(cursor).collect();
-        let innermost = stages.last()?;
-        Some(Self {
-            part: span.part,
-            stages: stages.iter().map(|bar| bar.stage.name()).collect(),
-            records_in: cursor - innermost.records.start,
-            is_end: cursor + 1 == innermost.records.end && innermost.succeeded.is_some(),
-        })
-    }
-
-    /// The same place in another run, if the run has come so far.
-    fn find(&self, run: &Run) -> Option<usize> {
-        let span = run.span_of(self.part)?;
-        let inside = |records: &std::ops::Range<usize>| {
-            span.records.start <= records.start && records.end <= span.records.end
-        };
-        let bar = run.stages().iter().find(|bar| {
-            inside(&bar.records)
-                && bar.depth == self.stages.len()
-                && run
-                    .stages_at(bar.records.start)
-                    .map(|bar| bar.stage.name())
-                    .eq(self.stages.iter().copied())
-        });
-        match bar {
-            Some(bar) => {
-                let last = bar.records.end - 1;
-                let wanted = bar.records.start + self.records_in;
-                match (bar.succeeded.is_some(), self.is_end) {
-                    (true, true) => Some(last),
-                    (true, false) => Some(wanted.min(last)),
-                    (false, true) => None,
-                    (false, false) => (wanted <= last).then_some(wanted),
-                }
-            }
-            // The stage is not part of this run: the estimator stopped before it.
-            None => span.result.as_ref().map(|_| span.records.end - 1),
-        }
-    }
-}
-
-impl Desk {
+impl AppState {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
         let params = Arc::new(setup.task.params.clone());
         let frames = Arc::default();
@@ -176,24 +82,24 @@ impl Desk {
             frames,
             session,
             ctx,
-            cursor: 0,
-            follows: true,
-            anchor: None,
+            navigation: Navigation::default(),
             kept: None,
-            comparing: Comparing::default(),
-            shows_truth: true,
-            only_differences: false,
-            blinking: false,
-            wants_filter: false,
-            selected_feature: None,
+            options: ViewOptions::default(),
             hovered: None,
             camera: None,
             camera_before: None,
             notes: Vec::new(),
             textures: Textures::default(),
-            results: setup.results.clone(),
+            results: Results::new(),
+            first_results: Results::new(),
             setup,
         }
+    }
+
+    /// Takes results over that were known before the window was opened.
+    pub(super) fn set_known_results(&mut self, results: Results) {
+        self.results.clone_from(&results);
+        self.first_results = results;
     }
 
     /// The present run.
@@ -201,23 +107,28 @@ impl Desk {
         self.session.run()
     }
 
+    /// Position among the records of the present run.
+    pub fn cursor(&self) -> usize {
+        self.navigation.cursor()
+    }
+
     /// What the present run is doing.
-    pub fn state(&self) -> &State {
+    pub fn run_state(&self) -> &RunState {
         self.session.state()
     }
 
     /// The place in the kept run that corresponds to the cursor.
     pub(super) fn kept_cursor(&self) -> Option<usize> {
         let kept = self.kept.as_ref()?;
-        let same = Meaning::of(self.run(), self.cursor).and_then(|here| here.find(&kept.run));
+        let same = self.navigation.counterpart(self.run(), &kept.run);
         Some(same.unwrap_or(kept.cursor))
     }
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
-    pub fn looking_at(&self) -> Option<(Pose, ShownAt)> {
+    pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
         self.hovered
-            .map(|pose| (pose, ShownAt::Pointer))
-            .or_else(|| self.camera.map(|pose| (pose, ShownAt::Camera)))
+            .map(|pose| (pose, ShownReason::Pointer))
+            .or_else(|| self.camera.map(|pose| (pose, ShownReason::Camera)))
     }
 
     /// What is known about the pose that was asked for last.
@@ -231,7 +142,7 @@ impl Desk {
     }
 
     /// Takes in what the threads have to say.
-    pub(super) fn attend(&mut self) {
+    pub(super) fn poll(&mut self) {
         let was_alive = self.session.is_alive();
         if self.session.drain() {
             if let Some(chosen) = self.session.chosen()
@@ -239,30 +150,16 @@ impl Desk {
             {
                 self.setup.chosen = chosen.clone();
             }
-            let last = self.session.run().len().saturating_sub(1);
-            if let Some(anchor) = &self.anchor {
-                match anchor.find(self.session.run()) {
-                    Some(at) => {
-                        self.cursor = at;
-                        self.anchor = None;
-                    }
-                    None if !self.session.is_alive() => {
-                        self.cursor = last;
-                        self.anchor = None;
-                    }
-                    None => self.cursor = last,
-                }
-            } else if self.follows {
-                self.cursor = last;
-            }
+            self.navigation
+                .on_records(self.session.run(), self.session.is_alive());
             if was_alive && !self.session.is_alive() {
-                self.ended();
+                self.on_run_end();
             }
         }
-        if let Err(why) = self.prober.attend() {
+        if let Err(why) = self.prober.poll() {
             self.note(why, true);
         }
-        for (query, outcome) in self.queries.attend() {
+        for (query, outcome) in self.queries.poll() {
             match outcome {
                 Ok(results) => {
                     self.results.insert(query, results);
@@ -271,7 +168,7 @@ impl Desk {
             }
         }
         // The query at work comes first.
-        if *self.session.state() != State::Loading {
+        if *self.session.state() != RunState::Loading {
             self.queries.paint_thumbnails(&self.setup);
         }
         if let Some((pose, _)) = self.looking_at()
@@ -284,16 +181,16 @@ impl Desk {
 
     fn problem(&self) -> Option<&crate::problem::Problem> {
         let loaded = self.run().loaded.as_deref()?;
-        loaded.problems.get(self.run().reference_at(self.cursor))
+        loaded.problems.get(self.run().reference_at(self.cursor()))
     }
 
-    fn ended(&mut self) {
+    fn on_run_end(&mut self) {
         match self.session.state() {
-            State::Finished => {
+            RunState::Finished => {
                 let results = self.session.run().results().cloned().collect();
                 self.results.insert(self.setup.query, results);
             }
-            State::Broken(why) => self.note(why.clone(), true),
+            RunState::Broken(why) => self.note(why.clone(), true),
             _ => {}
         }
     }
@@ -310,15 +207,13 @@ impl Desk {
     }
 
     /// Another query, or other references: everything begins anew.
-    pub(super) fn begin(&mut self, mode: RunMode) {
+    pub(super) fn start_run(&mut self, mode: RunMode) {
         // The run before would go on beside the new one.
         self.session.cancel();
         self.session = start(&self.setup, mode, &self.frames, &self.ctx);
-        self.cursor = 0;
-        self.follows = true;
-        self.anchor = None;
+        self.navigation = Navigation::default();
         self.hovered = None;
-        self.selected_feature = None;
+        self.options.selected_feature = None;
         self.prober.forget();
     }
 
@@ -334,29 +229,27 @@ impl Desk {
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
-        self.results = setup.results.clone();
+        self.results = self.first_results.clone();
         self.queries = Queries::new(self.ctx.clone());
         self.setup = setup;
         self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
-        self.comparing = Comparing::default();
+        self.options.compare_mode = CompareMode::default();
         // The scenes are others, even where they have the same names.
         self.frames = Arc::default();
-        self.begin(RunMode::Running);
-        self.follows = false;
-        self.anchor = Some(Anchor::Record(cursor));
+        self.start_run(RunMode::Running);
+        self.navigation = Navigation::towards_record(cursor);
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor
     /// stays where it was, in meaning.
-    pub(super) fn begin_again(&mut self) {
+    pub(super) fn restart_run(&mut self) {
         self.stop_queries();
-        let anchor = Meaning::of(self.run(), self.cursor).map(Anchor::Meaning);
-        let follows = self.follows && self.session.is_alive();
+        let is_alive = self.session.is_alive();
+        let navigation = self.navigation.towards_same(self.run(), is_alive);
         self.params = Arc::new(self.setup.task.params.clone());
-        self.begin(RunMode::Running);
-        self.follows = follows;
-        self.anchor = anchor;
+        self.start_run(RunMode::Running);
+        self.navigation = navigation;
     }
 }
 

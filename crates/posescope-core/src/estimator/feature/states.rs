@@ -1,4 +1,4 @@
-//! Where each query feature ends.
+//! The state of each query feature, from stage to stage.
 
 use std::sync::Arc;
 
@@ -7,12 +7,12 @@ use crate::features::FeatureState;
 use crate::features::{Match, MatchVerdict};
 use crate::robust::Consensus;
 
-/// Follows every query feature to the one state it ends in.
-pub(super) struct Journey {
+/// The state of each query feature, brought up to date by every stage until the one it ends in.
+pub(super) struct FeatureStates {
     states: Vec<FeatureState>,
 }
 
-impl Journey {
+impl FeatureStates {
     /// At first no feature has a match at all.
     pub(super) fn new(keypoints: usize) -> Self {
         Self {
@@ -72,7 +72,7 @@ impl Journey {
         }
     }
 
-    pub(super) fn states(&self) -> Arc<[FeatureState]> {
+    pub(super) fn shared(&self) -> Arc<[FeatureState]> {
         self.states.as_slice().into()
     }
 }

@@ -7,7 +7,7 @@ use egui::{Color32, Mesh, Painter, Pos2, Vec2, epaint::Vertex, pos2, vec2};
 
 /// A mark for a place in a photo; the shape tells the state as the colour does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mark {
+pub(super) enum MarkShape {
     /// A cross of two diagonals.
     Cross,
     /// A cross of an upright and a level line.
@@ -24,14 +24,14 @@ pub(super) enum Mark {
     Square,
 }
 
-/// A mesh that is drawn at once.
-pub(super) struct Ink {
+/// Collects strokes and marks in one mesh, which is painted at once.
+pub(super) struct MeshPainter {
     mesh: Mesh,
     /// Width of the soft edge: one pixel of the screen \[points\].
     soft: f32,
 }
 
-impl Ink {
+impl MeshPainter {
     pub(super) fn new(pixels_per_point: f32) -> Self {
         Self {
             mesh: Mesh::default(),
@@ -39,8 +39,8 @@ impl Ink {
         }
     }
 
-    /// Draws everything and starts anew.
-    pub(super) fn dry(&mut self, painter: &Painter) {
+    /// Paints everything collected so far and starts anew.
+    pub(super) fn paint_on(&mut self, painter: &Painter) {
         let mesh = std::mem::take(&mut self.mesh);
         if !mesh.is_empty() {
             painter.add(mesh);
@@ -70,24 +70,24 @@ impl Ink {
     }
 
     /// A mark of a radius \[points\].
-    pub(super) fn mark(&mut self, mark: Mark, at: Pos2, radius: f32, color: Color32) {
+    pub(super) fn mark(&mut self, mark: MarkShape, at: Pos2, radius: f32, color: Color32) {
         const WIDTH: f32 = 1.3;
         match mark {
-            Mark::Cross => {
+            MarkShape::Cross => {
                 for arm in [vec2(0.75, 0.75), vec2(0.75, -0.75)] {
                     self.line(at - radius * arm, at + radius * arm, WIDTH, color);
                 }
             }
-            Mark::Plus => {
+            MarkShape::Plus => {
                 for arm in [vec2(1.0, 0.0), vec2(0.0, 1.0)] {
                     self.line(at - radius * arm, at + radius * arm, 2.0, color);
                 }
             }
-            Mark::Triangle => self.outline(3, 0.0, at, 1.25 * radius, WIDTH, color),
-            Mark::Ring => self.ring(at, radius, WIDTH, color),
-            Mark::Diamond => self.outline(4, 0.0, at, 1.2 * radius, WIDTH, color),
-            Mark::Disc => self.disc(at, radius, color),
-            Mark::Square => self.outline(4, 0.5, at, 1.2 * radius, WIDTH, color),
+            MarkShape::Triangle => self.outline(3, 0.0, at, 1.25 * radius, WIDTH, color),
+            MarkShape::Ring => self.ring(at, radius, WIDTH, color),
+            MarkShape::Diamond => self.outline(4, 0.0, at, 1.2 * radius, WIDTH, color),
+            MarkShape::Disc => self.disc(at, radius, color),
+            MarkShape::Square => self.outline(4, 0.5, at, 1.2 * radius, WIDTH, color),
         }
     }
 
@@ -181,20 +181,20 @@ mod tests {
     fn every_mark_stays_near_its_place_and_refers_to_its_own_vertices() {
         let at = pos2(50.0, 60.0);
         for mark in [
-            Mark::Cross,
-            Mark::Plus,
-            Mark::Triangle,
-            Mark::Ring,
-            Mark::Diamond,
-            Mark::Disc,
-            Mark::Square,
+            MarkShape::Cross,
+            MarkShape::Plus,
+            MarkShape::Triangle,
+            MarkShape::Ring,
+            MarkShape::Diamond,
+            MarkShape::Disc,
+            MarkShape::Square,
         ] {
-            let mut ink = Ink::new(2.0);
-            ink.line(pos2(0.0, 0.0), pos2(9.0, 9.0), 1.0, Color32::RED);
-            let before = ink.mesh.vertices.len();
-            ink.mark(mark, at, 4.0, Color32::RED);
-            let mark_vertices = &ink.mesh.vertices[before..];
-            assert!(ink.mesh.is_valid(), "{mark:?}");
+            let mut mesh = MeshPainter::new(2.0);
+            mesh.line(pos2(0.0, 0.0), pos2(9.0, 9.0), 1.0, Color32::RED);
+            let before = mesh.mesh.vertices.len();
+            mesh.mark(mark, at, 4.0, Color32::RED);
+            let mark_vertices = &mesh.mesh.vertices[before..];
+            assert!(mesh.mesh.is_valid(), "{mark:?}");
             assert!(mark_vertices.iter().all(|v| v.pos.distance(at) < 7.5));
             assert!(mark_vertices.iter().any(|v| v.pos.distance(at) > 3.5));
         }
@@ -202,9 +202,9 @@ mod tests {
 
     #[test]
     fn a_line_without_length_draws_nothing() {
-        let mut ink = Ink::new(1.0);
-        ink.line(pos2(1.0, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
-        ink.line(pos2(f32::NAN, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
-        assert!(ink.mesh.is_empty());
+        let mut mesh = MeshPainter::new(1.0);
+        mesh.line(pos2(1.0, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
+        mesh.line(pos2(f32::NAN, 1.0), pos2(1.0, 1.0), 1.0, Color32::RED);
+        assert!(mesh.mesh.is_empty());
     }
 }

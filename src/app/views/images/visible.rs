@@ -3,9 +3,9 @@
 use egui::{Color32, Pos2};
 
 use super::marks::{color, mark, position};
-use super::story::{KINDS, Story, UNDECIDED};
+use super::progress::{FeatureProgress, KINDS, UNDECIDED};
 use crate::app::views::canvas::Placement;
-use crate::app::views::ink::{Ink, Mark};
+use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 
 /// How near the pointer must be \[points\].
 const REACH: f32 = 6.0;
@@ -16,7 +16,7 @@ const LAYERS: [usize; KINDS] = [0, 1, 2, 3, UNDECIDED, 4];
 
 /// A query feature on the screen, with the match that it made or missed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sight {
+pub(super) struct VisibleFeature {
     pub(super) feature: usize,
     kind: usize,
     /// Its keypoint in the query, if that is in view.
@@ -28,38 +28,38 @@ pub(super) struct Sight {
 }
 
 /// All features in view, the hindmost first.
-pub(super) struct Sights {
-    all: Vec<Sight>,
+pub(super) struct VisibleFeatures {
+    all: Vec<VisibleFeature>,
     /// Whether a reference keypoint has a mark of a match.
     is_matched: Vec<bool>,
 }
 
-impl Sights {
+impl VisibleFeatures {
     /// The features that are shown and in view.
     pub(super) fn new(
-        story: &Story<'_>,
+        progress: &FeatureProgress<'_>,
         kinds: &[usize],
         query: &Placement,
         reference: &Placement,
         is_shown: impl Fn(usize) -> bool,
     ) -> Self {
         let mut all = Vec::with_capacity(kinds.len());
-        let mut is_matched = vec![false; story.reference().len()];
+        let mut is_matched = vec![false; progress.reference().len()];
         let areas = [query.visible(), reference.visible()];
         for layer in LAYERS {
             for (feature, &kind) in kinds.iter().enumerate() {
                 if kind != layer || !is_shown(feature) {
                     continue;
                 }
-                let here = &story.query()[feature];
-                let there = story.matched(feature).and_then(|found| {
-                    Some((found.reference, story.reference().get(found.reference)?))
+                let here = &progress.query()[feature];
+                let there = progress.matched(feature).and_then(|found| {
+                    Some((found.reference, progress.reference().get(found.reference)?))
                 });
                 if let Some((index, _)) = there {
                     is_matched[index] = true;
                 }
                 let seen = |at: Pos2, area: usize| areas[area].contains(at).then_some(at);
-                let sight = Sight {
+                let shown = VisibleFeature {
                     feature,
                     kind,
                     query: seen(query.on_screen(position(here)), 0),
@@ -67,8 +67,8 @@ impl Sights {
                         .and_then(|(_, there)| seen(reference.on_screen(position(there)), 1)),
                     scales: [here.scale, there.map_or(0.0, |(_, there)| there.scale)],
                 };
-                if sight.query.is_some() || sight.reference.is_some() {
-                    all.push(sight);
+                if shown.query.is_some() || shown.reference.is_some() {
+                    all.push(shown);
                 }
             }
         }
@@ -76,19 +76,19 @@ impl Sights {
     }
 
     /// All of them, the hindmost first.
-    pub(super) fn all(&self) -> &[Sight] {
+    pub(super) fn all(&self) -> &[VisibleFeature] {
         &self.all
     }
 
     /// The feature whose keypoint is nearest to the pointer, else the one whose line is; none where
     /// none is near.
     pub(super) fn nearest(&self, pointer: Pos2) -> Option<usize> {
-        let to_keypoint = |sight: &Sight| {
-            let ends = [sight.query, sight.reference].into_iter().flatten();
+        let to_keypoint = |shown: &VisibleFeature| {
+            let ends = [shown.query, shown.reference].into_iter().flatten();
             ends.map(|end| end.distance(pointer))
                 .fold(f32::INFINITY, f32::min)
         };
-        let to_line = |sight: &Sight| match sight.line() {
+        let to_line = |shown: &VisibleFeature| match shown.line() {
             Some([from, to]) => distance_to_segment(pointer, from, to),
             None => f32::INFINITY,
         };
@@ -96,81 +96,81 @@ impl Sights {
             .or_else(|| self.nearest_by(to_line))
     }
 
-    fn nearest_by(&self, distance: impl Fn(&Sight) -> f32) -> Option<usize> {
+    fn nearest_by(&self, distance: impl Fn(&VisibleFeature) -> f32) -> Option<usize> {
         // Of equally near ones the foremost, which is the one to be seen.
         let distances = self
             .all
             .iter()
             .rev()
-            .map(|sight| (distance(sight), sight.feature));
+            .map(|shown| (distance(shown), shown.feature));
         let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0))?;
         (nearest.0 <= REACH).then_some(nearest.1)
     }
 
     /// One feature once more, to stand out from all others.
-    pub(super) fn draw_accent(&self, ink: &mut Ink, feature: usize) {
-        if let Some(sight) = self.all.iter().find(|sight| sight.feature == feature) {
-            sight.draw_accent(ink);
+    pub(super) fn draw_accent(&self, mesh: &mut MeshPainter, feature: usize) {
+        if let Some(shown) = self.all.iter().find(|shown| shown.feature == feature) {
+            shown.draw_accent(mesh);
         }
     }
 
     /// The reference keypoints that no shown match has.
     pub(super) fn draw_unmatched(
         &self,
-        ink: &mut Ink,
-        story: &Story<'_>,
+        mesh: &mut MeshPainter,
+        progress: &FeatureProgress<'_>,
         at: &Placement,
         strength: f32,
     ) {
         let area = at.visible();
-        let (mark, radius, color) = match story.is_unmatched() {
-            true => (Mark::Square, radius(UNDECIDED), color(UNDECIDED)),
-            false => (Mark::Disc, 1.3, color(0)),
+        let (mark, radius, color) = match progress.is_unmatched() {
+            true => (MarkShape::Square, radius(UNDECIDED), color(UNDECIDED)),
+            false => (MarkShape::Disc, 1.3, color(0)),
         };
         let color = color.gamma_multiply(strength);
-        for (keypoint, is_matched) in story.reference().iter().zip(&self.is_matched) {
+        for (keypoint, is_matched) in progress.reference().iter().zip(&self.is_matched) {
             let place = at.on_screen(position(keypoint));
             if !is_matched && area.contains(place) {
-                ink.mark(mark, place, radius, color);
+                mesh.mark(mark, place, radius, color);
             }
         }
     }
 }
 
-impl Sight {
+impl VisibleFeature {
     /// Its line, where both ends are in view.
     fn line(&self) -> Option<[Pos2; 2]> {
         Some([self.query?, self.reference?])
     }
 
     /// Line and marks; `points_per_pixel` tells how large the scales are.
-    pub(super) fn draw(&self, ink: &mut Ink, strength: f32, points_per_pixel: f32) {
+    pub(super) fn draw(&self, mesh: &mut MeshPainter, strength: f32, points_per_pixel: f32) {
         let color = color(self.kind);
         if let Some([from, to]) = self.line() {
             let pale = color.gamma_multiply(strength * line_strength(self.kind));
-            ink.line(from, to, 1.1, pale);
+            mesh.line(from, to, 1.1, pale);
         }
         let color = color.gamma_multiply(strength);
         for (end, scale) in [self.query, self.reference].into_iter().zip(self.scales) {
             let Some(end) = end else { continue };
-            ink.mark(mark(self.kind), end, radius(self.kind), color);
+            mesh.mark(mark(self.kind), end, radius(self.kind), color);
             let radius = scale * points_per_pixel;
             if radius > LEAST_SCALE {
-                ink.ring(end, radius, 1.0, color.gamma_multiply(0.7));
+                mesh.ring(end, radius, 1.0, color.gamma_multiply(0.7));
             }
         }
     }
 
-    fn draw_accent(&self, ink: &mut Ink) {
+    fn draw_accent(&self, mesh: &mut MeshPainter) {
         let color = color(self.kind);
         if let Some([from, to]) = self.line() {
-            ink.line(from, to, 4.5, Color32::from_black_alpha(170));
-            ink.line(from, to, 2.2, color);
+            mesh.line(from, to, 4.5, Color32::from_black_alpha(170));
+            mesh.line(from, to, 2.2, color);
         }
         for end in [self.query, self.reference].into_iter().flatten() {
-            ink.disc(end, 8.7, Color32::from_black_alpha(170));
-            ink.ring(end, 7.7, 1.6, Color32::WHITE);
-            ink.mark(mark(self.kind), end, 4.0, color);
+            mesh.disc(end, 8.7, Color32::from_black_alpha(170));
+            mesh.ring(end, 7.7, 1.6, Color32::WHITE);
+            mesh.mark(mark(self.kind), end, 4.0, color);
         }
     }
 }
@@ -203,8 +203,8 @@ mod tests {
     use super::*;
     use egui::pos2;
 
-    fn sight(feature: usize, query: Option<Pos2>, reference: Option<Pos2>) -> Sight {
-        Sight {
+    fn shown(feature: usize, query: Option<Pos2>, reference: Option<Pos2>) -> VisibleFeature {
+        VisibleFeature {
             feature,
             kind: 4,
             query,
@@ -215,22 +215,22 @@ mod tests {
 
     #[test]
     fn a_keypoint_is_picked_before_a_line_and_nothing_from_afar() {
-        let sights = Sights {
+        let visible = VisibleFeatures {
             all: vec![
-                sight(7, Some(pos2(0.0, 0.0)), Some(pos2(0.0, 100.0))),
-                sight(8, Some(pos2(5.0, 50.0)), None),
+                shown(7, Some(pos2(0.0, 0.0)), Some(pos2(0.0, 100.0))),
+                shown(8, Some(pos2(5.0, 50.0)), None),
             ],
             is_matched: Vec::new(),
         };
-        assert_eq!(sights.nearest(pos2(1.0, 30.0)), Some(7));
-        assert_eq!(sights.nearest(pos2(1.0, 50.0)), Some(8));
-        assert_eq!(sights.nearest(pos2(6.5, 30.0)), None);
-        assert_eq!(sights.nearest(pos2(0.0, 106.5)), None);
-        assert_eq!(sights.nearest(pos2(0.0, 105.5)), Some(7));
+        assert_eq!(visible.nearest(pos2(1.0, 30.0)), Some(7));
+        assert_eq!(visible.nearest(pos2(1.0, 50.0)), Some(8));
+        assert_eq!(visible.nearest(pos2(6.5, 30.0)), None);
+        assert_eq!(visible.nearest(pos2(0.0, 106.5)), None);
+        assert_eq!(visible.nearest(pos2(0.0, 105.5)), Some(7));
     }
 
     #[test]
     fn a_match_without_both_ends_in_view_has_no_line() {
-        assert_eq!(sight(1, Some(pos2(0.0, 0.0)), None).line(), None);
+        assert_eq!(shown(1, Some(pos2(0.0, 0.0)), None).line(), None);
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use crate::app::Scope;
+use crate::app::ViewContext;
 use crate::depth::LiftedMatch;
 use crate::event::{CloudColored, Event, PoseScored};
 use crate::features::FeatureState;
@@ -16,7 +16,7 @@ use crate::session::Run;
 
 /// The matches that FB lifts into space, and the camera that it finds with them.
 #[derive(Default)]
-pub(super) struct FeatureStory<'a> {
+pub(super) struct LiftedFeatures<'a> {
     lifted: &'a [LiftedMatch],
     states: Option<&'a [FeatureState]>,
     /// The best pose so far: that of MLESAC, then the refined one.
@@ -24,8 +24,8 @@ pub(super) struct FeatureStory<'a> {
 }
 
 /// A ray from a camera to a lifted point.
-pub(super) struct Ray {
-    /// In the reference camera's frame \[m\].
+pub(super) struct LiftedRay {
+    /// The lifted point, in the reference camera's frame \[m\].
     pub(super) point: Point3<f64>,
     /// Index of the query keypoint.
     pub(super) query: usize,
@@ -33,46 +33,46 @@ pub(super) struct Ray {
     pub(super) is_inlier: Option<bool>,
 }
 
-impl<'a> FeatureStory<'a> {
+impl<'a> LiftedFeatures<'a> {
     /// From the estimator at the cursor, if it lifts matches; else from FB's part.
-    pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let here = match scope.is_inside_hybrid(Method::FB) {
-            true => Self::told(scope.run, scope.cursor),
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
+        let here = match context.is_inside_hybrid(Method::FB) {
+            true => Self::told(context.run, context.cursor),
             false => Self::default(),
         };
         if !here.lifted.is_empty() {
             return here;
         }
-        match scope.of(Method::FB) {
-            Some((_, cursor)) => Self::told(scope.run, cursor),
+        match context.part_of(Method::FB) {
+            Some((_, cursor)) => Self::told(context.run, cursor),
             None => here,
         }
     }
 
     fn told(run: &'a Run, cursor: usize) -> Self {
-        let mut story = Self::default();
+        let mut progress = Self::default();
         for event in events(run, cursor) {
             match event {
-                Event::DepthsLifted(event) => story.lifted = &event.matches,
-                Event::FeaturesClassified(event) => story.states = Some(&event.states),
+                Event::DepthsLifted(event) => progress.lifted = &event.matches,
+                Event::FeaturesClassified(event) => progress.states = Some(&event.states),
                 Event::HypothesisTried(event) => {
                     if let Some(best) = &event.trial.best {
-                        story.reference_from_query = Some(best.pose.inverse());
+                        progress.reference_from_query = Some(best.pose.inverse());
                     }
                 }
                 Event::PoseRefined(event) => {
-                    story.reference_from_query = Some(event.reference_from_query);
+                    progress.reference_from_query = Some(event.reference_from_query);
                 }
                 _ => {}
             }
         }
-        story
+        progress
     }
 
-    pub(super) fn rays(&self) -> impl Iterator<Item = Ray> {
+    pub(super) fn rays(&self) -> impl Iterator<Item = LiftedRay> {
         self.lifted.iter().filter_map(|lifted| {
             let state = self.states.and_then(|states| states.get(lifted.query));
-            Some(Ray {
+            Some(LiftedRay {
                 point: lifted.point?,
                 query: lifted.query,
                 is_inlier: state.map(|state| matches!(state, FeatureState::Inlier { .. })),
@@ -83,7 +83,7 @@ impl<'a> FeatureStory<'a> {
 
 /// The grid search of a direct method.
 #[derive(Default)]
-pub(super) struct SearchStory<'a> {
+pub(super) struct SearchProgress<'a> {
     /// Complete phases up to the cursor: the coarse positions and those after them.
     pub(super) surfaces: Vec<&'a Arc<ScoredLattice>>,
     /// Hypotheses of a phase that is not complete.
@@ -94,48 +94,53 @@ pub(super) struct SearchStory<'a> {
     pub(super) costs: Option<(f64, f64)>,
 }
 
-impl<'a> SearchStory<'a> {
+impl<'a> SearchProgress<'a> {
     /// From the direct method whose pictures are shown.
-    pub(super) fn at(scope: &Scope<'a>) -> Self {
-        let method = scope.searching_method();
-        let Some((span, cursor)) = scope.of(method) else {
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
+        let method = context.searching_method();
+        let Some((span, cursor)) = context.part_of(method) else {
             return Self::default();
         };
-        let mut story = Self::default();
-        for event in events(scope.run, cursor) {
+        let mut progress = Self::default();
+        for event in events(context.run, cursor) {
             match event {
-                Event::ViewRendered(event) => story.path.push(event.offset),
-                Event::PoseScored(event) => story.scored.push(event),
+                Event::ViewRendered(event) => progress.path.push(event.offset),
+                Event::PoseScored(event) => progress.scored.push(event),
                 Event::PhaseSearched(event) => {
-                    story.scored.clear();
-                    story.surfaces.push(&event.surface);
+                    progress.scored.clear();
+                    progress.surfaces.push(&event.surface);
                 }
                 _ => {}
             }
         }
         let last = span.records.end.saturating_sub(1);
-        let first_surface = events(scope.run, last).find_map(|event| match event {
+        let first_surface = events(context.run, last).find_map(|event| match event {
             Event::PhaseSearched(event) => Some(&event.surface),
             _ => None,
         });
-        story.costs = match first_surface {
+        progress.costs = match first_surface {
             Some(surface) => {
                 ends((0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell)))
             }
-            None => ends(story.scored.iter().filter_map(|scored| scored.score.cost)),
+            None => ends(
+                progress
+                    .scored
+                    .iter()
+                    .filter_map(|scored| scored.score.cost),
+            ),
         };
-        story
+        progress
     }
 }
 
 /// The reference's cloud in the photo's grey values, if a direct method has coloured it.
-pub(super) fn colored<'a>(scope: &Scope<'a>) -> Option<&'a Arc<ColoredCloud>> {
-    let here = scope.latest::<CloudColored>();
+pub(super) fn colored<'a>(context: &ViewContext<'a>) -> Option<&'a Arc<ColoredCloud>> {
+    let here = context.latest::<CloudColored>();
     let other = || {
-        let methods = scope.desk.setup.task.protocol.methods.iter();
+        let methods = context.setup.task.protocol.methods.iter();
         methods
             .copied()
-            .find_map(|method| scope.latest_of::<CloudColored>(method))
+            .find_map(|method| context.latest_of::<CloudColored>(method))
     };
     here.or_else(other).map(|event| &event.cloud)
 }

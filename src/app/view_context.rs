@@ -2,9 +2,15 @@
 
 use std::sync::Arc;
 
+use super::camera::NamedPose;
 use super::command::{Command, Queue};
-use super::desk::Desk;
-use super::shown::{Shown, ShownAt};
+use super::prober::Probe;
+use super::queries::Queries;
+use super::setup::Setup;
+use super::shown::{ShownReason, ShownView};
+use super::state::{AppState, Results};
+use super::textures::Textures;
+use super::view_options::ViewOptions;
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
@@ -12,42 +18,106 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::{Part, Run, Span};
 
-/// A run at a cursor, and the desk around it.
+/// A run at a cursor, and what else of the application's state a view draws from.
 #[derive(Clone, Copy)]
-pub struct Scope<'a> {
+pub struct ViewContext<'a> {
     /// The run that is shown: the present one, or A.
     pub run: &'a Run,
     /// Position among its records.
     pub cursor: usize,
-    /// Everything else: the camera in hand, what is switched on.
-    pub desk: &'a Desk,
-    pub(super) commands: &'a Queue,
+    /// What is run: scenes, query, references, parameters.
+    pub setup: &'a Setup,
+    /// What is switched on and selected.
+    pub options: &'a ViewOptions,
+    /// Pictures on the graphics card.
+    pub textures: &'a Textures,
+    /// Thumbnails, and how far the run over all queries is.
+    pub queries: &'a Queries,
+    /// Results of the queries that were run, by query.
+    pub results: &'a Results,
+    state: &'a AppState,
+    commands: &'a Queue,
 }
 
-impl<'a> Scope<'a> {
-    /// The present run at the cursor.
-    pub(super) fn present(desk: &'a Desk, commands: &'a Queue) -> Self {
+impl<'a> ViewContext<'a> {
+    fn new(run: &'a Run, cursor: usize, state: &'a AppState, commands: &'a Queue) -> Self {
         Self {
-            run: desk.run(),
-            cursor: desk.cursor,
-            desk,
+            run,
+            cursor,
+            setup: &state.setup,
+            options: &state.options,
+            textures: &state.textures,
+            queries: &state.queries,
+            results: &state.results,
+            state,
             commands,
         }
     }
 
+    /// The present run at the cursor.
+    pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
+        Self::new(state.run(), state.cursor(), state, commands)
+    }
+
     /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept(desk: &'a Desk, commands: &'a Queue) -> Option<Self> {
-        Some(Self {
-            run: &desk.kept.as_ref()?.run,
-            cursor: desk.kept_cursor()?,
-            desk,
-            commands,
+    pub(super) fn kept(state: &'a AppState, commands: &'a Queue) -> Option<Self> {
+        let (kept, cursor) = (state.kept.as_ref()?, state.kept_cursor()?);
+        Some(Self::new(&kept.run, cursor, state, commands))
+    }
+
+    /// Whether the run that is shown is the present one, whose parameters can be changed.
+    pub fn is_present(&self) -> bool {
+        std::ptr::eq(self.run, self.state.run())
+    }
+
+    /// The run that this one is compared with: A beside the present one, and the other way round.
+    pub fn other_run(&self) -> Option<&'a Run> {
+        let kept = &self.state.kept.as_ref()?.run;
+        Some(if self.is_present() {
+            kept
+        } else {
+            self.state.run()
         })
     }
 
     /// Asks for something to be done after this frame.
     pub fn send(&self, command: Command) {
         self.commands.send(command);
+    }
+
+    /// Whether a method is known to fail on a query.
+    pub fn has_failed(&self, query: usize) -> bool {
+        self.state.has_failed(query)
+    }
+
+    /// The camera in hand (`world_from_camera`).
+    pub fn camera(&self) -> Option<Pose> {
+        self.state.camera
+    }
+
+    /// The pose under the pointer (`world_from_camera`).
+    pub fn hovered(&self) -> Option<Pose> {
+        self.state.hovered
+    }
+
+    /// A pose that the present run's search knows by name (`world_from_camera`).
+    pub fn named_pose(&self, name: NamedPose) -> Option<Pose> {
+        self.state.named_pose(name)
+    }
+
+    /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
+    pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
+        self.state.looking_at()
+    }
+
+    /// What is known about the pose that was asked for last.
+    pub fn probe(&self) -> Option<&'a Probe> {
+        self.state.probe()
+    }
+
+    /// Whether the answer for the pose that is looked at is still worked out.
+    pub fn is_probing(&self) -> bool {
+        self.state.is_probing()
     }
 
     /// The part of the run that the cursor is in.
@@ -73,7 +143,7 @@ impl<'a> Scope<'a> {
 
     /// The true pose of the query, if it is known and shown.
     pub fn truth(&self) -> Option<&'a Pose> {
-        if !self.desk.shows_truth {
+        if !self.options.shows_truth {
             return None;
         }
         self.run.loaded.as_deref()?.truth.as_ref()
@@ -89,9 +159,9 @@ impl<'a> Scope<'a> {
         self.run.all_until(self.cursor)
     }
 
-    /// The part of an estimator on the reference that is looked at, and the cursor for it: its last record,
-    /// or the cursor itself where it is the estimator at the cursor.
-    pub fn of(&self, method: Method) -> Option<(&'a Span, usize)> {
+    /// The part of an estimator on the reference that is looked at, and the cursor for it: its last
+    /// record, or the cursor itself where it is the estimator at the cursor.
+    pub fn part_of(&self, method: Method) -> Option<(&'a Span, usize)> {
         let part = Part::Reference(method, self.reference());
         if let Some(span) = self.span()
             && span.part == part
@@ -105,14 +175,14 @@ impl<'a> Scope<'a> {
     /// The latest event of a type that a method has told: up to the cursor if the cursor is in its
     /// part, else in all of its part.
     pub fn latest_of<E: DebugEvent + 'static>(&self, method: Method) -> Option<&'a E> {
-        let (span, cursor) = self.of(method)?;
+        let (span, cursor) = self.part_of(method)?;
         self.run.latest_in(span, cursor)
     }
 
     /// The methods whose cost can be looked at: those of this run that search one, those of the paper
     /// where there are none.
     pub fn direct_methods(&self) -> Vec<Method> {
-        self.desk.setup.direct_methods()
+        self.setup.direct_methods()
     }
 
     /// The direct method whose pictures are shown: that at the cursor, for the others that inside a
@@ -129,8 +199,8 @@ impl<'a> Scope<'a> {
             .unwrap_or(Method::MI)
     }
 
-    /// The method in whose part of the run the search of [`Self::direct_method`] is told: a hybrid, if
-    /// the cursor is in one.
+    /// The method in whose part of the run the search of [`Self::direct_method`] is told: a hybrid,
+    /// if the cursor is in one.
     pub fn searching_method(&self) -> Method {
         self.method()
             .filter(|&here| estimator::find(here).and_then(Entry::hybrid).is_some())
@@ -146,17 +216,16 @@ impl<'a> Scope<'a> {
 
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
-    pub fn shown(&self, method: Method) -> Option<Shown> {
-        if let Some((pose, at)) = self.desk.looking_at()
-            && let Some(probe) = self.desk.probe()
+    pub fn shown(&self, method: Method) -> Option<ShownView> {
+        if let Some((_, reason)) = self.looking_at()
+            && let Some(probe) = self.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.
-            let _ = pose;
-            return Some(Shown {
+            return Some(ShownView {
                 comparison: Arc::clone(comparison),
                 pose: probe.pose,
-                at,
+                reason,
             });
         }
         // A hybrid's views are those of the direct method inside it. Where it kept the other's pose it
@@ -167,10 +236,10 @@ impl<'a> Scope<'a> {
         };
         let event: &ViewRendered = within_hybrid.or_else(|| self.latest_of(method))?;
         let problem = self.problem()?;
-        Some(Shown {
+        Some(ShownView {
             comparison: Arc::clone(&event.comparison),
             pose: problem.world_from_query(&event.offset.reference_from_camera()),
-            at: ShownAt::Event(event.moment),
+            reason: ShownReason::Event(event.moment),
         })
     }
 
@@ -180,7 +249,7 @@ impl<'a> Scope<'a> {
         if self.span()?.part == Part::Fusion(method) {
             return self.latest::<ReferencesFused>()?.pose;
         }
-        let (span, _) = self.of(method)?;
+        let (span, _) = self.part_of(method)?;
         span.result.as_ref()?.pose.as_ref()?.to_pose()
     }
 
@@ -189,14 +258,14 @@ impl<'a> Scope<'a> {
     pub fn cost_bounds(&self, method: Method) -> CostBounds {
         let assessed = self.latest_of::<MinimumAssessed>(method);
         let report = self
-            .of(method)
+            .part_of(method)
             .and_then(|(span, _)| span.result.as_ref()?.cost.as_ref());
         CostBounds {
             shuffled: assessed.and_then(|assessed| assessed.shuffled),
             best: assessed.map(|assessed| assessed.best),
             truth: report
                 .and_then(|report| report.truth)
-                .filter(|_| self.desk.shows_truth),
+                .filter(|_| self.options.shows_truth),
         }
     }
 }

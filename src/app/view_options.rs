@@ -1,0 +1,43 @@
+//! How a person looks at the runs: what is switched on, and what is selected.
+
+/// Which of two runs is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CompareMode {
+    /// The present run, B.
+    #[default]
+    Present,
+    /// The run that was kept, A.
+    Kept,
+    /// Both, beside each other.
+    SideBySide,
+}
+
+/// What is switched on and selected.
+#[derive(Clone, Debug)]
+pub struct ViewOptions {
+    /// Which of the runs is shown.
+    pub compare_mode: CompareMode,
+    /// Whether the ground truth is shown.
+    pub shows_truth: bool,
+    /// Whether only what differs is shown.
+    pub only_differences: bool,
+    /// Whether query and synthetic view are shown in turn.
+    pub blinking: bool,
+    /// Whether the keyboard is wanted by the filter.
+    pub wants_filter: bool,
+    /// The query feature that is looked at.
+    pub selected_feature: Option<usize>,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self {
+            compare_mode: CompareMode::default(),
+            shows_truth: true,
+            only_differences: false,
+            blinking: false,
+            wants_filter: false,
+            selected_feature: None,
+        }
+    }
+}
