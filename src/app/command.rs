@@ -91,6 +91,8 @@ pub enum Command {
     ShowTruth,
     /// Put the keyboard into the filter.
     Filter,
+    /// The filter has the keyboard.
+    FilterFocused,
     /// Look at one query feature.
     SelectFeature(Option<usize>),
     /// Look at a pose as long as the pointer is there (`world_from_camera`).

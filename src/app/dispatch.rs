@@ -113,6 +113,7 @@ impl App {
                 state.options.wants_filter = true;
                 self.layout.show(super::views::PARAMETERS);
             }
+            Command::FilterFocused => state.options.wants_filter = false,
             Command::SelectFeature(feature) => state.options.selected_feature = feature,
             Command::Hover(pose) => state.hovered = pose,
             Command::TakeCamera(pose) => state.camera = pose,

@@ -235,6 +235,21 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
 }
 
 #[test]
+fn the_filter_takes_the_keyboard_once_and_lets_it_go() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    press(&mut window, Modifiers::NONE, Key::Slash);
+    assert!(window.get_by_label("Filter parameters").is_focused());
+    window.state_mut().send(Command::ShowView("breakpoints"));
+    window.step();
+    window.step();
+    window.get_by_label("New breakpoint").focus();
+    window.step();
+    window.step();
+    assert!(window.get_by_label("New breakpoint").is_focused());
+}
+
+#[test]
 fn a_wrong_breakpoint_is_refused_with_what_there_is() {
     let mut window = window(setup());
     run_until_idle(&mut window);

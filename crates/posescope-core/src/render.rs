@@ -5,12 +5,14 @@ mod canvas;
 mod color;
 mod projection;
 mod score;
+mod scorer;
 mod splat;
 mod worker;
 
 pub use canvas::{Canvas, PointArrays, Values};
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
-pub use score::{Comparison, MOST_AT_A_TIME, Score, Scorer};
+pub use score::Score;
+pub use scorer::{Comparison, MOST_AT_A_TIME, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
 use crate::describe::parameters;

@@ -26,6 +26,7 @@ impl View for ParametersView {
             });
             if context.options.wants_filter {
                 response.request_focus();
+                context.send(Command::FilterFocused);
             }
             let help = "All parameters to their defaults";
             if ui.button("Reset all").on_hover_text(help).clicked() {

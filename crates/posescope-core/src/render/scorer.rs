@@ -1,0 +1,134 @@
+//! Scoring many hypotheses of the direct methods at once.
+
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use rayon::prelude::*;
+
+use super::worker::{Prepared, Worker};
+use super::{ColoredPoint, Rasterizer, Score, SplattedPixel, SyntheticView};
+use crate::camera::Intrinsics;
+use crate::cost::{Cost, Explanation, IntensityPair};
+use crate::geometry::Pose;
+use crate::image::FloatImage;
+
+/// A synthetic view beside the query, and what the cost makes of the two.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// The view.
+    pub view: SyntheticView,
+    /// Query and view at each covered pixel, in the order of the view's pixels.
+    pub pairs: Vec<IntensityPair>,
+    /// Cost and support.
+    pub score: Score,
+    /// What the cost was made of; `None` where there is no cost.
+    pub explanation: Option<Explanation>,
+}
+
+/// Hypotheses that are scored between two checkpoints, at most: enough to keep eight threads busy.
+pub const MOST_AT_A_TIME: usize = 256;
+
+/// Hypotheses that a thread scores between two checkpoints. Of a street photo of 1241 × 376 px one
+/// takes some 50 µs, so that whoever wants to stop waits a few milliseconds.
+const PER_THREAD: usize = 32;
+
+/// Hypotheses that a thread takes at once.
+const PER_JOB: usize = 4;
+
+/// Renders the coloured cloud for a hypothesis and compares it with the query.
+pub struct Scorer<'a> {
+    points: &'a [ColoredPoint],
+    query: Arc<FloatImage>,
+    intrinsics: Intrinsics,
+    splat_px: usize,
+    cost: &'a dyn Cost,
+    prepared: OnceLock<Prepared>,
+    /// Those that no thread works with at present.
+    idle: Mutex<Vec<Worker<'a>>>,
+}
+
+impl<'a> Scorer<'a> {
+    /// A scorer for one query. `query` is smoothed as the cost wants it and has the size that
+    /// `intrinsics` says.
+    pub fn new(
+        points: &'a [ColoredPoint],
+        query: Arc<FloatImage>,
+        intrinsics: &Intrinsics,
+        splat_px: usize,
+        cost: &'a dyn Cost,
+    ) -> Self {
+        Self {
+            points,
+            query,
+            intrinsics: *intrinsics,
+            splat_px,
+            cost,
+            prepared: OnceLock::new(),
+            idle: Mutex::default(),
+        }
+    }
+
+    /// How many cameras to score at a time: few enough that a run can be stopped soon, enough for all
+    /// threads of the current pool. At most [`MOST_AT_A_TIME`].
+    pub fn at_a_time(&self) -> usize {
+        (PER_THREAD * rayon::current_num_threads()).min(MOST_AT_A_TIME)
+    }
+
+    /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
+    pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+        let prepared = self
+            .prepared
+            .get_or_init(|| Prepared::new(self.points, &self.query, self.cost));
+        let score = |worker: &mut Option<Worker<'_>>, pose: &Pose| match worker {
+            Some(worker) => worker.score(prepared, &self.query, &pose.inverse()),
+            None => self.compare(pose).score,
+        };
+        reference_from_camera
+            .par_chunks(PER_JOB)
+            .flat_map_iter(|poses| {
+                let idle = self.idle().pop();
+                let mut worker = idle
+                    .or_else(|| Worker::new(self.cost, prepared, &self.intrinsics, self.splat_px));
+                let scores: Vec<Score> =
+                    poses.iter().map(|pose| score(&mut worker, pose)).collect();
+                self.idle().extend(worker);
+                scores
+            })
+            .collect()
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Vec<Worker<'a>>> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The synthetic view of one camera beside the query.
+    pub fn compare(&self, reference_from_camera: &Pose) -> Comparison {
+        let view = self
+            .rasterizer()
+            .view(self.points, &reference_from_camera.inverse());
+        let pairs: Vec<IntensityPair> = self.pair_up(&view.pixels).collect();
+        Comparison {
+            score: Score {
+                cost: self.cost.evaluate(&pairs),
+                covered: pairs.len() as u32,
+            },
+            explanation: self.cost.explain(&pairs),
+            view,
+            pairs,
+        }
+    }
+
+    fn rasterizer(&self) -> Rasterizer {
+        Rasterizer::new(&self.intrinsics, self.splat_px)
+    }
+
+    fn pair_up<'p>(
+        &self,
+        pixels: &'p [SplattedPixel],
+    ) -> impl Iterator<Item = IntensityPair> + use<'_, 'p, 'a> {
+        let query: &[f32] = &self.query;
+        pixels.iter().map(move |pixel| IntensityPair {
+            query: query[pixel.index as usize],
+            synthetic: pixel.intensity,
+        })
+    }
+}
