@@ -138,6 +138,7 @@ fn fused(event: &ReferencesFused) -> String {
                 ShareOutcome::Kept => format!("weight {:.3}", share.weight),
                 ShareOutcome::Dropped => "dropped".to_owned(),
                 ShareOutcome::Failed => "failed".to_owned(),
+                ShareOutcome::FallbackUnneeded => "fallback not needed".to_owned(),
             };
             format!("{} {say} ({} matches)", share.reference, share.matches)
         })

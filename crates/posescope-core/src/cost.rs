@@ -18,7 +18,7 @@ mod photometric;
 use std::fmt;
 
 pub use evaluator::{CostOf, Evaluator};
-pub use joint_histogram::{Entropies, JointHistogram, bin, count_pairs};
+pub use joint_histogram::{Entropies, JointHistogram, LEAST_ENTROPY, bin, count_pairs};
 pub use mutual_information::{MutualInformation, MutualInformationParams};
 pub use orientation::{Orientation, OrientationParams};
 pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};

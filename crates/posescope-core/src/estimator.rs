@@ -73,6 +73,8 @@ pub struct Outcome {
     pub counts: Option<FeatureCounts>,
     /// What the cost was like, if a cost was minimised.
     pub cost: Option<CostSummary>,
+    /// Whether this is the answer of a hybrid's second method, because the first had no pose.
+    pub fell_back: bool,
 }
 
 impl Outcome {
@@ -82,6 +84,7 @@ impl Outcome {
             pose: Err(failure),
             counts: None,
             cost: None,
+            fell_back: false,
         }
     }
 }

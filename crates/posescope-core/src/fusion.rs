@@ -103,6 +103,8 @@ pub struct Candidate<'a> {
     pub matches: usize,
     /// `world_from_camera` of the query, or why this reference gave none.
     pub pose: Result<&'a Pose, &'a Failure>,
+    /// Whether the pose is that of a hybrid's second method, because the first had none.
+    pub fell_back: bool,
 }
 
 /// Fuses what the references gave each for itself.
@@ -110,6 +112,9 @@ pub struct Candidate<'a> {
 /// Candidates without a pose are left out and the weights of the others grow in proportion; where
 /// all those with a weight failed, so does the fusion: a reference that was left out for its few
 /// matches does not come back.
+///
+/// A hybrid falls back for the query, not for each reference: its second method's poses count only
+/// where no reference with a weight has one of the first, so that fused it is never behind that.
 ///
 /// # Errors
 /// Only [`Cancelled`].
@@ -138,9 +143,14 @@ pub fn fuse(
 fn shares(fusion: &Entry, candidates: &[Candidate<'_>]) -> Vec<Share> {
     let matches: Vec<usize> = candidates.iter().map(|c| c.matches).collect();
     let weights = (fusion.weigh)(&matches);
+    let weighed = candidates.iter().zip(&weights);
+    let first_method_succeeded = weighed
+        .filter(|(_, weight)| **weight > 0.0)
+        .any(|(candidate, _)| candidate.pose.is_ok() && !candidate.fell_back);
     let outcome = |candidate: &Candidate<'_>, weight: f64| match candidate.pose {
         _ if weight <= 0.0 => ShareOutcome::Dropped,
         Err(_) => ShareOutcome::Failed,
+        Ok(_) if candidate.fell_back && first_method_succeeded => ShareOutcome::FallbackUnneeded,
         Ok(_) => ShareOutcome::Kept,
     };
     let kept: f64 = candidates
@@ -224,6 +234,7 @@ mod tests {
                 reference: name,
                 matches: *matches,
                 pose: pose.as_ref(),
+                fell_back: false,
             })
             .collect();
         let mut history = History::default();
@@ -283,6 +294,41 @@ mod tests {
         ];
         assert_eq!(outcomes, expected);
         assert_eq!(told.shares[2].pose, Some(at(5.0)));
+    }
+
+    #[test]
+    fn a_fallback_counts_only_where_no_weighed_reference_can_do_without() {
+        let (good, coarse) = (at(1.0), at(9.0));
+        let share_outcomes = |candidates: &[(usize, &Pose, bool)]| -> Vec<ShareOutcome> {
+            let candidates: Vec<_> = candidates
+                .iter()
+                .map(|&(matches, pose, fell_back)| Candidate {
+                    reference: "r",
+                    matches,
+                    pose: Ok(pose),
+                    fell_back,
+                })
+                .collect();
+            let fusion: Fusion = "r-wavg".parse().expect("a fusion");
+            let shares = shares(&fusion, &candidates);
+            let total: f64 = shares.iter().map(|share| share.weight).sum();
+            assert!((total - 1.0).abs() < 1e-12);
+            shares.iter().map(|share| share.outcome).collect()
+        };
+        use ShareOutcome::{Dropped, FallbackUnneeded, Kept};
+        assert_eq!(
+            share_outcomes(&[(90, &coarse, true), (80, &good, false)]),
+            [FallbackUnneeded, Kept]
+        );
+        assert_eq!(
+            share_outcomes(&[(90, &coarse, true), (80, &coarse, true)]),
+            [Kept, Kept]
+        );
+        // What has no weight does not make the others' fallback unneeded.
+        assert_eq!(
+            share_outcomes(&[(90, &coarse, true), (10, &good, false)]),
+            [Kept, Dropped]
+        );
     }
 
     #[test]
@@ -346,7 +392,8 @@ mod tests {
         fn a_single_reference_is_taken_as_it_is(x in -1e6..1e6f64, angle in -3.0..3.0f64) {
             let pose = Pose::new([x, 2.0, 3.0].into(), [0.0, angle, 0.0].into());
             for entry in ALL {
-                let candidate = Candidate { reference: "r", matches: 7, pose: Ok(&pose) };
+                let candidate =
+                    Candidate { reference: "r", matches: 7, pose: Ok(&pose), fell_back: false };
                 let fused = fuse(entry, &[candidate], &mut Trace::off()).expect("not cancelled");
                 prop_assert_eq!(fused, Ok(pose));
             }

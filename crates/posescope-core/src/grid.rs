@@ -164,6 +164,9 @@ impl Phase {
 /// tens of gigabytes.
 pub const MOST_CELLS: usize = 1 << 20;
 
+/// Costs that differ by less are rounded differently, and no more.
+const LEAST_DIFFERENCE: f64 = 1e-9;
+
 /// A phase of the search has more than [`MOST_CELLS`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
@@ -314,19 +317,15 @@ impl ScoredLattice {
         best.map(|(cell, _)| cell)
     }
 
-    /// The one cost of all eligible cells and their number, where there are several and nothing
-    /// tells them apart.
+    /// The cost of all eligible cells and their number, where there are several and nothing tells them
+    /// apart: they differ by less than [`LEAST_DIFFERENCE`].
     pub fn flat_cost(&self) -> Option<(f64, usize)> {
-        let mut costs = (0..self.scores.len()).filter_map(|cell| self.eligible_cost(cell));
-        let first = costs.next()?;
-        let mut count = 1;
-        for cost in costs {
-            if cost != first {
-                return None;
-            }
-            count += 1;
-        }
-        (count > 1).then_some((first, count))
+        let costs = (0..self.scores.len()).filter_map(|cell| self.eligible_cost(cell));
+        let (least, most, count) = costs.fold(
+            (f64::INFINITY, f64::NEG_INFINITY, 0),
+            |(least, most, count), cost| (cost.min(least), cost.max(most), count + 1),
+        );
+        (count > 1 && most - least < LEAST_DIFFERENCE).then_some((least, count))
     }
 
     /// The cells that are lower than each of their neighbours, best first.
@@ -485,6 +484,10 @@ mod tests {
     fn a_surface_is_flat_only_if_several_costs_are_all_equal() {
         assert_eq!(
             scored(&[Some(2.0), None, Some(2.0)], 20, 3).flat_cost(),
+            Some((2.0, 2))
+        );
+        assert_eq!(
+            scored(&[Some(2.0), Some(2.0 + 1e-12)], 20, 2).flat_cost(),
             Some((2.0, 2))
         );
         assert_eq!(scored(&[Some(2.0), Some(2.1)], 20, 2).flat_cost(), None);

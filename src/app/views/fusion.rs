@@ -113,6 +113,11 @@ fn weight(ui: &mut Ui, share: &Share, color: Color32) {
             ui.weak("left out")
                 .on_hover_text("The fusion gives it no weight");
         }
+        ShareOutcome::FallbackUnneeded => {
+            ui.weak("fallback not needed").on_hover_text(
+                "Its pose is that of the hybrid's second method; another reference has one of the first",
+            );
+        }
         ShareOutcome::Failed => {
             ui.label(RichText::new("× failed").color(theme::ESTIMATE))
                 .on_hover_text("It had a weight, but no pose");
@@ -172,9 +177,9 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
                 let Some(pose) = &share.pose else { continue };
                 let (name, shape) = match share.outcome {
                     ShareOutcome::Kept => ("alone, kept", MarkerShape::Circle),
-                    ShareOutcome::Dropped | ShareOutcome::Failed => {
-                        ("alone, left out", MarkerShape::Cross)
-                    }
+                    ShareOutcome::Dropped
+                    | ShareOutcome::Failed
+                    | ShareOutcome::FallbackUnneeded => ("alone, left out", MarkerShape::Cross),
                 };
                 let radius = 3.0 + 6.0 * share.weight.sqrt() as f32;
                 mark(

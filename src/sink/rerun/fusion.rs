@@ -50,7 +50,9 @@ fn candidates(event: &ReferencesFused, origin: Origin) -> Points3D {
         .with_colors(placed().map(|(share, _)| {
             super::color(match share.outcome {
                 ShareOutcome::Kept => palette::ESTIMATE,
-                ShareOutcome::Dropped | ShareOutcome::Failed => palette::UNDECIDED,
+                ShareOutcome::Dropped | ShareOutcome::Failed | ShareOutcome::FallbackUnneeded => {
+                    palette::UNDECIDED
+                }
             })
         }))
         .with_radii([rerun::Radius::new_ui_points(4.0)])
@@ -91,5 +93,6 @@ fn say(share: &Share) -> String {
         ShareOutcome::Kept => format!("{:.3}", share.weight),
         ShareOutcome::Dropped => "dropped".to_owned(),
         ShareOutcome::Failed => "failed".to_owned(),
+        ShareOutcome::FallbackUnneeded => "fallback not needed".to_owned(),
     }
 }

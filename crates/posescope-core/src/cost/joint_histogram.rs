@@ -78,6 +78,11 @@ impl JointHistogram {
     }
 }
 
+/// The entropy below which an image counts as constant \[nat\]. That of a constant comes out as 0 or, for
+/// one number of pixels in fifty, as some 1e-16, whose quotients mean nothing. The least entropy that is
+/// one, of a single pixel that differs among a million, is a thousand times as large.
+pub const LEAST_ENTROPY: f64 = 1e-9;
+
 /// The entropies of two images and of both together \[nat\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entropies {
@@ -105,7 +110,7 @@ impl Entropies {
     /// NMI in 0 … 1, normalised by the larger entropy; `None` where both images are constant.
     pub fn normalized_mutual_information(&self) -> Option<f64> {
         let larger = self.query.max(self.synthetic);
-        (larger > 0.0).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
+        (larger > LEAST_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
     }
 
     /// I(Q, S) = H(Q) + H(S) − H(S, Q) \[nat\].
@@ -213,6 +218,26 @@ mod tests {
             count_pairs(&binned, bins, &mut counts);
             prop_assert_eq!(counts, JointHistogram::of(&pairs, bins).counts);
         }
+    }
+
+    #[test]
+    fn a_constant_has_no_information_whatever_the_number_of_its_pixels() {
+        let mut not_zero = 0;
+        for count in 1..=5_000_u32 {
+            let mut counts = vec![0; 256];
+            counts[37] = count;
+            let entropies = Entropies::of(&counts, 16);
+            not_zero += u32::from(entropies.query > 0.0);
+            assert_eq!(entropies.normalized_mutual_information(), None, "{count}");
+        }
+        assert!(
+            not_zero > 0,
+            "the counts that come out as 1e-16 are among them"
+        );
+        let mut one_differs = vec![0; 256];
+        (one_differs[37], one_differs[38]) = (1_000_000, 1);
+        let entropies = Entropies::of(&one_differs, 16);
+        assert!(entropies.synthetic > 1_000.0 * LEAST_ENTROPY);
     }
 
     #[test]

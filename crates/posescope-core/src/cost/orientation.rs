@@ -11,7 +11,7 @@ use image::Luma;
 
 use super::{
     Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    MakesCost, Similarity,
+    LEAST_ENTROPY, MakesCost, Similarity,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -145,7 +145,7 @@ impl Cost for Orientation {
 fn distance(entropies: &Entropies) -> Option<f64> {
     let joint = entropies.joint;
     let share = entropies.mutual_information() / joint;
-    (joint > 0.0).then(|| 1.0 - share.clamp(0.0, 1.0))
+    (joint > LEAST_ENTROPY).then(|| 1.0 - share.clamp(0.0, 1.0))
 }
 
 #[cfg(test)]

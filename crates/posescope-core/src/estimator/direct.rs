@@ -73,6 +73,7 @@ impl Estimator for Direct {
                 pose: Ok(pose),
                 counts: None,
                 cost: Some(cost),
+                fell_back: false,
             },
             Err(failure) => Outcome::failed(failure),
         })

@@ -106,6 +106,7 @@ impl Estimator for FeatureBased {
             pose: separate_failure(pose)?,
             counts: Some(counts),
             cost: None,
+            fell_back: false,
         })
     }
 }

@@ -50,6 +50,7 @@ pub fn hybrid_outcome(first: &Outcome, second: &Outcome) -> Outcome {
     }
     Outcome {
         counts: first.counts,
+        fell_back: true,
         ..second.clone()
     }
 }

@@ -11,6 +11,9 @@ pub enum ShareOutcome {
     Dropped,
     /// It had weight, but its reference gave no pose.
     Failed,
+    /// It had weight, but its pose is that of a hybrid's second method, and another reference with weight
+    /// has one of the first.
+    FallbackUnneeded,
 }
 
 /// A candidate with its share of the fused pose.

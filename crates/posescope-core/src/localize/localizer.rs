@@ -388,6 +388,7 @@ impl<'a> Localizer<'a> {
                 reference: &problem.reference.name,
                 matches: *matches,
                 pose: candidate.outcome.pose.as_ref(),
+                fell_back: candidate.outcome.fell_back,
             })
             .collect();
         observer.begin_fusion(method);
