@@ -11,7 +11,7 @@ if [ $# = 0 ]; then
 fi
 
 medians() {
-    cargo bench --quiet -p posescope-stages --profile "$1" -- "${@:2}" |
+    cargo bench --quiet -p posescope-stages --profile "$1" -- --sample-count 12 "${@:2}" |
         sed 's/[│├─╰]/ /g' |
         # A row with numbers has four times with their units; the third is the median.
         awk '
