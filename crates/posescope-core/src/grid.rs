@@ -318,7 +318,7 @@ impl ScoredLattice {
     }
 
     /// The cost of all eligible cells and their number, where there are several and nothing tells them
-    /// apart: they differ by less than [`LEAST_DIFFERENCE`].
+    /// apart: they differ by less than 1e-9.
     pub fn flat_cost(&self) -> Option<(f64, usize)> {
         let costs = (0..self.scores.len()).filter_map(|cell| self.eligible_cost(cell));
         let (least, most, count) = costs.fold(
