@@ -6,6 +6,7 @@
 //! street, or with `POSESCOPE_SCENE=PATH` and `POSESCOPE_PAIR=QUERY,REFERENCE`, the indices of two of its
 //! frames, one of any scene.
 
+use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::thread;
@@ -50,26 +51,39 @@ fn main() {
 
 /// Two frames of the street, 8 m apart, or those that the environment names.
 static PAIR: LazyLock<Problem> = LazyLock::new(|| {
-    let named = |name: &str, otherwise: &str| std::env::var(name).unwrap_or(otherwise.to_owned());
-    let scene = named("POSESCOPE_SCENE", "street");
-    let pair = named("POSESCOPE_PAIR", "70,62");
-    let scene = scene::open(&scene, None).expect("a scene that can be opened");
-    let indices = pair
-        .split(',')
-        .map(|index| index.parse().expect("a frame's index"));
-    let [query, reference]: [usize; 2] = indices
-        .collect::<Vec<_>>()
-        .try_into()
-        .expect("indices of a query and a reference");
-    Problem {
-        query: scene.query(query).expect("a query that can be read"),
-        reference: scene
-            .reference(reference)
-            .expect("a reference that can be read"),
+    let variable = |name: &str, default: &str| std::env::var(name).unwrap_or(default.to_owned());
+    let scene = variable("POSESCOPE_SCENE", "street");
+    let indices = variable("POSESCOPE_PAIR", "70,62");
+    named_pair(&scene, &indices).unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        std::process::exit(2);
+    })
+});
+
+fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
+    let expected = || {
+        format!(
+            "POSESCOPE_PAIR={indices}: the indices of a query and a reference expected, as 70,62"
+        )
+    };
+    let (query, reference) = indices.split_once(',').ok_or_else(expected)?;
+    let index = |text: &str| text.trim().parse::<usize>().map_err(|_| expected());
+    let scene = scene::open(scene, None)?;
+    let known = |index: usize| match scene.frames().len() {
+        frames if index < frames => Ok(index),
+        frames => Err(format!(
+            "POSESCOPE_PAIR={indices}: {} has {frames} frames, 0 to {}",
+            scene.name(),
+            frames.saturating_sub(1)
+        )),
+    };
+    Ok(Problem {
+        query: scene.query(known(index(query)?)?)?,
+        reference: scene.reference(known(index(reference)?)?)?,
         uncertainty_radius_m: 15.0,
         seed: 0,
-    }
-});
+    })
+}
 
 static FEATURES: LazyLock<(Features, Features)> = LazyLock::new(|| {
     let params = SurfParams::default();

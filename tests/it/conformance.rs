@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope::cloud::Cloud;
-use posescope::cost::{Cost, Explanation, IntensityPair};
+use posescope::cost::{
+    self, Cost, Entropies, Evaluator, Explanation, IntensityPair, JointHistogram,
+};
 use posescope::estimator::{self, Outcome, Parts};
 use posescope::event::{
     DepthsLifted, Event, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind, KindSet,
@@ -21,7 +23,7 @@ use posescope::memo::{Key, Memo};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::render::{Scorer, color_cloud};
+use posescope::render::{Scorer, color_cloud, color_cloud_by};
 use posescope::trace::{Cancelled, Record, Sink, Trace};
 use proptest::prelude::*;
 
@@ -355,6 +357,56 @@ fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
         .flat_map(|pose| scorer.score(std::slice::from_ref(pose)))
         .collect();
     assert_eq!(at_once, one_by_one);
+}
+
+/// Mutual information with as many bins as one likes.
+struct ManyBins(usize);
+
+impl Cost for ManyBins {
+    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
+        gaussian_smoothed(photo, 1.0)
+    }
+    fn query_channel_key(&self) -> Key {
+        Key::new("smooth")
+    }
+    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
+        let histogram = JointHistogram::of(pairs, self.0);
+        histogram.entropies().normalized_mutual_information()
+    }
+    fn evaluator(&self) -> Evaluator<'_> {
+        Evaluator::of_entropies(self.0, Entropies::normalized_mutual_information)
+    }
+}
+
+#[test]
+fn what_the_search_scores_is_what_the_view_shows() {
+    let problem = solvable();
+    let reference = &problem.reference;
+    let registered = cost::ALL.iter().map(|entry| (entry.params)().cost());
+    // More bins than a byte tells apart are scored the plain way.
+    let own = [16, 256, 300].map(|bins| Box::new(ManyBins(bins)) as Box<dyn Cost>);
+    let poses: Vec<_> = (0..9)
+        .map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i)))
+        .collect();
+    for cost in registered.chain(own) {
+        let cloud = color_cloud_by(
+            &reference.cloud,
+            &reference.intrinsics,
+            &Params::default().render,
+            cost.reference_channel(&reference.photo.gray),
+        );
+        let query = Arc::new(cost.query_channel(&problem.query.photo.gray));
+        for splat_px in [1, 3] {
+            let query = Arc::clone(&query);
+            let scorer = Scorer::new(&cloud.points, query, &CAMERA, splat_px, cost.as_ref());
+            let shown: Vec<_> = poses
+                .iter()
+                .map(|pose| scorer.compare(pose).score)
+                .collect();
+            assert!(shown.iter().all(|score| score.cost.is_some()));
+            assert_eq!(scorer.score(&poses), shown);
+        }
+    }
 }
 
 #[test]

@@ -3,13 +3,14 @@
 use posescope::cloud::Cloud;
 use posescope::estimator::{self, Failure, Outcome};
 use posescope::geometry::Pose;
-use posescope::localize::evaluate;
+use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request, evaluate};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
 use posescope::trace::Trace;
 
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
+use crate::walls_scene::Walls;
 
 fn with(assignments: &[&str]) -> Params {
     let mut params = Params::default();
@@ -84,6 +85,46 @@ fn without_the_uniqueness_test_every_match_that_passes_the_ratio_goes_on() {
     let (strict, lax) = (counts("fb.unique=true"), counts("fb.unique=false"));
     assert!(strict.unique < strict.ratio_passed);
     assert_eq!(lax.unique, lax.ratio_passed);
+}
+
+#[test]
+fn a_fused_hybrid_takes_the_first_methods_poses_alone_where_a_reference_has_one() {
+    // The query is 1 m from one reference, where FB is refused, and 0.5 m from the other.
+    let (scene, params) = (Walls::new(), Params::default());
+    let localizer = Localizer::new(&scene, &scene, &params, 7);
+    let request = Request {
+        radius_m: 0.7,
+        references: vec![0, 2].into(),
+        fusions: vec!["avg".parse().expect("a fusion")],
+        setting: None,
+    };
+    for methods in [&[Method::FB, Method::MI, Method::HY][..], &[Method::HY]] {
+        let mut results = Vec::new();
+        let keep = |result: QueryResult, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        };
+        localizer
+            .localize(
+                0,
+                1,
+                std::slice::from_ref(&request),
+                methods,
+                &mut NoObserver,
+                keep,
+            )
+            .expect("good data");
+        let hybrid = results.pop().expect("the last method is the hybrid");
+        let alone = hybrid.per_reference.expect("two references");
+        // MI answered where FB was refused: its search has a cost.
+        assert!(alone.iter().all(|result| result.pose.is_some()));
+        let fell_back: Vec<bool> = alone.iter().map(|result| result.cost.is_some()).collect();
+        assert_eq!(fell_back, [true, false]);
+        assert_eq!(hybrid.pose, alone[1].pose);
+        if let Some(feature_based) = results.first() {
+            assert_eq!(hybrid.pose, feature_based.pose);
+        }
+    }
 }
 
 #[test]

@@ -46,3 +46,16 @@ impl Default for RenderParams {
         }
     }
 }
+
+/// The camera that the tests of this room look through.
+#[cfg(test)]
+fn small_camera() -> crate::camera::Intrinsics {
+    crate::camera::Intrinsics {
+        fx: 10.0,
+        fy: 10.0,
+        cx: 4.0,
+        cy: 3.0,
+        width: 9,
+        height: 7,
+    }
+}

@@ -1,6 +1,6 @@
 //! How a cost is found for one hypothesis after another.
 
-use super::IntensityPair;
+use super::{Entropies, IntensityPair};
 
 /// The cost of one hypothesis: of its pairs, or of their counts.
 pub type CostOf<'a, T> = Box<dyn FnMut(&[T]) -> Option<f64> + Send + 'a>;
@@ -18,4 +18,14 @@ pub enum Evaluator<'a> {
         /// The cost of the counts, `bins` × `bins`; rows are the query's bins.
         cost: CostOf<'a, u32>,
     },
+}
+
+impl Evaluator<'_> {
+    /// The evaluator of a cost that is made of the entropies of a joint histogram.
+    pub fn of_entropies(bins: usize, cost: fn(&Entropies) -> Option<f64>) -> Self {
+        Self::Counts {
+            bins,
+            cost: Box::new(move |counts| cost(&Entropies::of(counts, bins))),
+        }
+    }
 }

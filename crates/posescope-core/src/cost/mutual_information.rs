@@ -78,11 +78,7 @@ impl Cost for MutualInformation {
     }
 
     fn evaluator(&self) -> Evaluator<'_> {
-        let bins = self.params.bins;
-        Evaluator::Counts {
-            bins,
-            cost: Box::new(move |counts| distance(&Entropies::of(counts, bins))),
-        }
+        Evaluator::of_entropies(self.params.bins, distance)
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {

@@ -234,20 +234,10 @@ impl<T: Copy + Default> Covered<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::small_camera;
     use crate::render::{Rasterizer, SplattedPixel};
     use nalgebra::Point3;
     use proptest::prelude::*;
-
-    fn camera() -> Intrinsics {
-        Intrinsics {
-            fx: 10.0,
-            fy: 10.0,
-            cx: 4.0,
-            cy: 3.0,
-            width: 9,
-            height: 7,
-        }
-    }
 
     /// Points before, beside and behind the camera, some of them exactly behind each other and some at
     /// equal depths.
@@ -269,7 +259,7 @@ mod tests {
 
     /// What the plain way draws.
     fn plainly(points: &[ColoredPoint], splat_px: usize, pose: &Pose) -> Vec<SplattedPixel> {
-        Rasterizer::new(&camera(), splat_px)
+        Rasterizer::new(&small_camera(), splat_px)
             .splat(points, pose)
             .to_vec()
     }
@@ -293,7 +283,7 @@ mod tests {
             let arrays = PointArrays::new(&points);
             let mut canvas = Canvas {
                 level: level(baseline),
-                ..Canvas::new(&camera(), splat_px).expect("a small image")
+                ..Canvas::new(&small_camera(), splat_px).expect("a small image")
             };
             let pixels: Vec<f32> = (0..63).map(|pixel| pixel as f32).collect();
             let intensities: Vec<f32> = points.iter().map(|point| point.intensity).collect();
@@ -327,7 +317,7 @@ mod tests {
             points: &[0; 9],
         };
         let [all, one, none] = [9, 1, 0].map(|count| PointArrays::new(&points[..count]));
-        let mut canvas = Canvas::new(&camera(), 1).expect("a small image");
+        let mut canvas = Canvas::new(&small_camera(), 1).expect("a small image");
         let mut covered = |points| canvas.draw(points, values, &Pose::identity()).len();
         assert_eq!(covered(&all), 9);
         // The drawing after these has the number of the first one again.
@@ -343,7 +333,7 @@ mod tests {
         let huge = Intrinsics {
             width: 1 << 13,
             height: (1 << 11) + 1,
-            ..camera()
+            ..small_camera()
         };
         assert!(Canvas::<u8>::new(&huge, 1).is_none());
     }

@@ -150,18 +150,8 @@ impl HorizonMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::small_camera;
     use ::image::Luma;
-
-    fn small_camera() -> Intrinsics {
-        Intrinsics {
-            fx: 10.0,
-            fy: 10.0,
-            cx: 4.0,
-            cy: 3.0,
-            width: 9,
-            height: 7,
-        }
-    }
 
     fn photo() -> GrayImage {
         GrayImage::from_fn(9, 7, |x, y| Luma([(20 * x + y) as u8]))

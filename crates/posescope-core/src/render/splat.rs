@@ -119,19 +119,9 @@ impl Rasterizer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::small_camera;
     use nalgebra::Point3;
     use proptest::prelude::*;
-
-    fn camera() -> Intrinsics {
-        Intrinsics {
-            fx: 10.0,
-            fy: 10.0,
-            cx: 4.0,
-            cy: 3.0,
-            width: 9,
-            height: 7,
-        }
-    }
 
     fn point(x: f32, y: f32, z: f32, intensity: f32) -> ColoredPoint {
         ColoredPoint {
@@ -148,7 +138,7 @@ mod tests {
             point(0.0, 0.0, 2.0, 3.0),
             point(0.0, 0.0, 9.0, 4.0),
         ];
-        let mut rasterizer = Rasterizer::new(&camera(), 1);
+        let mut rasterizer = Rasterizer::new(&small_camera(), 1);
         let pixels = rasterizer.splat(&points, &Pose::identity());
         let expected = SplattedPixel {
             index: 3 * 9 + 4,
@@ -160,7 +150,7 @@ mod tests {
 
     #[test]
     fn half_a_pixel_belongs_to_the_next_pixel_centre() {
-        let mut rasterizer = Rasterizer::new(&camera(), 1);
+        let mut rasterizer = Rasterizer::new(&small_camera(), 1);
         let at = |x: f32| point(x, 0.0, 1.0, 9.0);
         let pixels = rasterizer.splat(&[at(0.0499), at(0.0501)], &Pose::identity());
         let columns: Vec<_> = pixels.iter().map(|p| p.index % 9).collect();
@@ -169,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_point_without_a_depth_holds_no_pixel() {
-        let mut rasterizer = Rasterizer::new(&camera(), 1);
+        let mut rasterizer = Rasterizer::new(&small_camera(), 1);
         let points = [
             point(f32::NAN, f32::NAN, f32::NAN, 1.0),
             point(-0.8, -0.6, 2.0, 2.0),
@@ -181,7 +171,7 @@ mod tests {
 
     #[test]
     fn squares_are_cut_at_the_border() {
-        let mut rasterizer = Rasterizer::new(&camera(), 3);
+        let mut rasterizer = Rasterizer::new(&small_camera(), 3);
         let corner = point(-0.4, -0.3, 1.0, 7.0);
         assert_eq!(rasterizer.splat(&[corner], &Pose::identity()).len(), 4);
         let just_outside = point(-0.5, 0.0, 1.0, 7.0);
@@ -193,7 +183,7 @@ mod tests {
 
     #[test]
     fn moving_the_camera_forward_and_looking_back_sees_nothing() {
-        let mut rasterizer = Rasterizer::new(&camera(), 1);
+        let mut rasterizer = Rasterizer::new(&small_camera(), 1);
         let points = [point(0.0, 0.0, 2.0, 1.0)];
         let beyond = Pose::translation(0.0, 0.0, 3.0).inverse();
         assert!(rasterizer.splat(&points, &beyond).is_empty());
@@ -208,10 +198,10 @@ mod tests {
         ) {
             let points: Vec<_> = xs.iter().map(|&(x, y, z)| point(x, y, z, x + y)).collect();
             let moved = Pose::translation(shift, 0.0, 0.0);
-            let mut used = Rasterizer::new(&camera(), 3);
+            let mut used = Rasterizer::new(&small_camera(), 3);
             used.splat(&points, &Pose::identity());
             let again = used.splat(&points, &moved).to_vec();
-            let fresh = Rasterizer::new(&camera(), 3).splat(&points, &moved).to_vec();
+            let fresh = Rasterizer::new(&small_camera(), 3).splat(&points, &moved).to_vec();
             prop_assert_eq!(again, fresh);
         }
     }
