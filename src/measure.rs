@@ -1,5 +1,6 @@
 //! Measures of many results: tables, plots, gates, comparisons, exports.
 
+mod chance;
 mod diff;
 #[cfg(feature = "cli")]
 mod export;

@@ -79,6 +79,7 @@ impl From<SavedSession1> for SavedSession {
                     methods: saved.methods,
                     fusions: saved.fusions,
                     seed: saved.seed,
+                    ..default
                 },
                 params: saved.params,
                 breakpoints: saved.breakpoints,

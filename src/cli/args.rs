@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::diagnosis::Tolerance as Right;
 use posescope::estimator;
 use posescope::fusion::Fusion;
 use posescope::localize::Selection;
@@ -219,6 +220,17 @@ pub struct ProtocolArgs {
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
+    /// How near the truth a pose is right; one that is not gets a verdict that says why [default:
+    /// 1m,5deg]
+    #[arg(long, value_name = "METRES,DEGREES")]
+    pub right: Option<Right>,
+    /// Refuse poses that are within 1 m of the truth with less than this probability (L1)
+    #[arg(long, value_name = "PROBABILITY", value_parser = share)]
+    pub accept: Option<f64>,
+    /// Localise a query that went wrong again, at most so often for each result, and say what would
+    /// have helped
+    #[arg(long, value_name = "RUNS", num_args = 0..=1, default_missing_value = "12")]
+    pub explain: Option<usize>,
     #[command(flatten)]
     pub config: ConfigArgs,
     /// Number of threads [default: one per core]; results do not depend on it
@@ -244,6 +256,9 @@ impl ProtocolArgs {
                 wanted => wanted.to_vec(),
             },
             seed: self.seed,
+            right: self.right.unwrap_or(defaults.right),
+            accept: self.accept.or(defaults.accept),
+            explain: self.explain.unwrap_or(defaults.explain),
         }
     }
 }

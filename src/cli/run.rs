@@ -41,12 +41,12 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let plan = Plan {
         args,
         task: &task,
-        localizer: Localizer::new(
+        localizer: task.protocol.configured(Localizer::new(
             references.as_ref(),
             queries,
             &task.params,
             task.protocol.seed,
-        ),
+        )),
     };
     let tasks = plan.queries()?;
     let mut json = match &args.json {

@@ -20,7 +20,7 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
             "error",
             "rotation",
             "max Euler",
-            "evidence",
+            "verdict, or evidence",
             "time",
         ]);
     for index in [2, 4, 5, 6, 8] {
@@ -58,6 +58,9 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
 
 /// What the result rests on, in a few words.
 fn evidence(result: &QueryResult) -> String {
+    if let Some(primary) = result.diagnosis.first() {
+        return format!("{}: {}", primary.code, primary.text);
+    }
     if let Some(reason) = &result.reason {
         return format!("{}: {}", reason.code, reason.text);
     }

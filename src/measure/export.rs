@@ -368,7 +368,10 @@ fn csv(folder: &Path, run: &RunFile, choice: &ResultChoice) -> Result<String, Ex
                 "failed"
             }
             .to_owned(),
-            result.reason.map(|reason| reason.code).unwrap_or_default(),
+            result
+                .reason
+                .map(|reason| reason.code.to_string())
+                .unwrap_or_default(),
             u8::from(success).to_string(),
         ];
         let pose = result.pose.as_ref();

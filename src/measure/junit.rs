@@ -6,6 +6,7 @@ use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::gate::GateResult;
 use super::metrics::Row;
+use crate::diagnosis::Diagnosis;
 use crate::fusion::Fusion;
 use crate::localize::{Reason, Setting};
 use crate::run::RunFile;
@@ -17,6 +18,8 @@ struct Case {
     #[serde(flatten)]
     row: Row,
     reason: Option<Reason>,
+    #[serde(default)]
+    diagnosis: Vec<Diagnosis>,
 }
 
 /// The report as XML. It holds no clock.
@@ -32,17 +35,22 @@ pub fn junit(
     // Results come by query; a suite holds those of a method.
     let mut suites: Vec<TestSuite> = Vec::new();
     for case in read_results::<Case>(folder)? {
-        let Case { row, reason } = case?;
+        let Case {
+            row,
+            reason,
+            diagnosis,
+        } = case?;
         let mut name = row.scene.clone();
         if let Some(queries) = &row.query_scene {
             name += &format!(" ← {queries}");
         }
         name += &format!(" {}", row.method);
         let verdict = row.verdict(run.failure_radius_m);
-        let status = match &reason {
+        let status = match (diagnosis.first(), &reason) {
             _ if verdict.is_success() => TestCaseStatus::success(),
-            Some(reason) => failure(&reason.code, &reason.text),
-            None => failure("far", &verdict.words(row.error.as_ref())),
+            (Some(primary), _) => failure(primary.code.name(), &primary.text),
+            (None, Some(reason)) => failure(reason.code.name(), &reason.text),
+            (None, None) => failure("far", &verdict.words(row.error.as_ref())),
         };
         let case = TestCase::new(case_name(&row.query, row.setting, row.fusion), status);
         match suites.iter_mut().find(|suite| suite.name.as_str() == name) {

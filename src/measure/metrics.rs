@@ -8,6 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::chance::Chance;
+use crate::code::Code;
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
 use crate::localize::{Setting, Status, Verdict};
@@ -37,6 +39,19 @@ pub struct Row {
     pub status: Status,
     /// Its error, where the truth is known.
     pub error: Option<PoseError>,
+    /// The error of the reference pose, where the truth is known.
+    #[serde(default)]
+    pub initial_error: Option<PoseError>,
+    /// The verdicts, the primary one first.
+    #[serde(default)]
+    pub diagnosis: Vec<Finding>,
+}
+
+/// A verdict without its words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// The code.
+    pub code: Code,
 }
 
 impl Row {
@@ -162,6 +177,12 @@ pub struct Measures {
     /// Shares of the queries within [`RECALL_LIMITS`], with failures counted as infinite; nothing
     /// where the truth is not known.
     pub recall: Option<[f64; 3]>,
+    /// How often each primary verdict was given.
+    #[serde(default)]
+    pub verdicts: BTreeMap<Code, usize>,
+    /// What chance alone would reach; nothing where the truth is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chance: Option<Chance>,
     /// Every error, failures as infinite, for limits of one's own; nothing without truth.
     #[serde(skip)]
     pub errors: Option<Vec<(f64, f64)>>,
@@ -212,7 +233,8 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
     }
     let is_common = |query: &str| succeeded.values().all(|queries| queries.contains(query));
     let measure = |method: Method| {
-        let rows: Vec<&&Row> = rows.iter().filter(|row| row.method == method).collect();
+        let of_method = rows.iter().copied().filter(|row| row.method == method);
+        let rows: Vec<&Row> = of_method.collect();
         let errors_of = |wanted: &dyn Fn(&Row) -> bool| {
             let errors = rows.iter().filter(|row| wanted(row));
             Spread::of(&errors.filter_map(|row| row.error).collect::<Vec<_>>())
@@ -223,7 +245,7 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
         let has_truth = rows
             .iter()
             .all(|row| row.error.is_some() || row.status == Status::Failed);
-        let error = |row: &&&Row| match (row.error, success(row)) {
+        let error = |row: &&Row| match (row.error, success(row)) {
             (Some(error), true) => (error.translation_m, error.rotation_deg),
             _ => (f64::INFINITY, f64::INFINITY),
         };
@@ -237,8 +259,19 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
             of_successes: errors_of(&success),
             of_common: errors_of(&|row| success(row) && is_common(&row.query)),
             recall: None,
+            verdicts: BTreeMap::new(),
+            chance: Chance::of(
+                rows.iter().map(|row| {
+                    let away_m = row.initial_error.map(|error| error.translation_m);
+                    (away_m, row.setting.map(|setting| setting.radius_m))
+                }),
+                failure_radius_m,
+            ),
             errors: has_truth.then(|| rows.iter().map(error).collect()),
         };
+        for primary in rows.iter().filter_map(|row| row.diagnosis.first()) {
+            *measures.verdicts.entry(primary.code).or_default() += 1;
+        }
         measures.recall = has_truth
             .then(|| RECALL_LIMITS.map(|(m, deg)| measures.recall_within(m, deg).unwrap_or(0.0)));
         measures
@@ -269,6 +302,8 @@ pub(super) mod tests {
                 rotation_deg: error,
                 max_euler_deg: error / 2.0,
             }),
+            initial_error: None,
+            diagnosis: Vec::new(),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The tables of a run: an overview, and those of the paper with its figures beside ours.
 
+mod verdicts;
+
 use super::metrics::{Measures, RECALL_LIMITS};
 use super::paper::{self, FigureKey};
 use super::table::Table;
@@ -14,6 +16,7 @@ const NOTHING: &str = "–";
 /// All tables of a run.
 pub fn tables(run: &RunFile, measures: &[Measures]) -> Vec<Table> {
     let mut tables = vec![overview(measures)];
+    tables.extend(verdicts::verdicts(measures));
     for pair in &run.pairs {
         let of_pair = OfPair::new(pair, measures);
         match run.experiment {
@@ -38,6 +41,7 @@ fn overview(measures: &[Measures]) -> Table {
         "method",
         "queries",
         "success (%)",
+        "by chance: reference pose, random pose (%)",
         "median (m)",
         "median max Euler (°)",
         "RMSE (m)",
@@ -61,6 +65,13 @@ fn overview(measures: &[Measures]) -> Table {
             one.method.name().to_uppercase(),
             one.queries.to_string(),
             percent(one.success_rate),
+            one.chance.map_or(NOTHING.to_owned(), |chance| {
+                format!(
+                    "{}, {}",
+                    percent(chance.reference_pose),
+                    percent(chance.random_pose)
+                )
+            }),
             number(own.median_m, 2),
             number(own.median_deg, 2),
             number(own.rmse_m, 3),

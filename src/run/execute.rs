@@ -119,8 +119,9 @@ impl Execution<'_> {
             let (now, later) = rest.split_at(rest.iter().take_while(same).count());
             let references = self.scenes.references[first.pair.scene_index].as_ref();
             let queries = self.scenes.of_queries(first.pair);
-            let localizer =
-                Localizer::new(references, queries, self.params, self.run.protocol.seed);
+            let protocol = &self.run.protocol;
+            let localizer = Localizer::new(references, queries, self.params, protocol.seed);
+            let localizer = protocol.configured(localizer);
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
                 let results = self.results(item, &localizer, &left_out, observer)?;

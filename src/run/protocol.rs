@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::diagnosis::Tolerance;
 use crate::fusion::Fusion;
-use crate::localize::Selection;
+use crate::localize::{Localizer, Selection};
 use crate::method::Method;
 
 /// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
@@ -22,6 +23,21 @@ pub struct Protocol {
     pub fusions: Vec<Fusion>,
     /// Seed of every random choice.
     pub seed: u64,
+    /// How near the truth a pose is right, so that no verdict says why it failed.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub right: Tolerance,
+    /// The least probability of being within 1 m with which a pose is accepted; without it every pose
+    /// is that its method gives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accept: Option<f64>,
+    /// How often a query that went wrong is localised again, at most, to see what would have helped.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub explain: usize,
+}
+
+/// For what is written only where somebody asked for it.
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// One random reference, the methods of the paper.
@@ -33,13 +49,27 @@ impl Default for Protocol {
             methods: Method::PAPER.to_vec(),
             fusions: Vec::new(),
             seed: 0,
+            right: Tolerance::default(),
+            accept: None,
+            explain: 0,
         }
     }
 }
 
 impl Protocol {
+    /// Runs that explain a wrong result, where their number is not given.
+    pub const EXPLAINING_RUNS: usize = 12;
+
     /// The uncertainty radius where none is given \[m\].
     pub const RADIUS_M: f64 = 15.0;
+
+    /// A localizer that judges and accepts poses as this says.
+    pub fn configured<'a>(&self, localizer: Localizer<'a>) -> Localizer<'a> {
+        localizer
+            .with_tolerance(self.right)
+            .accepting_from(self.accept)
+            .explaining(self.explain)
+    }
 
     /// How far from a query's known position its references may be \[m\], with this uncertainty
     /// radius \[m\].

@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::experiment::Experiment;
-use super::protocol::Protocol;
+use super::protocol::{Protocol, is_default};
 use super::scene_pair::{QueryCamera, ScenePair};
+use crate::diagnosis::Tolerance;
 use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
@@ -105,6 +106,12 @@ struct RunFileForm {
     #[serde(skip_serializing_if = "Option::is_none")]
     limit: Option<usize>,
     failure_radius_m: f64,
+    #[serde(default, skip_serializing_if = "is_default")]
+    right: Tolerance,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    accept: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_default")]
+    explain: usize,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
@@ -128,6 +135,9 @@ impl From<RunFileForm> for RunFile {
                 methods: form.methods,
                 fusions: form.fusions,
                 seed: form.seed,
+                right: form.right,
+                accept: form.accept,
+                explain: form.explain,
             },
             radii_m: form.radii_m,
             share: form.share,
@@ -157,6 +167,9 @@ impl From<RunFile> for RunFileForm {
             share: run.share,
             limit: run.limit,
             failure_radius_m: run.failure_radius_m,
+            right: run.protocol.right,
+            accept: run.protocol.accept,
+            explain: run.protocol.explain,
             seed: run.protocol.seed,
             shard: run.shard,
             pairs: run.pairs,

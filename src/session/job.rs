@@ -131,7 +131,11 @@ impl Job {
             self.frames.of(&self.references),
             self.frames.of(&self.queries),
         );
-        let localizer = Localizer::with_cached_scenes(scenes, &task.params, protocol.seed);
+        let localizer = protocol.configured(Localizer::with_cached_scenes(
+            scenes,
+            &task.params,
+            protocol.seed,
+        ));
         let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
         let request = Request {

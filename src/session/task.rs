@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::breakpoint::Breakpoint;
+use crate::diagnosis::Tolerance;
 use crate::method::Method;
 use crate::params::Params;
 use crate::run::Protocol;
@@ -99,6 +100,15 @@ impl Task {
             option("fusion", &joined(&protocol.fusions));
         }
         option("seed", &protocol.seed);
+        if protocol.right != Tolerance::default() {
+            option("right", &protocol.right);
+        }
+        if let Some(probability) = protocol.accept {
+            option("accept", &probability);
+        }
+        if protocol.explain > 0 {
+            option("explain", &protocol.explain);
+        }
         for change in self.params.changes() {
             option("set", &change);
         }
@@ -152,6 +162,9 @@ mod tests {
                     .map(|name| name.parse().expect("a fusion"))
                     .to_vec(),
                 seed: 9,
+                right: "0.5m,2deg".parse().expect("a tolerance"),
+                accept: Some(0.75),
+                explain: 4,
             },
             params,
             breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
@@ -165,7 +178,7 @@ mod tests {
             task().command_line("000070", &[]),
             "posescope run street --format street --queries street:night --query 000070 \
              --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
-             --fusion avg,r-wavg --seed 9 --set fb.ratio=0.75 --break 'inliers < 10'"
+             --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 --set fb.ratio=0.75 --break 'inliers < 10'"
         );
         let by_hand = Task {
             by_hand: true,

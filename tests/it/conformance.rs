@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope::cloud::Cloud;
+use posescope::code::Code;
 use posescope::cost::{
     self, Cost, Entropies, Evaluator, Explanation, IntensityPair, JointHistogram,
 };
@@ -424,7 +425,7 @@ fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
             Parts::Features | Parts::Hybrid(_) => assert!(outcome.pose.is_ok()),
             Parts::Cost(_) => {
                 let failure = outcome.pose.expect_err("400 million hypotheses");
-                assert_eq!(failure.code(), "D9");
+                assert_eq!(failure.code(), Code::D9);
                 let said = failure.to_string();
                 assert!(
                     said.contains("400040001") && said.contains("grid.coarse_step"),

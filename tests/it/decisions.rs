@@ -1,6 +1,8 @@
 //! Single decisions of the estimators, on two walls: each parameter changes what it says it does.
 
 use posescope::cloud::Cloud;
+use posescope::code::Code;
+use posescope::diagnosis::{Evidence, Subject, Tolerance};
 use posescope::estimator::{self, Failure, Outcome};
 use posescope::geometry::Pose;
 use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request, evaluate};
@@ -40,7 +42,7 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
         matches!(failure, Failure::OutsideRadius { .. }),
         "{failure}"
     );
-    assert_eq!(failure.code(), "R5");
+    assert_eq!(failure.code(), Code::R9);
     for accepting in ["fb.accept=paper", "fb.radius_slack=2"] {
         let pose = outcome(Method::FB, &near, &with(&[accepting])).pose;
         assert!(pose.is_ok(), "{accepting}");
@@ -133,7 +135,9 @@ fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
     let params = Params::default();
     let result = |method, truth: Option<&Pose>| {
         let outcome = outcome(method, &problem, &params);
-        evaluate("two walls", &problem, method, &params, &outcome, truth)
+        let evidence = Evidence::default();
+        let subject = Subject::new(&problem, method, &params, &outcome, &evidence);
+        evaluate("two walls", &subject.against(truth, Tolerance::default()))
     };
     // If the reference pose were the true one, its cost would be the initial cost.
     let reference = problem.reference.world_from_camera;

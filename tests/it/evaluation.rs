@@ -8,6 +8,7 @@ use std::process::{Command as Process, Stdio};
 use assert_cmd::Command;
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
+use posescope::code::Code;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
@@ -573,17 +574,17 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         .expect("one per line");
     assert_eq!(results.len(), 8);
     for result in &results {
-        let code = result.reason.as_ref().map(|reason| reason.code.as_str());
+        let code = result.reason.as_ref().map(|reason| reason.code);
         if result.query == "000001" {
             let reason = result.reason.as_ref().expect("a reason");
-            assert_eq!(reason.code, "X9");
+            assert_eq!(reason.code, Code::X9);
             assert!(
                 reason.text.contains("a trap for the photo"),
                 "{}",
                 reason.text
             );
         } else {
-            assert_ne!(code, Some("X9"), "{result:?}");
+            assert_ne!(code, Some(Code::X9), "{result:?}");
         }
     }
 }

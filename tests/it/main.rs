@@ -6,6 +6,7 @@ mod command_line;
 mod conformance;
 mod data;
 mod decisions;
+mod diagnosis;
 mod evaluation;
 mod frame_cache;
 mod imports;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::cost;
+use posescope::diagnosis::{Evidence, Subject, Tolerance};
 use posescope::estimator::{self, Direct};
 use posescope::event::{Kind, KindSet, ReferencesRanked, Stage};
 use posescope::features::FeatureState;
@@ -49,14 +50,10 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
             .make(params)
             .estimate(&problem, &mut Trace::to(recorder))
             .expect("a recorder never cancels");
-        let result = evaluate(
-            "two walls",
-            &problem,
-            method,
-            params,
-            &outcome,
-            Some(&truth),
-        );
+        let evidence = Evidence::default();
+        let subject = Subject::new(&problem, method, params, &outcome, &evidence);
+        let subject = subject.against(Some(&truth), Tolerance::default());
+        let result = evaluate("two walls", &subject);
         recorder.end_method(&result, &StageTimes::default());
     }
 }

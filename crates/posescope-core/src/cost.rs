@@ -17,6 +17,10 @@ mod photometric;
 
 use std::fmt;
 
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_pcg::Pcg64;
+
 pub use evaluator::{CostOf, Evaluator};
 pub use joint_histogram::{Entropies, JointHistogram, LEAST_ENTROPY, bin, count_pairs};
 pub use mutual_information::{MutualInformation, MutualInformationParams};
@@ -41,6 +45,17 @@ pub type IntensityPair = Pair<f32>;
 
 /// The bins of a joint histogram that both values fall into.
 pub type BinPair = Pair<u8>;
+
+/// The pairs with the synthetic values dealt out anew: what two images give that have nothing to do with
+/// each other, and the same values.
+pub fn shuffled(pairs: &[IntensityPair], seed: u64) -> Vec<IntensityPair> {
+    let mut values: Vec<f32> = pairs.iter().map(|pair| pair.synthetic).collect();
+    values.shuffle(&mut Pcg64::seed_from_u64(seed));
+    let dealt = pairs.iter().zip(values);
+    dealt
+        .map(|(pair, synthetic)| IntensityPair { synthetic, ..*pair })
+        .collect()
+}
 
 /// A robust dissimilarity of two images over the pixels they share.
 pub trait Cost: Send + Sync {

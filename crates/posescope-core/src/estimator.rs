@@ -12,7 +12,7 @@ mod hybrid;
 
 pub use direct::Direct;
 pub use failure::Failure;
-pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches};
+pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches, projected_cloud};
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 
 use std::str::FromStr;
@@ -23,7 +23,7 @@ use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, Score};
+use crate::render::{Comparison, Score, Scorer};
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
@@ -100,6 +100,12 @@ pub trait Estimator: Send + Sync {
     /// The cost that this estimator minimises, at any pose of the query; `None` if it has none.
     fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {
         Some(self.compare_at(problem, world_from_query)?.score)
+    }
+
+    /// Hands `work` what scores many poses of the query by that cost, and says whether there is one.
+    fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {
+        let _ = (problem, work);
+        false
     }
 
     /// What [`Self::score_at`] returns, with the synthetic view and what the cost was made of.

@@ -116,13 +116,15 @@ pub struct Candidate<'a> {
 /// A hybrid falls back for the query, not for each reference: its second method's poses count only
 /// where no reference with a weight has one of the first, so that fused it is never behind that.
 ///
+/// Beside the pose, what each candidate had to say in it, in their order.
+///
 /// # Errors
 /// Only [`Cancelled`].
 pub fn fuse(
     fusion: &Entry,
     candidates: &[Candidate<'_>],
     trace: &mut Trace<'_>,
-) -> Result<Result<Pose, Failure>, Cancelled> {
+) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
     trace.stage(Stage::Fuse, |trace| {
         let shares = shares(fusion, candidates);
         let members: Vec<(f64, &Pose)> = shares
@@ -136,7 +138,8 @@ pub fn fuse(
             shares: Arc::from(shares.as_slice()),
             pose,
         })?;
-        Ok(pose.ok_or_else(|| no_pose(&shares, candidates)))
+        let pose = pose.ok_or_else(|| no_pose(&shares, candidates));
+        Ok((pose, shares))
     })
 }
 
@@ -208,6 +211,7 @@ fn no_pose(shares: &[Share], candidates: &[Candidate<'_>]) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::code::Code;
     use crate::history::History;
     use proptest::prelude::*;
 
@@ -239,7 +243,8 @@ mod tests {
             .collect();
         let mut history = History::default();
         let entry: Fusion = name.parse().expect("a fusion");
-        let pose = fuse(&entry, &candidates, &mut Trace::to(&mut history)).expect("not cancelled");
+        let (pose, _) =
+            fuse(&entry, &candidates, &mut Trace::to(&mut history)).expect("not cancelled");
         let told = history
             .records()
             .iter()
@@ -336,7 +341,7 @@ mod tests {
         let candidates = [(60, Err(failure())), (5, Ok(at(1.0))), (60, Err(failure()))];
         for name in ["maxf", "r-wavg"] {
             let reason = fused(name, &candidates).0.expect_err("no pose");
-            assert_eq!(reason.code(), "R3");
+            assert_eq!(reason.code(), Code::R3);
             let text = reason.to_string();
             assert!(text.contains("r0") && text.contains("2 unique"), "{text}");
         }
@@ -357,13 +362,14 @@ mod tests {
     #[test]
     fn without_a_reference_there_is_no_pose() {
         for entry in ALL {
-            assert_eq!(fused_nothing(entry).code(), "R1");
+            assert_eq!(fused_nothing(entry).code(), Code::R1);
         }
     }
 
     fn fused_nothing(entry: &Entry) -> Failure {
         fuse(entry, &[], &mut Trace::off())
             .expect("not cancelled")
+            .0
             .expect_err("no pose")
     }
 
@@ -394,7 +400,8 @@ mod tests {
             for entry in ALL {
                 let candidate =
                     Candidate { reference: "r", matches: 7, pose: Ok(&pose), fell_back: false };
-                let fused = fuse(entry, &[candidate], &mut Trace::off()).expect("not cancelled");
+                let (fused, _) =
+                    fuse(entry, &[candidate], &mut Trace::off()).expect("not cancelled");
                 prop_assert_eq!(fused, Ok(pose));
             }
         }

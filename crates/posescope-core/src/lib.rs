@@ -36,9 +36,11 @@
 
 pub mod camera;
 pub mod cloud;
+pub mod code;
 pub mod cost;
 pub mod depth;
 pub mod describe;
+pub mod diagnosis;
 pub mod estimator;
 pub mod event;
 pub mod features;

@@ -13,7 +13,7 @@ pub mod refine;
 
 pub use loss::{Loss, LossShape};
 pub use p3p::{MAX_SOLUTIONS, p3p};
-pub use refine::{Refinement, refine};
+pub use refine::{Refinement, pose_covariance, refine};
 
 use nalgebra::{Point2, Point3};
 

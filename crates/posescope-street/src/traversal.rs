@@ -62,7 +62,12 @@ impl Traversal {
 
     /// The image of a frame.
     pub fn image(&self, frame: usize) -> RgbImage {
-        self.view(frame).image()
+        self.view(frame, &self.poses[frame]).image()
+    }
+
+    /// The image that the camera would have taken at this time from another pose.
+    pub fn image_from(&self, frame: usize, world_from_camera: &Pose) -> RgbImage {
+        self.view(frame, world_from_camera).image()
     }
 
     /// The laser scan of a frame, all around the car.
@@ -73,15 +78,15 @@ impl Traversal {
 
     /// Exact z-depth of the surface seen through a pixel \[m\]; `None` for the sky.
     pub fn depth(&self, frame: usize, pixel: Point2<f64>) -> Option<f64> {
-        self.view(frame).depth(&pixel)
+        self.view(frame, &self.poses[frame]).depth(&pixel)
     }
 
-    fn view(&self, frame: usize) -> View<'_> {
+    fn view<'a>(&'a self, frame: usize, world_from_camera: &'a Pose) -> View<'a> {
         View {
             town: &self.town,
             look: &self.look,
             intrinsics: &self.intrinsics,
-            world_from_camera: &self.poses[frame],
+            world_from_camera,
             frame_seed: derive(self.seed, 0xF4A3).wrapping_add(mix(frame as u32)),
             sky_seed: derive(self.seed, 0x5C1),
             // What is on the lens stays there for a while.

@@ -4,6 +4,7 @@ use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
 use crate::app::{ViewContext, theme};
+use crate::code::Code;
 use crate::localize::{QueryResult, Verdict};
 use crate::session::Span;
 
@@ -121,10 +122,52 @@ fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
     if let (Some(error), true) = (initial, shows_truth) {
         ui.weak(format!("The reference itself, from the truth: {error}"));
     }
-    for finding in context.run.results().flat_map(|result| &result.diagnosis) {
-        ui.label(format!("{} {}", finding.code, finding.text));
+    let with_result = context
+        .run
+        .spans()
+        .iter()
+        .filter(|span| span.result.is_some());
+    for span in with_result {
+        findings(ui, span, shows_truth);
     }
     ui.separator();
+}
+
+/// Why a pose is wrong, missing or hardly to be believed. Verdicts tell the ground truth, which may be
+/// hidden; that the method doubts its pose does not.
+fn findings(ui: &mut Ui, span: &Span, shows_truth: bool) {
+    let Some(result) = &span.result else { return };
+    let may_show = |code: Code| shows_truth || !code.is_failure();
+    let findings = result
+        .diagnosis
+        .iter()
+        .filter(|finding| may_show(finding.code));
+    for (rank, finding) in findings.enumerate() {
+        ui.horizontal_wrapped(|ui| {
+            name(ui, span);
+            let code = RichText::new(finding.code.name());
+            let code = if rank == 0 {
+                code.strong()
+            } else {
+                code.weak()
+            };
+            ui.label(code).on_hover_text(finding.code.about());
+            ui.label(&finding.text);
+        });
+    }
+    let Some(explanation) = result.explanation.as_ref().filter(|_| shows_truth) else {
+        return;
+    };
+    for helped in &explanation.helped {
+        ui.horizontal_wrapped(|ui| {
+            ui.weak("helped:");
+            ui.monospace(helped.args.join(" "));
+            ui.label(helped.error.to_string());
+        });
+    }
+    if explanation.helped.is_empty() {
+        ui.weak(format!("None of {} remedies helped", explanation.runs));
+    }
 }
 
 fn features(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {

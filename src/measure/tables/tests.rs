@@ -30,7 +30,7 @@ fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
                 Experiment::Large => vec![fusion("r-wavg")],
             },
             prior_m: (experiment == Experiment::Large).then_some(200.0),
-            seed: 0,
+            ..Protocol::default()
         },
         radii_m: if experiment == Experiment::Single {
             vec![10.0, 15.0]

@@ -27,7 +27,8 @@ pub(super) fn markdown(
             problem.seed
         );
     }
-    text += &verdicts(results, failure_radius_m);
+    text += &story(results);
+    text += &errors(results, failure_radius_m);
     text += &features(results);
     text += &costs(results);
     text += &changes(configuration);
@@ -40,13 +41,49 @@ pub(super) fn markdown(
     text
 }
 
-fn verdicts(results: &[QueryResult], failure_radius_m: f64) -> String {
-    let mut text = "| method | reference | result | error | rotation | max Euler |\n\
-                    |:--|:--|:--|--:|--:|--:|\n"
-        .to_owned();
+/// What went wrong, in sentences: the primary verdict of each method, what it leads to, what helped.
+fn story(results: &[QueryResult]) -> String {
+    let mut text = String::new();
+    for result in results {
+        let Some((primary, others)) = result.diagnosis.split_first() else {
+            continue;
+        };
+        let name = result.method.name().to_uppercase();
+        let name = match &result.fusion {
+            Some(fusion) => format!("{name} {fusion}"),
+            None => name,
+        };
+        let error = result.error.as_ref();
+        let error = error.map_or(String::new(), |error| format!(", {}", error.translation()));
+        text += &format!("**{name}{error}: {}** {}.\n\n", primary.code, primary.text);
+        for other in others {
+            text += &format!("- also {}: {}\n", other.code, other.text);
+        }
+        if let Some(explanation) = &result.explanation {
+            for helped in &explanation.helped {
+                let (args, error) = (helped.args.join(" "), helped.error.translation());
+                text += &format!("- helped: `{args}` ({error})\n");
+            }
+            if explanation.helped.is_empty() {
+                text += &format!("- none of {} remedies helped\n", explanation.runs);
+            }
+            if !explanation.complete {
+                text += "- the explanation was stopped before its end\n";
+            }
+        }
+        text += "\n";
+    }
+    text
+}
+
+fn errors(results: &[QueryResult], failure_radius_m: f64) -> String {
+    let mut text =
+        "| method | error | rotation | max Euler | result | probability of 1 m | reference |\n\
+                    |:--|--:|--:|--:|:--|--:|:--|\n"
+            .to_owned();
     for result in results {
         let verdict = match (result.verdict(failure_radius_m), &result.reason) {
-            (Verdict::NoPose, Some(reason)) => format!("**{}** {}", reason.code, reason.text),
+            (Verdict::NoPose, Some(reason)) => format!("no pose, **{}**", reason.code),
             (Verdict::NoPose, None) => "no pose".to_owned(),
             (Verdict::Far, _) => "**far**".to_owned(),
             (Verdict::Near | Verdict::Unmeasured, _) => "pose".to_owned(),
@@ -55,24 +92,23 @@ fn verdicts(results: &[QueryResult], failure_radius_m: f64) -> String {
             let error = result.error.as_ref();
             error.map_or("–".to_owned(), part)
         };
+        let probability = result.trust.as_ref().and_then(|trust| trust.probability);
         row(
             &mut text,
             &[
                 result.method.name(),
-                &result.references.join(", "),
-                &verdict,
                 &part(PoseError::translation),
                 &part(PoseError::rotation),
                 &part(PoseError::max_euler),
+                &verdict,
+                &probability.map_or("–".to_owned(), |probability| format!("{probability:.2}")),
+                &result.references.join(", "),
             ],
         );
     }
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
         text += &format!("\nThe first reference itself, from the truth: {error}.\n");
-    }
-    for finding in results.iter().flat_map(|result| &result.diagnosis) {
-        text += &format!("\n- **{}** {}", finding.code, finding.text);
     }
     text + "\n"
 }

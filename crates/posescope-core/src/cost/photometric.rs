@@ -84,7 +84,8 @@ impl Photometric {
                 let counts = error <= threshold;
                 let error = f64::from(if counts { error } else { 0.0 });
                 *sum += if squared_again { error * error } else { error };
-                *counted += u32::from(counts);
+                // A view has no 2³² pixels; a check would keep the eight from being added at once.
+                *counted = counted.wrapping_add(u32::from(counts));
             }
         }
         sums.iter().sum::<f64>() / f64::from(counted.iter().sum::<u32>())

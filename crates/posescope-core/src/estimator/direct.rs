@@ -4,12 +4,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use rand::SeedableRng as _;
-use rand::seq::SliceRandom as _;
-use rand_pcg::Pcg64;
-
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
-use crate::cost::{self, Cost};
+use crate::cost::{self, Cost, shuffled};
 use crate::event::{
     CloudColored, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
 };
@@ -77,6 +73,12 @@ impl Estimator for Direct {
             },
             Err(failure) => Outcome::failed(failure),
         })
+    }
+
+    fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {
+        let cloud = self.colored(problem).value;
+        work(&self.scorer(problem, &cloud));
+        true
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
@@ -384,12 +386,7 @@ impl Search<'_, '_> {
     /// minimum must beat to mean anything.
     fn shuffled_cost(&self, seed: u64) -> Option<f64> {
         let best = self.best.reference_from_camera();
-        let Comparison { mut pairs, .. } = self.scorer.compare(&best);
-        let mut values: Vec<f32> = pairs.iter().map(|pair| pair.synthetic).collect();
-        values.shuffle(&mut Pcg64::seed_from_u64(seed));
-        for (pair, value) in pairs.iter_mut().zip(values) {
-            pair.synthetic = value;
-        }
+        let pairs = shuffled(&self.scorer.compare(&best).pairs, seed);
         self.memory.direct.cost.evaluate(&pairs)
     }
 }

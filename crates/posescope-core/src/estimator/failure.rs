@@ -1,5 +1,6 @@
 //! Why a query could not be localised.
 
+use crate::code::Code;
 use crate::grid::LatticeTooLarge;
 
 /// A typed reason with its evidence. In statistics it counts as an infinite error.
@@ -114,6 +115,16 @@ pub enum Failure {
         /// Why that one failed.
         failure: Box<Failure>,
     },
+    /// The pose is less certain than somebody asked for.
+    #[error(
+        "the pose is within 1 m with a probability of {probability:.2}, and {needed:.2} is asked for"
+    )]
+    LowConfidence {
+        /// Its probability of being within 1 m.
+        probability: f64,
+        /// The probability that is asked for.
+        needed: f64,
+    },
     /// A bug: an estimator panicked.
     #[error("internal error: {message}")]
     Internal {
@@ -124,19 +135,20 @@ pub enum Failure {
 
 impl Failure {
     /// The code of the reason in results.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         match self {
-            Self::NothingInView { .. } | Self::NoReference { .. } => "R1",
-            Self::TooFewFeatures { .. } => "R2",
+            Self::NothingInView { .. } | Self::NoReference { .. } => Code::R1,
+            Self::TooFewFeatures { .. } => Code::R2,
             Self::TooFewMatches { .. }
             | Self::NoConsensus { .. }
-            | Self::ChanceConsensus { .. } => "R3",
-            Self::TooFewDepths { .. } => "R4",
-            Self::OutsideRadius { .. } => "R5",
-            Self::NothingComparable { .. } | Self::FlatCost { .. } => "D5",
-            Self::LatticeTooLarge(_) => "D9",
+            | Self::ChanceConsensus { .. } => Code::R3,
+            Self::TooFewDepths { .. } => Code::R4,
+            Self::OutsideRadius { .. } => Code::R9,
+            Self::NothingComparable { .. } | Self::FlatCost { .. } => Code::D5,
+            Self::LatticeTooLarge(_) => Code::D9,
             Self::NoReferenceSucceeded { failure, .. } => failure.code(),
-            Self::Internal { .. } => "X9",
+            Self::LowConfidence { .. } => Code::L1,
+            Self::Internal { .. } => Code::X9,
         }
     }
 }

@@ -273,10 +273,7 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = tuple.memo.recall((), || {
-            ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
-        });
-        let cloud = cloud.value;
+        let cloud = projected_cloud(tuple);
         trace.emit(|| ProjectedCloud {
             points: tuple.cloud.len(),
             in_view: cloud.len(),
@@ -449,6 +446,14 @@ fn best_matches<E>(
         }
     }
     Ok(matches.into())
+}
+
+/// The cloud of a reference tuple projected into its own photo, remembered with the tuple.
+pub fn projected_cloud(tuple: &ReferenceTuple) -> Arc<ProjectedCloudIndex> {
+    let cloud = tuple.memo.recall((), || {
+        ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
+    });
+    cloud.value
 }
 
 /// How many features of the query have a match in the reference: FB's count after the ratio test and

@@ -9,7 +9,7 @@ use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::Comparison;
+use crate::render::{Comparison, Scorer};
 use crate::trace::{Cancelled, Trace};
 
 /// The two methods of a hybrid.
@@ -77,6 +77,10 @@ impl Estimator for Hybrid {
             let fallback = self.second.estimate(problem, trace)?;
             Ok(hybrid_outcome(&outcome, &fallback))
         })
+    }
+
+    fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {
+        self.second.with_scorer(problem, work)
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -3,12 +3,19 @@
 //! The one way through for a single query, for an experiment over thousands, and for whoever wants
 //! to watch either.
 
+mod explain;
+
 use std::sync::Arc;
+
+use self::explain::Unexplained;
 
 use super::observer::checkpoint;
 use super::{
-    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, evaluate,
-    localize_traced, tell_ranking,
+    Agreement, LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings,
+    evaluate, localize_traced, tell_ranking,
+};
+use crate::diagnosis::{
+    Evidence, Member, Subject, Tolerance, diagnose_fusion, diagnose_ranking, fused_trust,
 };
 use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
 use crate::event::KindSet;
@@ -57,11 +64,21 @@ pub struct Localizer<'a> {
     queries: CachedScene<'a>,
     params: &'a Params,
     seed: u64,
+    tolerance: Tolerance,
+    /// The least probability of being within 1 m with which a pose is accepted.
+    least_probability: Option<f64>,
+    /// How often a query that went wrong is localised again to see what would have helped.
+    runs_to_explain: usize,
 }
 
 /// What one method made of one problem.
 struct MethodOutcome {
+    /// What the estimator answered.
+    estimated: Outcome,
+    /// What is made of it: a pose of low confidence may be refused.
     outcome: Outcome,
+    /// What the estimator told.
+    evidence: Evidence,
     result: QueryResult,
     times: StageTimes,
 }
@@ -71,6 +88,10 @@ struct QueryWork<'a> {
     query: &'a Query,
     truth: Option<Pose>,
     problems: Vec<Problem>,
+    /// The query's position in its scene.
+    frame: usize,
+    /// The reference and the radius of each problem \[m\].
+    places: Vec<(usize, f64)>,
     /// Feature matches by problem, once they are known.
     matches: Vec<Option<usize>>,
     /// What each method made of each problem, in the order of [`estimator::methods`].
@@ -100,6 +121,58 @@ impl<'a> Localizer<'a> {
             queries,
             params,
             seed,
+            tolerance: Tolerance::default(),
+            least_probability: None,
+            runs_to_explain: 0,
+        }
+    }
+
+    /// The same scenes and their frames, localised with other parameters. It explains nothing.
+    fn with_other_params<'b>(&'b self, params: &'b Params) -> Localizer<'b> {
+        Localizer {
+            references: self.references.clone(),
+            queries: self.queries.clone(),
+            params,
+            seed: self.seed,
+            tolerance: self.tolerance,
+            least_probability: self.least_probability,
+            runs_to_explain: 0,
+        }
+    }
+
+    /// The parameters.
+    pub fn params(&self) -> &Params {
+        self.params
+    }
+
+    /// When a pose is right.
+    pub fn tolerance(&self) -> Tolerance {
+        self.tolerance
+    }
+
+    /// The same localizer, which localises a query that went wrong again, at most so often for each
+    /// result, to see what would have helped.
+    #[must_use]
+    pub fn explaining(self, runs: usize) -> Self {
+        Self {
+            runs_to_explain: runs,
+            ..self
+        }
+    }
+
+    /// The same localizer, for which a pose is right that is within `tolerance` of the truth.
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: Tolerance) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// The same localizer, which accepts no pose that is within 1 m of the truth with less than this
+    /// probability.
+    #[must_use]
+    pub fn accepting_from(self, least_probability: Option<f64>) -> Self {
+        Self {
+            least_probability,
+            ..self
         }
     }
 
@@ -163,12 +236,19 @@ impl<'a> Localizer<'a> {
                 .map(|_| problems.iter().map(|_| None).collect())
                 .collect(),
             problems,
+            frame: query,
+            places: places
+                .into_iter()
+                .map(|(reference, radius)| (reference, f64::from_bits(radius)))
+                .collect(),
         };
         observer.begin_query(index, &work.problems, work.truth.as_ref());
         self.tell_rankings(requests, observer)?;
         for &method in methods {
             for (request, members) in requests.iter().zip(&members) {
+                let truth = work.truth;
                 let mut emit = |result: QueryResult, times: StageTimes| {
+                    let result = self.with_ranking_judged(result, request, truth.as_ref());
                     hand_out(self.marked(result, request.setting), times)
                 };
                 if members.is_empty() {
@@ -188,7 +268,8 @@ impl<'a> Localizer<'a> {
                     continue;
                 }
                 for &problem in members {
-                    self.solve(&mut work, problem, method, observer)?;
+                    let is_fused = !request.fusions.is_empty();
+                    self.solve(&mut work, problem, method, is_fused, observer)?;
                     if let (true, Some(candidate)) =
                         (request.fusions.is_empty(), work.candidate(problem, method))
                     {
@@ -199,7 +280,11 @@ impl<'a> Localizer<'a> {
                     self.count_matches(&mut work, members, observer)?;
                 }
                 for &fusion in &request.fusions {
-                    let (result, times) = self.fuse(&work, members, method, fusion, observer)?;
+                    let fused = Request {
+                        fusions: vec![fusion],
+                        ..request.clone()
+                    };
+                    let (result, times) = self.fuse(&work, members, method, &fused, observer)?;
                     emit(result, times)?;
                 }
             }
@@ -237,6 +322,26 @@ impl<'a> Localizer<'a> {
         }
     }
 
+    /// A result that is not right because retrieval found another place says so first.
+    fn with_ranking_judged(
+        &self,
+        mut result: QueryResult,
+        request: &Request,
+        truth: Option<&Pose>,
+    ) -> QueryResult {
+        let is_right = result
+            .error
+            .is_some_and(|error| self.tolerance.contains(&error));
+        let ranking = request.references.ranking.as_ref().zip(truth);
+        if !is_right
+            && let Some(verdict) = ranking
+                .and_then(|(ranking, truth)| diagnose_ranking(ranking, truth, request.radius_m))
+        {
+            result.diagnosis.insert(0, verdict);
+        }
+        result
+    }
+
     fn without_pose(
         &self,
         work: &QueryWork<'_>,
@@ -263,33 +368,81 @@ impl<'a> Localizer<'a> {
         work: &mut QueryWork<'_>,
         problem: usize,
         method: Method,
+        is_fused: bool,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
         if work.candidate(problem, method).is_some() {
             return Ok(());
         }
         observer.begin_method(problem, method);
-        let candidate = match work.hybrid_parts(problem, method) {
+        let mut candidate = match work.hybrid_parts(problem, method) {
             Some((feature, direct)) => {
                 let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
                 let times = StageTimes::inside(method.name(), runs.into_iter().take(used));
-                let outcome = match observer.wanted() == KindSet::NONE {
-                    true => hybrid_outcome(&feature.outcome, &direct.outcome),
+                let (outcome, evidence) = match observer.wanted() == KindSet::NONE {
+                    true => {
+                        let outcome = hybrid_outcome(&feature.estimated, &direct.estimated);
+                        let evidence = match outcome.fell_back {
+                            true => feature.evidence.followed_by(&direct.evidence),
+                            false => feature.evidence.clone(),
+                        };
+                        (outcome, evidence)
+                    }
                     // Whoever watches wants to see the hybrid at work. It has everything at hand, so
                     // what it takes now says nothing.
-                    false => self.estimate(work, problem, method, observer)?.outcome,
+                    false => {
+                        let again = self.estimate(work, problem, method, observer)?;
+                        (again.estimated, again.evidence)
+                    }
                 };
-                self.judged(work, problem, method, outcome, times)
+                self.judged(work, problem, method, outcome, evidence, times)
             }
             None => self.estimate(work, problem, method, observer)?,
+        };
+        // What is fused is explained as a whole.
+        let explained = if is_fused {
+            Ok(())
+        } else {
+            let (reference, radius_m) = work.places[problem];
+            let request = Request {
+                radius_m,
+                references: vec![reference].into(),
+                fusions: Vec::new(),
+                setting: None,
+            };
+            self.explain_wrong(&mut candidate.result, work.frame, &request, observer)
         };
         observer.end_method(&candidate.result, &candidate.times);
         let row = estimator::methods().position(|known| known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
         }
-        Ok(())
+        explained
+    }
+
+    /// Says of a wrong result what would have helped, if that is asked for.
+    fn explain_wrong(
+        &self,
+        result: &mut QueryResult,
+        query: usize,
+        request: &Request,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(), Cancelled> {
+        let is_right = |error: &PoseError| self.tolerance.contains(error);
+        let is_wrong =
+            result.initial_error.is_some() && !result.error.as_ref().is_some_and(is_right);
+        if self.runs_to_explain == 0 || !is_wrong {
+            return Ok(());
+        }
+        let unexplained = Unexplained {
+            result,
+            query,
+            request,
+        };
+        let (explanation, outcome) = self.explain(&unexplained, self.runs_to_explain, observer);
+        result.explanation = Some(explanation);
+        outcome
     }
 
     fn estimate(
@@ -300,15 +453,17 @@ impl<'a> Localizer<'a> {
         observer: &mut dyn LocalizeObserver,
     ) -> Result<MethodOutcome, Cancelled> {
         let mut timings = StageTimings::default();
+        let mut evidence = Evidence::default();
         let attention = observer.attention();
-        let sinks: Vec<&mut dyn Sink> = vec![&mut timings, observer];
+        let sinks: Vec<&mut dyn Sink> = vec![&mut timings, &mut evidence, observer];
         let mut fanout = Fanout::new(sinks);
         let mut trace = match &attention {
             Some(flag) => Trace::watched(&mut fanout, flag),
             None => Trace::to(&mut fanout),
         };
         let outcome = localize_traced(&work.problems[problem], method, self.params, &mut trace)?;
-        Ok(self.judged(work, problem, method, outcome, timings.into_times()))
+        let times = timings.into_times();
+        Ok(self.judged(work, problem, method, outcome, evidence, times))
     }
 
     fn judged(
@@ -316,21 +471,44 @@ impl<'a> Localizer<'a> {
         work: &QueryWork<'_>,
         problem: usize,
         method: Method,
-        outcome: Outcome,
+        estimated: Outcome,
+        evidence: Evidence,
         times: StageTimes,
     ) -> MethodOutcome {
-        let result = evaluate(
-            self.references.name(),
-            &work.problems[problem],
-            method,
-            self.params,
-            &outcome,
-            work.truth.as_ref(),
-        );
+        let solved = &work.problems[problem];
+        let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
+        let outcome = self.accepted(&subject);
+        let subject = Subject {
+            outcome: &outcome,
+            ..subject
+        };
+        let subject = subject.against(work.truth.as_ref(), self.tolerance);
+        let mut result = evaluate(self.references.name(), &subject);
+        if let Ok(pose) = &outcome.pose {
+            result.agreement = work.agreement(problem, method, pose);
+        }
         MethodOutcome {
+            estimated,
             outcome,
+            evidence,
             result,
             times,
+        }
+    }
+
+    /// The outcome, without its pose where that is less certain than asked for.
+    fn accepted(&self, subject: &Subject<'_>) -> Outcome {
+        let trust = subject.trust.as_ref();
+        let probability = trust.and_then(|trust| trust.probability);
+        match (self.least_probability, probability) {
+            (Some(needed), Some(probability)) if probability < needed => Outcome {
+                pose: Err(Failure::LowConfidence {
+                    probability,
+                    needed,
+                }),
+                ..subject.outcome.clone()
+            },
+            _ => subject.outcome.clone(),
         }
     }
 
@@ -371,9 +549,12 @@ impl<'a> Localizer<'a> {
         work: &QueryWork<'_>,
         members: &[usize],
         method: Method,
-        fusion: Fusion,
+        request: &Request,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(QueryResult, StageTimes), Cancelled> {
+        let [fusion] = request.fusions[..] else {
+            unreachable!("one fusion at a time");
+        };
         let solved: Vec<(&Problem, usize, &MethodOutcome)> = members
             .iter()
             .filter_map(|&problem| {
@@ -393,11 +574,20 @@ impl<'a> Localizer<'a> {
             .collect();
         observer.begin_fusion(method);
         let sink: &mut dyn Sink = observer;
-        let pose = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
+        let (pose, shares) = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
+        let fused_members: Vec<Member<'_>> = shares
+            .iter()
+            .zip(&solved)
+            .map(|(share, (.., candidate))| Member {
+                share,
+                verdicts: &candidate.result.diagnosis,
+                trust: candidate.result.trust.as_ref(),
+            })
+            .collect();
         let truth = work.truth.as_ref();
         // Where one would start from with a single reference: the one with the most matches.
         let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
-        let result = QueryResult {
+        let mut result = QueryResult {
             references: solved
                 .iter()
                 .map(|(problem, ..)| problem.reference.name.clone())
@@ -406,6 +596,11 @@ impl<'a> Localizer<'a> {
             initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
                 PoseError::between(truth, &problem.reference.world_from_camera)
             }),
+            diagnosis: diagnose_fusion(&pose, &fused_members, truth, self.tolerance),
+            trust: pose
+                .as_ref()
+                .ok()
+                .and_then(|pose| fused_trust(pose, &fused_members)),
             per_reference: Some(
                 solved
                     .iter()
@@ -421,13 +616,31 @@ impl<'a> Localizer<'a> {
                 truth,
             )
         };
+        let explained = self.explain_wrong(&mut result, work.frame, request, observer);
         observer.end_fusion(&result);
+        explained?;
         let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
         Ok((result, times))
     }
 }
 
 impl QueryWork<'_> {
+    /// How far the poses of the other methods that solved the problem are from this one.
+    fn agreement(&self, problem: usize, method: Method, pose: &Pose) -> Vec<Agreement> {
+        estimator::methods()
+            .filter(|other| *other != method)
+            .filter_map(|other| {
+                let candidate = self.candidate(problem, other)?;
+                let error = PoseError::between(candidate.outcome.pose.as_ref().ok()?, pose);
+                Some(Agreement {
+                    method: other,
+                    translation_m: error.translation_m,
+                    rotation_deg: error.rotation_deg,
+                })
+            })
+            .collect()
+    }
+
     fn candidate(&self, problem: usize, method: Method) -> Option<&MethodOutcome> {
         let row = estimator::methods().position(|known| known == method)?;
         self.candidates.get(row)?.get(problem)?.as_ref()

@@ -6,12 +6,11 @@ use std::str::FromStr;
 use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
-use crate::estimator::{self, CostSummary, Failure, FeatureCounts, Outcome};
+use crate::diagnosis::{Code, Diagnosis, Subject, Trust, diagnose};
+use crate::estimator::{self, CostSummary, Failure, FeatureCounts};
 use crate::fusion::Fusion;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 use crate::method::Method;
-use crate::params::Params;
-use crate::problem::Problem;
 use crate::text::UnknownWord;
 
 /// The version of the result's form.
@@ -54,11 +53,41 @@ pub struct QueryResult {
     pub counts: Option<FeatureCounts>,
     /// What the cost was like, if a cost was minimised.
     pub cost: Option<CostReport>,
-    /// What the run says about its own failure.
+    /// Why the pose is wrong, missing or hardly to be believed, the primary verdict first.
     pub diagnosis: Vec<Diagnosis>,
+    /// What was tried to make a wrong pose right, if it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explanation: Option<Explanation>,
+    /// How far the pose is to be believed, from what the method itself can tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trust: Option<Trust>,
+    /// How far the poses of the methods that ran before on the same reference are from this one. The
+    /// probability of `trust` does not know of them, so that it depends on no other method.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub agreement: Vec<Agreement>,
     /// What each reference alone gave, where several were fused; they have no such list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub per_reference: Option<Vec<QueryResult>>,
+}
+
+/// What was tried to make a wrong result right.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Explanation {
+    /// What made it right, in the order in which it was tried.
+    pub helped: Vec<Helped>,
+    /// How often the query was localised again.
+    pub runs: usize,
+    /// Whether all was tried that was to be; a run that was cancelled did not come to its end.
+    pub complete: bool,
+}
+
+/// A change that made a wrong result right.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Helped {
+    /// The arguments that repeat it, beside those of the run.
+    pub args: Vec<String>,
+    /// The error of the pose then.
+    pub error: PoseError,
 }
 
 /// What an experiment varies from one result of a query to the next.
@@ -113,20 +142,20 @@ crate::serde_as_text!(Status);
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reason {
     /// The code, such as `R3`.
-    pub code: String,
+    pub code: Code,
     /// The reason in one sentence with the numbers.
     pub text: String,
 }
 
-/// A finding about why a pose is wrong or missing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Diagnosis {
-    /// The code, such as `D2`.
-    pub code: String,
-    /// The finding in one sentence.
-    pub text: String,
-    /// The numbers behind it.
-    pub evidence: serde_json::Value,
+/// The pose of another method beside this one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Agreement {
+    /// The other method.
+    pub method: Method,
+    /// Distance of the camera centres \[m\].
+    pub translation_m: f64,
+    /// Geodesic angle \[°\].
+    pub rotation_deg: f64,
 }
 
 /// A pose in the forms that people paste elsewhere.
@@ -200,18 +229,21 @@ impl CostReport {
     }
 }
 
-/// Measures an outcome against the true pose, where it is known.
-pub fn evaluate(
-    scene: &str,
-    problem: &Problem,
-    method: Method,
-    params: &Params,
-    outcome: &Outcome,
-    truth: Option<&Pose>,
-) -> QueryResult {
+/// Measures an outcome against the true pose, where it is known, and says what is wrong with it.
+pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
+    let Subject {
+        problem,
+        method,
+        outcome,
+        truth,
+        ..
+    } = *subject;
     let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth| {
-        let estimator = estimator::find(method)?.make(params);
-        estimator.score_at(problem, truth)?.cost
+        let estimator = estimator::find(method)?.make(subject.params);
+        let truth = [problem.reference_from_query(truth)];
+        let mut cost = None;
+        estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost);
+        cost
     });
     QueryResult {
         references: vec![problem.reference.name.clone()],
@@ -222,6 +254,8 @@ pub fn evaluate(
             .cost
             .as_ref()
             .map(|summary| CostReport::new(summary, cost_at_truth)),
+        diagnosis: diagnose(subject),
+        trust: subject.trust.clone(),
         ..QueryResult::new(
             scene,
             &problem.query.name,
@@ -259,7 +293,7 @@ impl QueryResult {
                 Status::Failed
             },
             reason: pose.err().map(|failure| Reason {
-                code: failure.code().to_owned(),
+                code: failure.code(),
                 text: failure.to_string(),
             }),
             pose: pose.ok().map(PoseReport::from),
@@ -269,7 +303,14 @@ impl QueryResult {
             initial_error: None,
             counts: None,
             cost: None,
-            diagnosis: Vec::new(),
+            diagnosis: pose
+                .err()
+                .map(|failure| Diagnosis::of_failure(failure))
+                .into_iter()
+                .collect(),
+            explanation: None,
+            trust: None,
+            agreement: Vec::new(),
             per_reference: Some(Vec::new()),
         }
     }

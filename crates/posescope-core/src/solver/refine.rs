@@ -105,6 +105,22 @@ pub fn refine(
     refinement
 }
 
+/// Covariance of the twist \[rad², m²\], rotation first, by which the pose may be off, if pixels are off
+/// by `sigma_px` along each axis: σ² (Σ JᵀJ)⁻¹. `None` where the correspondences do not fix the pose.
+pub fn pose_covariance(
+    correspondences: &[Correspondence],
+    intrinsics: &Intrinsics,
+    pose: &Pose,
+    sigma_px: f64,
+) -> Option<Matrix6<f64>> {
+    let normal = NormalEquations::at(correspondences, intrinsics, pose, Loss::Squared);
+    let inverse = normal.hessian.cholesky()?.inverse() * (sigma_px * sigma_px);
+    inverse
+        .iter()
+        .all(|entry| entry.is_finite())
+        .then_some(inverse)
+}
+
 /// The pose after a twist in the camera frame: rotation \[rad\] first, translation \[m\] second.
 fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(0).into_owned());

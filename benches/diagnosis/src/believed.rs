@@ -1,0 +1,176 @@
+//! Is anything believed that cannot be known, or doubted that is right?
+//!
+//! `cargo run -p posescope-diagnosis --bin believed -- --places 40` localises queries that show nothing
+//! of their place (grey, noise, mirrored, upside down, another town) without telling the truth, and
+//! counts the poses without any verdict: there should be none. Then it localises proper queries of all
+//! conditions against references of all, and counts failure verdicts on poses that are right, with the
+//! truth and without: there should be hardly any.
+//!
+//! Options: `--places N` (40), `--seed N` (0).
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use image::{Rgb, RgbImage};
+use posescope::diagnosis::Tolerance;
+use posescope::localize::{QueryResult, Status};
+use posescope::method::Method;
+use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
+use posescope_diagnosis::places::{Case, Drives, Place, frame_of};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+const METHODS: [Method; 4] = Method::PAPER;
+
+/// Counts by what was done and method: results, and those that were not to be.
+type Counts = BTreeMap<(&'static str, &'static str), (usize, usize)>;
+
+fn main() -> Result<(), String> {
+    let mut arguments = std::env::args().skip(1);
+    let (mut places, mut seed) = (40, 0);
+    while let Some(argument) = arguments.next() {
+        let value = arguments
+            .next()
+            .ok_or(format!("{argument} needs a value"))?;
+        let number: usize = value.parse().map_err(|_| format!("{value} is no number"))?;
+        match argument.as_str() {
+            "--places" => places = number,
+            "--seed" => seed = number as u64,
+            other => return Err(format!("unknown argument {other}")),
+        }
+    }
+    let drives = Drives::new();
+    let conditions = Condition::ALL.map(|c| (c, Traversal::new(WORLD_SEED, c, Size::Full)));
+    let done = AtomicUsize::new(0);
+    let counted: Vec<(Counts, Counts)> = (0..places)
+        .into_par_iter()
+        .map(|number| {
+            let place = Place::numbered(&drives, number, seed);
+            let counts = (unknowable(&place), right(&place, &conditions));
+            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+            eprintln!("{count} of {places} places");
+            counts
+        })
+        .collect();
+    let (mut believed, mut alarms) = (Counts::new(), Counts::new());
+    for (of_unknowable, of_right) in counted {
+        add(&mut believed, of_unknowable);
+        add(&mut alarms, of_right);
+    }
+    print(
+        "Queries that show nothing of their place: poses believed without any verdict",
+        &believed,
+    );
+    print("Poses that are right: failure verdicts", &alarms);
+    Ok(())
+}
+
+fn add(all: &mut Counts, some: Counts) {
+    for (key, (bad, count)) in some {
+        let entry = all.entry(key).or_default();
+        *entry = (entry.0 + bad, entry.1 + count);
+    }
+}
+
+fn print(title: &str, counts: &Counts) {
+    println!(
+        "\n## {title}\n\n| | {} |\n|---|---|---|---|---|",
+        METHODS.map(Method::name).join(" | ")
+    );
+    let mut kinds: Vec<&str> = counts.keys().map(|(kind, _)| *kind).collect();
+    kinds.dedup();
+    for kind in kinds {
+        let cells = METHODS.map(|method| {
+            let (bad, count) = counts
+                .get(&(kind, method.name()))
+                .copied()
+                .unwrap_or_default();
+            format!("{bad} of {count}")
+        });
+        println!("| {kind} | {} |", cells.join(" | "));
+    }
+}
+
+fn unknowable(place: &Place<'_>) -> Counts {
+    let case = place.case();
+    let own = &case.query.photo;
+    let mut rng = Pcg64::seed_from_u64(place.number as u64);
+    let mut noise = RgbImage::new(own.width(), own.height());
+    noise
+        .pixels_mut()
+        .for_each(|pixel| *pixel = Rgb([rng.random(); 3]));
+    let drive = &place.drives.elsewhere;
+    let photos = [
+        (
+            "grey",
+            RgbImage::from_pixel(own.width(), own.height(), Rgb([128; 3])),
+        ),
+        ("noise", noise),
+        ("mirrored", image::imageops::flip_horizontal(own)),
+        ("upside down", image::imageops::rotate180(own)),
+        (
+            "another town",
+            drive.image(place.query % drive.frame_count()),
+        ),
+    ];
+    let mut counts = Counts::new();
+    for (kind, photo) in photos {
+        let mut case = case.clone();
+        case.query.photo = photo;
+        for result in case.results(&METHODS, false) {
+            let entry = counts.entry((kind, result.method.name())).or_default();
+            entry.0 += usize::from(result.status == Status::Ok && result.diagnosis.is_empty());
+            entry.1 += 1;
+        }
+    }
+    counts
+}
+
+/// The query and the reference of the place in two conditions each.
+fn right(place: &Place<'_>, conditions: &[(Condition, Traversal); 5]) -> Counts {
+    let mut counts = Counts::new();
+    let (query, reference) = (place.number % 5, (place.number / 5) % 5);
+    let day = &place.drives.day;
+    let nearest = |drive: &Traversal, frame: usize| {
+        let target = day.world_from_camera(frame).translation.vector;
+        let away = |k: &usize| (drive.world_from_camera(*k).translation.vector - target).norm();
+        (0..drive.frame_count())
+            .min_by(|a, b| away(a).total_cmp(&away(b)))
+            .unwrap_or(0)
+    };
+    for (query, reference) in [(query, query), (query, reference)] {
+        let (queries, references) = (&conditions[query].1, &conditions[reference].1);
+        let query = nearest(queries, place.query);
+        let reference = nearest(references, place.reference);
+        let case = Case {
+            query: frame_of(queries, query, &queries.world_from_camera(query)),
+            references: vec![frame_of(
+                references,
+                reference,
+                &references.world_from_camera(reference),
+            )],
+            ..place.case()
+        };
+        let (known, withheld) = (case.results(&METHODS, true), case.results(&METHODS, false));
+        for (known, withheld) in known.iter().zip(&withheld) {
+            let tolerance = Tolerance::default();
+            if !known.error.is_some_and(|error| tolerance.contains(&error)) {
+                continue;
+            }
+            let is_alarm =
+                |result: &QueryResult| result.diagnosis.iter().any(|d| d.code.is_failure());
+            let is_doubted = |result: &QueryResult| !result.diagnosis.is_empty();
+            for (kind, bad) in [
+                ("truth known", is_alarm(known)),
+                ("truth withheld", is_alarm(withheld)),
+                ("low confidence alone", is_doubted(withheld)),
+            ] {
+                let entry = counts.entry((kind, known.method.name())).or_default();
+                entry.0 += usize::from(bad);
+                entry.1 += 1;
+            }
+        }
+    }
+    counts
+}

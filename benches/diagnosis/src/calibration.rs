@@ -1,0 +1,433 @@
+//! How far is a pose to be believed? Fits the probability of being within a metre, and judges it.
+//!
+//! `cargo run -p posescope-diagnosis --bin calibration -- --places 40` localises queries of every
+//! condition of the street against references of every other, fits a logistic function of each method's
+//! signals where both are overcast, sunny or at night, and prints its coefficients, as
+//! `diagnosis/trust/coefficients.rs` holds them. Then it judges the probabilities that posescope has
+//! now on the other pairs, which rain or snow is part of: calibration error, area under the ROC curve,
+//! reliability by tenths.
+//!
+//! Options: `--places N` (40), `--seed N` (0), `--dump FILE` to keep the signals, `--from FILE` to use
+//! those of an earlier run.
+
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use nalgebra::{DMatrix, DVector};
+use posescope::diagnosis::{Evidence, trust};
+use posescope::estimator;
+use posescope::geometry::{Pose, PoseError};
+use posescope::image::Photo;
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::{Problem, Query, ReferenceTuple};
+use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
+use posescope::trace::Trace;
+use posescope_diagnosis::places::frame_of;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// The conditions whose pairs the probabilities are fitted on.
+const FITTED_ON: [Condition; 3] = [Condition::Overcast, Condition::Sun, Condition::Snow];
+
+/// Queries that do not show their place are fitted on too.
+const UNKNOWABLE: &str = "unknowable";
+
+/// One pose with its signals.
+#[derive(Clone, Debug)]
+struct Sample {
+    method: String,
+    /// The condition of the reference, and that of the query.
+    conditions: [String; 2],
+    is_near: bool,
+    probability: Option<f64>,
+    names: Vec<String>,
+    values: Vec<f64>,
+}
+
+impl Sample {
+    fn is_for_fitting(&self) -> bool {
+        let is_fitted = |name: &String| {
+            name == UNKNOWABLE || FITTED_ON.iter().any(|condition| condition.name() == name)
+        };
+        self.conditions.iter().all(is_fitted)
+    }
+}
+
+fn main() -> Result<(), String> {
+    let mut arguments = std::env::args().skip(1);
+    let (mut places, mut seed, mut dump, mut from) = (40, 0, None, None);
+    while let Some(argument) = arguments.next() {
+        let value = arguments
+            .next()
+            .ok_or(format!("{argument} needs a value"))?;
+        let number = || {
+            value
+                .parse::<usize>()
+                .map_err(|_| format!("{value} is no number"))
+        };
+        match argument.as_str() {
+            "--places" => places = number()?,
+            "--seed" => seed = number()? as u64,
+            "--dump" => dump = Some(value),
+            "--from" => from = Some(value),
+            other => return Err(format!("unknown argument {other}")),
+        }
+    }
+    let samples = match from {
+        Some(path) => read(&path)?,
+        None => collect(places, seed),
+    };
+    if let Some(path) = dump {
+        std::fs::write(&path, written(&samples)).map_err(|error| format!("{path}: {error}"))?;
+    }
+    let mut methods: Vec<&str> = samples.iter().map(|s| s.method.as_str()).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    println!("## Coefficients\n\n```rust");
+    let mut refitted = samples.clone();
+    for method in &methods {
+        let own = |s: &&Sample| s.method == *method && s.is_for_fitting();
+        let fitting: Vec<&Sample> = samples.iter().filter(own).collect();
+        let Some(weights) = fitted(&fitting) else {
+            continue;
+        };
+        let numbers: Vec<String> = weights.iter().map(|w| format!("{w:.4}")).collect();
+        println!("    (\"{method}\", &[{}]),", numbers.join(", "));
+        println!("    // constant, {}", fitting[0].names.join(", "));
+        for sample in refitted.iter_mut().filter(|s| s.method == *method) {
+            sample.probability = Some(logistic(&weights, &sample.values));
+        }
+    }
+    println!("```");
+    judge("As posescope has them now", &samples, &methods);
+    judge("With these coefficients", &refitted, &methods);
+    Ok(())
+}
+
+fn collect(places: usize, seed: u64) -> Vec<Sample> {
+    let drives = Condition::ALL
+        .map(|condition| (condition, Traversal::new(WORLD_SEED, condition, Size::Full)));
+    let done = AtomicUsize::new(0);
+    (0..places)
+        .into_par_iter()
+        .flat_map_iter(|place| {
+            let samples = at(&drives, place, seed);
+            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+            eprintln!("{count} of {places} places");
+            samples
+        })
+        .collect()
+}
+
+/// All pairs of conditions at one place.
+fn at(drives: &[(Condition, Traversal)], place: usize, seed: u64) -> Vec<Sample> {
+    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(7919).wrapping_add(place as u64));
+    let share: f64 = rng.random();
+    let apart: f64 = rng.random_range(-9.0..9.0);
+    let nearest = |drive: &Traversal, target: &nalgebra::Vector3<f64>| {
+        let distance =
+            |frame: &usize| (drive.world_from_camera(*frame).translation.vector - target).norm();
+        let frames = 0..drive.frame_count();
+        frames
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(0)
+    };
+    let day = &drives[0].1;
+    let middle = (share * day.frame_count() as f64) as usize % day.frame_count();
+    let beside =
+        (middle as f64 + apart).rem_euclid(day.frame_count() as f64) as usize % day.frame_count();
+    let at_query = day.world_from_camera(middle).translation.vector;
+    let at_reference = day.world_from_camera(beside).translation.vector;
+    let problems: Vec<_> = drives
+        .iter()
+        .map(|(condition, drive)| {
+            let query = nearest(drive, &at_query);
+            // The query itself is no reference.
+            let mut reference = nearest(drive, &at_reference);
+            if reference == query {
+                reference = (query + 1) % drive.frame_count();
+            }
+            let truth = drive.world_from_camera(query);
+            let frame = frame_of(drive, query, &truth);
+            let query = Query::new(
+                format!("{query:06}"),
+                Photo::from_color(frame.photo),
+                frame.intrinsics,
+            );
+            let pose = drive.world_from_camera(reference);
+            let frame = frame_of(drive, reference, &pose);
+            let photo = Photo::from_color(frame.photo);
+            let tuple = ReferenceTuple::new(
+                format!("{reference:06}"),
+                photo,
+                frame.intrinsics,
+                pose,
+                frame.cloud,
+            );
+            (
+                *condition,
+                std::sync::Arc::new(query.expect("a whole frame")),
+                truth,
+                std::sync::Arc::new(tuple.expect("a whole frame")),
+            )
+        })
+        .collect();
+    let mut samples = Vec::new();
+    for (query_condition, query, truth, _) in &problems {
+        for (reference_condition, _, _, reference) in &problems {
+            let problem = Problem::new(query.clone(), reference.clone(), 10.0).expect("a radius");
+            let conditions = [reference_condition, query_condition].map(|c| c.name().to_owned());
+            samples.extend(of_problem(&problem, Some(truth), &conditions));
+        }
+    }
+    let (_, query, _, reference) = &problems[0];
+    samples.extend(unknowable(query, reference, place));
+    samples
+}
+
+/// The place of a query that does not show it: mirrored, or of another town. Every other place is for
+/// fitting.
+fn unknowable(
+    query: &std::sync::Arc<Query>,
+    reference: &std::sync::Arc<ReferenceTuple>,
+    place: usize,
+) -> Vec<Sample> {
+    let Some(color) = &query.photo.color else {
+        return Vec::new();
+    };
+    let drive = Traversal::new(WORLD_SEED + 1, Condition::Overcast, Size::Full);
+    let photos = [
+        image::imageops::flip_horizontal(color),
+        drive.image(7 * place % drive.frame_count()),
+    ];
+    let use_of = if place.is_multiple_of(2) {
+        UNKNOWABLE
+    } else {
+        "unknowable, set aside"
+    };
+    photos
+        .into_iter()
+        .flat_map(|photo| {
+            let query = Query::new("unknowable", Photo::from_color(photo), query.intrinsics);
+            let query = query.expect("a photo of the same size");
+            let problem = Problem::new(query, reference.clone(), 10.0).expect("a radius");
+            of_problem(&problem, None, &[use_of.to_owned(), use_of.to_owned()])
+        })
+        .collect()
+}
+
+/// A sample of every method that gives a pose. Without a truth no pose is near.
+fn of_problem(problem: &Problem, truth: Option<&Pose>, conditions: &[String; 2]) -> Vec<Sample> {
+    let params = Params::default();
+    let mut samples = Vec::new();
+    for method in estimator::methods().filter(|method| *method != Method::HY) {
+        let mut evidence = Evidence::default();
+        let estimator = estimator::entry(method).make(&params);
+        let outcome = estimator
+            .estimate(problem, &mut Trace::to(&mut evidence))
+            .expect("nobody cancels");
+        let signals = trust::signals(problem, method, &params, &outcome, &evidence);
+        let (Ok(pose), Some(signals)) = (&outcome.pose, signals) else {
+            continue;
+        };
+        let trust = trust::Trust::of(problem, method, &params, &outcome, &evidence);
+        let is_near = truth
+            .is_some_and(|truth| PoseError::between(truth, pose).translation_m < trust::WITHIN_M);
+        samples.push(Sample {
+            method: method.name().to_owned(),
+            conditions: conditions.clone(),
+            is_near,
+            probability: trust.and_then(|trust| trust.probability),
+            names: signals
+                .names
+                .iter()
+                .map(|name| (*name).to_owned())
+                .collect(),
+            values: signals.values,
+        });
+    }
+    samples
+}
+
+fn written(samples: &[Sample]) -> String {
+    samples.iter().fold(String::new(), |mut text, s| {
+        let line = serde_json::json!([
+            s.method,
+            s.conditions,
+            s.is_near,
+            s.probability,
+            s.names,
+            s.values
+        ]);
+        let _ = writeln!(text, "{line}");
+        text
+    })
+}
+
+fn read(path: &str) -> Result<Vec<Sample>, String> {
+    type Line = (
+        String,
+        [String; 2],
+        bool,
+        Option<f64>,
+        Vec<String>,
+        Vec<f64>,
+    );
+    let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
+    text.lines()
+        .map(|line| {
+            let read: Line = serde_json::from_str(line).map_err(|error| error.to_string())?;
+            let (method, conditions, is_near, probability, names, values) = read;
+            Ok(Sample {
+                method,
+                conditions,
+                is_near,
+                probability,
+                names,
+                values,
+            })
+        })
+        .collect()
+}
+
+fn logistic(weights: &[f64], values: &[f64]) -> f64 {
+    let sum: f64 = weights[1..].iter().zip(values).map(|(w, v)| w * v).sum();
+    1.0 / (1.0 + (-(weights[0] + sum)).exp())
+}
+
+/// Logistic regression by iteratively reweighted least squares, on standardised signals and with a
+/// ridge, so that signals that tell little keep small weights. The constant first.
+fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
+    const RIDGE: f64 = 2.0;
+    let columns = samples.first()?.values.len();
+    let count = samples.len() as f64;
+    let column = |k: usize| samples.iter().map(move |s| s.values[k]);
+    let means: Vec<f64> = (0..columns)
+        .map(|k| column(k).sum::<f64>() / count)
+        .collect();
+    let deviations: Vec<f64> = (0..columns)
+        .map(|k| {
+            let squared: f64 = column(k).map(|v| (v - means[k]).powi(2)).sum();
+            (squared / count).sqrt().max(1e-9)
+        })
+        .collect();
+    let design = DMatrix::from_fn(samples.len(), columns + 1, |row, k| match k {
+        0 => 1.0,
+        _ => (samples[row].values[k - 1] - means[k - 1]) / deviations[k - 1],
+    });
+    let labels = DVector::from_fn(samples.len(), |row, _| {
+        f64::from(u8::from(samples[row].is_near))
+    });
+    let mut weights = DVector::zeros(columns + 1);
+    for _ in 0..50 {
+        let predicted = (&design * &weights).map(|x: f64| 1.0 / (1.0 + (-x).exp()));
+        let spread = predicted.map(|p| (p * (1.0 - p)).max(1e-6));
+        let mut hessian = design.transpose() * DMatrix::from_diagonal(&spread) * &design;
+        let mut gradient = design.transpose() * (&labels - &predicted);
+        for k in 1..=columns {
+            hessian[(k, k)] += RIDGE;
+            gradient[k] -= RIDGE * weights[k];
+        }
+        let step = hessian.cholesky()?.solve(&gradient);
+        weights += &step;
+        if step.amax() < 1e-9 {
+            break;
+        }
+    }
+    let slopes: Vec<f64> = (0..columns)
+        .map(|k| weights[k + 1] / deviations[k])
+        .collect();
+    let constant = weights[0] - slopes.iter().zip(&means).map(|(s, m)| s * m).sum::<f64>();
+    Some(std::iter::once(constant).chain(slopes).collect())
+}
+
+fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
+    println!("\n## {title}\n");
+    println!(
+        "| judged on | method | poses | within 1 m | calibration error | AUC |\n|---|---|---|---|---|---|"
+    );
+    for is_for_fitting in [true, false] {
+        let set = if is_for_fitting {
+            "fitted pairs"
+        } else {
+            "other pairs"
+        };
+        let pooled = std::iter::once("all");
+        for method in methods.iter().copied().chain(pooled) {
+            let scored: Vec<(f64, bool)> = samples
+                .iter()
+                .filter(|s| s.is_for_fitting() == is_for_fitting)
+                .filter(|s| method == "all" || s.method == method)
+                .filter_map(|s| Some((s.probability?, s.is_near)))
+                .collect();
+            if scored.is_empty() {
+                continue;
+            }
+            let near = scored.iter().filter(|s| s.1).count();
+            println!(
+                "| {set} | {method} | {} | {:.1} % | {:.3} | {:.3} |",
+                scored.len(),
+                100.0 * near as f64 / scored.len() as f64,
+                calibration_error(&scored),
+                area_under_curve(&scored)
+            );
+        }
+    }
+    let mut all: Vec<(f64, bool)> = samples
+        .iter()
+        .filter(|s| !s.is_for_fitting())
+        .filter_map(|s| Some((s.probability?, s.is_near)))
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    println!("\nOther pairs, all methods, by tenths: probability said / share within 1 m\n");
+    for bin in tenths(&all) {
+        let (said, was) = said_and_was(bin);
+        println!("- {said:.3} / {was:.3}");
+    }
+}
+
+/// Ten bins of equal count of sorted samples.
+fn tenths(sorted: &[(f64, bool)]) -> impl Iterator<Item = &[(f64, bool)]> {
+    (0..10)
+        .map(|k| &sorted[k * sorted.len() / 10..(k + 1) * sorted.len() / 10])
+        .filter(|bin| !bin.is_empty())
+}
+
+fn said_and_was(bin: &[(f64, bool)]) -> (f64, f64) {
+    let count = bin.len() as f64;
+    let said = bin.iter().map(|s| s.0).sum::<f64>() / count;
+    (said, bin.iter().filter(|s| s.1).count() as f64 / count)
+}
+
+/// Expected calibration error over ten bins of equal count.
+fn calibration_error(scored: &[(f64, bool)]) -> f64 {
+    let mut sorted = scored.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tenths(&sorted)
+        .map(|bin| {
+            let (said, was) = said_and_was(bin);
+            (said - was).abs() * bin.len() as f64 / sorted.len() as f64
+        })
+        .sum()
+}
+
+/// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
+fn area_under_curve(scored: &[(f64, bool)]) -> f64 {
+    let (near, far): (Vec<(f64, bool)>, Vec<(f64, bool)>) =
+        scored.iter().copied().partition(|s| s.1);
+    let wins: f64 = near
+        .iter()
+        .map(|a| {
+            far.iter()
+                .map(|b| match a.0.total_cmp(&b.0) {
+                    std::cmp::Ordering::Greater => 1.0,
+                    std::cmp::Ordering::Equal => 0.5,
+                    std::cmp::Ordering::Less => 0.0,
+                })
+                .sum::<f64>()
+        })
+        .sum();
+    wins / (near.len() * far.len()).max(1) as f64
+}

@@ -1,0 +1,874 @@
+//! D1 to D8: did the search fail, or the cost, or what it was not allowed to move?
+//!
+//! That a result costs more than the exact truth says nothing: right results do too, because height,
+//! pitch and roll are not searched and the grid has steps. So the result is compared with the best pose
+//! near the truth that the search could have reached, and with the best in all six freedoms.
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use serde_json::{Value, json};
+
+use super::descent::{Descended, compass_search};
+use super::{Code, Diagnosis, Subject, failure_alone, suspicion};
+use crate::camera::Intrinsics;
+use crate::cost::shuffled;
+use crate::estimator::{self, CostSummary};
+use crate::event::MinimumAssessed;
+use crate::geometry::{Pose, PoseError, yaw};
+use crate::grid::{GridParams, Offset, Phase, ScoredLattice};
+use crate::problem::{Problem, Query};
+use crate::render::{Score, Scorer};
+
+/// Coarse minima beside the result from which the cost is descended, to see whether a better search
+/// would have found the truth or only another wrong place.
+const OTHER_PLACES: usize = 4;
+
+/// A minimum that covers less than this share of what the truth covers is hardly covered.
+const HARDLY_COVERED: f64 = 0.5;
+
+/// How many standard deviations of the cost of shuffled pixels images must be below it to have anything
+/// to do with each other.
+const BEYOND_CHANCE: f64 = 6.0;
+
+/// So few pixels do not tell whether images have anything to do with each other.
+const TELLING_PIXELS: usize = 500;
+
+/// How often pixels are shuffled to see what chance gives.
+const SHUFFLES: u64 = 12;
+
+/// What the truth must save more than the result, as a share of the cost of shuffled pixels, if the
+/// result is cheap by chance.
+const MORE_GAIN: f64 = 0.02;
+
+/// How far the truth must be off the plane of the search for that to be a cause.
+const OFF_PLANE_M: f64 = 0.1;
+const OFF_PLANE_DEG: f64 = 0.5;
+
+/// Standard deviation of grey values below which a photo shows nothing.
+const TEXTURELESS: f64 = 2.0;
+
+/// What another reading of the camera must save beyond the best pose, as a share of the cost of
+/// shuffled pixels.
+const TELLING_GAIN: f64 = 0.02;
+
+/// The verdicts of a method that searches a cost, in the order in which they are tried.
+pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
+    if let Some(finding) = textureless(subject) {
+        return vec![finding];
+    }
+    let (Some(truth), Some(summary), Some(minimum)) = (
+        subject.reference_from_truth(),
+        subject.outcome.cost,
+        subject.evidence.minimum,
+    ) else {
+        return without_truth(subject);
+    };
+    let Some(estimator) = estimator::find(subject.method).map(|entry| entry.make(subject.params))
+    else {
+        return failure_alone(subject);
+    };
+    let mut found = Vec::new();
+    estimator.with_scorer(subject.problem, &mut |scorer| {
+        let search = SearchedCost {
+            subject,
+            scorer,
+            grid: &subject.params.grid,
+            truth,
+            summary,
+            minimum,
+        };
+        found = search.verdicts(&|camera| {
+            let problem = seen_by(subject.problem, camera);
+            let mut score = None;
+            estimator.with_scorer(&problem, &mut |scorer| {
+                score = scorer.score(&[truth])[0].cost;
+            });
+            score
+        });
+    });
+    found
+}
+
+/// What can be said of a pose that is hardly to be believed, and of none.
+fn without_truth(subject: &Subject<'_>) -> Vec<Diagnosis> {
+    let (Some(summary), Some(minimum)) = (subject.outcome.cost, subject.evidence.minimum) else {
+        return failure_alone(subject);
+    };
+    if !subject.trust.as_ref().is_some_and(|trust| trust.is_low()) {
+        return Vec::new();
+    }
+    let radius_m = subject.problem.uncertainty_radius_m;
+    on_rim(&minimum, radius_m, &subject.params.grid)
+        .into_iter()
+        .chain(hardly_covered(&summary))
+        .collect()
+}
+
+/// A query that is the same everywhere: costs may differ, but by nothing that it shows.
+fn textureless(subject: &Subject<'_>) -> Option<Diagnosis> {
+    const STRIDE: usize = 7;
+    subject.outcome.pose.as_ref().ok()?;
+    let photo = &subject.problem.query.photo.gray;
+    let values = photo
+        .as_raw()
+        .iter()
+        .step_by(STRIDE)
+        .map(|&value| f64::from(value));
+    let count = values.len() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let deviation = (values.map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+    (deviation < TEXTURELESS).then(|| {
+        Diagnosis::new(
+            Code::D5,
+            format!(
+                "the grey values of the query differ by {deviation:.1} only: it shows nothing that tells \
+                 one hypothesis from another"
+            ),
+            json!({ "deviation": deviation }),
+        )
+    })
+}
+
+/// The result lies where the grid ends, so its basin may go on outside.
+fn on_rim(minimum: &MinimumAssessed, radius_m: f64, grid: &GridParams) -> Option<Diagnosis> {
+    let Offset {
+        right_m,
+        forward_m,
+        yaw_rad,
+    } = minimum.offset;
+    let distance_m = right_m.hypot(forward_m);
+    let yaw_deg = yaw_rad.to_degrees().abs();
+    let place = if distance_m > radius_m - 0.5 * grid.coarse_step_m {
+        format!("{distance_m:.1} m from the reference, where the disc of {radius_m:.1} m ends")
+    } else if yaw_deg > grid.yaw_range_deg - 0.5 * grid.yaw_step_deg {
+        format!(
+            "at a yaw of {yaw_deg:.1}°, where the range of {:.1}° ends",
+            grid.yaw_range_deg
+        )
+    } else {
+        return None;
+    };
+    Some(Diagnosis::new(
+        Code::D8,
+        format!("the minimum lies on the rim of the grid, {place}"),
+        json!({ "distance_m": distance_m, "radius_m": radius_m, "yaw_deg": yaw_deg }),
+    ))
+}
+
+/// Without the truth, only a minimum of next to nothing is hardly covered.
+fn hardly_covered(summary: &CostSummary) -> Option<Diagnosis> {
+    const NEXT_TO_NOTHING: f64 = 0.15;
+    let share = summary.coverage_best / summary.coverage_reference;
+    (share < NEXT_TO_NOTHING).then(|| {
+        Diagnosis::new(
+            Code::D1,
+            format!(
+                "the minimum covers {:.2} % of the image, {:.0} % of what the reference pose covers; \
+                 shuffled pixels cost {} there",
+                100.0 * summary.coverage_best,
+                100.0 * share,
+                summary.shuffled.map_or("nothing".to_owned(), |cost| format!("{cost:.4}")),
+            ),
+            json!({ "coverage": summary.coverage_best, "share_of_reference": share, "chance_level": summary.shuffled }),
+        )
+    })
+}
+
+/// The same problem, seen by another camera.
+fn seen_by(problem: &Problem, camera: Intrinsics) -> Problem {
+    let query = Query {
+        intrinsics: camera,
+        memo: problem.query.memo.shared(),
+        ..(*problem.query).clone()
+    };
+    Problem {
+        query: query.into(),
+        ..problem.clone()
+    }
+}
+
+/// What a place costs, and what shuffled pixels cost there.
+struct AgainstChance {
+    /// Covered pixels.
+    pixels: usize,
+    cost: f64,
+    mean: f64,
+    deviation: f64,
+}
+
+impl AgainstChance {
+    /// How far below chance, in its standard deviations.
+    fn deviations(&self) -> f64 {
+        (self.mean - self.cost) / self.deviation.max(1e-12)
+    }
+}
+
+/// A place and what it costs.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    offset: Offset,
+    cost: f64,
+}
+
+/// A finished search, and the truth in the reference camera's frame.
+struct SearchedCost<'a, 'cost> {
+    subject: &'a Subject<'a>,
+    scorer: &'a Scorer<'cost>,
+    grid: &'a GridParams,
+    truth: Pose,
+    summary: CostSummary,
+    minimum: MinimumAssessed,
+}
+
+impl SearchedCost<'_, '_> {
+    fn verdicts(&self, cost_seen_by: &dyn Fn(Intrinsics) -> Option<f64>) -> Vec<Diagnosis> {
+        let mut found = Vec::new();
+        found.extend(suspicion::of_poses(self.subject));
+        let near = self.best_near_truth();
+        found.extend(self.suspect_camera(near.as_ref(), cost_seen_by));
+        found.extend(self.suspect_truth(near.as_ref()));
+        if let Some(outside) = self.outside_grid() {
+            found.push(outside);
+            return found;
+        }
+        let Some(near) = near else {
+            found.push(self.truth_has_no_say());
+            return found;
+        };
+        let mut causes = Vec::new();
+        let is_cheaper = near.cost < self.summary.best;
+        let elsewhere = if is_cheaper {
+            self.cheapest_elsewhere()
+        } else {
+            None
+        };
+        let elsewhere = elsewhere.filter(|place| place.cost < near.cost);
+        let appearance = self.changed_appearance(&near);
+        let can_win = self.can_be_right(&near.offset) && appearance.is_none();
+        if is_cheaper && elsewhere.is_none() && can_win {
+            found.push(self.search_failed(&near));
+            return found;
+        }
+        let winner = elsewhere.unwrap_or(Place {
+            offset: self.minimum.offset,
+            cost: self.summary.best,
+        });
+        causes.extend(self.too_few_pixels(&near, &winner));
+        if appearance.is_none() && self.goes_on_outside() {
+            let radius_m = self.subject.problem.uncertainty_radius_m;
+            causes.extend(on_rim(&self.minimum, radius_m, self.grid));
+        }
+        causes.extend(self.frozen_freedoms(&near, &winner));
+        causes.extend(appearance);
+        causes.push(self.cost_failed(&near, &winner));
+        found.extend(causes);
+        found
+    }
+
+    fn least_covered(&self) -> u32 {
+        let surfaces = &self.subject.evidence.surfaces;
+        surfaces.first().map_or(0, |surface| surface.least_covered)
+    }
+
+    fn eligible(&self, scores: Vec<Score>) -> Vec<Option<f64>> {
+        let least_covered = self.least_covered();
+        let costs = scores.into_iter();
+        costs
+            .map(|score| score.eligible_cost(least_covered))
+            .collect()
+    }
+
+    fn truth_offset(&self) -> Offset {
+        Offset::of(&self.truth)
+    }
+
+    /// How far the search can go from the reference \[m, rad\].
+    fn reach(&self) -> (f64, f64) {
+        let grid = self.grid;
+        (
+            self.subject.problem.uncertainty_radius_m + grid.fine_range_m,
+            (grid.yaw_range_deg + grid.yaw_fine_range_deg).to_radians(),
+        )
+    }
+
+    fn is_reachable(&self, offset: &Offset) -> bool {
+        let (reach_m, reach_rad) = self.reach();
+        offset.right_m.hypot(offset.forward_m) <= reach_m + 1e-9
+            && offset.yaw_rad.abs() <= reach_rad + 1e-9
+    }
+
+    /// The reachable pose nearest to the truth.
+    fn nearest_reachable(&self) -> Offset {
+        let (reach_m, reach_rad) = self.reach();
+        let truth = self.truth_offset();
+        let shrink = (reach_m / truth.right_m.hypot(truth.forward_m)).min(1.0);
+        Offset {
+            right_m: truth.right_m * shrink,
+            forward_m: truth.forward_m * shrink,
+            yaw_rad: truth.yaw_rad.clamp(-reach_rad, reach_rad),
+        }
+    }
+
+    /// Whether a searched pose is right.
+    fn can_be_right(&self, offset: &Offset) -> bool {
+        let error = PoseError::between(&self.truth, &offset.reference_from_camera());
+        self.subject.tolerance.contains(&error)
+    }
+
+    /// The cheapest pose near the truth that the search could have reached, of those that have a say:
+    /// from the best of a small lattice around it, and from the nearest reachable pose itself, as far
+    /// as the fine steps go.
+    fn best_near_truth(&self) -> Option<Place> {
+        const AROUND: [f64; 5] = [-0.8, -0.4, 0.0, 0.4, 0.8];
+        const TURNS: [f64; 3] = [-1.0, 0.0, 1.0];
+        let centre = self.nearest_reachable();
+        let within_m = self.subject.tolerance.translation_m;
+        let within_rad = self.subject.tolerance.rotation_deg.to_radians();
+        let is_near = |offset: &Offset| {
+            let (right, forward) = (
+                offset.right_m - centre.right_m,
+                offset.forward_m - centre.forward_m,
+            );
+            right.hypot(forward) <= within_m
+                && (offset.yaw_rad - centre.yaw_rad).abs() <= within_rad
+                && self.is_reachable(offset)
+        };
+        let lattice: Vec<Offset> = TURNS
+            .iter()
+            .flat_map(|turn| AROUND.iter().map(move |forward| (turn, forward)))
+            .flat_map(|(turn, forward)| AROUND.iter().map(move |right| (turn, forward, right)))
+            .map(|(turn, forward, right)| Offset {
+                right_m: centre.right_m + right * within_m,
+                forward_m: centre.forward_m + forward * within_m,
+                yaw_rad: centre.yaw_rad + turn.to_radians(),
+            })
+            .filter(is_near)
+            .collect();
+        let costs = self.costs(&lattice);
+        let best = lattice
+            .iter()
+            .zip(costs)
+            .filter_map(|(offset, cost)| {
+                Some(Place {
+                    offset: *offset,
+                    cost: cost?,
+                })
+            })
+            .reduce(|best, next| if next.cost < best.cost { next } else { best });
+        let starts = [Some(centre), best.map(|place| place.offset)];
+        starts
+            .into_iter()
+            .flatten()
+            .filter_map(|start| self.descended(start, &is_near))
+            .reduce(|best, next| if next.cost < best.cost { next } else { best })
+    }
+
+    fn costs(&self, offsets: &[Offset]) -> Vec<Option<f64>> {
+        let poses: Vec<Pose> = offsets.iter().map(Offset::reference_from_camera).collect();
+        self.eligible(self.scorer.score(&poses))
+    }
+
+    /// The foot of the basin of a start, in the freedoms and steps that the search has.
+    fn descended(&self, start: Offset, is_allowed: &dyn Fn(&Offset) -> bool) -> Option<Place> {
+        const HALVINGS: usize = 2;
+        let grid = self.grid;
+        let steps = [
+            grid.fine_step_m,
+            grid.fine_step_m,
+            (4.0 * grid.yaw_fine_step_deg).to_radians(),
+        ];
+        let offset = |at: &[f64; 3]| Offset {
+            right_m: at[0],
+            forward_m: at[1],
+            yaw_rad: at[2],
+        };
+        let Offset {
+            right_m,
+            forward_m,
+            yaw_rad,
+        } = start;
+        let found = compass_search([right_m, forward_m, yaw_rad], steps, HALVINGS, |places| {
+            let offsets: Vec<Offset> = places.iter().map(offset).collect();
+            let costs = self.costs(&offsets).into_iter().zip(&offsets);
+            costs
+                .map(|(cost, offset)| cost.filter(|_| is_allowed(offset)))
+                .collect()
+        })?;
+        Some(Place {
+            offset: offset(&found.at),
+            cost: found.cost,
+        })
+    }
+
+    /// The cheapest place away from the truth, from the result and the best coarse minima.
+    fn cheapest_elsewhere(&self) -> Option<Place> {
+        let coarse = self.surface(Phase::PositionCoarse)?;
+        let is_elsewhere = |offset: &Offset| !self.can_be_right(offset);
+        let minima = coarse
+            .local_minima()
+            .into_iter()
+            .filter_map(|(cell, _)| coarse.lattice.offset(cell))
+            .filter(is_elsewhere)
+            .take(OTHER_PLACES);
+        let is_allowed = |offset: &Offset| self.is_reachable(offset) && is_elsewhere(offset);
+        std::iter::once(self.minimum.offset)
+            .chain(minima)
+            .filter_map(|start| self.descended(start, &is_allowed))
+            .reduce(|best, next| if next.cost < best.cost { next } else { best })
+    }
+
+    fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {
+        let mut surfaces = self.subject.evidence.surfaces.iter();
+        let found = surfaces.find(|surface| surface.lattice.phase == phase);
+        found.map(AsRef::as_ref)
+    }
+
+    /// From the true pose, another focal length explains the query much better than any pose does with
+    /// the stated one.
+    fn suspect_camera(
+        &self,
+        near: Option<&Place>,
+        cost_seen_by: &dyn Fn(Intrinsics) -> Option<f64>,
+    ) -> Option<Diagnosis> {
+        const TIMES: [f64; 8] = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.4];
+        let stated = self.subject.problem.query.intrinsics;
+        let camera = |at: &[f64; 3]| Intrinsics {
+            fx: stated.fx * at[0].exp(),
+            fy: stated.fy * at[0].exp(),
+            cx: stated.cx + at[1],
+            cy: stated.cy + at[2],
+            ..stated
+        };
+        let cost = |at: &[f64; 3]| cost_seen_by(camera(at));
+        let best = TIMES
+            .iter()
+            .map(|times| [times.ln(), 0.0, 0.0])
+            .filter_map(|at| {
+                Some(Descended {
+                    at,
+                    cost: cost(&at)?,
+                })
+            })
+            .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
+        let stated_cost = self.scorer.score(&[self.truth])[0]
+            .cost
+            .unwrap_or(f64::INFINITY);
+        if best.cost >= stated_cost {
+            return None;
+        }
+        let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, |places| {
+            places.iter().map(cost).collect()
+        })?;
+        let chance = self.summary.shuffled?;
+        let rival = near
+            .map_or(f64::INFINITY, |near| near.cost)
+            .min(self.summary.best);
+        let camera = camera(&best.at);
+        (rival - best.cost > TELLING_GAIN * chance).then(|| {
+            Diagnosis::new(
+                Code::X1,
+                format!(
+                    "at the true pose the cost is {stated_cost:.4} with the stated camera and {:.4} with \
+                     a focal length of {:.0} px instead of {:.0} and its centre at ({:.0}, {:.0}) instead \
+                     of ({:.0}, {:.0}); the result costs {:.4}",
+                    best.cost,
+                    camera.fx,
+                    stated.fx,
+                    camera.cx,
+                    camera.cy,
+                    stated.cx,
+                    stated.cy,
+                    self.summary.best,
+                ),
+                json!({ "cost_at_truth": stated_cost, "cost_otherwise": best.cost, "camera": camera }),
+            )
+        })
+    }
+
+    /// The result is as certain as results ever are, and it is not the stated truth.
+    /// Where the images agree at the truth too, though less, both are there, and the truth is not suspect.
+    fn suspect_truth(&self, near: Option<&Place>) -> Option<Diagnosis> {
+        const NEARLY_CERTAIN: f64 = 0.97;
+        const SUPPORTED: f64 = 0.5;
+        let gain = near.and_then(|near| self.gain(&near.offset)).unwrap_or(0.0);
+        if gain > SUPPORTED * self.gain(&self.minimum.offset)? {
+            return None;
+        }
+        let probability = self.subject.trust.as_ref()?.probability?;
+        let error = self.subject.error()?;
+        (probability >= NEARLY_CERTAIN).then(|| {
+            Diagnosis::new(
+                Code::X1,
+                format!(
+                    "poses like this one are right in {:.0} % of cases, and it is {error} from the \
+                     stated truth: the truth is suspect",
+                    100.0 * probability
+                ),
+                json!({ "probability": probability, "error": error }),
+            )
+        })
+    }
+
+    fn outside_grid(&self) -> Option<Diagnosis> {
+        let (reach_m, reach_rad) = self.reach();
+        let truth = self.truth_offset();
+        let distance_m = truth.right_m.hypot(truth.forward_m);
+        let yaw_deg = truth.yaw_rad.to_degrees();
+        let radius_m = self.subject.problem.uncertainty_radius_m;
+        let is_far = distance_m > reach_m + self.grid.coarse_step_m;
+        let is_turned = yaw_deg.abs() > reach_rad.to_degrees() + self.grid.yaw_step_deg;
+        let words = match (is_far, is_turned) {
+            (true, _) => format!(
+                "the truth is {distance_m:.1} m from the reference, and positions up to {radius_m:.1} m \
+                 are searched"
+            ),
+            (false, true) => format!(
+                "the truth is turned by {yaw_deg:.1}° against the reference, and ±{:.1}° are searched",
+                self.grid.yaw_range_deg
+            ),
+            (false, false) => return None,
+        };
+        Some(Diagnosis::new(
+            Code::D4,
+            words,
+            json!({
+                "distance_m": distance_m,
+                "radius_m": radius_m,
+                "yaw_deg": yaw_deg,
+                "yaw_range_deg": self.grid.yaw_range_deg,
+            }),
+        ))
+    }
+
+    /// No pose near the truth covers enough to have a say: the grid leaves it out.
+    fn truth_has_no_say(&self) -> Diagnosis {
+        let score = self
+            .scorer
+            .score(&[self.nearest_reachable().reference_from_camera()])[0];
+        let least_covered = self.least_covered();
+        Diagnosis::new(
+            Code::D4,
+            format!(
+                "near the truth the view covers {} px, and {least_covered} are needed to have a say \
+                 (grid.coverage_floor)",
+                score.covered
+            ),
+            json!({ "covered": score.covered, "least_covered": least_covered }),
+        )
+    }
+
+    /// A pose near the truth that the search could have reached is cheaper than all others.
+    fn search_failed(&self, near: &Place) -> Diagnosis {
+        let loss = self.lost_in(near);
+        Diagnosis::new(
+            Code::D3,
+            format!(
+                "the search failed, not the cost: {:.2} m from the truth it is {:.4}, and {:.4} at the \
+                 result{}",
+                self.distance_from_truth(&near.offset),
+                near.cost,
+                self.summary.best,
+                loss.words
+            ),
+            json!({
+                "cost_near_truth": near.cost,
+                "cost_at_result": self.summary.best,
+                "near_truth": offset_evidence(&near.offset),
+                "lost_in": loss.phase,
+                "rank": loss.rank,
+                "margin": loss.margin,
+            }),
+        )
+    }
+
+    /// The phase that turned away from the truth.
+    fn lost_in(&self, near: &Place) -> Loss {
+        let at = |phase: Phase| {
+            let surface = self.surface(phase)?;
+            Some((surface, surface.lattice.offset(surface.minimum()?)?))
+        };
+        let Some((coarse, chosen)) = at(Phase::PositionCoarse) else {
+            return Loss::default();
+        };
+        let target = near.offset;
+        let away = |offset: &Offset| {
+            let (right, forward) = (
+                offset.right_m - target.right_m,
+                offset.forward_m - target.forward_m,
+            );
+            right.hypot(forward)
+        };
+        let fine_reach = self.grid.fine_range_m.hypot(self.grid.fine_range_m);
+        if away(&chosen) > fine_reach + self.grid.fine_step_m {
+            return lost_among_coarse(coarse, &away);
+        }
+        let tolerance_m = self.subject.tolerance.translation_m;
+        let lost = match at(Phase::PositionFine) {
+            Some((surface, chosen)) if away(&chosen) > tolerance_m => Some(surface),
+            _ => self.surface(Phase::YawCoarse),
+        };
+        lost.map_or_else(Loss::default, |surface| Loss {
+            words: format!(
+                "; it was lost in the phase “{}”",
+                surface.lattice.phase.name()
+            ),
+            phase: Some(surface.lattice.phase.name()),
+            ..Loss::default()
+        })
+    }
+
+    fn distance_from_truth(&self, offset: &Offset) -> f64 {
+        let pose = offset.reference_from_camera();
+        PoseError::between(&self.truth, &pose).translation_m
+    }
+
+    /// What chance gives at a pose, and what the images cost there.
+    fn against_chance(&self, offset: &Offset) -> Option<AgainstChance> {
+        let compared = self.scorer.compare(&offset.reference_from_camera());
+        let subject = self.subject;
+        let responsible = super::trust::responsible(subject.method, subject.outcome);
+        let entry = estimator::find(responsible)?.cost()?;
+        let measure = subject.params.costs.of(entry)?.cost();
+        let seed = subject.problem.random_seed("shuffled truth");
+        let costs: Vec<f64> = (0..SHUFFLES)
+            .filter_map(|k| measure.evaluate(&shuffled(&compared.pairs, seed.wrapping_add(k))))
+            .collect();
+        let count = costs.len() as f64;
+        let mean = costs.iter().sum::<f64>() / count;
+        let squared: f64 = costs.iter().map(|cost| (cost - mean).powi(2)).sum();
+        Some(AgainstChance {
+            pixels: compared.pairs.len(),
+            cost: compared.score.cost?,
+            mean,
+            deviation: (squared / (count - 1.0)).sqrt(),
+        })
+        .filter(|_| costs.len() > 1)
+    }
+
+    fn gain(&self, offset: &Offset) -> Option<f64> {
+        let AgainstChance { cost, mean, .. } = self.against_chance(offset)?;
+        Some(1.0 - cost / mean)
+    }
+
+    fn is_beyond_chance(&self, offset: &Offset) -> bool {
+        self.against_chance(offset)
+            .is_some_and(|against| against.deviations() >= BEYOND_CHANCE)
+    }
+
+    /// Whether the basin of the result has its foot beyond where positions are searched.
+    fn goes_on_outside(&self) -> bool {
+        let start = self.minimum.offset;
+        let beyond_m = 2.0 * self.grid.coarse_step_m;
+        let (reach_m, _) = self.reach();
+        let distance = |offset: &Offset| offset.right_m.hypot(offset.forward_m);
+        let is_allowed = |offset: &Offset| distance(offset) <= reach_m + beyond_m;
+        let foot = self.descended(start, &is_allowed);
+        foot.is_some_and(|foot| {
+            let is_outside = distance(&foot.offset) > self.subject.problem.uncertainty_radius_m
+                || foot.offset.yaw_rad.abs() > self.grid.yaw_range_deg.to_radians();
+            is_outside && foot.cost < self.summary.best && self.is_beyond_chance(&foot.offset)
+        })
+    }
+
+    /// The winner is cheap because so few pixels are cheap by chance.
+    fn too_few_pixels(&self, near: &Place, winner: &Place) -> Option<Diagnosis> {
+        let covered = |place: &Place| {
+            let score = self.scorer.score(&[place.offset.reference_from_camera()])[0];
+            f64::from(score.covered)
+        };
+        let (at_truth, at_winner) = (covered(near), covered(winner));
+        if at_winner >= HARDLY_COVERED * at_truth {
+            return None;
+        }
+        let (gain_at_truth, gain_at_winner) =
+            (self.gain(&near.offset)?, self.gain(&winner.offset)?);
+        (gain_at_winner + MORE_GAIN < gain_at_truth).then(|| {
+            Diagnosis::new(
+                Code::D1,
+                format!(
+                    "the minimum covers {at_winner:.0} px and the truth {at_truth:.0}: so few cost little \
+                     by chance, {:.1} % less than shuffled, and at the truth they save {:.1} %",
+                    100.0 * gain_at_winner,
+                    100.0 * gain_at_truth
+                ),
+                json!({
+                    "covered_at_result": at_winner,
+                    "covered_at_truth": at_truth,
+                    "gain_at_result": gain_at_winner,
+                    "gain_at_truth": gain_at_truth,
+                }),
+            )
+        })
+    }
+
+    /// With height, pitch and roll free, the truth would win; or none of what is searched is right.
+    fn frozen_freedoms(&self, near: &Place, winner: &Place) -> Option<Diagnosis> {
+        let frozen = PoseError::between(&self.truth, &self.truth_offset().reference_from_camera());
+        let evidence = |cost: Option<f64>| {
+            json!({
+                "height_m": -self.truth.translation.y,
+                "frozen_error": frozen,
+                "cost_in_six_freedoms": cost,
+                "cost_near_truth": near.cost,
+            })
+        };
+        if !self.subject.tolerance.contains(&frozen) {
+            return Some(Diagnosis::new(
+                Code::D7,
+                format!(
+                    "no pose that is searched is right: the truth is {frozen} off the plane of the search, \
+                     in height, pitch and roll"
+                ),
+                evidence(None),
+            ));
+        }
+        // What is on the plane of the search has nothing to win by leaving it.
+        if frozen.translation_m < OFF_PLANE_M && frozen.rotation_deg < OFF_PLANE_DEG {
+            return None;
+        }
+        let best = self.best_in_six_freedoms(near)?;
+        (best < winner.cost).then(|| {
+            Diagnosis::new(
+                Code::D7,
+                format!(
+                    "with height, pitch and roll free the cost near the truth falls from {:.4} to {best:.4}, \
+                     below the {:.4} elsewhere; the truth is {frozen} off the plane of the search",
+                    near.cost, winner.cost
+                ),
+                evidence(Some(best)),
+            )
+        })
+    }
+
+    /// The least cost near the truth in all six freedoms.
+    fn best_in_six_freedoms(&self, near: &Place) -> Option<f64> {
+        const HALVINGS: usize = 2;
+        let from = |start: Pose| {
+            let degree = 1_f64.to_radians();
+            let steps = [0.1, 0.1, 0.1, 0.5 * degree, 0.5 * degree, 0.5 * degree];
+            let found = compass_search([0.0; 6], steps, HALVINGS, |places| {
+                let poses: Vec<Pose> = places.iter().map(|at| moved(&start, at)).collect();
+                self.eligible(self.scorer.score(&poses))
+            })?;
+            let error = PoseError::between(&self.truth, &moved(&start, &found.at));
+            self.subject
+                .tolerance
+                .contains(&error)
+                .then_some(found.cost)
+        };
+        let starts = [self.truth, lifted_to(&near.offset, &self.truth)];
+        starts.into_iter().filter_map(from).reduce(f64::min)
+    }
+
+    /// The images share nothing, even at the truth.
+    fn changed_appearance(&self, near: &Place) -> Option<Diagnosis> {
+        let against = self.against_chance(&near.offset)?;
+        if against.pixels < TELLING_PIXELS {
+            return None;
+        }
+        let deviations = against.deviations();
+        (deviations < BEYOND_CHANCE).then(|| {
+            Diagnosis::new(
+                Code::D6,
+                format!(
+                    "even at the truth the images cost {:.4}, and shuffled pixels {:.4} ± {:.4}: they look \
+                     too different",
+                    against.cost, against.mean, against.deviation
+                ),
+                json!({
+                    "cost_near_truth": near.cost,
+                    "chance_level": against.mean,
+                    "chance_deviation": against.deviation,
+                    "deviations": deviations,
+                }),
+            )
+        })
+    }
+
+    fn cost_failed(&self, near: &Place, winner: &Place) -> Diagnosis {
+        Diagnosis::new(
+            Code::D2,
+            format!(
+                "the cost failed, not the search: {:.1} m from the truth it is {:.4}, and near the truth at \
+                 best {:.4}",
+                self.distance_from_truth(&winner.offset),
+                winner.cost,
+                near.cost
+            ),
+            json!({
+                "cost_near_truth": near.cost,
+                "cost_at_result": self.summary.best,
+                "cost_elsewhere": winner.cost,
+                "near_truth": offset_evidence(&near.offset),
+                "elsewhere": offset_evidence(&winner.offset),
+            }),
+        )
+    }
+}
+
+/// Where the search turned away from the truth.
+#[derive(Default)]
+struct Loss {
+    words: String,
+    phase: Option<&'static str>,
+    rank: Option<usize>,
+    margin: Option<f64>,
+}
+
+/// The rank of the coarse cell nearest to the target, and what it costs more than the one chosen.
+fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> Loss {
+    let phase = coarse.lattice.phase.name();
+    let lost = Loss {
+        words: format!("; it was lost in the phase “{phase}”"),
+        phase: Some(phase),
+        ..Loss::default()
+    };
+    let nearest = coarse
+        .lattice
+        .hypotheses()
+        .filter_map(|(cell, offset)| Some((away(&offset), coarse.eligible_cost(cell)?)))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let least = coarse.minimum().and_then(|cell| coarse.eligible_cost(cell));
+    let (Some((_, cost)), Some(least)) = (nearest, least) else {
+        return lost;
+    };
+    let cheaper = (0..coarse.scores.len())
+        .filter_map(|cell| coarse.eligible_cost(cell))
+        .filter(|other| *other < cost)
+        .count();
+    let (rank, margin) = (cheaper + 1, cost - least);
+    Loss {
+        words: format!(
+            "; the step nearest to it came at rank {rank} in the phase “{phase}”, {margin:.4} dearer than \
+             the one chosen"
+        ),
+        rank: Some(rank),
+        margin: Some(margin),
+        ..lost
+    }
+}
+
+fn offset_evidence(offset: &Offset) -> Value {
+    json!({
+        "right_m": offset.right_m,
+        "forward_m": offset.forward_m,
+        "yaw_deg": offset.yaw_rad.to_degrees(),
+    })
+}
+
+/// A camera moved along and turned about its own axes.
+fn moved(pose: &Pose, by: &[f64; 6]) -> Pose {
+    let [x, y, z, about_x, about_y, about_z] = *by;
+    pose * Pose::from_parts(
+        Translation3::new(x, y, z),
+        UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, about_z)),
+    )
+}
+
+/// The searched pose with the height, pitch and roll of the truth.
+fn lifted_to(offset: &Offset, truth: &Pose) -> Pose {
+    let plane = Offset::of(truth);
+    let mut pose = offset.reference_from_camera();
+    pose.translation.y = truth.translation.y;
+    pose.rotation = yaw(offset.yaw_rad) * (yaw(plane.yaw_rad).inverse() * truth.rotation);
+    pose
+}

@@ -1,0 +1,85 @@
+//! What an estimator told that a verdict is drawn from.
+
+use std::sync::Arc;
+
+use crate::depth::LiftedMatch;
+use crate::event::{ConsensusJudged, Event, Kind, KindSet, MinimumAssessed, PoseRefined, Side};
+use crate::features::{FeatureState, Features, Match};
+use crate::grid::ScoredLattice;
+use crate::trace::{Cancelled, Record, Sink};
+
+/// The events of one method on one problem that verdicts are drawn from. Their payloads are shared, so
+/// that keeping them is cheap.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence {
+    /// Features of the query photo.
+    pub query: Option<Arc<Features>>,
+    /// Features of the reference photo.
+    pub reference: Option<Arc<Features>>,
+    /// What matching decided, by query keypoint.
+    pub decisions: Option<Arc<[Option<Match>]>>,
+    /// Depths of the unique matches.
+    pub lifted: Option<Arc<[LiftedMatch]>>,
+    /// The consensus, refined.
+    pub refined: Option<PoseRefined>,
+    /// Whether it was accepted.
+    pub judged: Option<ConsensusJudged>,
+    /// Where every query feature ended.
+    pub states: Option<Arc<[FeatureState]>>,
+    /// The lattices of the search, in order.
+    pub surfaces: Vec<Arc<ScoredLattice>>,
+    /// The minimum that the search ended in.
+    pub minimum: Option<MinimumAssessed>,
+}
+
+impl Evidence {
+    /// What a hybrid of two methods would have told that fell back to the second.
+    #[must_use]
+    pub fn followed_by(&self, second: &Self) -> Self {
+        Self {
+            surfaces: second.surfaces.clone(),
+            minimum: second.minimum,
+            ..self.clone()
+        }
+    }
+}
+
+impl Sink for Evidence {
+    fn wanted(&self) -> KindSet {
+        KindSet::of(&[
+            Kind::FeaturesDetected,
+            Kind::MatchesDecided,
+            Kind::DepthsLifted,
+            Kind::PoseRefined,
+            Kind::ConsensusJudged,
+            Kind::FeaturesClassified,
+            Kind::PhaseSearched,
+            Kind::MinimumAssessed,
+        ])
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        match &record.event {
+            Event::FeaturesDetected(detected) => {
+                let features = Some(Arc::clone(&detected.features));
+                match detected.side {
+                    Side::Query => self.query = features,
+                    Side::Reference => self.reference = features,
+                }
+            }
+            Event::MatchesDecided(matches) => {
+                self.decisions = Some(Arc::clone(&matches.decisions));
+            }
+            Event::DepthsLifted(depths) => self.lifted = Some(Arc::clone(&depths.matches)),
+            Event::PoseRefined(refined) => self.refined = Some(refined.clone()),
+            Event::ConsensusJudged(judged) => self.judged = Some(judged.clone()),
+            Event::FeaturesClassified(classified) => {
+                self.states = Some(Arc::clone(&classified.states));
+            }
+            Event::PhaseSearched(searched) => self.surfaces.push(Arc::clone(&searched.surface)),
+            Event::MinimumAssessed(minimum) => self.minimum = Some(*minimum),
+            _ => {}
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,272 @@
+//! Where the true matches went: with the truth known, every match is true or false.
+
+use nalgebra::{Matrix3, Point2, Point3};
+use serde_json::{Value, json};
+
+use super::Subject;
+use crate::camera::Intrinsics;
+use crate::estimator::projected_cloud;
+use crate::features::{FeatureState, Features, MatchVerdict};
+use crate::geometry::Pose;
+use crate::solver::Correspondence;
+
+/// A match is true if the keypoint is this many inlier thresholds from where the truth puts it: the
+/// truth and the depths are not exact either.
+const THRESHOLDS: f64 = 2.0;
+
+/// How many reference keypoints with a depth, and true matches of them, were left at each stage of FB.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Funnel {
+    /// Reference keypoints with a depth.
+    pub(super) with_depth: usize,
+    /// Those that the query photo shows, by the truth.
+    pub(super) visible: usize,
+    /// Those with a query keypoint where they must be.
+    pub(super) detected: usize,
+    /// Query keypoints whose nearest reference feature is a true match.
+    pub(super) nearest: usize,
+    /// Those that passed the ratio test.
+    pub(super) ratio: usize,
+    /// Those that are mutually best.
+    pub(super) unique: usize,
+    /// Those whose 3-D point was lifted to where the truth says.
+    pub(super) lifted: usize,
+    /// Those that are inliers of the estimate.
+    pub(super) inliers: usize,
+}
+
+impl Funnel {
+    pub(super) fn evidence(&self) -> Value {
+        json!({
+            "with_depth": self.with_depth,
+            "visible": self.visible,
+            "detected": self.detected,
+            "nearest": self.nearest,
+            "ratio": self.ratio,
+            "unique": self.unique,
+            "lifted": self.lifted,
+            "inliers": self.inliers,
+        })
+    }
+
+    /// The step before `lifted` that lost the greatest share of what it got, and both counts.
+    pub(super) fn deadliest(&self) -> (&'static str, usize, usize) {
+        let steps = [
+            ("are not detected in the query", self.visible, self.detected),
+            (
+                "have another nearest neighbour",
+                self.detected,
+                self.nearest,
+            ),
+            ("fail the ratio test", self.nearest, self.ratio),
+            ("are not mutually best", self.ratio, self.unique),
+        ];
+        let kept = |before: usize, after: usize| after as f64 / before.max(1) as f64;
+        let worst = steps
+            .into_iter()
+            .filter(|(_, before, _)| *before > 0)
+            .min_by(|a, b| kept(a.1, a.2).total_cmp(&kept(b.1, b.2)));
+        worst.unwrap_or(("are in view", self.with_depth, self.visible))
+    }
+}
+
+/// All that the truth says about the matches of a problem.
+pub(super) struct TrueMatches {
+    pub(super) funnel: Funnel,
+    /// The correspondences that MLESAC got, in their order.
+    pub(super) correspondences: Vec<Correspondence>,
+    /// For each of them, whether the truth explains it.
+    pub(super) is_true: Vec<bool>,
+    /// For each of them, whether it is an inlier of the estimate.
+    pub(super) is_inlier: Vec<bool>,
+    /// Correspondences that lie on the epipolar line of the truth, but whose depth puts them elsewhere,
+    /// beyond as many as lie there by chance. Inliers of the estimate are left out: what agrees on
+    /// another pose has moved, or belongs to another place, and its depth need not be wrong.
+    pub(super) wrong_depth: usize,
+    /// Unique matches that lie on the epipolar line and have no depth at all, beyond chance.
+    pub(super) no_depth: usize,
+}
+
+impl TrueMatches {
+    /// `None` where the method did not come to matching, or nobody knows the truth.
+    pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
+        let evidence = subject.evidence;
+        let (query, reference) = (evidence.query.as_ref()?, evidence.reference.as_ref()?);
+        let truth = subject.reference_from_truth()?;
+        let query_from_reference = truth.inverse();
+        let camera = &subject.problem.query.intrinsics;
+        let threshold_px = THRESHOLDS * subject.params.fb.mlesac.inlier_threshold_px;
+        let points = lifted_keypoints(subject, reference);
+        let predicted: Vec<Option<Point2<f64>>> = points
+            .iter()
+            .map(|point| {
+                let seen = camera.project(&(query_from_reference * (*point)?))?;
+                camera.contains(&seen).then_some(seen)
+            })
+            .collect();
+        let is_near = |query_keypoint: usize, reference_keypoint: usize| {
+            predicted[reference_keypoint].is_some_and(|predicted| {
+                let keypoint = query.keypoints[query_keypoint].pixel();
+                (keypoint - predicted).norm() <= threshold_px
+            })
+        };
+        let mut funnel = Funnel {
+            with_depth: points.iter().flatten().count(),
+            visible: predicted.iter().flatten().count(),
+            detected: detected(query, &predicted, threshold_px),
+            ..Funnel::default()
+        };
+        for found in evidence.decisions.iter().flat_map(|d| d.iter()).flatten() {
+            if !is_near(found.query, found.reference) {
+                continue;
+            }
+            funnel.nearest += 1;
+            funnel.ratio += usize::from(found.verdict != MatchVerdict::Ambiguous);
+            funnel.unique += usize::from(found.verdict == MatchVerdict::Candidate);
+        }
+        let mut matches = Self {
+            funnel,
+            correspondences: Vec::new(),
+            is_true: Vec::new(),
+            is_inlier: Vec::new(),
+            wrong_depth: 0,
+            no_depth: 0,
+        };
+        let epipolar = Epipolar::new(
+            &truth,
+            camera,
+            &subject.problem.reference.intrinsics,
+            threshold_px,
+        );
+        let all_lifted = evidence.lifted.as_deref().unwrap_or_default();
+        let pixels: Vec<_> = all_lifted
+            .iter()
+            .map(|lifted| {
+                let seen = reference.keypoints[lifted.reference].pixel();
+                (seen, query.keypoints[lifted.query].pixel())
+            })
+            .collect();
+        let by_chance = epipolar.share_by_chance(&pixels);
+        let (mut lifted_elsewhere, mut unlifted) = (0, 0);
+        for (lifted, (seen, pixel)) in all_lifted.iter().zip(pixels) {
+            let on_line = epipolar.explains(&seen, &pixel);
+            let Some(point) = lifted.point else {
+                matches.no_depth += usize::from(on_line);
+                unlifted += 1;
+                continue;
+            };
+            let seen = camera.project(&(query_from_reference * point));
+            let is_true = seen.is_some_and(|seen| (seen - pixel).norm() <= threshold_px);
+            let state = evidence.states.as_ref().and_then(|s| s.get(lifted.query));
+            let is_inlier = matches!(state, Some(FeatureState::Inlier { .. }));
+            matches
+                .correspondences
+                .push(Correspondence { pixel, point });
+            matches.is_true.push(is_true);
+            matches.is_inlier.push(is_inlier);
+            matches.wrong_depth += usize::from(on_line && !is_true && !is_inlier);
+            lifted_elsewhere += usize::from(!is_true && !is_inlier);
+            matches.funnel.lifted += usize::from(is_true);
+            matches.funnel.inliers += usize::from(is_true && is_inlier);
+        }
+        let chance = |count: usize| (by_chance * f64::from(count as u32)).round() as usize;
+        matches.wrong_depth = matches.wrong_depth.saturating_sub(chance(lifted_elsewhere));
+        matches.no_depth = matches.no_depth.saturating_sub(chance(unlifted));
+        Some(matches)
+    }
+
+    /// Inliers of the estimate.
+    pub(super) fn inliers(&self) -> usize {
+        self.is_inlier
+            .iter()
+            .filter(|is_inlier| **is_inlier)
+            .count()
+    }
+}
+
+/// The 3-D point of every reference keypoint that has a depth near by.
+fn lifted_keypoints(subject: &Subject<'_>, reference: &Features) -> Vec<Option<Point3<f64>>> {
+    let tuple = &subject.problem.reference;
+    let cloud = projected_cloud(tuple);
+    let radius_px = subject.params.fb.depth_radius_px;
+    reference
+        .keypoints
+        .iter()
+        .map(|keypoint| {
+            let pixel = keypoint.pixel();
+            let depths = cloud.read(&pixel, radius_px).within?;
+            Some(tuple.intrinsics.unproject(&pixel, depths.nearest))
+        })
+        .collect()
+}
+
+/// How many of the predicted places have a query keypoint.
+fn detected(query: &Features, predicted: &[Option<Point2<f64>>], threshold_px: f64) -> usize {
+    // Sorted by column, so that each place is compared with few.
+    let mut keypoints: Vec<Point2<f64>> = query.keypoints.iter().map(|k| k.pixel()).collect();
+    keypoints.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
+    let has_keypoint = |place: &&Point2<f64>| {
+        let first = keypoints.partition_point(|k| k.x < place.x - threshold_px);
+        keypoints[first..]
+            .iter()
+            .take_while(|k| k.x <= place.x + threshold_px)
+            .any(|k| (*k - **place).norm() <= threshold_px)
+    };
+    predicted.iter().flatten().filter(has_keypoint).count()
+}
+
+/// The epipolar lines of the true pose.
+struct Epipolar {
+    /// Takes a reference pixel (homogeneous) to its line in the query.
+    fundamental: Matrix3<f64>,
+    threshold_px: f64,
+}
+
+impl Epipolar {
+    fn new(
+        reference_from_query: &Pose,
+        query: &Intrinsics,
+        reference: &Intrinsics,
+        threshold_px: f64,
+    ) -> Self {
+        let query_from_reference = reference_from_query.inverse();
+        let essential = query_from_reference.translation.vector.cross_matrix()
+            * query_from_reference.rotation.to_rotation_matrix();
+        let inverse = |camera: &Intrinsics| {
+            Matrix3::new(
+                1.0 / camera.fx,
+                0.0,
+                -camera.cx / camera.fx,
+                0.0,
+                1.0 / camera.fy,
+                -camera.cy / camera.fy,
+                0.0,
+                0.0,
+                1.0,
+            )
+        };
+        Self {
+            fundamental: inverse(query).transpose() * essential * inverse(reference),
+            threshold_px,
+        }
+    }
+
+    /// The share of pixels that lie on the line of something that they have nothing to do with: each is
+    /// held against the lines of some others.
+    fn share_by_chance(&self, pixels: &[(Point2<f64>, Point2<f64>)]) -> f64 {
+        const OTHERS: usize = 5;
+        let count = pixels.len();
+        let hits = (1..=OTHERS)
+            .flat_map(|k| (0..count).map(move |at| (at, (at + k * count / (OTHERS + 1)) % count)))
+            .filter(|&(at, other)| self.explains(&pixels[other].0, &pixels[at].1))
+            .count();
+        hits as f64 / (OTHERS * count).max(1) as f64
+    }
+
+    /// Whether a query pixel lies on the line of a reference pixel.
+    fn explains(&self, reference: &Point2<f64>, query: &Point2<f64>) -> bool {
+        let line = self.fundamental * reference.to_homogeneous();
+        let distance = line.dot(&query.to_homogeneous()).abs() / line.x.hypot(line.y);
+        distance <= self.threshold_px / THRESHOLDS
+    }
+}

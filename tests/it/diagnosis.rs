@@ -1,0 +1,287 @@
+//! Verdicts: what is said of results that are right, wrong or missing.
+
+use std::sync::Arc;
+
+use posescope::code::Code;
+use posescope::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope::geometry::Pose;
+use posescope::localize::{
+    LocalizeError, Localizer, NoObserver, QueryResult, Request, localize_traced,
+};
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::{Problem, Query};
+use posescope::trace::Trace;
+
+use crate::binary::posescope;
+use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
+use crate::walls_scene::Walls;
+
+/// Where the query really is: 1 m ahead of the reference.
+fn truth(problem: &Problem) -> Pose {
+    problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0)
+}
+
+fn with(assignments: &[&str]) -> Params {
+    let mut params = Params::default();
+    for assignment in assignments {
+        params.assign(assignment).expect("a parameter");
+    }
+    params
+}
+
+fn verdicts(
+    problem: &Problem,
+    method: Method,
+    params: &Params,
+    truth: Option<&Pose>,
+) -> Vec<Diagnosis> {
+    let mut evidence = Evidence::default();
+    let mut trace = Trace::to(&mut evidence);
+    let outcome = localize_traced(problem, method, params, &mut trace).expect("nobody cancels");
+    let subject = Subject::new(problem, method, params, &outcome, &evidence);
+    let tolerance = Tolerance {
+        translation_m: 0.5,
+        rotation_deg: 5.0,
+    };
+    diagnose(&subject.against(truth, tolerance))
+}
+
+fn codes(found: &[Diagnosis]) -> Vec<Code> {
+    found.iter().map(|finding| finding.code).collect()
+}
+
+fn primary(found: &[Diagnosis]) -> Option<Code> {
+    found.first().map(|finding| finding.code)
+}
+
+#[test]
+fn a_pose_that_is_right_carries_at_most_low_confidence() {
+    let problem = solvable();
+    for method in Method::PAPER {
+        let found = verdicts(&problem, method, &Params::default(), Some(&truth(&problem)));
+        assert!(
+            codes(&found).iter().all(|code| !code.is_failure()),
+            "{method}: {found:?}"
+        );
+    }
+}
+
+#[test]
+fn a_truth_that_the_photos_contradict_is_suspect() {
+    let problem = solvable();
+    let wrong = truth(&problem) * Pose::translation(2.0, 0.0, 0.0);
+    let found = verdicts(&problem, Method::FB, &Params::default(), Some(&wrong));
+    assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
+    assert!(found[0].evidence["inliers"].as_u64() > found[0].evidence["supports_truth"].as_u64());
+}
+
+#[test]
+fn a_cloud_in_millimetres_is_suspect_with_and_without_the_truth() {
+    let mut cloud = cloud_of_the_walls();
+    for point in &mut cloud.points {
+        *point *= 1000.0;
+    }
+    let problem = problem(photo(1.0, 5), photo(0.0, 5), cloud);
+    for truth in [Some(truth(&problem)), None] {
+        for method in [Method::FB, Method::MI] {
+            let found = verdicts(&problem, method, &Params::default(), truth.as_ref());
+            assert_eq!(primary(&found), Some(Code::X1), "{method}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn another_camera_is_suspected_from_the_matches() {
+    let mut problem = solvable();
+    let mut query = Query::clone(&problem.query);
+    // A longer focal length alone looks like a camera that stands nearer.
+    query.intrinsics.fx *= 0.8;
+    query.intrinsics.fy *= 0.8;
+    query.intrinsics.cx += 20.0;
+    query.intrinsics.cy -= 15.0;
+    problem.query = Arc::new(query);
+    let found = verdicts(
+        &problem,
+        Method::FB,
+        &Params::default(),
+        Some(&truth(&problem)),
+    );
+    assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
+    let focal_length = found[0].evidence["camera"]["fx"]
+        .as_f64()
+        .expect("a camera");
+    assert!((focal_length - 180.0).abs() < 6.0, "{focal_length}");
+}
+
+#[test]
+fn a_truth_beyond_the_disc_is_outside_the_grid() {
+    let mut problem = solvable();
+    problem.uncertainty_radius_m = 3.0;
+    let far = problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 9.0);
+    let found = verdicts(&problem, Method::PM, &Params::default(), Some(&far));
+    assert!(codes(&found).contains(&Code::D4), "{found:?}");
+    let outside = found
+        .iter()
+        .find(|finding| finding.code == Code::D4)
+        .expect("D4");
+    assert_eq!(outside.evidence["distance_m"], 9.0);
+}
+
+#[test]
+fn a_query_that_shows_nothing_has_too_few_features_and_costs_that_tell_nothing() {
+    let grey = image::GrayImage::from_pixel(240, 100, image::Luma([90]));
+    let problem = problem(grey, photo(0.0, 5), cloud_of_the_walls());
+    let truth = truth(&problem);
+    for truth in [Some(&truth), None] {
+        for (method, code) in [
+            (Method::FB, Code::R2),
+            (Method::PM, Code::D5),
+            (Method::MI, Code::D5),
+        ] {
+            let found = verdicts(&problem, method, &Params::default(), truth);
+            assert_eq!(primary(&found), Some(code), "{method}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_search_in_steps_over_the_truth_failed_and_not_the_cost() {
+    let problem = solvable();
+    let params = with(&["grid.coarse_step=3", "grid.fine_range=0.2"]);
+    let found = verdicts(&problem, Method::PM, &params, Some(&truth(&problem)));
+    assert_eq!(primary(&found), Some(Code::D3), "{found:?}");
+    let evidence = &found[0].evidence;
+    assert!(evidence["cost_near_truth"].as_f64() < evidence["cost_at_result"].as_f64());
+    assert_eq!(evidence["lost_in"], "position, coarse");
+}
+
+#[test]
+fn the_true_matches_only_become_fewer_on_their_way() {
+    // The ratio leaves hardly any match, so that there is something to explain.
+    let problem = solvable();
+    let found = verdicts(
+        &problem,
+        Method::FB,
+        &with(&["fb.ratio=0.1"]),
+        Some(&truth(&problem)),
+    );
+    assert_eq!(primary(&found), Some(Code::R3), "{found:?}");
+    let funnel = &found[0].evidence["true_matches"];
+    let count = |stage: &str| funnel[stage].as_u64().expect("a count");
+    let stages = ["with_depth", "visible", "detected"].map(count);
+    assert!(stages.is_sorted_by(|a, b| a >= b), "{funnel}");
+    let matches = ["nearest", "ratio", "unique"].map(count);
+    assert!(matches.is_sorted_by(|a, b| a >= b), "{funnel}");
+    assert!(matches[0] > 20 && matches[2] < 8, "{funnel}");
+}
+
+#[test]
+fn what_is_said_to_help_helps() {
+    let scene = Walls::new();
+    let params = with(&["grid.coarse_step=3", "grid.fine_range=0.2"]);
+    let tolerance: Tolerance = "0.4m,5deg".parse().expect("a tolerance");
+    let request = Request {
+        radius_m: 3.0,
+        references: vec![0].into(),
+        fusions: Vec::new(),
+        setting: None,
+    };
+    let run = |params: &Params, explaining: usize| {
+        let localizer = Localizer::new(&scene, &scene, params, 7)
+            .with_tolerance(tolerance)
+            .explaining(explaining);
+        let mut results = Vec::new();
+        let keep = |result: QueryResult, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        };
+        let requests = std::slice::from_ref(&request);
+        localizer
+            .localize(0, 1, requests, &[Method::PM], &mut NoObserver, keep)
+            .expect("good data");
+        results.pop().expect("a result")
+    };
+    let result = run(&params, 12);
+    let explanation = result.explanation.expect("it went wrong");
+    assert!(explanation.complete && explanation.runs <= 12);
+    let settings: Vec<_> = explanation
+        .helped
+        .iter()
+        .filter(|helped| helped.args.iter().step_by(2).all(|name| name == "--set"))
+        .collect();
+    assert!(!settings.is_empty(), "{:?}", explanation.helped);
+    for helped in settings {
+        let mut changed = params.clone();
+        for assignment in helped.args.iter().skip(1).step_by(2) {
+            changed.assign(assignment).expect("a parameter");
+        }
+        assert_eq!(
+            run(&changed, 0).error,
+            Some(helped.error),
+            "{:?}",
+            helped.args
+        );
+    }
+    // A result that is right needs no explanation.
+    assert_eq!(run(&Params::default(), 12).explanation, None);
+}
+
+#[test]
+fn a_pose_that_is_less_certain_than_asked_for_is_refused() {
+    let (scene, params) = (Walls::new(), Params::default());
+    let request = Request {
+        radius_m: 3.0,
+        references: vec![0].into(),
+        fusions: Vec::new(),
+        setting: None,
+    };
+    let mut results = Vec::new();
+    for needed in [None, Some(1.0)] {
+        let localizer = Localizer::new(&scene, &scene, &params, 7).accepting_from(needed);
+        let keep = |result: QueryResult, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        };
+        let requests = std::slice::from_ref(&request);
+        localizer
+            .localize(0, 1, requests, &[Method::FB], &mut NoObserver, keep)
+            .expect("good data");
+    }
+    let probability = results[0]
+        .trust
+        .as_ref()
+        .and_then(|trust| trust.probability);
+    assert!(
+        probability.is_some_and(|p| (0.0..1.0).contains(&p)),
+        "{probability:?}"
+    );
+    let reason = results[1].reason.as_ref().expect("no pose is that certain");
+    assert_eq!(reason.code, Code::L1);
+    assert_eq!(results[1].pose, None);
+}
+
+#[test]
+fn every_code_is_explained() {
+    let page = include_str!("../../docs/diagnosis.md");
+    for code in Code::ALL {
+        assert!(page.contains(&format!("| **{code}** |")), "{code}");
+    }
+}
+
+#[test]
+fn what_is_no_tolerance_is_refused() {
+    for (option, value) in [
+        ("--right", "1,5"),
+        ("--accept", "1.5"),
+        ("--explain", "many"),
+    ] {
+        let output = posescope()
+            .args(["run", "street", "--query", "0", option, value])
+            .output()
+            .expect("it runs");
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(option), "{message}");
+    }
+}
