@@ -2,8 +2,16 @@
 //!
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
+mod argument;
+mod depth_image;
+mod file_scene;
 mod kitti;
+mod lines;
+mod photo_file;
 mod retriever;
+mod seven_scenes;
+mod trajectory;
+mod tum;
 
 pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
@@ -12,7 +20,7 @@ pub use kitti::{KittiOdometry, SequenceWriter};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are asked.
-pub const ALL: &[Entry] = &[street::ENTRY, kitti::ENTRY];
+pub const ALL: &[Entry] = &[street::ENTRY, kitti::ENTRY, tum::ENTRY, seven_scenes::ENTRY];
 
 /// Opens a scene; `format` overrides what its content says.
 ///

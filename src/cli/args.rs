@@ -98,8 +98,9 @@ impl ConfigArgs {
 
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Where the frames are: street, street:night and so on, or a folder such as …/sequences/00
-    /// (KITTI odometry)
+    /// Where the frames are: street, street:night and so on, or a folder such as …/sequences/00;
+    /// --help lists all formats
+    #[arg(long_help = scene_formats())]
     pub scene: String,
     /// The frame to localise; repeatable (3823 finds 003823)
     #[arg(long, value_name = "FRAME", required_unless_present = "all")]
@@ -435,6 +436,16 @@ pub struct IndexArgs {
     /// Number of threads [default: one per core]; the index does not depend on it
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
+}
+
+/// What a scene argument may be, format by format.
+fn scene_formats() -> String {
+    let formats = posescope::scene::ALL.iter();
+    let lines = formats.map(|entry| format!("\n- {}: {}", entry.name, entry.about));
+    format!(
+        "Where the frames are; the content tells which of these it is, or --format:{}",
+        lines.collect::<String>()
+    )
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -10,7 +10,9 @@ use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, Vector3};
 
 pub use writer::SequenceWriter;
 
-use super::{Entry, Scene, SceneError};
+use super::file_scene::folder_name;
+use super::lines::{numbers, read_text};
+use super::{Entry, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, matrix_from_pose, pose_from_matrix};
@@ -76,24 +78,13 @@ impl KittiOdometry {
         };
         let images = folder.join(camera);
         let frames = frame_names(&images)?;
-        let (width, height) = {
-            let first = images.join(format!("{}.png", frames[0]));
-            image::image_dimensions(&first).map_err(|source| SceneError::Image {
-                path: first,
-                source,
-            })?
-        };
+        let (width, height) = photo_file::dimensions(&images.join(format!("{}.png", frames[0])))?;
         let calibration = Calibration::read(&folder.join("calib.txt"))?;
         let projection = calibration.projection(&camera.replace("image_", "P"))?;
         let (intrinsics, camera_from_camera0) =
             split_projection(&projection, width, height, &calibration.path)?;
 
-        let sequence = folder
-            .canonicalize()
-            .unwrap_or_else(|_| folder.to_owned())
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned())
-            .unwrap_or_default();
+        let sequence = folder_name(folder);
         let last_frame = frame_number(&frames[frames.len() - 1]);
         let poses = read_poses(folder, &sequence, last_frame)?;
         let times_s = read_times(&folder.join("times.txt"), last_frame)?;
@@ -165,27 +156,7 @@ impl Scene for KittiOdometry {
     }
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let path = self.photo_path(frame);
-        let photo = Photo::read(&path).map_err(|source| SceneError::Image {
-            path: path.clone(),
-            source,
-        })?;
-        let (width, height) = photo.dimensions();
-        let Intrinsics {
-            width: expected_width,
-            height: expected_height,
-            ..
-        } = self.intrinsics(frame);
-        if (width, height) != (expected_width, expected_height) {
-            return Err(SceneError::Content {
-                path,
-                expected: format!(
-                    "{expected_width}x{expected_height} pixels expected as in the first image, \
-                     {width}x{height} found"
-                ),
-            });
-        }
-        Ok(photo)
+        photo_file::read(&self.photo_path(frame), &self.intrinsics(frame))
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
@@ -395,20 +366,7 @@ fn expect_rows(found: usize, last: usize, path: &Path, what: &str) -> Result<(),
 
 /// Twelve numbers, row by row.
 fn parse_matrix(text: &str) -> Result<Matrix3x4<f64>, String> {
-    let mut numbers = Vec::with_capacity(12);
-    for word in text.split_whitespace() {
-        let number: f64 = word
-            .parse()
-            .map_err(|_| format!("a number expected, `{word}` found"))?;
-        numbers.push(number);
-    }
-    if numbers.len() != 12 {
-        return Err(format!("12 numbers expected, {} found", numbers.len()));
-    }
-    if !numbers.iter().all(|number| number.is_finite()) {
-        return Err("finite numbers expected".to_owned());
-    }
-    Ok(Matrix3x4::from_row_slice(&numbers))
+    numbers::<12>(text).map(|numbers| Matrix3x4::from_row_slice(&numbers))
 }
 
 /// A scan: little-endian `f32` x, y, z, reflectance.
@@ -456,11 +414,4 @@ fn read_scan(path: &Path, camera_from_velodyne: &Matrix3x4<f64>) -> Result<Cloud
         points.push(Point3::from(in_camera).cast());
     }
     Ok(Cloud { points })
-}
-
-fn read_text(path: &Path) -> Result<String, SceneError> {
-    std::fs::read_to_string(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })
 }
