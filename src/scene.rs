@@ -3,9 +3,11 @@
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
 mod argument;
+mod colmap;
 mod depth_image;
 mod file_scene;
 mod kitti;
+mod lens;
 mod lines;
 mod photo_file;
 mod retriever;
@@ -20,7 +22,13 @@ pub use kitti::{KittiOdometry, SequenceWriter};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are asked.
-pub const ALL: &[Entry] = &[street::ENTRY, kitti::ENTRY, tum::ENTRY, seven_scenes::ENTRY];
+pub const ALL: &[Entry] = &[
+    street::ENTRY,
+    kitti::ENTRY,
+    tum::ENTRY,
+    seven_scenes::ENTRY,
+    colmap::ENTRY,
+];
 
 /// Opens a scene; `format` overrides what its content says.
 ///

@@ -2,7 +2,9 @@
 //! their clouds come from.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::lens::Lens;
 use super::{Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -17,6 +19,8 @@ pub(super) struct Frame {
     pub photo: PathBuf,
     /// The camera, as the photo is handed out.
     pub intrinsics: Intrinsics,
+    /// What takes the distortion out of the photo, if it has any.
+    pub lens: Option<Arc<Lens>>,
     /// Where the camera stood, if that is known.
     pub world_from_camera: Option<Pose>,
     /// When the photo was taken \[s\], if that is known.
@@ -95,7 +99,11 @@ impl<C: Clouds> Scene for FileScene<C> {
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let frame = &self.frames[frame];
-        photo_file::read(&frame.photo, &frame.intrinsics)
+        let photo = photo_file::read(&frame.photo, &frame.intrinsics)?;
+        Ok(match &frame.lens {
+            Some(lens) => lens.undistorted(&photo),
+            None => photo,
+        })
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {

@@ -84,6 +84,7 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
             name: file.name,
             photo: file.photo,
             intrinsics: cameras.photo,
+            lens: None,
             world_from_camera: world_from_depth
                 .map(|pose| pose * cameras.camera_from_posed.inverse()),
             time_s: None,

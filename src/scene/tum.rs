@@ -67,6 +67,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
             world_from_camera: trajectory.as_ref().and_then(|all| all.at(time)),
             photo,
             intrinsics,
+            lens: None,
             time_s: Some(time),
         })
         .collect();

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod binary;
+mod colmap;
 mod command_line;
 mod conformance;
 mod data;

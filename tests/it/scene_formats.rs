@@ -10,8 +10,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use tempfile::TempDir;
 
-use crate::rgbd;
 use crate::small_sequence::SmallSequence;
+use crate::{colmap, rgbd};
 
 /// A small scene of a format on disk, and its argument.
 struct Sample {
@@ -42,6 +42,10 @@ fn sample(format: &str) -> Sample {
         }
         "7scenes" => {
             rgbd::write_seven_scenes(&root);
+            root
+        }
+        "colmap" => {
+            colmap::write(&root, colmap::Form::Binary);
             root
         }
         other => panic!("a small scene of the format {other} is wanted here"),
