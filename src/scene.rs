@@ -3,8 +3,10 @@
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
 mod argument;
+mod cloud_file;
 mod colmap;
 mod depth_image;
+mod described;
 mod file_scene;
 mod kitti;
 mod lens;
@@ -14,6 +16,7 @@ mod retriever;
 mod seven_scenes;
 mod trajectory;
 mod tum;
+mod view_crop;
 
 pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
@@ -28,6 +31,7 @@ pub const ALL: &[Entry] = &[
     tum::ENTRY,
     seven_scenes::ENTRY,
     colmap::ENTRY,
+    described::ENTRY,
 ];
 
 /// Opens a scene; `format` overrides what its content says.

@@ -83,7 +83,7 @@ impl Clouds for DepthImages {
 }
 
 /// Every how many pixels along both axes a point is made.
-fn step((width, height): (u32, u32)) -> u32 {
+pub(super) fn step((width, height): (u32, u32)) -> u32 {
     let pixels = f64::from(width) * f64::from(height);
     (pixels / f64::from(MOST_POINTS)).sqrt().ceil().max(1.0) as u32
 }

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Matrix3x4, Quaternion, Translation3, UnitQuaternion};
 
 use super::SceneError;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, pose_from_matrix};
 
 /// A text file in memory.
 pub(super) struct TextFile {
@@ -97,6 +97,12 @@ impl<'a> Line<'a> {
     /// A single finite number.
     pub fn number(&self, word: &str) -> Result<f64, SceneError> {
         number(word).map_err(|expected| self.error(expected))
+    }
+
+    /// The pose that twelve numbers are, a 3 × 4 matrix row by row.
+    pub fn matrix_pose(&self) -> Result<Pose, SceneError> {
+        let matrix = Matrix3x4::from_row_slice(&self.numbers::<12>()?);
+        pose_from_matrix(&matrix).map_err(|error| self.error(error.to_string()))
     }
 
     /// The pose of a position and a quaternion, whose parts are in the order x y z w.

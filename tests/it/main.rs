@@ -23,6 +23,7 @@ mod retrieval;
 mod rgbd;
 mod robust_pose;
 mod scene_formats;
+mod scene_toml;
 mod search_views;
 mod session;
 mod small_sequence;

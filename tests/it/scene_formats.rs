@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use tempfile::TempDir;
 
 use crate::small_sequence::SmallSequence;
-use crate::{colmap, rgbd};
+use crate::{colmap, rgbd, scene_toml};
 
 /// A small scene of a format on disk, and its argument.
 struct Sample {
@@ -46,6 +46,10 @@ fn sample(format: &str) -> Sample {
         }
         "colmap" => {
             colmap::write(&root, colmap::Form::Binary);
+            root
+        }
+        "toml" => {
+            scene_toml::write(&root);
             root
         }
         other => panic!("a small scene of the format {other} is wanted here"),
