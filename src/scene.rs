@@ -9,6 +9,8 @@ mod depth_image;
 mod described;
 mod file_scene;
 mod kitti;
+mod kitti_format;
+mod kitti_raw;
 mod lens;
 mod lines;
 mod photo_file;
@@ -28,6 +30,7 @@ pub use retriever::{IndexOptions, NoIndex, Retriever};
 pub const ALL: &[Entry] = &[
     street::ENTRY,
     kitti::ENTRY,
+    kitti_raw::ENTRY,
     tum::ENTRY,
     seven_scenes::ENTRY,
     colmap::ENTRY,

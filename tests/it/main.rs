@@ -11,6 +11,7 @@ mod evaluation;
 mod frame_cache;
 mod imports;
 mod kitti;
+mod kitti_raw;
 mod looks;
 mod memory;
 mod own_cost;

@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use tempfile::TempDir;
 
 use crate::small_sequence::SmallSequence;
-use crate::{colmap, rgbd, scene_toml};
+use crate::{colmap, kitti_raw, rgbd, scene_toml};
 
 /// A small scene of a format on disk, and its argument.
 struct Sample {
@@ -52,6 +52,7 @@ fn sample(format: &str) -> Sample {
             scene_toml::write(&root);
             root
         }
+        "kitti-raw" => kitti_raw::write(&root),
         other => panic!("a small scene of the format {other} is wanted here"),
     };
     Sample {
