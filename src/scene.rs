@@ -11,6 +11,7 @@ mod file_scene;
 mod kitti;
 mod kitti_format;
 mod kitti_raw;
+pub mod layout;
 mod lens;
 mod lines;
 mod photo_file;
@@ -23,7 +24,7 @@ mod view_crop;
 pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
 
-pub use kitti::{KittiOdometry, SequenceWriter};
+pub use kitti::KittiOdometry;
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are asked.

@@ -12,6 +12,7 @@ use posescope::measure::{Format, Gate, Tolerance};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{Experiment, Protocol, Shard};
+use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 use posescope::session::{Breakpoint, Task};
 
@@ -47,7 +48,7 @@ pub enum Command {
     Diff(DiffArgs),
     /// Write the poses or tables of a run in formats of other programs
     Export(ExportArgs),
-    /// Write the built-in street to disk in KITTI odometry layout, one sequence per condition
+    /// Write the built-in street to disk in the layout of a data set, one drive per condition
     Synth(SynthArgs),
     /// Build the retrieval index of a scene, which --references retrieve:K asks
     Index(IndexArgs),
@@ -387,9 +388,19 @@ pub struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
-    /// Where to write: DIR/sequences/CONDITION and DIR/poses/CONDITION.txt
+    /// Where to write: DIR/CONDITION, or in the layout kitti DIR/sequences/CONDITION and
+    /// DIR/poses/CONDITION.txt
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
+    /// The layout, by the name of the scene format that reads it. tum can say depths up to 13 m only,
+    /// 7scenes up to 65 m; colmap has some of each scan's points
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = LAYOUTS[0].name,
+        value_parser = PossibleValuesParser::new(LAYOUTS.iter().map(|layout| layout.name))
+    )]
+    pub layout: String,
     /// The size of the images: 620x188 or 1241x376 pixels
     #[arg(
         long,

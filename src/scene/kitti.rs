@@ -1,14 +1,10 @@
 //! KITTI odometry: `image_0|image_2`, `velodyne`, `calib.txt`, `times.txt`, and the poses in
 //! `../../poses/NN.txt` or in `poses.txt` beside the images.
 
-mod writer;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3x4, Point3, Vector3};
-
-pub use writer::SequenceWriter;
 
 use super::file_scene::folder_name;
 use super::kitti_format::{read_scan, split_projection};

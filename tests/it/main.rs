@@ -23,6 +23,7 @@ mod reference_views;
 mod retrieval;
 mod rgbd;
 mod robust_pose;
+mod round_trips;
 mod scene_formats;
 mod scene_toml;
 mod search_views;
