@@ -2,17 +2,41 @@
 //!
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
+mod argument;
+mod cloud_file;
+mod colmap;
+mod depth_image;
+mod described;
+mod file_scene;
 mod kitti;
+mod kitti_format;
+mod kitti_raw;
+pub mod layout;
+mod lens;
+mod lines;
+mod photo_file;
 mod retriever;
+mod seven_scenes;
+mod trajectory;
+mod tum;
+mod view_crop;
 
 pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
 
-pub use kitti::{KittiOdometry, SequenceWriter};
+pub use kitti::KittiOdometry;
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are asked.
-pub const ALL: &[Entry] = &[street::ENTRY, kitti::ENTRY];
+pub const ALL: &[Entry] = &[
+    street::ENTRY,
+    kitti::ENTRY,
+    kitti_raw::ENTRY,
+    tum::ENTRY,
+    seven_scenes::ENTRY,
+    colmap::ENTRY,
+    described::ENTRY,
+];
 
 /// Opens a scene; `format` overrides what its content says.
 ///

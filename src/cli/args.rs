@@ -13,6 +13,7 @@ use posescope::measure::{Format, Gate, Tolerance};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{Experiment, Protocol, Shard};
+use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 use posescope::session::{Breakpoint, Task};
 
@@ -48,7 +49,7 @@ pub enum Command {
     Diff(DiffArgs),
     /// Write the poses or tables of a run in formats of other programs
     Export(ExportArgs),
-    /// Write the built-in street to disk in KITTI odometry layout, one sequence per condition
+    /// Write the built-in street to disk in the layout of a data set, one drive per condition
     Synth(SynthArgs),
     /// Build the retrieval index of a scene, which --references retrieve:K asks
     Index(IndexArgs),
@@ -99,8 +100,9 @@ impl ConfigArgs {
 
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Where the frames are: street, street:night and so on, or a folder such as …/sequences/00
-    /// (KITTI odometry)
+    /// Where the frames are: street, street:night and so on, or a folder such as …/sequences/00;
+    /// --help lists all formats
+    #[arg(long_help = scene_formats())]
     pub scene: String,
     /// The frame to localise; repeatable (3823 finds 003823)
     #[arg(long, value_name = "FRAME", required_unless_present = "all")]
@@ -401,9 +403,19 @@ pub struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
-    /// Where to write: DIR/sequences/CONDITION and DIR/poses/CONDITION.txt
+    /// Where to write: DIR/CONDITION, or in the layout kitti DIR/sequences/CONDITION and
+    /// DIR/poses/CONDITION.txt
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
+    /// The layout, by the name of the scene format that reads it. tum can say depths up to 13 m only,
+    /// 7scenes up to 65 m; colmap has some of each scan's points
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = LAYOUTS[0].name,
+        value_parser = PossibleValuesParser::new(LAYOUTS.iter().map(|layout| layout.name))
+    )]
+    pub layout: String,
     /// The size of the images: 620x188 or 1241x376 pixels
     #[arg(
         long,
@@ -450,6 +462,16 @@ pub struct IndexArgs {
     /// Number of threads [default: one per core]; the index does not depend on it
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
+}
+
+/// What a scene argument may be, format by format.
+fn scene_formats() -> String {
+    let formats = posescope::scene::ALL.iter();
+    let lines = formats.map(|entry| format!("\n- {}: {}", entry.name, entry.about));
+    format!(
+        "Where the frames are; the content tells which of these it is, or --format:{}",
+        lines.collect::<String>()
+    )
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -1,18 +1,23 @@
-//! `posescope synth`: the street on disk, in KITTI odometry layout.
+//! `posescope synth`: the street on disk, in the layout of a data set.
 
 use std::fs;
 use std::path::Path;
 
+use posescope::scene::layout::{Drive, LAYOUTS, Layout, Shot};
 use posescope::scene::street::Street;
-use posescope::scene::{Scene as _, SceneError, SequenceWriter};
+use posescope::scene::{Scene as _, SceneError};
 use rayon::prelude::*;
 
 use super::args::SynthArgs;
 use super::failure::CliError;
 use super::terminal::Terminal;
 
-/// Runs the command: one sequence per condition, named after it.
+/// Runs the command: one drive per condition, named after it.
 pub fn synth(args: &SynthArgs, terminal: &Terminal) -> Result<(), CliError> {
+    let layout = LAYOUTS
+        .iter()
+        .find(|layout| layout.name == args.layout)
+        .ok_or_else(|| CliError::Usage(format!("there is no layout `{}`", args.layout)))?;
     let streets = streets(args)?;
     if !args.force && holds_anything(&args.folder)? {
         return Err(CliError::Usage(format!(
@@ -27,16 +32,19 @@ pub fn synth(args: &SynthArgs, terminal: &Terminal) -> Result<(), CliError> {
     let bar = terminal.bar(frames as u64);
     let outcome = streets.iter().try_for_each(|(name, street)| {
         bar.set_message(*name);
-        write(street, name, &args.folder, every, || bar.inc(1))
+        write(street, name, layout, &args.folder, every, || bar.inc(1))
     });
     bar.finish_and_clear();
     outcome?;
     if !terminal.is_quiet() {
-        let names: Vec<&str> = streets.iter().map(|(name, _)| *name).collect();
+        let places: Vec<String> = streets
+            .iter()
+            .map(|(name, _)| (layout.place)(name))
+            .collect();
         eprintln!(
             "{frames} frames in {}: {}",
-            args.folder.join("sequences").display(),
-            names.join(", ")
+            args.folder.display(),
+            places.join(", ")
         );
     }
     Ok(())
@@ -63,28 +71,38 @@ fn holds_anything(folder: &Path) -> Result<bool, CliError> {
 fn write(
     street: &Street,
     name: &str,
+    layout: &Layout,
     root: &Path,
     every: usize,
     tick: impl Fn() + Sync,
 ) -> Result<(), CliError> {
-    let writer = SequenceWriter::create(root, name, Street::scanner_position())?;
     let all = 0..street.frames().len();
-    let poses: Vec<_> = all.clone().filter_map(|frame| street.pose(frame)).collect();
-    let times_s: Vec<_> = all
-        .clone()
-        .filter_map(|frame| street.time_s(frame))
-        .collect();
-    writer.calibration(&street.intrinsics(0))?;
-    writer.poses(&poses, &times_s)?;
+    let drive = Drive {
+        intrinsics: street.intrinsics(0),
+        names: street.frames().to_vec(),
+        poses: all.clone().filter_map(|frame| street.pose(frame)).collect(),
+        times_s: all
+            .clone()
+            .filter_map(|frame| street.time_s(frame))
+            .collect(),
+        written: all.clone().step_by(every).collect(),
+        scanner: Street::scanner_position(),
+    };
+    let writer = (layout.create)(root, name, drive)?;
     let traversal = street.traversal();
-    all.into_par_iter().step_by(every).try_for_each(|frame| {
-        let scan = traversal.cloud(frame).into_iter();
-        writer.frame(
-            &street.frames()[frame],
-            &traversal.image(frame),
-            scan.map(|point| (point.position, point.reflectance)),
-        )?;
+    all.into_par_iter().step_by(every).try_for_each(|index| {
+        let scan = traversal.cloud(index).into_iter();
+        let scan: Vec<_> = scan
+            .map(|point| (point.position, point.reflectance))
+            .collect();
+        writer.frame(&Shot {
+            index,
+            photo: &traversal.image(index),
+            scan: &scan,
+            depth: &|pixel| traversal.depth(index, pixel),
+        })?;
         tick();
-        Ok(())
-    })
+        Ok::<(), CliError>(())
+    })?;
+    Ok(writer.finish()?)
 }

@@ -1,16 +1,15 @@
 //! KITTI odometry: `image_0|image_2`, `velodyne`, `calib.txt`, `times.txt`, and the poses in
 //! `../../poses/NN.txt` or in `poses.txt` beside the images.
 
-mod writer;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, Vector3};
+use nalgebra::{Matrix3x4, Point3, Vector3};
 
-pub use writer::SequenceWriter;
-
-use super::{Entry, Scene, SceneError};
+use super::file_scene::folder_name;
+use super::kitti_format::{read_scan, split_projection};
+use super::lines::{numbers, read_text};
+use super::{Entry, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, matrix_from_pose, pose_from_matrix};
@@ -76,24 +75,13 @@ impl KittiOdometry {
         };
         let images = folder.join(camera);
         let frames = frame_names(&images)?;
-        let (width, height) = {
-            let first = images.join(format!("{}.png", frames[0]));
-            image::image_dimensions(&first).map_err(|source| SceneError::Image {
-                path: first,
-                source,
-            })?
-        };
+        let size = photo_file::dimensions(&images.join(format!("{}.png", frames[0])))?;
         let calibration = Calibration::read(&folder.join("calib.txt"))?;
         let projection = calibration.projection(&camera.replace("image_", "P"))?;
         let (intrinsics, camera_from_camera0) =
-            split_projection(&projection, width, height, &calibration.path)?;
+            split_projection(&projection, size, &calibration.path)?;
 
-        let sequence = folder
-            .canonicalize()
-            .unwrap_or_else(|_| folder.to_owned())
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned())
-            .unwrap_or_default();
+        let sequence = folder_name(folder);
         let last_frame = frame_number(&frames[frames.len() - 1]);
         let poses = read_poses(folder, &sequence, last_frame)?;
         let times_s = read_times(&folder.join("times.txt"), last_frame)?;
@@ -165,27 +153,7 @@ impl Scene for KittiOdometry {
     }
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let path = self.photo_path(frame);
-        let photo = Photo::read(&path).map_err(|source| SceneError::Image {
-            path: path.clone(),
-            source,
-        })?;
-        let (width, height) = photo.dimensions();
-        let Intrinsics {
-            width: expected_width,
-            height: expected_height,
-            ..
-        } = self.intrinsics(frame);
-        if (width, height) != (expected_width, expected_height) {
-            return Err(SceneError::Content {
-                path,
-                expected: format!(
-                    "{expected_width}x{expected_height} pixels expected as in the first image, \
-                     {width}x{height} found"
-                ),
-            });
-        }
-        Ok(photo)
+        photo_file::read(&self.photo_path(frame), &self.intrinsics(frame))
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
@@ -214,7 +182,9 @@ impl Scene for KittiOdometry {
                 Vector3::zeros(),
                 self.camera_from_camera0.translation.vector,
             ]);
-        read_scan(&path, &camera_from_velodyne)
+        read_scan(&path, |point| {
+            Point3::from(camera_from_velodyne * point.to_homogeneous())
+        })
     }
 
     /// With the sizes of the files: photos of the same size in bytes are hardly ever different ones,
@@ -298,39 +268,6 @@ impl Calibration {
     }
 }
 
-/// P = K [I | t]: the intrinsics and the transform from camera 0.
-fn split_projection(
-    projection: &Matrix3x4<f64>,
-    width: u32,
-    height: u32,
-    path: &Path,
-) -> Result<(Intrinsics, Pose), SceneError> {
-    let k: Matrix3<f64> = projection.fixed_columns::<3>(0).into_owned();
-    let inverse = k
-        .try_inverse()
-        .filter(|_| k[(0, 0)] > 0.0 && k[(1, 1)] > 0.0);
-    let Some(inverse) = inverse else {
-        return Err(SceneError::Content {
-            path: path.to_owned(),
-            expected: "a projection matrix with positive focal lengths expected".to_owned(),
-        });
-    };
-    let intrinsics = Intrinsics {
-        fx: k[(0, 0)],
-        fy: k[(1, 1)],
-        cx: k[(0, 2)],
-        cy: k[(1, 2)],
-        width,
-        height,
-    };
-    let translation: Vector3<f64> = inverse * projection.column(3);
-    let camera_from_camera0 = Pose::from_parts(
-        Translation3::from(translation),
-        nalgebra::UnitQuaternion::identity(),
-    );
-    Ok((intrinsics, camera_from_camera0))
-}
-
 /// Poses by frame number; none where the sequence has no pose file.
 fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Vec<Pose>, SceneError> {
     let candidates = [
@@ -395,72 +332,5 @@ fn expect_rows(found: usize, last: usize, path: &Path, what: &str) -> Result<(),
 
 /// Twelve numbers, row by row.
 fn parse_matrix(text: &str) -> Result<Matrix3x4<f64>, String> {
-    let mut numbers = Vec::with_capacity(12);
-    for word in text.split_whitespace() {
-        let number: f64 = word
-            .parse()
-            .map_err(|_| format!("a number expected, `{word}` found"))?;
-        numbers.push(number);
-    }
-    if numbers.len() != 12 {
-        return Err(format!("12 numbers expected, {} found", numbers.len()));
-    }
-    if !numbers.iter().all(|number| number.is_finite()) {
-        return Err("finite numbers expected".to_owned());
-    }
-    Ok(Matrix3x4::from_row_slice(&numbers))
-}
-
-/// A scan: little-endian `f32` x, y, z, reflectance.
-fn read_scan(path: &Path, camera_from_velodyne: &Matrix3x4<f64>) -> Result<Cloud, SceneError> {
-    const BYTES_PER_POINT: usize = 16;
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
-    let content = |expected| SceneError::Content {
-        path: path.to_owned(),
-        expected,
-    };
-    if bytes.is_empty() {
-        return Err(content("points expected, the scan is empty".to_owned()));
-    }
-    if bytes.len() % BYTES_PER_POINT != 0 {
-        return Err(content(format!(
-            "whole points of {BYTES_PER_POINT} bytes expected, {} bytes found; the file is cut off",
-            bytes.len()
-        )));
-    }
-    let mut points = Vec::with_capacity(bytes.len() / BYTES_PER_POINT);
-    for (index, record) in bytes.chunks_exact(BYTES_PER_POINT).enumerate() {
-        let coordinate = |axis: usize| {
-            let at = 4 * axis;
-            f64::from(f32::from_le_bytes([
-                record[at],
-                record[at + 1],
-                record[at + 2],
-                record[at + 3],
-            ]))
-        };
-        let point = Point3::new(coordinate(0), coordinate(1), coordinate(2));
-        if !point.iter().all(|value| value.is_finite()) {
-            return Err(content(format!(
-                "finite coordinates expected, point {index} (byte {}) is {}, {}, {}",
-                index * BYTES_PER_POINT,
-                point.x,
-                point.y,
-                point.z
-            )));
-        }
-        let in_camera = camera_from_velodyne * point.to_homogeneous();
-        points.push(Point3::from(in_camera).cast());
-    }
-    Ok(Cloud { points })
-}
-
-fn read_text(path: &Path) -> Result<String, SceneError> {
-    std::fs::read_to_string(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    numbers::<12>(text).map(|numbers| Matrix3x4::from_row_slice(&numbers))
 }

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod binary;
+mod colmap;
 mod command_line;
 mod conformance;
 mod data;
@@ -11,6 +12,7 @@ mod evaluation;
 mod frame_cache;
 mod imports;
 mod kitti;
+mod kitti_raw;
 mod looks;
 mod memory;
 mod own_cost;
@@ -20,7 +22,11 @@ mod real_pair;
 mod recording;
 mod reference_views;
 mod retrieval;
+mod rgbd;
 mod robust_pose;
+mod round_trips;
+mod scene_formats;
+mod scene_toml;
 mod search_views;
 mod session;
 mod small_sequence;

@@ -557,11 +557,11 @@ fn a_session_keeps_the_format_and_the_index() {
     assert_eq!(index, Some("an.index"));
     // A format that does not fit is refused as it would be on the command line.
     let saved = std::fs::read_to_string(&path).expect("saved");
-    std::fs::write(&path, saved.replace("\"kitti\"", "\"colmap\"")).expect("writable");
+    std::fs::write(&path, saved.replace("\"kitti\"", "\"rosbag\"")).expect("writable");
     here.state_mut().send(Command::RestoreSession(path));
     here.step();
     here.step();
-    assert!(is_said(&here, "colmap"));
+    assert!(is_said(&here, "rosbag"));
 }
 
 #[test]

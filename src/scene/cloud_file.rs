@@ -1,0 +1,110 @@
+//! Clouds of other programs: PLY, PCD, LAS, LAZ and XYZ text, told apart by their content.
+//!
+//! No count in a header is believed before it is compared with the size of the file.
+
+mod las;
+mod pcd;
+mod ply;
+mod xyz;
+
+use std::fs::File;
+use std::io::{BufReader, Read as _};
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+
+use super::SceneError;
+
+/// As many points as a cloud may have: 1.2 GB of them.
+pub(super) const MOST_POINTS: usize = 100_000_000;
+
+/// A cloud in the frame that its file speaks of, which may be that of a map.
+///
+/// Map coordinates do not fit `f32`: the points are relative to a local origin, which is subtracted
+/// when they are read.
+#[derive(Debug, Default)]
+pub(super) struct MapCloud {
+    /// The local origin \[m\].
+    pub origin: Vector3<f64>,
+    /// The points from there \[m\].
+    pub points: Vec<Point3<f32>>,
+}
+
+impl MapCloud {
+    /// Adds a point \[m\]. One without finite coordinates stands for a beam that did not return, and
+    /// is left out; the first point's whole metres are the local origin.
+    fn add(&mut self, [x, y, z]: [f64; 3]) -> Result<(), String> {
+        let point = Vector3::new(x, y, z);
+        if !point.iter().all(|coordinate| coordinate.is_finite()) {
+            return Ok(());
+        }
+        if self.points.is_empty() {
+            self.origin = point.map(f64::round);
+        }
+        if self.points.len() == MOST_POINTS {
+            return Err(format!("at most {MOST_POINTS} points expected"));
+        }
+        self.points.push(Point3::from(point - self.origin).cast());
+        Ok(())
+    }
+
+    /// The points in the frame that their file speaks of \[m\].
+    pub fn positions(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
+        let from_origin = |point: &Point3<f32>| point.cast::<f64>() + self.origin;
+        self.points.iter().map(from_origin)
+    }
+}
+
+/// Reads a cloud, whatever format it has.
+pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
+    let io = |source| SceneError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let mut start = Vec::new();
+    let file = File::open(path).map_err(io)?;
+    let size = file.metadata().map_err(io)?.len();
+    BufReader::new(file)
+        .take(4096)
+        .read_to_end(&mut start)
+        .map_err(io)?;
+    let read = if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
+        ply::read
+    } else if start.starts_with(b"LASF") {
+        las::read
+    } else if pcd::is_pcd(&start) {
+        pcd::read
+    } else if start.contains(&0) {
+        return Err(content(
+            path,
+            "a cloud as PLY, PCD, LAS, LAZ or XYZ text expected",
+        ));
+    } else {
+        return xyz::read(path);
+    };
+    let cloud = read(path, size).map_err(|expected| content(path, &expected))?;
+    if cloud.points.is_empty() {
+        return Err(content(path, "points expected, the cloud has none"));
+    }
+    Ok(cloud)
+}
+
+fn content(path: &Path, expected: &str) -> SceneError {
+    // Some libraries say it in several lines.
+    let lines: Vec<&str> = expected.split_whitespace().collect();
+    SceneError::Content {
+        path: path.to_owned(),
+        expected: super::lines::excerpt_of(&lines.join(" "), 200),
+    }
+}
+
+/// Says that a header promises more than the file can hold.
+fn expect_room(points: u64, least_bytes: u64, size: u64) -> Result<(), String> {
+    if points > size / least_bytes.max(1) {
+        return Err(format!(
+            "{points} points of at least {least_bytes} bytes expected, but the file has only {size} \
+             bytes; it is cut off or damaged"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! Models as text: `cameras.txt`, `images.txt`, `points3D.txt`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::super::SceneError;
+use super::super::lines::{Line, TextFile};
+use super::camera::ModelCamera;
+use super::model::{Model, ModelImage, Points};
+
+/// Reads the model in a folder.
+pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
+    let cameras = TextFile::read(&folder.join("cameras.txt"))?
+        .lines()
+        .map(camera)
+        .collect::<Result<BTreeMap<_, _>, _>>()?;
+    let points = points(&folder.join("points3D.txt"))?;
+    let images = images(&folder.join("images.txt"), &points)?;
+    Ok(Model {
+        cameras,
+        images,
+        points: points.into_positions(),
+    })
+}
+
+/// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`
+fn camera(line: Line<'_>) -> Result<(u32, ModelCamera), SceneError> {
+    let words: Vec<&str> = line.words().collect();
+    let [id, model, width, height, parameters @ ..] = words.as_slice() else {
+        return Err(line.error("a line `id model width height parameters` expected"));
+    };
+    let size = (whole(&line, width)?, whole(&line, height)?);
+    let parameters = parameters
+        .iter()
+        .map(|word| line.number(word))
+        .collect::<Result<Vec<_>, _>>()?;
+    let camera = ModelCamera::new(model, size, &parameters).map_err(|why| line.error(why))?;
+    Ok((whole(&line, id)?, camera))
+}
+
+/// `POINT3D_ID X Y Z R G B ERROR TRACK…`; a model without points has no such file.
+fn points(path: &Path) -> Result<Points, SceneError> {
+    let mut points = Points::default();
+    if !path.is_file() {
+        return Ok(points);
+    }
+    for line in TextFile::read(path)?.lines() {
+        let mut words = line.words();
+        let mut next = || {
+            words
+                .next()
+                .ok_or_else(|| line.error("a line `id x y z …` expected, it is cut off"))
+        };
+        let id = whole(&line, next()?)?;
+        let position = [
+            line.number(next()?)?,
+            line.number(next()?)?,
+            line.number(next()?)?,
+        ];
+        points.add(id, position);
+    }
+    Ok(points)
+}
+
+/// Two lines for each image: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` of
+/// each of its features, which may be none.
+fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
+    let file = TextFile::read(path)?;
+    let mut images = Vec::new();
+    let mut lines = file.all_lines();
+    while let Some(line) = lines.next() {
+        if line.text.is_empty() || line.text.starts_with('#') {
+            continue;
+        }
+        let mut image = image(line)?;
+        if let Some(features) = lines.next() {
+            image.observed = observed(features, points)?;
+        }
+        images.push(image);
+    }
+    if images.is_empty() {
+        return Err(file.error("images expected, none found"));
+    }
+    Ok(images)
+}
+
+fn image(line: Line<'_>) -> Result<ModelImage, SceneError> {
+    let mut rest = line.text;
+    let mut next = || {
+        let (word, after) = rest.split_once(char::is_whitespace).ok_or_else(|| {
+            line.error("a line `id qw qx qy qz tx ty tz camera name` expected, it is cut off")
+        })?;
+        rest = after.trim_start();
+        Ok::<&str, SceneError>(word)
+    };
+    let _id: u32 = whole(&line, next()?)?;
+    let mut numbers = [0.0; 7];
+    for number in &mut numbers {
+        *number = line.number(next()?)?;
+    }
+    let camera = whole(&line, next()?)?;
+    let [qw, qx, qy, qz, x, y, z] = numbers;
+    Ok(ModelImage {
+        name: rest.to_owned(),
+        camera,
+        camera_from_world: line.pose([x, y, z], [qx, qy, qz, qw])?,
+        observed: Vec::new(),
+    })
+}
+
+/// The points that features were matched to; −1 stands for none.
+fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
+    let words = line.words().collect::<Vec<_>>();
+    if words.len() % 3 != 0 {
+        return Err(line.error(format!(
+            "features `x y point` expected, {} numbers found",
+            words.len()
+        )));
+    }
+    let ids = words.chunks_exact(3).map(|feature| feature[2]);
+    ids.filter(|id| *id != "-1")
+        .map(|id| {
+            let id = whole(&line, id)?;
+            points
+                .find(id)
+                .ok_or_else(|| line.error(format!("points of points3D expected, {id} found")))
+        })
+        .collect()
+}
+
+fn whole<T: std::str::FromStr>(line: &Line<'_>, word: &str) -> Result<T, SceneError> {
+    word.parse().map_err(|_| {
+        line.error(format!(
+            "a whole number expected, `{}` found",
+            super::super::lines::excerpt(word)
+        ))
+    })
+}

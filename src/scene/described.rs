@@ -1,0 +1,393 @@
+//! `scene.toml`: anything else, described in a few lines.
+//!
+//! ```toml
+//! images = "photos/*.jpg"
+//! poses = "poses.txt"          # TUM (time tx ty tz qx qy qz qw) or KITTI (3 × 4 matrices)
+//! cloud = "map.laz"            # one for all, in the frame of the poses
+//!
+//! [camera]
+//! fx = 1200.5
+//! fy = 1200.5
+//! cx = 959.5                   # pixel centres at integers
+//! cy = 539.5
+//! ```
+//!
+//! All files are in the folder of `scene.toml` or below it.
+
+mod pattern;
+mod poses;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::Matrix3x4;
+use serde::Deserialize;
+use toml::Spanned;
+
+use self::poses::FramePoses;
+use super::cloud_file::{self, MapCloud};
+use super::file_scene::{Clouds, FileScene, Frame, folder_name};
+use super::lens::{Distortion, Lens};
+use super::{Entry, Scene, SceneError, lines, photo_file, view_crop};
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use crate::geometry::{Pose, pose_from_matrix};
+
+const FILE: &str = "scene.toml";
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "toml",
+    about: "anything else: a scene.toml, or the folder with it, that names images, poses, camera and \
+            cloud (PLY, PCD, LAS, LAZ, XYZ)",
+    recognizes: |argument| description_of(Path::new(argument)).is_file(),
+    open: |argument| open(&description_of(Path::new(argument))),
+};
+
+fn description_of(argument: &Path) -> PathBuf {
+    match argument.file_name() {
+        Some(name) if name == FILE => argument.to_owned(),
+        _ => argument.join(FILE),
+    }
+}
+
+/// What the file says.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Description {
+    /// What the scene is called in results; its folder otherwise.
+    name: Option<Spanned<String>>,
+    /// The photos: a path whose last part may have stars.
+    images: Spanned<String>,
+    /// The file with the poses, without which there are queries only.
+    poses: Option<Spanned<String>>,
+    /// What the poses are.
+    #[serde(default)]
+    pose: PoseMeaning,
+    camera: Spanned<CameraDescription>,
+    /// One cloud for all frames.
+    cloud: Option<Spanned<String>>,
+    /// A cloud per frame.
+    clouds: Option<CloudsDescription>,
+}
+
+/// Which way poses go.
+#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+enum PoseMeaning {
+    #[default]
+    WorldFromCamera,
+    CameraFromWorld,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraDescription {
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(default)]
+    k1: f64,
+    #[serde(default)]
+    k2: f64,
+    #[serde(default)]
+    p1: f64,
+    #[serde(default)]
+    p2: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CloudsDescription {
+    /// The clouds: a path whose last part has a star in the place of the image's name.
+    files: Spanned<String>,
+    /// The frame that they are in.
+    #[serde(default)]
+    frame: CloudFrame,
+    /// From the scanner's frame, a 3 × 4 matrix row by row.
+    camera_from_cloud: Option<Spanned<[f64; 12]>>,
+}
+
+/// Which frame the clouds of single frames are in.
+#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+enum CloudFrame {
+    #[default]
+    Camera,
+    World,
+}
+
+/// The file with its text, for errors that name a line.
+struct Source {
+    path: PathBuf,
+    text: String,
+}
+
+impl Source {
+    fn folder(&self) -> &Path {
+        match self.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    fn error_at(&self, at: usize, expected: &str) -> SceneError {
+        let before = &self.text.as_bytes()[..at.min(self.text.len())];
+        SceneError::Line {
+            path: self.path.clone(),
+            line: before.iter().filter(|byte| **byte == b'\n').count() + 1,
+            expected: expected.replace('\n', " "),
+        }
+    }
+
+    fn error<T>(&self, value: &Spanned<T>, expected: &str) -> SceneError {
+        self.error_at(value.span().start, expected)
+    }
+
+    /// The file of this name.
+    fn file(&self, name: &Spanned<String>) -> Result<PathBuf, SceneError> {
+        let path = photo_file::within(self.folder(), name.get_ref())
+            .map_err(|expected| self.error(name, &expected))?;
+        if !path.is_file() {
+            let expected = format!("a file expected, `{}` is none", path.display());
+            return Err(self.error(name, &expected));
+        }
+        Ok(path)
+    }
+
+    /// The files that a pattern names, in the order of their names.
+    fn files(&self, name: &Spanned<String>) -> Result<Vec<PathBuf>, SceneError> {
+        let pattern = photo_file::within(self.folder(), name.get_ref())
+            .map_err(|expected| self.error(name, &expected))?;
+        let files = pattern::files(&pattern).map_err(|source| SceneError::Io {
+            path: pattern.parent().unwrap_or(self.folder()).to_owned(),
+            source,
+        })?;
+        if files.is_empty() {
+            let expected = format!("files expected, `{}` names none", pattern.display());
+            return Err(self.error(name, &expected));
+        }
+        Ok(files)
+    }
+}
+
+fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
+    let source = Source {
+        path: path.to_owned(),
+        text: lines::read_text(path)?,
+    };
+    let description: Description = toml::from_str(&source.text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        source.error_at(at, error.message())
+    })?;
+    let photos = source.files(&description.images)?;
+    let (intrinsics, lens) = camera(&source, &description.camera, &photos[0])?;
+    let poses = match &description.poses {
+        Some(name) => poses::read(&source.file(name)?, &photos)?,
+        None => {
+            log::warn!(
+                "{}: no poses, so no frame can be a reference and nothing has an error",
+                path.display()
+            );
+            vec![FramePoses::default(); photos.len()]
+        }
+    };
+    let clouds = clouds(&source, &description, &photos)?;
+    let name = match &description.name {
+        Some(name) if !name.get_ref().trim().is_empty() => name.get_ref().clone(),
+        Some(name) => return Err(source.error(name, "a name expected, an empty one found")),
+        None => format!("toml/{}", folder_name(source.folder())),
+    };
+    let frames = photos
+        .into_iter()
+        .zip(poses)
+        .map(|(photo, FramePoses { pose, time_s })| Frame {
+            name: stem(&photo),
+            photo,
+            intrinsics,
+            lens: lens.clone(),
+            world_from_camera: match description.pose {
+                PoseMeaning::WorldFromCamera => pose,
+                PoseMeaning::CameraFromWorld => pose.map(|pose| pose.inverse()),
+            },
+            time_s,
+        })
+        .collect();
+    Ok(Box::new(FileScene::new(name, frames, clouds)))
+}
+
+/// The camera of all photos, as they are handed out.
+fn camera(
+    source: &Source,
+    described: &Spanned<CameraDescription>,
+    first: &Path,
+) -> Result<(Intrinsics, Option<Arc<Lens>>), SceneError> {
+    let (width, height) = photo_file::dimensions(first)?;
+    let camera = described.get_ref();
+    let taken = Intrinsics {
+        fx: camera.fx,
+        fy: camera.fy,
+        cx: camera.cx,
+        cy: camera.cy,
+        width,
+        height,
+    };
+    let is_length = |length: f64| length.is_finite() && length > 0.0;
+    if !is_length(camera.fx) || !is_length(camera.fy) || !(camera.cx + camera.cy).is_finite() {
+        let expected = "positive focal lengths fx, fy and a centre cx, cy expected";
+        return Err(source.error(described, expected));
+    }
+    let distortion = Distortion {
+        k1: camera.k1,
+        k2: camera.k2,
+        p1: camera.p1,
+        p2: camera.p2,
+    };
+    if distortion == Distortion::default() {
+        return Ok((taken, None));
+    }
+    let lens = Lens::new(taken, distortion).map_err(|why| source.error(described, &why))?;
+    Ok((lens.pinhole(), Some(Arc::new(lens))))
+}
+
+fn clouds(
+    source: &Source,
+    description: &Description,
+    photos: &[PathBuf],
+) -> Result<DescribedClouds, SceneError> {
+    let (place, clouds) = match (&description.cloud, &description.clouds) {
+        (Some(name), None) => {
+            let path = source.file(name)?;
+            (path, Place::Map(OnceLock::new()))
+        }
+        (None, Some(clouds)) => (source.path.clone(), per_frame(source, clouds, photos)?),
+        (None, None) => (
+            source.path.clone(),
+            Place::PerFrame(Vec::new(), InCamera::World),
+        ),
+        (Some(name), Some(_)) => {
+            return Err(source.error(name, "either `cloud` or `clouds` expected, both found"));
+        }
+    };
+    Ok(DescribedClouds { place, clouds })
+}
+
+fn per_frame(
+    source: &Source,
+    described: &CloudsDescription,
+    photos: &[PathBuf],
+) -> Result<Place, SceneError> {
+    let files = source.files(&described.files)?;
+    let of_photo = |photo: &PathBuf| files.iter().find(|file| stem(file) == stem(photo)).cloned();
+    let clouds: Vec<_> = photos.iter().map(of_photo).collect();
+    if clouds.iter().all(Option::is_none) {
+        return Err(source.error(
+            &described.files,
+            &format!(
+                "clouds named as their images are expected, such as `{}`; `{}` found",
+                stem(&photos[0]),
+                stem(&files[0])
+            ),
+        ));
+    }
+    let frame = match (described.frame, &described.camera_from_cloud) {
+        (CloudFrame::World, None) => InCamera::World,
+        (CloudFrame::World, Some(matrix)) => {
+            let expected = "either frame = \"world\" or camera_from_cloud expected, both found";
+            return Err(source.error(matrix, expected));
+        }
+        (CloudFrame::Camera, None) => InCamera::By(Pose::identity()),
+        (CloudFrame::Camera, Some(matrix)) => {
+            let pose = pose_from_matrix(&Matrix3x4::from_row_slice(matrix.get_ref()));
+            InCamera::By(pose.map_err(|error| source.error(matrix, &error.to_string()))?)
+        }
+    };
+    Ok(Place::PerFrame(clouds, frame))
+}
+
+/// What takes a frame's own cloud into the camera's frame.
+enum InCamera {
+    /// A fixed transform.
+    By(Pose),
+    /// The frame's pose, as the cloud is in the frame of the world.
+    World,
+}
+
+/// Where the clouds are.
+enum Place {
+    /// In one file for all, which is read when the first is asked for.
+    Map(OnceLock<MapCloud>),
+    /// In a file each.
+    PerFrame(Vec<Option<PathBuf>>, InCamera),
+}
+
+struct DescribedClouds {
+    /// The file of the map, or the one that names the clouds.
+    place: PathBuf,
+    clouds: Place,
+}
+
+impl Clouds for DescribedClouds {
+    fn has(&self, frame: usize) -> bool {
+        match &self.clouds {
+            Place::Map(_) => true,
+            Place::PerFrame(files, _) => files.get(frame).is_some_and(Option::is_some),
+        }
+    }
+
+    fn place(&self, frame: usize) -> &Path {
+        match &self.clouds {
+            Place::PerFrame(files, _) => files.get(frame).and_then(Option::as_deref),
+            Place::Map(_) => None,
+        }
+        .unwrap_or(&self.place)
+    }
+
+    fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
+        let path = self.place(index);
+        let world_from_camera = || {
+            frame.world_from_camera.ok_or_else(|| SceneError::Content {
+                path: path.to_owned(),
+                expected: format!(
+                    "a cloud in the frame of the world, but frame {} has no pose in it",
+                    frame.name
+                ),
+            })
+        };
+        match &self.clouds {
+            Place::Map(map) => {
+                let map = match map.get() {
+                    Some(map) => map,
+                    None => {
+                        let read = cloud_file::read(path)?;
+                        map.get_or_init(|| read)
+                    }
+                };
+                Ok(view_crop::in_view(
+                    map,
+                    &world_from_camera()?,
+                    &frame.intrinsics,
+                ))
+            }
+            Place::PerFrame(_, frame_of_cloud) => {
+                let camera_from_cloud = match frame_of_cloud {
+                    InCamera::By(camera_from_cloud) => *camera_from_cloud,
+                    InCamera::World => world_from_camera()?.inverse(),
+                };
+                let cloud = cloud_file::read(path)?;
+                let points = cloud.positions();
+                Ok(Cloud {
+                    points: points
+                        .map(|point| (camera_from_cloud * point).cast())
+                        .collect(),
+                })
+            }
+        }
+    }
+}
+
+/// What a file is called, without its folder and extension.
+fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}

@@ -1,0 +1,74 @@
+//! The calibration of a day: `calib_cam_to_cam.txt`, `calib_velo_to_cam.txt`, `calib_imu_to_velo.txt`.
+
+use std::path::Path;
+
+use nalgebra::Matrix3x4;
+
+use super::super::SceneError;
+use super::super::lines::TextFile;
+use crate::geometry::{Pose, pose_from_matrix};
+
+/// The file of the cameras.
+pub(super) const CAMERAS: &str = "calib_cam_to_cam.txt";
+const VELODYNE: &str = "calib_velo_to_cam.txt";
+const IMU: &str = "calib_imu_to_velo.txt";
+
+/// Where the sensors of a drive are, and one of its rectified cameras.
+pub(super) struct Calibration {
+    /// The size of the camera's rectified images \[px\].
+    pub size: (u32, u32),
+    /// From the rectified camera 0 to the camera's pixels.
+    pub projection: Matrix3x4<f64>,
+    /// The rectified camera 0 from the scanner.
+    pub camera0_from_velodyne: Pose,
+    /// The scanner from the IMU, whose axes are forward, left, up as well.
+    pub velodyne_from_imu: Pose,
+}
+
+impl Calibration {
+    /// Of a camera such as `image_02`, from the folder of its day.
+    pub fn read(day: &Path, camera: &str) -> Result<Self, SceneError> {
+        let number = camera.trim_start_matches("image_");
+        let cameras = TextFile::read(&day.join(CAMERAS))?;
+        let projection = labelled::<12>(&cameras, &format!("P_rect_{number}"))?;
+        let [width, height] = labelled::<2>(&cameras, &format!("S_rect_{number}"))?;
+        // The frame of all sensors is the rectified camera 0, whichever camera is read.
+        let rectified_from_camera0 = pose(&cameras, "R_rect_00", None)?;
+        let velodyne = TextFile::read(&day.join(VELODYNE))?;
+        let imu = TextFile::read(&day.join(IMU))?;
+        Ok(Self {
+            size: (width as u32, height as u32),
+            projection: Matrix3x4::from_row_slice(&projection),
+            camera0_from_velodyne: rectified_from_camera0 * pose(&velodyne, "R", Some("T"))?,
+            velodyne_from_imu: pose(&imu, "R", Some("T"))?,
+        })
+    }
+
+    /// The rectified camera 0 from the IMU.
+    pub fn camera0_from_imu(&self) -> Pose {
+        self.camera0_from_velodyne * self.velodyne_from_imu
+    }
+}
+
+/// The numbers of the line `LABEL: …`.
+fn labelled<const N: usize>(file: &TextFile, label: &str) -> Result<[f64; N], SceneError> {
+    for line in file.lines() {
+        if let Some((found, numbers)) = line.text.split_once(':')
+            && found.trim() == label
+        {
+            return super::super::lines::numbers(numbers).map_err(|why| line.error(why));
+        }
+    }
+    Err(file.error(format!("a line `{label}:` expected, none found")))
+}
+
+/// The transform of a rotation and perhaps a translation.
+fn pose(file: &TextFile, rotation: &str, translation: Option<&str>) -> Result<Pose, SceneError> {
+    let [a, b, c, d, e, f, g, h, i] = labelled::<9>(file, rotation)?;
+    let [x, y, z] = match translation {
+        Some(label) => labelled::<3>(file, label)?,
+        None => [0.0; 3],
+    };
+    let matrix = Matrix3x4::new(a, b, c, x, d, e, f, y, g, h, i, z);
+    pose_from_matrix(&matrix).map_err(|error| file.error(format!("`{rotation}:`: {error}")))
+}

@@ -1,0 +1,182 @@
+//! Writing a drive in the layout of a data set, for any program that reads it.
+//!
+//! A new layout is one file, its `mod` line and its entry in [`LAYOUTS`].
+
+mod colmap;
+mod described;
+mod kitti;
+mod kitti_raw;
+mod seven_scenes;
+mod tum;
+
+use std::fs;
+use std::path::Path;
+
+use image::{ImageBuffer, ImageFormat, Luma, RgbImage};
+use nalgebra::{Matrix3, Matrix3x4, Point2, Point3};
+use posescope_core::files::write_whole;
+
+use super::SceneError;
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+
+/// A drive: what is known of all its frames before any is made.
+pub struct Drive {
+    /// The camera of all photos.
+    pub intrinsics: Intrinsics,
+    /// The frames' names, which are their numbers.
+    pub names: Vec<String>,
+    /// `world_from_camera` of all frames, whether or not they are written.
+    pub poses: Vec<Pose>,
+    /// The times of all frames \[s\].
+    pub times_s: Vec<f64>,
+    /// The frames whose photos and clouds are written, by position.
+    pub written: Vec<usize>,
+    /// The position of the laser scanner in the camera's frame \[m\].
+    pub scanner: Point3<f64>,
+}
+
+/// A frame with all that a layout may want of it.
+pub struct Shot<'a> {
+    /// Its position in the drive.
+    pub index: usize,
+    /// The photo.
+    pub photo: &'a RgbImage,
+    /// The scan: positions in the camera's frame \[m\], and reflectances.
+    pub scan: &'a [(Point3<f32>, f32)],
+    /// The depth of the surface at a pixel \[m\]; none for the sky.
+    pub depth: &'a (dyn Fn(Point2<f64>) -> Option<f64> + Sync),
+}
+
+/// Writes the frames of one drive. Files are whole or not there; one that exists is replaced.
+pub trait DriveWriter: Send + Sync {
+    /// Writes a frame. Frames may come in any order, and at the same time.
+    ///
+    /// # Errors
+    /// [`SceneError::Io`] when the disk is full or a folder not writable, [`SceneError::Image`] when
+    /// an image cannot be encoded.
+    fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError>;
+
+    /// Writes what can only be written when all frames are known.
+    ///
+    /// # Errors
+    /// As for frames.
+    fn finish(&self) -> Result<(), SceneError> {
+        Ok(())
+    }
+}
+
+/// What writes a drive, or why nothing can.
+pub type CreateResult = Result<Box<dyn DriveWriter>, SceneError>;
+
+/// A layout's place in the registry.
+pub struct Layout {
+    /// The name of the scene format that reads it.
+    pub name: &'static str,
+    /// Where the drive of a name is, below the folder that everything is written to.
+    pub place: fn(&str) -> String,
+    /// Makes the folders of a drive of this name, and writes what is known of all frames.
+    pub create: fn(&Path, &str, Drive) -> CreateResult,
+}
+
+/// Every layout; the first is the default.
+pub const LAYOUTS: &[Layout] = &[
+    kitti::LAYOUT,
+    kitti_raw::LAYOUT,
+    tum::LAYOUT,
+    seven_scenes::LAYOUT,
+    colmap::LAYOUT,
+    described::LAYOUT,
+];
+
+/// The rotation from the axes of scanners and cars (x forward, y left, z up) to those of cameras.
+const CAMERA_FROM_VELODYNE: Matrix3<f64> =
+    Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+
+fn make_folder(folder: &Path) -> Result<(), SceneError> {
+    fs::create_dir_all(folder).map_err(io(folder))
+}
+
+/// Removes the files that an earlier drive has left: those whose name says that they are frames.
+fn remove_frames(folder: &Path, is_frame: impl Fn(&str) -> bool) -> Result<(), SceneError> {
+    for entry in fs::read_dir(folder).map_err(io(folder))? {
+        let path = entry.map_err(io(folder))?.path();
+        if path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .is_some_and(&is_frame)
+        {
+            fs::remove_file(&path).map_err(io(&path))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file is called by as many digits and this extension.
+fn is_numbered(name: &str, digits: usize, extension: &str) -> bool {
+    let number = name
+        .strip_suffix(extension)
+        .and_then(|name| name.strip_suffix('.'));
+    number.is_some_and(|number| {
+        number.len() == digits && number.bytes().all(|byte| byte.is_ascii_digit())
+    })
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
+    write_whole(path, bytes).map_err(io(path))
+}
+
+fn write_photo(path: &Path, photo: &RgbImage) -> Result<(), SceneError> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    let encoded = photo.write_to(&mut png, ImageFormat::Png);
+    encoded.map_err(|source| SceneError::Image {
+        path: path.to_owned(),
+        source,
+    })?;
+    write(path, png.get_ref())
+}
+
+/// Writes the depths of all pixels, a value of 1 being `unit_m`; 0 where there is none, or one that no
+/// value can say.
+fn write_depth(
+    path: &Path,
+    camera: &Intrinsics,
+    unit_m: f64,
+    depth: &(dyn Fn(Point2<f64>) -> Option<f64> + Sync),
+) -> Result<(), SceneError> {
+    let image: ImageBuffer<Luma<u16>, Vec<u16>> =
+        ImageBuffer::from_fn(camera.width, camera.height, |x, y| {
+            let depth_m = depth(Point2::new(f64::from(x), f64::from(y)));
+            let value = depth_m.map_or(0.0, |depth_m| (depth_m / unit_m).round());
+            Luma([if value < f64::from(u16::MAX) {
+                value as u16
+            } else {
+                0
+            }])
+        });
+    let mut png = std::io::Cursor::new(Vec::new());
+    let encoded = image.write_to(&mut png, ImageFormat::Png);
+    encoded.map_err(|source| SceneError::Image {
+        path: path.to_owned(),
+        source,
+    })?;
+    write(path, png.get_ref())
+}
+
+/// Numbers with as many digits as they need to be read as they were.
+fn joined<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> String {
+    let words = numbers.into_iter().map(|number| format!("{number:e}"));
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// Twelve numbers, row by row.
+fn row_by_row(matrix: &Matrix3x4<f64>) -> String {
+    joined(&matrix.transpose())
+}
+
+fn io(path: &Path) -> impl FnOnce(std::io::Error) -> SceneError + '_ {
+    |source| SceneError::Io {
+        path: path.to_owned(),
+        source,
+    }
+}

@@ -1,0 +1,106 @@
+//! A COLMAP model as text, in `NAME/sparse/0`, with its photos in `NAME/images`. The points are some of
+//! each frame's scan, which it alone observes.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use nalgebra::{Point2, Point3};
+
+use super::{Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_photo};
+use crate::camera::Intrinsics;
+use crate::scene::SceneError;
+
+pub(super) const LAYOUT: Layout = Layout {
+    name: "colmap",
+    place: str::to_owned,
+    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
+};
+
+/// How many points of a frame are written at most: a photo has some thousand features.
+const MOST_POINTS: usize = 2000;
+
+/// A pixel, and the point that is seen there in the world's frame \[m\].
+type Observation = (Point2<f64>, Point3<f64>);
+
+struct Writer {
+    folder: PathBuf,
+    drive: Drive,
+    /// What each written frame observes.
+    observed: Mutex<BTreeMap<usize, Vec<Observation>>>,
+}
+
+impl Writer {
+    fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
+        let folder = root.join(name);
+        make_folder(&folder.join("images"))?;
+        make_folder(&folder.join("sparse/0"))?;
+        Ok(Self {
+            folder,
+            drive,
+            observed: Mutex::default(),
+        })
+    }
+}
+
+impl DriveWriter for Writer {
+    fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
+        let camera = &self.drive.intrinsics;
+        let world_from_camera = self.drive.poses[shot.index];
+        let in_view: Vec<_> = shot
+            .scan
+            .iter()
+            .filter_map(|(position, _)| {
+                let position: Point3<f64> = position.cast();
+                let pixel = camera
+                    .project(&position)
+                    .filter(|pixel| camera.contains(pixel))?;
+                Some((pixel, world_from_camera * position))
+            })
+            .collect();
+        let step = in_view.len().div_ceil(MOST_POINTS).max(1);
+        let some = in_view.into_iter().step_by(step).collect();
+        let mut observed = self.observed.lock().unwrap_or_else(PoisonError::into_inner);
+        observed.insert(shot.index, some);
+        drop(observed);
+        let name = &self.drive.names[shot.index];
+        write_photo(&self.folder.join(format!("images/{name}.png")), shot.photo)
+    }
+
+    fn finish(&self) -> Result<(), SceneError> {
+        let Intrinsics {
+            fx,
+            fy,
+            cx,
+            cy,
+            width,
+            height,
+        } = self.drive.intrinsics;
+        let parameters = joined(&[fx, fy, cx + 0.5, cy + 0.5]);
+        let cameras = format!("1 PINHOLE {width} {height} {parameters}\n");
+        let (mut images, mut points) = (String::new(), String::new());
+        let observed = self.observed.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut id = 0;
+        for (&frame, seen) in observed.iter() {
+            let image = frame + 1;
+            let pose = self.drive.poses[frame].inverse();
+            let [x, y, z, w] = pose.rotation.coords.into();
+            let rotation = joined(&[w, x, y, z]);
+            let position = joined(pose.translation.vector.iter());
+            let name = &self.drive.names[frame];
+            let _ = writeln!(images, "{image} {rotation} {position} 1 {name}.png");
+            for (feature, (pixel, point)) in seen.iter().enumerate() {
+                id += 1;
+                let _ = write!(images, "{} {} {id} ", pixel.x + 0.5, pixel.y + 0.5);
+                let point = joined(point.iter());
+                let _ = writeln!(points, "{id} {point} 0 0 0 0 {image} {feature}");
+            }
+            images.push('\n');
+        }
+        let model = self.folder.join("sparse/0");
+        write(&model.join("points3D.txt"), points.as_bytes())?;
+        write(&model.join("images.txt"), images.as_bytes())?;
+        write(&model.join("cameras.txt"), cameras.as_bytes())
+    }
+}

@@ -1,0 +1,249 @@
+//! Text files of numbers, line by line, with errors that name file and line.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix3x4, Quaternion, Translation3, UnitQuaternion};
+
+use super::SceneError;
+use crate::geometry::{Pose, pose_from_matrix};
+
+/// A text file in memory.
+pub(super) struct TextFile {
+    path: PathBuf,
+    text: String,
+}
+
+/// A line of a [`TextFile`] that says something.
+#[derive(Clone, Copy)]
+pub(super) struct Line<'a> {
+    path: &'a Path,
+    /// Counted from 1.
+    number: usize,
+    /// Without white space at both ends.
+    pub text: &'a str,
+}
+
+impl TextFile {
+    /// Reads a file as a whole.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        Ok(Self {
+            path: path.to_owned(),
+            text: read_text(path)?,
+        })
+    }
+
+    /// The lines that are neither empty nor comments (`#`).
+    pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
+        let is_said = |line: &Line<'_>| !line.text.is_empty() && !line.text.starts_with('#');
+        self.all_lines().filter(is_said)
+    }
+
+    /// All lines, the empty ones and comments too.
+    pub fn all_lines(&self) -> impl Iterator<Item = Line<'_>> {
+        let lines = self.text.lines().enumerate();
+        lines.map(|(index, text)| Line {
+            path: &self.path,
+            number: index + 1,
+            text: text.trim(),
+        })
+    }
+
+    /// An error about the file as a whole.
+    pub fn error(&self, expected: impl Into<String>) -> SceneError {
+        SceneError::Content {
+            path: self.path.clone(),
+            expected: expected.into(),
+        }
+    }
+
+    /// The first `ROWS` lines as rows of numbers, such as a matrix that is a file of its own.
+    pub fn rows<const ROWS: usize, const COLUMNS: usize>(
+        &self,
+    ) -> Result<[[f64; COLUMNS]; ROWS], SceneError> {
+        let mut rows = [[0.0; COLUMNS]; ROWS];
+        let mut lines = self.lines();
+        for (found, row) in rows.iter_mut().enumerate() {
+            let line = lines.next().ok_or_else(|| {
+                self.error(format!(
+                    "{ROWS} lines of {COLUMNS} numbers expected, {found} found"
+                ))
+            })?;
+            *row = line.numbers()?;
+        }
+        Ok(rows)
+    }
+}
+
+impl<'a> Line<'a> {
+    /// An error at this line.
+    pub fn error(&self, expected: impl Into<String>) -> SceneError {
+        SceneError::Line {
+            path: self.path.to_owned(),
+            line: self.number,
+            expected: expected.into(),
+        }
+    }
+
+    /// The words between white space or commas.
+    pub fn words(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        words(self.text)
+    }
+
+    /// As many finite numbers as are asked for, and nothing else.
+    pub fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
+        numbers(self.text).map_err(|expected| self.error(expected))
+    }
+
+    /// A single finite number.
+    pub fn number(&self, word: &str) -> Result<f64, SceneError> {
+        number(word).map_err(|expected| self.error(expected))
+    }
+
+    /// The pose that twelve numbers are, a 3 × 4 matrix row by row.
+    pub fn matrix_pose(&self) -> Result<Pose, SceneError> {
+        let matrix = Matrix3x4::from_row_slice(&self.numbers::<12>()?);
+        pose_from_matrix(&matrix).map_err(|error| self.error(error.to_string()))
+    }
+
+    /// The pose of a position and a quaternion, whose parts are in the order x y z w.
+    pub fn pose(&self, position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, SceneError> {
+        pose(position, quaternion).map_err(|expected| self.error(expected))
+    }
+}
+
+/// The pose of a position and a quaternion, whose parts are in the order x y z w.
+pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, String> {
+    let [x, y, z, w] = quaternion;
+    let quaternion = Quaternion::new(w, x, y, z);
+    let length = quaternion.norm();
+    // Files carry a few decimals; more than that away from length 1 is another convention.
+    if !position.iter().all(|part| part.is_finite()) {
+        return Err(format!("a finite position expected, {position:?} found"));
+    }
+    if !length.is_finite() || (length - 1.0).abs() > 0.02 {
+        return Err(format!(
+            "a quaternion of length 1 expected, {x} {y} {z} {w} (x y z w) has length {length:.3}"
+        ));
+    }
+    Ok(Pose::from_parts(
+        Translation3::from(position),
+        UnitQuaternion::from_quaternion(quaternion),
+    ))
+}
+
+/// The words of a line between white space or commas.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| c.is_whitespace() || c == ',')
+        .filter(|word| !word.is_empty())
+}
+
+/// As many finite numbers as are asked for, and nothing else.
+pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let mut numbers = [0.0; N];
+    let mut count = 0;
+    for word in words(text) {
+        let number = number(word)?;
+        if let Some(place) = numbers.get_mut(count) {
+            *place = number;
+        }
+        count += 1;
+    }
+    if count != N {
+        return Err(format!("{N} numbers expected, {count} found"));
+    }
+    Ok(numbers)
+}
+
+fn number(word: &str) -> Result<f64, String> {
+    let number: f64 = word
+        .parse()
+        .map_err(|_| format!("a number expected, `{}` found", excerpt(word)))?;
+    if !number.is_finite() {
+        return Err(format!("finite numbers expected, `{word}` found"));
+    }
+    Ok(number)
+}
+
+/// As much of a word as fits an error: a binary file that is read as text has long ones.
+pub(super) fn excerpt(word: &str) -> String {
+    excerpt_of(word, 40)
+}
+
+/// The first characters of a text, without any that a terminal would obey.
+pub(super) fn excerpt_of(text: &str, most: usize) -> String {
+    let printable = |c: char| if c.is_control() { '\u{fffd}' } else { c };
+    let short: String = text.chars().take(most).map(printable).collect();
+    if text.chars().nth(most).is_some() {
+        short + "…"
+    } else {
+        short
+    }
+}
+
+/// The text of a file.
+pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
+    std::fs::read_to_string(path).map_err(|source| SceneError::Io {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(text: &str) -> TextFile {
+        TextFile {
+            path: "a.txt".into(),
+            text: text.to_owned(),
+        }
+    }
+
+    fn said<T>(result: Result<T, SceneError>) -> Result<T, String> {
+        result.map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn lines_are_counted_with_those_that_say_nothing() {
+        let file = file("# a comment\n\n 1 2,3\nx 1 2\n4 5\n1 nan 2\n");
+        let read: Vec<_> = file.lines().map(|line| said(line.numbers::<3>())).collect();
+        assert_eq!(read[0], Ok([1.0, 2.0, 3.0]));
+        let errors: Vec<_> = read[1..].iter().flat_map(|r| r.as_ref().err()).collect();
+        assert_eq!(
+            errors,
+            [
+                "a.txt:4: a number expected, `x` found",
+                "a.txt:5: 3 numbers expected, 2 found",
+                "a.txt:6: finite numbers expected, `nan` found",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_matrix_in_a_file_of_its_own_needs_all_its_rows() {
+        let whole = file("1 2\n\n3 4\n5 6\n").rows::<2, 2>();
+        assert_eq!(said(whole), Ok([[1.0, 2.0], [3.0, 4.0]]));
+        let short = file("1 2\n").rows::<2, 2>();
+        let expected = "a.txt: 2 lines of 2 numbers expected, 1 found";
+        assert_eq!(said(short), Err(expected.to_owned()));
+    }
+
+    #[test]
+    fn a_quaternion_of_another_length_is_refused() {
+        let file = file("anything");
+        let line = file.lines().next().expect("one line");
+        let pose = said(line.pose([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8]));
+        let turned = pose.map(|pose| pose * nalgebra::Point3::new(1.0, 0.0, 0.0));
+        let distance = turned.map(|point| (point - nalgebra::Point3::new(1.28, 2.96, 3.0)).norm());
+        assert!(distance.is_ok_and(|distance| distance < 1e-9));
+        let error = said(line.pose([0.0; 3], [0.0, 0.0, 90.0, 0.0])).err();
+        assert!(error.is_some_and(|error| error.contains("length 90.000")));
+    }
+
+    #[test]
+    fn a_long_word_is_cut() {
+        assert_eq!(excerpt("short"), "short");
+        assert_eq!(excerpt(&"x".repeat(99)).chars().count(), 41);
+        assert_eq!(excerpt("\u{0}"), "\u{fffd}");
+    }
+}

@@ -1,0 +1,322 @@
+//! 7-Scenes: `frame-NNNNNN.color.png`, `.depth.png` and `.pose.txt` in the folders `seq-NN` of a
+//! scene, all in one world frame.
+//!
+//! As distributed, the data name no camera, and the depth images are those of the depth camera, whose
+//! frame the poses speak of. Its documented intrinsics hold then, and for the colour camera beside it
+//! the calibration of a Kinect that work on this data set commonly takes. A folder with a
+//! `camera-intrinsics.txt`, a 3 × 3 matrix, has depth images that are registered with the photos.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix3, Matrix4, Translation3, UnitQuaternion};
+
+use super::argument::split_word;
+use super::depth_image::{DepthCamera, DepthImages};
+use super::file_scene::{FileScene, Frame, folder_name};
+use super::lines::TextFile;
+use super::{Entry, Scene, SceneError, photo_file};
+use crate::camera::Intrinsics;
+use crate::geometry::{Pose, pose_from_matrix};
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "7scenes",
+    about: "7-Scenes: a scene's folder of seq-NN folders (with :train or :test, its split), or one \
+            seq-NN of it",
+    recognizes: |argument| {
+        let (folder, _) = split_word(argument, &SPLITS);
+        is_sequence(folder) || subfolders(folder).iter().any(|(_, path)| is_sequence(path))
+    },
+    open: |argument| {
+        let (folder, split) = split_word(argument, &SPLITS);
+        open(folder, split)
+    },
+};
+
+const SPLITS: [&str; 2] = ["train", "test"];
+
+/// What a depth value of 1 means \[m\].
+const UNIT_M: f64 = 0.001;
+const SIZE: (u32, u32) = (640, 480);
+/// Focal length of the depth camera, as documented \[px\].
+const DEPTH_FOCAL_LENGTH: f64 = 585.0;
+/// Focal length of the colour camera \[px\].
+const COLOR_FOCAL_LENGTH: f64 = 525.0;
+/// The principal point of both, as documented \[px\].
+const CENTER: (f64, f64) = (320.0, 240.0);
+
+/// The colour camera of a Kinect from its depth camera, rotation and translation \[m\]: the calibration
+/// of LIRIS.
+const COLOR_FROM_DEPTH: (Matrix3<f64>, [f64; 3]) = (
+    Matrix3::new(
+        0.99996518,
+        0.00267651,
+        -0.00790410, //
+        -0.00274093,
+        0.99996303,
+        -0.00815045, //
+        0.00788199,
+        0.00817183,
+        0.99993555,
+    ),
+    [-0.02555894, 0.00010110, 0.00203183],
+);
+
+/// A frame by its files, before they are read.
+struct FrameFiles {
+    name: String,
+    photo: PathBuf,
+    depth: Option<PathBuf>,
+    pose: PathBuf,
+}
+
+fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError> {
+    let (name, files) = listing(folder, split)?;
+    let size = photo_file::dimensions(&files[0].photo)?;
+    let cameras = Cameras::of(folder, size)?;
+    let mut unknown = 0;
+    let mut frames = Vec::with_capacity(files.len());
+    let mut depths = Vec::with_capacity(files.len());
+    for file in files {
+        let world_from_depth = read_pose(&file.pose)?;
+        unknown += usize::from(world_from_depth.is_none());
+        frames.push(Frame {
+            name: file.name,
+            photo: file.photo,
+            intrinsics: cameras.photo,
+            lens: None,
+            world_from_camera: world_from_depth
+                .map(|pose| pose * cameras.camera_from_posed.inverse()),
+            time_s: None,
+        });
+        depths.push(file.depth);
+    }
+    if unknown > 0 {
+        log::warn!(
+            "{}: {unknown} of {} frames have no pose",
+            folder.display(),
+            frames.len()
+        );
+    }
+    let clouds = DepthImages {
+        images: depths,
+        listed_in: folder.to_owned(),
+        camera: cameras.depth,
+        unit_m: UNIT_M,
+    };
+    Ok(Box::new(FileScene::new(name, frames, clouds)))
+}
+
+/// The scene's name and its frames in order. Frames of a single sequence are called by their numbers,
+/// those of several by sequence and number.
+fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<FrameFiles>), SceneError> {
+    if is_sequence(folder) {
+        let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let scene = scene.parent().map(folder_name).unwrap_or_default();
+        let name = format!("7scenes/{scene}/{}", folder_name(folder));
+        return Ok((name, frames_of(folder, "")?));
+    }
+    let mut sequences = subfolders(folder);
+    let mut name = format!("7scenes/{}", folder_name(folder));
+    if let Some(split) = split {
+        let wanted = read_split(folder, split)?;
+        sequences.retain(|(number, _)| wanted.contains(number));
+        name += &format!(":{split}");
+    }
+    let mut files = Vec::new();
+    for (number, path) in &sequences {
+        let prefix = match sequences.len() {
+            1 => String::new(),
+            _ => format!("seq-{number:02}-"),
+        };
+        files.extend(frames_of(path, &prefix)?);
+    }
+    if files.is_empty() {
+        return Err(SceneError::Content {
+            path: folder.to_owned(),
+            expected: "folders seq-NN with frames frame-NNNNNN.color.png expected, none found"
+                .to_owned(),
+        });
+    }
+    Ok((name, files))
+}
+
+/// The numbers of the sequences in `TrainSplit.txt` or `TestSplit.txt`, whose lines are `sequenceN`.
+fn read_split(folder: &Path, split: &str) -> Result<Vec<u32>, SceneError> {
+    let file = match split {
+        "train" => "TrainSplit.txt",
+        _ => "TestSplit.txt",
+    };
+    TextFile::read(&folder.join(file))?
+        .lines()
+        .map(|line| {
+            let number = line.text.strip_prefix("sequence").unwrap_or(line.text);
+            number
+                .trim()
+                .parse()
+                .map_err(|_| line.error("a line such as `sequence3` expected"))
+        })
+        .collect()
+}
+
+/// The folders `seq-NN` by their numbers.
+fn subfolders(folder: &Path) -> Vec<(u32, PathBuf)> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found: Vec<(u32, PathBuf)> = entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let number = name.to_str()?.strip_prefix("seq-")?.parse().ok()?;
+            entry.path().is_dir().then(|| (number, entry.path()))
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+/// The number of a frame and which of its files this is: `frame-000025.color.png` is `000025`, `color`.
+fn file_parts(name: &str) -> Option<(&str, &str, &str)> {
+    let (number, rest) = name.strip_prefix("frame-")?.split_once('.')?;
+    let (kind, extension) = rest.rsplit_once('.')?;
+    let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    is_number.then_some((number, kind, extension))
+}
+
+fn is_photo(name: &str) -> bool {
+    file_parts(name).is_some_and(|(_, kind, extension)| {
+        kind == "color" && ["png", "jpg", "jpeg"].contains(&extension)
+    })
+}
+
+fn is_sequence(folder: &Path) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.any(|entry| entry.file_name().to_str().is_some_and(is_photo))
+}
+
+/// The frames of a sequence in the order of their numbers.
+fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<FrameFiles>, SceneError> {
+    let io = |source| SceneError::Io {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let name = entry.map_err(io)?.file_name();
+        names.extend(
+            name.to_str()
+                .filter(|name| is_photo(name))
+                .map(str::to_owned),
+        );
+    }
+    // Where a photo is there in two formats, one of them is taken whatever order the system lists.
+    names.sort();
+    let mut by_number = BTreeMap::new();
+    for name in &names {
+        let Some((number, _, _)) = file_parts(name) else {
+            continue;
+        };
+        let depth = folder.join(format!("frame-{number}.depth.png"));
+        let frame = FrameFiles {
+            name: format!("{prefix}{number}"),
+            photo: folder.join(name),
+            depth: Some(depth).filter(|path| path.is_file()),
+            pose: folder.join(format!("frame-{number}.pose.txt")),
+        };
+        by_number.insert((number.len(), number), frame);
+    }
+    Ok(by_number.into_values().collect())
+}
+
+/// A 4 × 4 matrix, camera to world; `None` where there is no file, or where it is of numbers that are
+/// none, as trackers write them that have lost the camera.
+fn read_pose(path: &Path) -> Result<Option<Pose>, SceneError> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let file = TextFile::read(path)?;
+    let is_lost = |word: &str| word.parse().is_ok_and(|number: f64| !number.is_finite());
+    if file.lines().any(|line| line.words().any(is_lost)) {
+        return Ok(None);
+    }
+    let rows = file.rows::<4, 4>()?;
+    let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
+    let pose = pose_from_matrix(&matrix.fixed_rows::<3>(0).into_owned());
+    pose.map(Some)
+        .map_err(|error| file.error(error.to_string()))
+}
+
+/// The cameras of a scene.
+struct Cameras {
+    photo: Intrinsics,
+    /// The photos' camera from the one that the poses speak of.
+    camera_from_posed: Pose,
+    depth: DepthCamera,
+}
+
+impl Cameras {
+    /// Of the folder of a scene, or of a sequence in it.
+    fn of(folder: &Path, (width, height): (u32, u32)) -> Result<Self, SceneError> {
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let file = [Some(folder.as_path()), folder.parent()]
+            .into_iter()
+            .flatten()
+            .map(|folder| folder.join("camera-intrinsics.txt"))
+            .find(|path| path.is_file());
+        if let Some(path) = file {
+            return Ok(Self {
+                photo: read_intrinsics(&path, (width, height))?,
+                camera_from_posed: Pose::identity(),
+                depth: DepthCamera::Registered,
+            });
+        }
+        if (width, height) != SIZE {
+            return Err(SceneError::Content {
+                path: folder.join("camera-intrinsics.txt"),
+                expected: format!(
+                    "a 3x3 matrix expected, as the images have {width}x{height} pixels and the \
+                     default is for 640x480"
+                ),
+            });
+        }
+        log::info!(
+            "{}: no camera-intrinsics.txt; the documented depth camera and the usual colour camera \
+             of the data set hold",
+            folder.display()
+        );
+        let camera = |focal_length| Intrinsics {
+            fx: focal_length,
+            fy: focal_length,
+            cx: CENTER.0,
+            cy: CENTER.1,
+            width,
+            height,
+        };
+        let camera_from_depth = Pose::from_parts(
+            Translation3::from(COLOR_FROM_DEPTH.1),
+            UnitQuaternion::from_matrix(&COLOR_FROM_DEPTH.0),
+        );
+        Ok(Self {
+            photo: camera(COLOR_FOCAL_LENGTH),
+            camera_from_posed: camera_from_depth,
+            depth: DepthCamera::Beside {
+                intrinsics: camera(DEPTH_FOCAL_LENGTH),
+                camera_from_depth,
+            },
+        })
+    }
+}
+
+fn read_intrinsics(path: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, SceneError> {
+    let file = TextFile::read(path)?;
+    let [[fx, skew, cx], [zero, fy, cy], last] = file.rows::<3, 3>()?;
+    if fx <= 0.0 || fy <= 0.0 || skew != 0.0 || zero != 0.0 || last != [0.0, 0.0, 1.0] {
+        return Err(file.error("a matrix fx 0 cx, 0 fy cy, 0 0 1 expected"));
+    }
+    Ok(Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    })
+}

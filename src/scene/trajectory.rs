@@ -1,0 +1,153 @@
+//! Poses by time, as the TUM RGB-D benchmark writes them: `time tx ty tz qx qy qz qw`.
+
+use std::path::Path;
+
+use nalgebra::{Translation3, UnitQuaternion};
+
+use super::SceneError;
+use super::lines::{Line, TextFile};
+use crate::geometry::Pose;
+
+/// How far apart in time two measurements of the same moment may be \[s\]; that of the benchmark's
+/// own tool for association.
+pub(super) const SAME_MOMENT_S: f64 = 0.02;
+/// Times that are looked at for each: more than any camera takes in a moment, so that a file with one
+/// time in all lines is not compared line by line with another.
+const MOST_CANDIDATES: usize = 64;
+/// Between poses this far apart in time, what lies between is interpolated \[s\]. Motion capture
+/// gives a pose every 10 ms, a tracked camera every 33 ms.
+const INTERPOLATED_S: f64 = 0.1;
+
+/// Poses in the order of their times.
+pub(super) struct Trajectory {
+    samples: Vec<(f64, Pose)>,
+}
+
+impl Trajectory {
+    /// Reads a file of `time tx ty tz qx qy qz qw` lines, in any order.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let file = TextFile::read(path)?;
+        let mut samples = file.lines().map(sample).collect::<Result<Vec<_>, _>>()?;
+        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(Self { samples })
+    }
+
+    /// The pose at a time \[s\]: between two samples where they are close, otherwise that of the
+    /// moment if there is one.
+    pub fn at(&self, time_s: f64) -> Option<Pose> {
+        let after = self.samples.partition_point(|(time, _)| *time < time_s);
+        let next = self.samples.get(after);
+        let previous = after.checked_sub(1).and_then(|i| self.samples.get(i));
+        if let (Some(previous), Some(next)) = (previous, next)
+            && next.0 - previous.0 <= INTERPOLATED_S
+        {
+            let share = (time_s - previous.0) / (next.0 - previous.0);
+            return Some(between(&previous.1, &next.1, share));
+        }
+        let nearest = [previous, next]
+            .into_iter()
+            .flatten()
+            .map(|(time, pose)| ((time - time_s).abs(), pose))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (nearest.0 <= SAME_MOMENT_S).then_some(*nearest.1)
+    }
+
+    /// First and last time \[s\], unless there is no sample.
+    pub fn range(&self) -> Option<(f64, f64)> {
+        Some((self.samples.first()?.0, self.samples.last()?.0))
+    }
+}
+
+fn sample(line: Line<'_>) -> Result<(f64, Pose), SceneError> {
+    let [time, x, y, z, qx, qy, qz, qw] = line.numbers()?;
+    Ok((time, line.pose([x, y, z], [qx, qy, qz, qw])?))
+}
+
+/// The pose a share of the way from one to another.
+pub(super) fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let position = from.translation.vector.lerp(&to.translation.vector, share);
+    // Opposite rotations have no way between them that is the shortest; either will do.
+    let rotation: UnitQuaternion<f64> = from
+        .rotation
+        .try_slerp(&to.rotation, share, 1e-9)
+        .unwrap_or(from.rotation);
+    Pose::from_parts(Translation3::from(position), rotation)
+}
+
+/// Which times of `others` are those of `times`, as positions: the closest pairs first, none more than
+/// [`SAME_MOMENT_S`] apart, each time in one pair at most. Both are in ascending order.
+pub(super) fn associated(times: &[f64], others: &[f64]) -> Vec<Option<usize>> {
+    let mut pairs = Vec::new();
+    for (index, time) in times.iter().enumerate() {
+        let first = others.partition_point(|other| *other < time - SAME_MOMENT_S);
+        let near = others[first..].iter().enumerate();
+        let near = near
+            .take_while(|(_, other)| **other <= time + SAME_MOMENT_S)
+            .take(MOST_CANDIDATES);
+        pairs.extend(near.map(|(other, at)| ((at - time).abs(), index, first + other)));
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut found = vec![None; times.len()];
+    let mut taken = vec![false; others.len()];
+    for (_, index, other) in pairs {
+        if found[index].is_none() && !taken[other] {
+            found[index] = Some(other);
+            taken[other] = true;
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trajectory(times: &[f64]) -> Trajectory {
+        let sample = |&time: &f64| {
+            let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, time);
+            (
+                time,
+                Pose::from_parts(Translation3::new(10.0 * time, 0.0, 1.0), turn),
+            )
+        };
+        Trajectory {
+            samples: times.iter().map(sample).collect(),
+        }
+    }
+
+    #[test]
+    fn a_pose_between_two_is_interpolated_and_one_far_from_all_is_unknown() {
+        let trajectory = trajectory(&[0.0, 0.04, 1.0, 1.5]);
+        let at = |time| trajectory.at(time);
+        for time in [0.0, 0.01, 0.03, 0.04] {
+            let pose = at(time).expect("is between");
+            assert!((pose.translation.vector.x - 10.0 * time).abs() < 1e-12);
+            assert!((pose.rotation.angle() - time).abs() < 1e-12);
+        }
+        // Within 20 ms of a single sample, its own; farther away, none.
+        assert_eq!(at(1.019), at(1.0));
+        assert_eq!(at(-0.019), at(0.0));
+        assert!(at(1.03).is_none() && at(0.5).is_none() && at(1.6).is_none());
+    }
+
+    #[test]
+    fn no_sample_knows_no_pose() {
+        assert!(trajectory(&[]).at(0.0).is_none());
+        assert!(trajectory(&[]).range().is_none());
+    }
+
+    #[test]
+    fn each_time_is_paired_once_and_with_the_closest() {
+        // The second is closer to 0.095 than the first is, which then takes what is left.
+        let found = associated(&[0.085, 0.1, 0.2, 0.5], &[0.07, 0.095, 0.21]);
+        assert_eq!(found, [Some(0), Some(1), Some(2), None]);
+        let found = associated(&[0.1, 0.101], &[0.1]);
+        assert_eq!(found, [Some(0), None]);
+    }
+
+    #[test]
+    fn times_a_fiftieth_apart_are_no_longer_the_same() {
+        assert_eq!(associated(&[1.0], &[1.021]), [None]);
+        assert_eq!(associated(&[1.0], &[0.981]), [Some(0)]);
+    }
+}

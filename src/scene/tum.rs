@@ -1,0 +1,150 @@
+//! TUM RGB-D: `rgb.txt` and `depth.txt` list the images by time, `groundtruth.txt` the poses of the
+//! camera. Images of the same moment belong together.
+//!
+//! The layout names no camera. `calibration.txt` (`fx fy cx cy`, as ETH3D adds it) is one; without it
+//! the benchmark's own recommendation holds, the default calibration of its Kinect drivers, to which
+//! the depth images are registered.
+
+use std::path::{Path, PathBuf};
+
+use super::depth_image::{DepthCamera, DepthImages};
+use super::file_scene::{FileScene, Frame, folder_name};
+use super::lines::TextFile;
+use super::trajectory::{Trajectory, associated};
+use super::{Entry, Scene, SceneError, photo_file};
+use crate::camera::Intrinsics;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "tum",
+    about: "TUM RGB-D: a folder with rgb.txt, depth.txt and groundtruth.txt",
+    recognizes: |argument| {
+        let folder = Path::new(argument);
+        ["rgb.txt", "depth.txt"]
+            .iter()
+            .all(|list| folder.join(list).is_file())
+    },
+    open: |argument| open(Path::new(argument)),
+};
+
+/// What a depth value of 1 means \[m\].
+const UNIT_M: f64 = 1.0 / 5000.0;
+
+/// The default of the Kinect's drivers: fx, fy, cx, cy of 640 × 480 pixels, whose centres are at
+/// integers.
+const KINECT: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
+const KINECT_SIZE: (u32, u32) = (640, 480);
+
+/// Opens the folder of a sequence.
+fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
+    let photos = image_list(folder, "rgb.txt")?;
+    let depths = image_list(folder, "depth.txt")?;
+    let Some((_, first)) = photos.first() else {
+        return Err(SceneError::Content {
+            path: folder.join("rgb.txt"),
+            expected: "lines `time file` expected, none found".to_owned(),
+        });
+    };
+    let intrinsics = camera(folder, photo_file::dimensions(first)?)?;
+    let truth = folder.join("groundtruth.txt");
+    let trajectory = if truth.is_file() {
+        Some(Trajectory::read(&truth)?)
+    } else {
+        log::warn!(
+            "{}: no groundtruth.txt, so no frame can be a reference and nothing has an error",
+            folder.display()
+        );
+        None
+    };
+    let times = |list: &[(f64, PathBuf)]| list.iter().map(|(time, _)| *time).collect::<Vec<_>>();
+    let images = associated(&times(&photos), &times(&depths))
+        .into_iter()
+        .map(|depth| depth.map(|depth| depths[depth].1.clone()))
+        .collect();
+    let frames: Vec<Frame> = photos
+        .into_iter()
+        .map(|(time, photo)| Frame {
+            name: stem(&photo),
+            world_from_camera: trajectory.as_ref().and_then(|all| all.at(time)),
+            photo,
+            intrinsics,
+            lens: None,
+            time_s: Some(time),
+        })
+        .collect();
+    if let Some((first, last)) = trajectory.as_ref().and_then(Trajectory::range)
+        && frames.iter().all(|frame| frame.world_from_camera.is_none())
+    {
+        return Err(SceneError::Content {
+            path: truth,
+            expected: format!(
+                "poses at the times of rgb.txt expected, but these are between {first} and {last}"
+            ),
+        });
+    }
+    let name = format!("tum/{}", folder_name(folder));
+    let clouds = DepthImages {
+        images,
+        listed_in: folder.join("depth.txt"),
+        camera: DepthCamera::Registered,
+        unit_m: UNIT_M,
+    };
+    Ok(Box::new(FileScene::new(name, frames, clouds)))
+}
+
+/// The images of a list in the order of their times \[s\].
+fn image_list(folder: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>, SceneError> {
+    let file = TextFile::read(&folder.join(list))?;
+    let mut images = file
+        .lines()
+        .map(|line| {
+            let (time, name) = line
+                .text
+                .split_once(char::is_whitespace)
+                .ok_or_else(|| line.error("a line `time file` expected, one word found"))?;
+            let path = photo_file::within(folder, name.trim()).map_err(|why| line.error(why))?;
+            Ok((line.number(time)?, path))
+        })
+        .collect::<Result<Vec<_>, SceneError>>()?;
+    images.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(images)
+}
+
+/// The camera of the folder, whose images are of this size.
+fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, SceneError> {
+    let path = folder.join("calibration.txt");
+    let [fx, fy, cx, cy] = if path.is_file() {
+        let file = TextFile::read(&path)?;
+        let [camera] = file.rows::<1, 4>()?;
+        if camera[0] <= 0.0 || camera[1] <= 0.0 {
+            return Err(file.error("fx fy cx cy with positive focal lengths expected"));
+        }
+        camera
+    } else if (width, height) == KINECT_SIZE {
+        log::info!(
+            "{}: no calibration.txt; the Kinect's default holds, f = 525, centre 319.5, 239.5",
+            folder.display()
+        );
+        KINECT
+    } else {
+        return Err(SceneError::Content {
+            path,
+            expected: format!(
+                "a file with fx fy cx cy expected, as the images have {width}x{height} pixels \
+                 and the default is for 640x480"
+            ),
+        });
+    };
+    Ok(Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    })
+}
+
+fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}

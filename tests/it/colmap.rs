@@ -1,0 +1,404 @@
+//! The reader of COLMAP models, on a small one in both forms and on a real one.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use nalgebra::{Point2, Point3, Quaternion, UnitQuaternion, Vector3};
+use posescope::geometry::{Pose, PoseError};
+use posescope::localize::localize;
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::scene::{self, Scene};
+use tempfile::TempDir;
+
+use crate::data;
+use crate::small_sequence::wall;
+
+/// Which form a model is written in.
+#[derive(Clone, Copy, Debug)]
+pub enum Form {
+    Text,
+    Binary,
+}
+
+/// Id, model, its number, size, parameters.
+type Camera = (u32, &'static str, u32, [u64; 2], &'static [f64]);
+
+const CAMERAS: [Camera; 2] = [
+    (1, "PINHOLE", 1, [160, 64], &[100.0, 101.0, 80.5, 32.5]),
+    (
+        7,
+        "OPENCV",
+        4,
+        [96, 80],
+        &[90.0, 90.0, 48.0, 40.0, -0.05, 0.01, 0.001, -0.001],
+    ),
+];
+
+/// Id, name, camera, rotation and translation of `camera_from_world`, ids of the points that it observes.
+type Image = (u32, &'static str, u32, [f64; 4], [f64; 3], &'static [i64]);
+
+const IMAGES: [Image; 2] = [
+    (
+        4,
+        "b side/2.png",
+        7,
+        [0.923_879_533, 0.0, 0.382_683_432, 0.0],
+        [1.0, 2.0, 3.0],
+        &[],
+    ),
+    (
+        2,
+        "a/1.png",
+        1,
+        [1.0, 0.0, 0.0, 0.0],
+        [0.5, 0.0, 4.0],
+        &[30, -1, 10, 20],
+    ),
+];
+
+const POINTS: [(u64, [f64; 3]); 3] = [
+    (10, [0.0, 0.0, 6.0]),
+    (20, [1.0, -0.5, 7.0]),
+    (30, [-2.0, 0.25, 16.0]),
+];
+
+/// A project with photos and the model in `sparse/0`.
+pub fn write(folder: &Path, form: Form) {
+    let model = folder.join("sparse/0");
+    fs::create_dir_all(&model).expect("writable");
+    for (_, name, camera, ..) in IMAGES {
+        let (.., [width, height], _) = CAMERAS
+            .into_iter()
+            .find(|(id, ..)| *id == camera)
+            .expect("is there");
+        let path = folder.join("images").join(name);
+        fs::create_dir_all(path.parent().expect("has one")).expect("writable");
+        wall(width as u32, height as u32)
+            .save(path)
+            .expect("writable");
+    }
+    match form {
+        Form::Text => write_text(&model),
+        Form::Binary => write_binary(&model),
+    }
+}
+
+fn joined<T: ToString>(values: &[T]) -> String {
+    let words: Vec<String> = values.iter().map(ToString::to_string).collect();
+    words.join(" ")
+}
+
+fn write_text(model: &Path) {
+    let mut text = "# Camera list\n".to_owned();
+    for (id, name, _, [width, height], parameters) in CAMERAS {
+        let _ = writeln!(text, "{id} {name} {width} {height} {}", joined(parameters));
+    }
+    fs::write(model.join("cameras.txt"), text).expect("writable");
+    let mut text = "# Image list\n".to_owned();
+    for (id, name, camera, rotation, translation, observed) in IMAGES {
+        let (q, t) = (joined(&rotation), joined(&translation));
+        let _ = writeln!(text, "{id} {q} {t} {camera} {name}");
+        let features: Vec<String> = observed.iter().map(|id| format!("1.5 2.5 {id}")).collect();
+        let _ = writeln!(text, "{}", features.join(" "));
+    }
+    fs::write(model.join("images.txt"), text).expect("writable");
+    let mut text = "# Points\n".to_owned();
+    for (id, position) in POINTS {
+        let _ = writeln!(text, "{id} {} 1 2 3 0.5 2 0 4 1", joined(&position));
+    }
+    fs::write(model.join("points3D.txt"), text).expect("writable");
+}
+
+fn write_binary(model: &Path) {
+    let floats = |values: &[f64]| -> Vec<u8> {
+        values
+            .iter()
+            .flat_map(|value| value.to_le_bytes())
+            .collect()
+    };
+    let mut bytes = (CAMERAS.len() as u64).to_le_bytes().to_vec();
+    for (id, _, number, size, parameters) in CAMERAS {
+        bytes.extend(id.to_le_bytes());
+        bytes.extend(number.to_le_bytes());
+        bytes.extend(size.iter().flat_map(|side| side.to_le_bytes()));
+        bytes.extend(floats(parameters));
+    }
+    fs::write(model.join("cameras.bin"), bytes).expect("writable");
+    let mut bytes = (IMAGES.len() as u64).to_le_bytes().to_vec();
+    for (id, name, camera, rotation, translation, observed) in IMAGES {
+        bytes.extend(id.to_le_bytes());
+        bytes.extend(floats(&rotation));
+        bytes.extend(floats(&translation));
+        bytes.extend(camera.to_le_bytes());
+        bytes.extend(name.as_bytes());
+        bytes.push(0);
+        bytes.extend((observed.len() as u64).to_le_bytes());
+        for id in observed {
+            bytes.extend(floats(&[1.5, 2.5]));
+            bytes.extend(id.to_le_bytes());
+        }
+    }
+    fs::write(model.join("images.bin"), bytes).expect("writable");
+    let mut bytes = (POINTS.len() as u64).to_le_bytes().to_vec();
+    for (id, position) in POINTS {
+        bytes.extend(id.to_le_bytes());
+        bytes.extend(floats(&position));
+        bytes.extend([1, 2, 3]);
+        bytes.extend(floats(&[0.5]));
+        bytes.extend(2_u64.to_le_bytes());
+        for value in [2_u32, 0, 4, 1] {
+            bytes.extend(value.to_le_bytes());
+        }
+    }
+    fs::write(model.join("points3D.bin"), bytes).expect("writable");
+}
+
+fn open(path: &Path) -> Box<dyn Scene> {
+    scene::open(path.to_str().expect("a plain path"), None).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn error_of(path: &Path) -> String {
+    let opened = scene::open(path.to_str().expect("a plain path"), None);
+    opened.err().expect("it is damaged").to_string()
+}
+
+#[test]
+fn both_forms_say_the_same() {
+    for form in [Form::Text, Form::Binary] {
+        let folder = TempDir::new().expect("a folder");
+        let project = folder.path().join("yard");
+        write(&project, form);
+        let scene = open(&project);
+        assert_eq!(scene.name(), "colmap/yard");
+        assert_eq!(scene.frames(), ["1", "2"]);
+
+        // The centre of the first pixel is at (0.5, 0.5) of the model.
+        let camera = scene.intrinsics(0);
+        assert_eq!((camera.fx, camera.fy), (100.0, 101.0));
+        assert_eq!((camera.cx, camera.cy), (80.0, 32.0));
+        assert_eq!((camera.width, camera.height), (160, 64));
+        let other = scene.intrinsics(1);
+        assert_eq!((other.width, other.height), (96, 80));
+        assert_eq!((other.cx, other.cy), (47.5, 39.5));
+        for frame in 0..2 {
+            let camera = scene.intrinsics(frame);
+            let size = scene.photo(frame).expect("readable").dimensions();
+            assert_eq!(size, (camera.width, camera.height), "{form:?}");
+        }
+
+        // Poses are the inverse of what the model says.
+        let pose = scene.pose(0).expect("is known");
+        assert!((pose.translation.vector - Vector3::new(-0.5, 0.0, -4.0)).norm() < 1e-12);
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(
+            0.923_879_533,
+            0.0,
+            0.382_683_432,
+            0.0,
+        ));
+        let camera_from_world = Pose::from_parts(Vector3::new(1.0, 2.0, 3.0).into(), turn);
+        let error =
+            PoseError::between(&camera_from_world.inverse(), &scene.pose(1).expect("known"));
+        assert!(error.translation_m < 1e-9 && error.rotation_deg < 1e-6);
+
+        // The points that the image observes, in its camera's frame.
+        let cloud = scene.cloud(0).expect("has one");
+        let expected = [[-1.5, 0.25, 20.0], [0.5, 0.0, 10.0], [1.5, -0.5, 11.0]];
+        assert_eq!(cloud.points, expected.map(Point3::from));
+        assert!(!scene.has_cloud(1));
+        let error = scene
+            .reference(1)
+            .expect_err("observes nothing")
+            .to_string();
+        assert!(error.contains("frame 1 has one"), "{error}");
+    }
+}
+
+#[test]
+fn a_model_opens_by_its_own_folder_too() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path(), Form::Binary);
+    for place in ["sparse/0", "sparse", ""] {
+        let path = folder.path().join(place);
+        if place == "sparse" {
+            continue;
+        }
+        assert_eq!(open(&path).frames().len(), 2, "{place}");
+    }
+}
+
+#[test]
+fn photos_that_are_not_there_are_left_out() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path(), Form::Text);
+    let images = folder.path().join("images");
+    fs::remove_file(images.join("b side/2.png")).expect("just written");
+    assert_eq!(open(folder.path()).frames(), ["1"]);
+    fs::remove_dir_all(images).expect("just written");
+    let error = error_of(folder.path());
+    assert!(
+        error.contains("`images`") && error.contains("a/1.png"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_text_model_is_named_with_its_line() {
+    for (file, from, to, words) in [
+        (
+            "cameras.txt",
+            "PINHOLE 160",
+            "FOV 160",
+            &["cameras.txt:2", "`FOV`"][..],
+        ),
+        (
+            "cameras.txt",
+            "32.5",
+            "",
+            &["cameras.txt:2", "4 parameters of PINHOLE"],
+        ),
+        (
+            "cameras.txt",
+            "7 OPENCV",
+            "8 OPENCV",
+            &["images.txt", "b side/2.png", "7 found"],
+        ),
+        (
+            "images.txt",
+            "4 0.92",
+            "4 2.92",
+            &["images.txt:2", "length"],
+        ),
+        (
+            "images.txt",
+            "a/1.png",
+            "../1.png",
+            &["images.txt", "scene's folder"],
+        ),
+        (
+            "images.txt",
+            "1.5 2.5 30",
+            "1.5 30",
+            &["images.txt:5", "`x y point`"],
+        ),
+        (
+            "images.txt",
+            "2.5 30",
+            "2.5 31",
+            &["images.txt:5", "31 found"],
+        ),
+        (
+            "points3D.txt",
+            "10 0 0",
+            "10 0 nan",
+            &["points3D.txt:2", "nan"],
+        ),
+    ] {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path(), Form::Text);
+        let path = folder.path().join("sparse/0").join(file);
+        let text = fs::read_to_string(&path).expect("just written");
+        assert!(text.contains(from), "{from}");
+        fs::write(&path, text.replacen(from, to, 1)).expect("writable");
+        let error = error_of(folder.path());
+        for word in words {
+            assert!(error.contains(word), "`{word}` is missing in: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_binary_model_that_promises_more_than_it_has_is_refused_before_anything_is_made() {
+    for file in ["cameras.bin", "images.bin", "points3D.bin"] {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path(), Form::Binary);
+        let path = folder.path().join("sparse/0").join(file);
+        let whole = fs::read(&path).expect("just written");
+        let mut promising = whole.clone();
+        promising[..8].copy_from_slice(&(u64::MAX / 2).to_le_bytes());
+        fs::write(&path, promising).expect("writable");
+        let error = error_of(folder.path());
+        assert!(error.contains(file) && error.contains("cut off"), "{error}");
+        for length in [0, 4, 20, whole.len() / 2, whole.len() - 1] {
+            fs::write(&path, &whole[..length]).expect("writable");
+            let error = error_of(folder.path());
+            assert!(error.contains(file), "{length}: {error}");
+        }
+    }
+}
+
+/// What `images.txt` says of the features of an image: pixel and point.
+fn features(model: &Path, name: &str) -> Vec<(Point2<f64>, u64)> {
+    let text = fs::read_to_string(model.join("images.txt")).expect("readable");
+    let mut lines = text.lines().skip_while(|line| !line.ends_with(name));
+    let numbers: Vec<f64> = lines
+        .nth(1)
+        .expect("a line of features")
+        .split_whitespace()
+        .map(|word| word.parse().expect("a number"))
+        .collect();
+    let features = numbers.chunks_exact(3).filter(|feature| feature[2] >= 0.0);
+    features
+        .map(|f| (Point2::new(f[0] - 0.5, f[1] - 0.5), f[2] as u64))
+        .collect()
+}
+
+#[test]
+fn the_points_of_the_real_door_are_seen_where_its_features_are() {
+    let Some(folder) = data::sample("colmap/lund_door") else {
+        return;
+    };
+    let scene = open(&folder);
+    assert_eq!(scene.name(), "colmap/lund_door");
+    assert_eq!(scene.frames().len(), 12);
+    let frame = scene.find("DSC_0005").expect("is there");
+    let camera = scene.intrinsics(frame);
+    let cloud = scene.cloud(frame).expect("readable");
+    let features = features(&folder.join("sparse/0"), "DSC_0005.JPG");
+    assert_eq!(cloud.len(), features.len());
+    let k = -0.0336422;
+    let mut errors: Vec<f64> = cloud
+        .points
+        .iter()
+        .zip(&features)
+        .map(|(point, (seen, _))| {
+            // Through the lens of the model again.
+            let point: Point3<f64> = point.cast();
+            let (x, y) = (point.x / point.z, point.y / point.z);
+            let radial = 1.0 + k * (x * x + y * y);
+            let f = 2435.38 * radial;
+            (Point2::new(f * x + 647.5, f * y + 967.5) - seen).norm()
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    let median = errors[errors.len() / 2];
+    println!("{} points, median {median:.3} px", errors.len());
+    assert!(median < 0.3, "{median}");
+    assert_eq!((camera.cx, camera.cy), (647.5, 967.5));
+}
+
+#[test]
+fn fb_localises_at_the_real_door() {
+    let Some(folder) = data::sample("colmap/lund_door") else {
+        return;
+    };
+    let scene = open(&folder);
+    let frame = |name| scene.find(name).expect("is there");
+    let (query, reference) = (frame("DSC_0006"), frame("DSC_0005"));
+    let problem = Problem {
+        query: scene.query(query).expect("readable"),
+        reference: scene.reference(reference).expect("readable"),
+        uncertainty_radius_m: 5.0,
+        seed: 0,
+    };
+    let outcome = localize(&problem, Method::FB, &Params::default());
+    let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));
+    let error = PoseError::between(&scene.pose(query).expect("is known"), &pose);
+    println!("{error}");
+    assert!(
+        error.translation_m < 0.1 && error.rotation_deg < 0.5,
+        "{error}"
+    );
+}

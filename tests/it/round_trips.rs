@@ -1,0 +1,182 @@
+//! The street in every layout that can be written, read back: the same frames, within what each layout
+//! can say.
+
+use std::path::Path;
+
+use nalgebra::{Point2, Point3};
+use posescope::camera::Intrinsics;
+use posescope::geometry::{Pose, PoseError};
+use posescope::localize::localize;
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::scene::layout::{Drive, LAYOUTS, Layout, Shot};
+use posescope::scene::street::{Size, Street};
+use posescope::scene::{self, Scene};
+use tempfile::TempDir;
+
+/// A query and a reference 9 m behind it.
+const WRITTEN: [usize; 2] = [63, 72];
+
+fn street() -> Street {
+    Street::new("overcast", Size::Half).expect("is built in")
+}
+
+/// Writes some frames of the street and opens them.
+fn written(layout: &Layout, street: &Street, root: &Path) -> Box<dyn Scene> {
+    let all = 0..street.frames().len();
+    let drive = Drive {
+        intrinsics: street.intrinsics(0),
+        names: street.frames().to_vec(),
+        poses: all.clone().flat_map(|frame| street.pose(frame)).collect(),
+        times_s: all.flat_map(|frame| street.time_s(frame)).collect(),
+        written: WRITTEN.to_vec(),
+        scanner: Street::scanner_position(),
+    };
+    let writer = (layout.create)(root, "dusk", drive).expect("writable");
+    for index in WRITTEN {
+        let traversal = street.traversal();
+        let scan = traversal.cloud(index).into_iter();
+        let scan: Vec<_> = scan
+            .map(|point| (point.position, point.reflectance))
+            .collect();
+        let shot = Shot {
+            index,
+            photo: &traversal.image(index),
+            scan: &scan,
+            depth: &|pixel| traversal.depth(index, pixel),
+        };
+        writer.frame(&shot).expect("writable");
+    }
+    writer.finish().expect("writable");
+    let place = root.join((layout.place)("dusk"));
+    let opened = scene::open(place.to_str().expect("a plain path"), None);
+    opened.unwrap_or_else(|error| panic!("{}: {error}", layout.name))
+}
+
+/// Where the layout's world is in the street's: raw drives begin with their first packet.
+fn street_from_world(layout: &Layout, street: &Street) -> Pose {
+    match layout.name {
+        "kitti-raw" => street.pose(0).expect("is known"),
+        _ => Pose::identity(),
+    }
+}
+
+#[test]
+fn photos_cameras_poses_and_times_come_back_from_every_layout() {
+    let street = street();
+    for layout in LAYOUTS {
+        let root = TempDir::new().expect("a folder");
+        let disk = written(layout, &street, root.path());
+        let street_from_world = street_from_world(layout, &street);
+        assert_eq!(disk.frames().len(), 2, "{}", layout.name);
+        for (frame, index) in WRITTEN.into_iter().enumerate() {
+            let [read, expected] = [disk.photo(frame), street.photo(index)];
+            let [read, expected] = [read, expected].map(|photo| photo.expect("readable").color);
+            assert_eq!(read, expected, "{}", layout.name);
+            let (read, expected) = (disk.intrinsics(frame), street.intrinsics(index));
+            let Intrinsics { fx, fy, cx, cy, .. } = expected;
+            assert!((read.fx - fx).abs() + (read.fy - fy).abs() < 1e-9);
+            assert!((read.cx - cx).abs() + (read.cy - cy).abs() < 1e-9);
+            let read = street_from_world * disk.pose(frame).expect("is known");
+            let expected = street.pose(index).expect("is known");
+            let error = PoseError::between(&expected, &read);
+            assert!(error.translation_m < 1e-6, "{}: {error}", layout.name);
+            assert!(error.rotation_deg < 1e-6, "{}: {error}", layout.name);
+            if let Some(time_s) = disk.time_s(frame) {
+                let expected = street.time_s(index).expect("is known");
+                assert!((time_s - expected).abs() < 1e-6, "{}", layout.name);
+            }
+        }
+    }
+}
+
+/// The depth that the street has at a pixel, if it is one surface there.
+fn depth_around(street: &Street, frame: usize, pixel: Point2<f64>) -> Option<f64> {
+    street.traversal().depth(frame, pixel)
+}
+
+#[test]
+fn clouds_come_back_from_every_layout() {
+    let street = street();
+    for layout in LAYOUTS {
+        let root = TempDir::new().expect("a folder");
+        let disk = written(layout, &street, root.path());
+        let cloud = disk.cloud(1).expect("readable").points;
+        let scan = street.cloud(WRITTEN[1]).expect("is there").points;
+        let camera = street.intrinsics(0);
+        match layout.name {
+            "kitti" | "kitti-raw" | "toml" => {
+                assert_eq!(cloud.len(), scan.len(), "{}", layout.name);
+                for (read, written) in cloud.iter().zip(&scan) {
+                    // As f32 from another origin.
+                    let tolerance = 1e-6 * written.coords.norm() + 1e-6;
+                    assert!(
+                        (read - written).norm() <= 4.0 * tolerance,
+                        "{read} {written}"
+                    );
+                }
+            }
+            "colmap" => {
+                assert!((1000..=2000).contains(&cloud.len()));
+                for read in &cloud {
+                    let pixel = camera.project(&read.cast()).expect("is ahead");
+                    assert!(camera.contains(&pixel));
+                    let is_scanned = |other: &Point3<f32>| (read - other).norm() < 1e-4;
+                    assert!(scan.iter().any(is_scanned), "{read}");
+                }
+            }
+            "tum" | "7scenes" => {
+                let unit_m = if layout.name == "tum" { 0.0002 } else { 0.001 };
+                assert!(cloud.len() > 3000, "{}", cloud.len());
+                for read in cloud.iter().step_by(7) {
+                    let pixel = camera.project(&read.cast()).expect("is ahead");
+                    let pixel = pixel.map(f64::round);
+                    let depth = depth_around(&street, WRITTEN[1], pixel).expect("no sky");
+                    assert!((f64::from(read.z) - depth).abs() < 0.51 * unit_m + 1e-5);
+                }
+            }
+            other => panic!("what the cloud of the layout {other} is like is wanted here"),
+        }
+    }
+}
+
+#[test]
+fn every_layout_leads_to_the_same_pose_within_what_it_can_say() {
+    let street = street();
+    for layout in LAYOUTS {
+        let root = TempDir::new().expect("a folder");
+        let disk = written(layout, &street, root.path());
+        let problem = Problem {
+            query: disk.query(1).expect("is complete"),
+            reference: disk.reference(0).expect("is complete"),
+            uncertainty_radius_m: 15.0,
+            seed: 0,
+        };
+        let outcome = localize(&problem, Method::FB, &Params::default());
+        // Depths up to 13 m are too few to agree on a pose 9 m on.
+        let pose = match (outcome.pose, layout.name) {
+            (Ok(pose), _) => pose,
+            (Err(_), "tum") => continue,
+            (Err(failure), name) => panic!("{name}: {failure}"),
+        };
+        let error = PoseError::between(&disk.pose(1).expect("is known"), &pose);
+        println!("{}: {error}", layout.name);
+        assert!(
+            error.translation_m < 0.5 && error.rotation_deg < 1.0,
+            "{}: {error}",
+            layout.name
+        );
+    }
+}
+
+#[test]
+fn writing_again_leaves_no_frame_of_before() {
+    let street = street();
+    for layout in LAYOUTS {
+        let root = TempDir::new().expect("a folder");
+        written(layout, &street, root.path());
+        let again = written(layout, &street, root.path());
+        assert_eq!(again.frames().len(), 2, "{}", layout.name);
+    }
+}

@@ -1,0 +1,495 @@
+//! Scenes that a `scene.toml` describes, with clouds of every format.
+
+use std::fs;
+use std::path::Path;
+
+use las::point::Format;
+use las::{Builder, Point as LasPoint, Writer as LasWriter};
+use nalgebra::{Point2, Point3};
+use posescope::geometry::Pose;
+use posescope::scene::{self, Scene};
+use tempfile::TempDir;
+
+use crate::small_sequence::wall;
+
+/// Where the map's frame begins: coordinates as surveyors have them.
+const ORIGIN: [f64; 3] = [500_123.0, 5_400_456.0, 310.0];
+
+const SIMPLE: &str = "\
+images = \"photos/*.png\"
+poses = \"poses.txt\"
+cloud = \"map.xyz\"
+
+[camera]
+fx = 100.0
+fy = 100.0
+cx = 79.5
+cy = 31.5
+";
+
+/// Three photos a metre apart, at sea level of the map.
+pub fn write(folder: &Path) {
+    fs::create_dir_all(folder.join("photos")).expect("writable");
+    let mut poses = String::new();
+    for frame in 0..3 {
+        let path = folder.join(format!("photos/img{frame}.png"));
+        wall(160, 64).save(path).expect("writable");
+        let [x, y, z] = ORIGIN;
+        poses += &format!("1 0 0 {x} 0 1 0 {y} 0 0 1 {}\n", z + f64::from(frame));
+    }
+    fs::write(folder.join("poses.txt"), poses).expect("writable");
+    fs::write(folder.join("scene.toml"), SIMPLE).expect("writable");
+    let line = |[x, y, z]: [f64; 3]| format!("{x} {y} {z} 255 0\n");
+    let map: String = points().into_iter().map(line).collect();
+    fs::write(folder.join("map.xyz"), "x y z r g\n".to_owned() + &map).expect("writable");
+}
+
+/// A wall 10 m ahead of the first photo, in the frame of the map, on a grid of half a metre.
+fn points() -> Vec<[f64; 3]> {
+    let rows = (-6..=6).flat_map(|row| (-16..=16).map(move |column| (column, row)));
+    rows.map(|(column, row)| {
+        let [x, y, z] = ORIGIN;
+        [
+            x + 0.5 * f64::from(column),
+            y + 0.5 * f64::from(row),
+            z + 10.0,
+        ]
+    })
+    .collect()
+}
+
+fn open(folder: &Path) -> Box<dyn Scene> {
+    scene::open(folder.to_str().expect("a plain path"), None).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn error_of(folder: &Path) -> String {
+    let opened = scene::open(folder.to_str().expect("a plain path"), None);
+    opened.err().expect("it is damaged").to_string()
+}
+
+/// The points of the wall that frame 0 has in view are where its camera sees them.
+fn expect_the_wall(scene: &dyn Scene, tolerance_m: f32) {
+    let cloud = scene.cloud(0).unwrap_or_else(|error| panic!("{error}"));
+    let camera = scene.intrinsics(0);
+    let mut expected: Vec<Point3<f32>> = points()
+        .iter()
+        .map(|point| (Point3::from(*point) - nalgebra::Vector3::from(ORIGIN)).cast())
+        .filter(|point: &Point3<f32>| {
+            let pixel: Point2<f64> = camera.project(&point.cast()).expect("is ahead");
+            camera.contains(&pixel)
+        })
+        .collect();
+    assert_eq!(cloud.len(), expected.len());
+    for point in &cloud.points {
+        let nearest = expected
+            .iter()
+            .position(|other| (other - point).norm() <= tolerance_m);
+        expected.swap_remove(nearest.unwrap_or_else(|| panic!("{point} is not of the wall")));
+    }
+}
+
+fn with(folder: &Path, from: &str, to: &str) {
+    assert!(SIMPLE.contains(from), "{from}");
+    let text = SIMPLE.replacen(from, to, 1);
+    fs::write(folder.join("scene.toml"), text).expect("writable");
+}
+
+#[test]
+fn a_few_lines_describe_a_scene() {
+    let folder = TempDir::new().expect("a folder");
+    let yard = folder.path().join("yard");
+    write(&yard);
+    for argument in [yard.clone(), yard.join("scene.toml")] {
+        let scene = open(&argument);
+        assert_eq!(scene.name(), "toml/yard");
+        assert_eq!(scene.frames(), ["img0", "img1", "img2"]);
+        let pose = scene.pose(2).expect("is known");
+        assert_eq!(pose.translation.vector.z, ORIGIN[2] + 2.0);
+        expect_the_wall(scene.as_ref(), 1e-6);
+    }
+    with(&yard, "images =", "name = \"my yard\"\nimages =");
+    assert_eq!(open(&yard).name(), "my yard");
+}
+
+#[test]
+fn poses_may_be_by_time_and_the_other_way_round() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    for (frame, time) in [(0, "10.05"), (1, "10.10"), (2, "10.5")] {
+        let photo = |name: &str| folder.path().join(format!("photos/{name}.png"));
+        fs::rename(photo(&format!("img{frame}")), photo(time)).expect("just written");
+    }
+    let poses = "# time x y z qx qy qz qw\n10.0 1 2 3 0 0 0 1\n10.1 2 2 3 0 0 0 1\n";
+    fs::write(folder.path().join("poses.txt"), poses).expect("writable");
+    let scene = open(folder.path());
+    let expected = Pose::translation(1.5, 2.0, 3.0);
+    let pose = scene.pose(0).expect("is known");
+    assert!((pose.translation.vector - expected.translation.vector).norm() < 1e-9);
+    assert_eq!(scene.time_s(1), Some(10.1));
+    assert!(scene.pose(2).is_none());
+
+    with(
+        folder.path(),
+        "[camera]",
+        "pose = \"camera_from_world\"\n[camera]",
+    );
+    let pose = open(folder.path()).pose(1).expect("is known");
+    assert_eq!(pose, Pose::translation(-2.0, -2.0, -3.0));
+}
+
+#[test]
+fn poses_by_number_are_found_where_photos_are_missing() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    fs::remove_file(folder.path().join("photos/img1.png")).expect("just written");
+    let pose = open(folder.path()).pose(1).expect("is known");
+    assert_eq!(pose.translation.vector.z, ORIGIN[2] + 2.0);
+}
+
+/// The wall as text and in both byte orders, behind a comment and with a colour.
+fn ply(format: &str) -> Vec<u8> {
+    let points = points();
+    let mut bytes = format!(
+        "ply\nformat {format} 1.0\ncomment a wall\nelement vertex {}\nproperty double x\n\
+         property double y\nproperty double z\nproperty uchar red\nelement face 0\n\
+         property list uchar int vertex_indices\nend_header\n",
+        points.len()
+    )
+    .into_bytes();
+    for point in points {
+        match format {
+            "ascii" => bytes.extend(format!("{} {} {} 7\n", point[0], point[1], point[2]).bytes()),
+            "binary_little_endian" => {
+                bytes.extend(point.iter().flat_map(|value| value.to_le_bytes()));
+                bytes.push(7);
+            }
+            _ => {
+                bytes.extend(point.iter().flat_map(|value| value.to_be_bytes()));
+                bytes.push(7);
+            }
+        }
+    }
+    bytes
+}
+
+/// The wall as PCD, with a point that did not return and a field that nobody asks for.
+fn pcd(data: &str) -> Vec<u8> {
+    let mut points = points();
+    points.push([f64::NAN; 3]);
+    let mut bytes = format!(
+        "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 8 8 8 4\nTYPE F F F F\n\
+         COUNT 1 1 1 1\nWIDTH {0}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA {data}\n",
+        points.len()
+    )
+    .into_bytes();
+    match data {
+        "ascii" => {
+            for [x, y, z] in points {
+                bytes.extend(format!("{x} {y} {z} 0.5\n").bytes());
+            }
+        }
+        "binary" => {
+            for point in points {
+                bytes.extend(point.iter().flat_map(|value| value.to_le_bytes()));
+                bytes.extend(0.5_f32.to_le_bytes());
+            }
+        }
+        _ => {
+            let mut columns = Vec::new();
+            for axis in 0..3 {
+                columns.extend(points.iter().flat_map(|point| point[axis].to_le_bytes()));
+            }
+            columns.extend(points.iter().flat_map(|_| 0.5_f32.to_le_bytes()));
+            // Literal runs alone are a valid stream of the compression.
+            let mut stream = Vec::new();
+            for run in columns.chunks(32) {
+                stream.push(run.len() as u8 - 1);
+                stream.extend(run);
+            }
+            bytes.extend((stream.len() as u32).to_le_bytes());
+            bytes.extend((columns.len() as u32).to_le_bytes());
+            bytes.extend(stream);
+        }
+    }
+    bytes
+}
+
+fn las(path: &Path) {
+    let mut builder = Builder::from((1, 4));
+    let is_layered = path.file_stem().is_some_and(|stem| stem == "layered");
+    builder.point_format = Format::new(if is_layered { 7 } else { 0 }).expect("a format");
+    builder.point_format.is_compressed = path.extension().is_some_and(|end| end == "laz");
+    for (axis, offset) in ORIGIN.into_iter().enumerate() {
+        let transform = las::Transform {
+            scale: 0.001,
+            offset,
+        };
+        match axis {
+            0 => builder.transforms.x = transform,
+            1 => builder.transforms.y = transform,
+            _ => builder.transforms.z = transform,
+        }
+    }
+    let header = builder.into_header().expect("a header");
+    let mut writer = LasWriter::from_path(path, header).expect("writable");
+    for [x, y, z] in points() {
+        let point = LasPoint {
+            x,
+            y,
+            z,
+            gps_time: is_layered.then_some(1.0),
+            color: is_layered.then(las::Color::default),
+            ..LasPoint::default()
+        };
+        writer.write_point(point).expect("writable");
+    }
+    writer.close().expect("writable");
+}
+
+/// All clouds that can be read, in a folder.
+fn write_clouds(folder: &Path) -> Vec<String> {
+    let mut names = Vec::new();
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let name = format!("{format}.ply");
+        fs::write(folder.join(&name), ply(format)).expect("writable");
+        names.push(name);
+    }
+    for data in ["ascii", "binary", "binary_compressed"] {
+        let name = format!("{data}.pcd");
+        fs::write(folder.join(&name), pcd(data)).expect("writable");
+        names.push(name);
+    }
+    for name in ["map.las", "map.laz", "layered.laz"] {
+        las(&folder.join(name));
+        names.push(name.to_owned());
+    }
+    names
+}
+
+#[test]
+fn clouds_of_all_formats_are_the_same_wall() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    for name in write_clouds(folder.path()) {
+        println!("{name}");
+        with(folder.path(), "map.xyz", &name);
+        expect_the_wall(open(folder.path()).as_ref(), 1e-3);
+    }
+}
+
+#[test]
+fn every_frame_may_have_a_cloud_of_its_own() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let scans = folder.path().join("scans");
+    fs::create_dir_all(&scans).expect("writable");
+    fs::write(scans.join("img0.xyz"), "0 0 9\n1, 2, 3\n").expect("writable");
+    fs::write(scans.join("img2.xyz"), "//X Y Z\n5;6;7\n").expect("writable");
+    let described = |more: &str| {
+        with(folder.path(), "cloud = \"map.xyz\"\n", "");
+        let path = folder.path().join("scene.toml");
+        let text = fs::read_to_string(&path).expect("just written");
+        let clouds = format!("{text}\n[clouds]\nfiles = \"scans/*.xyz\"\n{more}");
+        fs::write(path, clouds).expect("writable");
+        open(folder.path())
+    };
+    let scene = described("");
+    assert!(scene.has_cloud(0) && !scene.has_cloud(1) && scene.has_cloud(2));
+    let points = scene.cloud(0).expect("is there").points;
+    assert_eq!(
+        points,
+        [Point3::new(0.0, 0.0, 9.0), Point3::new(1.0, 2.0, 3.0)]
+    );
+    let error = scene.cloud(1).expect_err("has none").to_string();
+    assert!(error.contains("2 frames have one: img0 … img2"), "{error}");
+
+    // From a scanner with x forward, y left, z up, half a metre above the camera.
+    let scene = described("camera_from_cloud = [0,-1,0,0, 0,0,-1,-0.5, 1,0,0,0]\n");
+    let points = scene.cloud(2).expect("is there").points;
+    assert_eq!(points, [Point3::new(-6.0, -7.5, 5.0)]);
+
+    let [x, y, z] = ORIGIN;
+    let map = format!("{} {y} {}\n", x + 1.5, z + 8.0);
+    fs::write(scans.join("img2.xyz"), map).expect("writable");
+    let points = described("frame = \"world\"\n")
+        .cloud(2)
+        .expect("is there")
+        .points;
+    assert_eq!(points, [Point3::new(1.5, 0.0, 6.0)]);
+}
+
+#[test]
+fn distortion_is_taken_out() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    with(folder.path(), "cy = 31.5", "cy = 31.5\nk1 = 0.1");
+    let scene = open(folder.path());
+    assert!(scene.intrinsics(0).fx > 105.0);
+    let photo = scene.photo(0).expect("readable");
+    assert_eq!(photo.dimensions(), (160, 64));
+    assert_ne!(photo.gray, wall(160, 64));
+}
+
+#[test]
+fn what_is_wrong_with_a_description_is_named_with_its_line() {
+    for (from, to, words) in [
+        ("images =", "image =", &["scene.toml:1", "`image`"][..]),
+        ("fy = 100.0\n", "", &["scene.toml:5", "`fy`"]),
+        (
+            "fx = 100.0",
+            "fx = -1",
+            &["scene.toml:5", "positive focal lengths"],
+        ),
+        ("fx = 100.0", "fx = \"wide\"", &["scene.toml:6"]),
+        (
+            "photos/*.png",
+            "photos/*.jpg",
+            &["scene.toml:1", "names none"],
+        ),
+        (
+            "photos/*.png",
+            "../*.png",
+            &["scene.toml:1", "scene's folder"],
+        ),
+        (
+            "map.xyz",
+            "/etc/passwd",
+            &["scene.toml:3", "scene's folder"],
+        ),
+        ("map.xyz", "none.laz", &["scene.toml:3", "none.laz"]),
+        (
+            "cy = 31.5",
+            "cy = 31.5\nk1 = -9",
+            &["scene.toml:5", "undistorted"],
+        ),
+        (
+            "[camera]",
+            "clouds = { files = \"*.xyz\" }\n[camera]",
+            &["scene.toml:3", "both found"],
+        ),
+    ] {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path());
+        with(folder.path(), from, to);
+        let error = error_of(folder.path());
+        for word in words {
+            assert!(error.contains(word), "`{word}` is missing in: {error}");
+        }
+    }
+}
+
+#[test]
+fn poses_that_fit_no_photo_are_named() {
+    for (poses, words) in [
+        ("", &["poses.txt", "8 numbers", "0 found"][..]),
+        ("1 2 3\n", &["poses.txt", "3 found"]),
+        (
+            "1 0 0 0 0 1 0 0 0 0 1 0\n",
+            &["poses.txt", "3 images", "`img1`"],
+        ),
+        (
+            "5.0 0 0 0 0 0 0 1\n",
+            &["poses.txt", "img0", "between 5 and 5"],
+        ),
+    ] {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path());
+        fs::write(folder.path().join("poses.txt"), poses).expect("writable");
+        let error = error_of(folder.path());
+        for word in words {
+            assert!(error.contains(word), "`{word}` is missing in: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_damaged_cloud_is_named_and_a_length_in_it_is_not_believed() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let header = |vertices: &str, properties: &str| {
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\n{properties}end_header\n"
+        )
+    };
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let huge_pcd = |data: &str| {
+        String::from_utf8_lossy(&pcd("ascii"))
+            .replace("POINTS 430", "POINTS 4000000000000000000")
+            .replace("DATA ascii", &format!("DATA {data}"))
+    };
+    assert!(huge_pcd("ascii").contains("4000000000000000000"));
+    for (name, content, words) in [
+        (
+            "a.ply",
+            header("4000000000", xyz),
+            &["4000000000 points"][..],
+        ),
+        ("b.ply", header("1", "property float x\n"), &["`y`"]),
+        (
+            "c.ply",
+            header("1", &format!("{xyz}property list uint float more\n")),
+            &["`more` is a list"],
+        ),
+        ("d.ply", "ply\nformat ascii 1.0\n".to_owned(), &["d.ply"]),
+        ("a.pcd", huge_pcd("ascii"), &["4000000000000000000 points"]),
+        ("b.pcd", huge_pcd("binary"), &["4000000000000000000 points"]),
+        ("c.pcd", huge_pcd("binary_compressed"), &["announced"]),
+        ("a.las", "LASF".to_owned(), &["a.las"]),
+        ("a.xyz", "1 2 3\n1 2 x\n".to_owned(), &["a.xyz:2", "`x`"]),
+        ("b.xyz", "heading\n".to_owned(), &["b.xyz", "none found"]),
+        ("a.bin", "\0\0\0".to_owned(), &["PLY, PCD"]),
+    ] {
+        fs::write(folder.path().join(name), content).expect("writable");
+        with(folder.path(), "map.xyz", name);
+        let error = open(folder.path()).cloud(0).expect_err(name).to_string();
+        assert_eq!(error.lines().count(), 1, "{error}");
+        for word in words.iter().chain([&name]) {
+            assert!(error.contains(word), "`{word}` is missing in: {error}");
+        }
+    }
+}
+
+#[test]
+fn the_length_of_a_compressed_layer_is_not_believed() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let path = folder.path().join("layered.laz");
+    las(&path);
+    let mut bytes = fs::read(&path).expect("just written");
+    let points = u32::from_le_bytes([96, 97, 98, 99].map(|at: usize| bytes[at])) as usize;
+    // Where the table of chunks is, the first point, how many there are, the length of the first layer.
+    let length = points + 8 + 36 + 4;
+    bytes[length..length + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    fs::write(&path, bytes).expect("writable");
+    with(folder.path(), "map.xyz", "layered.laz");
+    let error = open(folder.path())
+        .cloud(0)
+        .expect_err("is too long")
+        .to_string();
+    assert!(error.contains("a chunk of points"), "{error}");
+}
+
+#[test]
+fn no_byte_of_a_cloud_makes_its_reader_panic() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    for name in write_clouds(folder.path()) {
+        let path = folder.path().join(&name);
+        let whole = fs::read(&path).expect("just written");
+        with(folder.path(), "map.xyz", &name);
+        // Every byte of a header, and some of the rest; and all kinds of ends.
+        let places = (0..whole.len()).filter(|at| *at < 300 || at % 997 == 0);
+        for at in places {
+            for value in [0xff, whole[at] ^ 0x10] {
+                let mut damaged = whole.clone();
+                damaged[at] = value;
+                fs::write(&path, damaged).expect("writable");
+                let _ = open(folder.path()).cloud(0);
+            }
+        }
+        for length in (0..whole.len()).step_by(211) {
+            fs::write(&path, &whole[..length]).expect("writable");
+            let _ = open(folder.path()).cloud(0);
+        }
+    }
+}
