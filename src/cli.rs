@@ -13,6 +13,7 @@ mod observer;
 mod output;
 mod params;
 mod run;
+mod story;
 mod synth;
 mod table;
 mod terminal;

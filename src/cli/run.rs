@@ -14,6 +14,7 @@ use super::args::RunArgs;
 use super::failure::CliError;
 use super::observer::CliObserver;
 use super::output::{self, JsonLines};
+use super::story::story;
 use super::table;
 use super::terminal::Terminal;
 
@@ -129,10 +130,10 @@ impl Plan<'_> {
         }
         let table = table::results(results, self.failure_radius_m());
         if self.args.json.as_deref().is_some_and(output::is_stdout) {
-            eprintln!("{table}");
+            eprintln!("{table}{}", story(results));
             return Ok(());
         }
-        output::print(&table)
+        output::print(&format_args!("{table}{}", story(results)))
     }
 
     fn queries(&self) -> Result<Vec<PlannedQuery>, CliError> {

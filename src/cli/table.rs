@@ -59,7 +59,7 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
 /// What the result rests on, in a few words.
 fn evidence(result: &QueryResult) -> String {
     if let Some(primary) = result.diagnosis.first() {
-        return format!("{}: {}", primary.code, primary.text);
+        return format!("{} {}", primary.code, primary.code.about());
     }
     if let Some(reason) = &result.reason {
         return format!("{}: {}", reason.code, reason.text);

@@ -140,10 +140,6 @@ impl<'a> Subject<'a> {
 pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
     let mut found = Vec::new();
     let doubt = subject.trust.as_ref().and_then(low_confidence);
-    if subject.truth.is_none() {
-        // Where nobody knows the truth, the doubt comes first, and then what speaks for it.
-        found.extend(doubt.clone());
-    }
     if !subject.is_right() {
         found.extend(suspicion::of_units(subject));
         let responsible = trust::responsible(subject.method, subject.outcome);
@@ -159,7 +155,14 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         found.extend(combined);
         found.extend(others);
     }
-    found.extend(doubt);
+    // Where nobody knows the truth, the doubt comes before what only speaks for it.
+    let speaks_for_it = |finding: &Diagnosis| matches!(finding.code, Code::D1 | Code::D8);
+    let place = match subject.truth {
+        None => found.iter().position(speaks_for_it),
+        Some(_) => None,
+    };
+    let place = place.unwrap_or(found.len());
+    found.splice(place..place, doubt);
     // One finding for each code: the first says most.
     let mut seen = Vec::new();
     found.retain(|finding: &Diagnosis| {

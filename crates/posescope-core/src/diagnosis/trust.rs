@@ -24,7 +24,7 @@ use crate::solver::{Correspondence, pose_covariance};
 pub const WITHIN_M: f64 = 1.0;
 
 /// A pose of less probability has low confidence.
-pub const LOW_CONFIDENCE: f64 = 0.5;
+pub const LOW_CONFIDENCE: f64 = 0.7;
 
 /// How far a pose is to be believed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

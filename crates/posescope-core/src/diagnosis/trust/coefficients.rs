@@ -20,4 +20,12 @@ pub(super) fn probability(method: Method, signals: &Signals) -> Option<f64> {
 }
 
 /// By method: the constant, then one weight per signal in their order.
-const FITTED: &[(&str, &[f64])] = &[];
+#[rustfmt::skip]
+const FITTED: &[(&str, &[f64])] = &[
+    // constant, inliers, inlier_share, beyond_chance, spread, deviation, residual, distance
+    ("fb", &[-4.6589, 0.2906, 7.7375, 0.4399, 4.6002, -0.3532, -0.7431, 2.1287]),
+    // constant, depth, refined_by, margin, above_start, gain, coverage, yaw_depth, distance
+    ("mi", &[-5.9960, 0.8675, 0.4243, 0.6716, -0.6377, 5.0349, -1.3214, 3.4759, -3.4659]),
+    ("nid", &[-9.7684, 0.9469, 0.2323, 0.8798, 0.8574, -7.0172, -0.5573, 3.0585, -2.3108]),
+    ("pm", &[-12.6126, 4.6086, -2.5037, -0.1926, -2.6316, 7.8038, -0.8361, 3.8227, -0.8331]),
+];
