@@ -388,6 +388,9 @@ fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
     }
 }
 
+/// A probability, and whether the pose is near.
+type Scored = (f64, bool);
+
 /// Ten bins of equal count of sorted samples.
 fn tenths(sorted: &[(f64, bool)]) -> impl Iterator<Item = &[(f64, bool)]> {
     (0..10)
@@ -415,8 +418,7 @@ fn calibration_error(scored: &[(f64, bool)]) -> f64 {
 
 /// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
 fn area_under_curve(scored: &[(f64, bool)]) -> f64 {
-    let (near, far): (Vec<(f64, bool)>, Vec<(f64, bool)>) =
-        scored.iter().copied().partition(|s| s.1);
+    let (near, far): (Vec<Scored>, Vec<Scored>) = scored.iter().copied().partition(|s| s.1);
     let wins: f64 = near
         .iter()
         .map(|a| {

@@ -209,7 +209,7 @@ fn report(half: &str, found: &[&Judged], expected: &BTreeMap<String, Expected>, 
                 panic!("{fault} is not in the table");
             };
             let mut cells = Vec::new();
-            for method in 0..METHODS.len() {
+            for (method, name) in METHODS.iter().enumerate() {
                 let codes = if withheld {
                     &expected.withheld[method]
                 } else {
@@ -229,7 +229,7 @@ fn report(half: &str, found: &[&Judged], expected: &BTreeMap<String, Expected>, 
                         if !may && misses {
                             println!(
                                 "<!-- false alarm {fault} {} {}: {} {} -->",
-                                judged.place, METHODS[method], judged.found, judged.text
+                                judged.place, name, judged.found, judged.text
                             );
                         }
                         continue;
@@ -251,7 +251,7 @@ fn report(half: &str, found: &[&Judged], expected: &BTreeMap<String, Expected>, 
                         println!(
                             "<!-- {fault} {} {}: {} expected, {} found: {} -->",
                             judged.place,
-                            METHODS[method],
+                            name,
                             codes.join("|"),
                             judged.found,
                             judged.text

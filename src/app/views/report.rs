@@ -87,7 +87,12 @@ fn verdict(result: &QueryResult, context: &ViewContext<'_>) -> (String, Option<C
     let failure_radius_m = context.setup.failure_radius_m;
     let words = result.words(failure_radius_m);
     match result.verdict(failure_radius_m) {
-        Verdict::NoPose => (format!("× {words}"), Some(theme::ESTIMATE)),
+        // The reason is told below, in full.
+        Verdict::NoPose => {
+            let code = result.reason.as_ref().map(|reason| reason.code);
+            let code = code.map_or(String::new(), |code| format!(", {code}"));
+            (format!("× no pose{code}"), Some(theme::ESTIMATE))
+        }
         _ if !context.options.shows_truth => ("a pose".to_owned(), None),
         Verdict::Far => (format!("▲ {words}"), Some(theme::FAR)),
         Verdict::Near | Verdict::Unmeasured => (words, None),
@@ -137,13 +142,22 @@ fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
 /// hidden; that the method doubts its pose does not.
 fn findings(ui: &mut Ui, span: &Span, shows_truth: bool) {
     let Some(result) = &span.result else { return };
+    if let (Some(reason), false) = (&result.reason, shows_truth) {
+        ui.horizontal_wrapped(|ui| {
+            name(ui, span);
+            ui.label(&reason.text);
+        });
+    }
     let may_show = |code: Code| shows_truth || !code.is_failure();
     let findings = result
         .diagnosis
         .iter()
         .filter(|finding| may_show(finding.code));
+    // The tables may be wider than what is seen; sentences are not.
+    let width = ui.clip_rect().width() - 2.0 * ui.spacing().item_spacing.x;
     for (rank, finding) in findings.enumerate() {
         ui.horizontal_wrapped(|ui| {
+            ui.set_max_width(width);
             name(ui, span);
             let code = RichText::new(finding.code.name());
             let code = if rank == 0 {

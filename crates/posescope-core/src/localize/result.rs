@@ -303,11 +303,7 @@ impl QueryResult {
             initial_error: None,
             counts: None,
             cost: None,
-            diagnosis: pose
-                .err()
-                .map(|failure| Diagnosis::of_failure(failure))
-                .into_iter()
-                .collect(),
+            diagnosis: pose.err().map(Diagnosis::of_failure).into_iter().collect(),
             explanation: None,
             trust: None,
             agreement: Vec::new(),
