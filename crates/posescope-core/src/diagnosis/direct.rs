@@ -80,7 +80,7 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
             let problem = seen_by(subject.problem, camera);
             let mut score = None;
             estimator.with_scorer(&problem, &mut |scorer| {
-                score = scorer.score(&[truth])[0].cost;
+                score = scorer.score(&[truth]).first().copied();
             });
             score
         });
@@ -220,11 +220,11 @@ struct SearchedCost<'a, 'cost> {
 }
 
 impl SearchedCost<'_, '_> {
-    fn verdicts(&self, cost_seen_by: &dyn Fn(Intrinsics) -> Option<f64>) -> Vec<Diagnosis> {
+    fn verdicts(&self, seen_by: &dyn Fn(Intrinsics) -> Option<Score>) -> Vec<Diagnosis> {
         let mut found = Vec::new();
         found.extend(suspicion::of_poses(self.subject));
         let near = self.best_near_truth();
-        found.extend(self.suspect_camera(near.as_ref(), cost_seen_by));
+        found.extend(self.suspect_camera(near.as_ref(), seen_by));
         found.extend(self.suspect_truth(near.as_ref()));
         if let Some(outside) = self.outside_grid() {
             found.push(outside);
@@ -427,7 +427,7 @@ impl SearchedCost<'_, '_> {
     fn suspect_camera(
         &self,
         near: Option<&Place>,
-        cost_seen_by: &dyn Fn(Intrinsics) -> Option<f64>,
+        seen_by: &dyn Fn(Intrinsics) -> Option<Score>,
     ) -> Option<Diagnosis> {
         const TIMES: [f64; 8] = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.4];
         let stated = self.subject.problem.query.intrinsics;
@@ -438,7 +438,11 @@ impl SearchedCost<'_, '_> {
             cy: stated.cy + at[2],
             ..stated
         };
-        let cost = |at: &[f64; 3]| cost_seen_by(camera(at));
+        // Another camera that sees next to nothing of the cloud is cheap by chance.
+        let stated_score = self.scorer.score(&[self.truth])[0];
+        let stated_cost = stated_score.eligible_cost(self.least_covered())?;
+        let least_covered = stated_score.covered / 2;
+        let cost = |at: &[f64; 3]| seen_by(camera(at))?.eligible_cost(least_covered);
         let best = TIMES
             .iter()
             .map(|times| [times.ln(), 0.0, 0.0])
@@ -449,9 +453,6 @@ impl SearchedCost<'_, '_> {
                 })
             })
             .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
-        let stated_cost = self.scorer.score(&[self.truth])[0]
-            .cost
-            .unwrap_or(f64::INFINITY);
         if best.cost >= stated_cost {
             return None;
         }
