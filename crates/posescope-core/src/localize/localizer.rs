@@ -280,11 +280,8 @@ impl<'a> Localizer<'a> {
                     self.count_matches(&mut work, members, observer)?;
                 }
                 for &fusion in &request.fusions {
-                    let fused = Request {
-                        fusions: vec![fusion],
-                        ..request.clone()
-                    };
-                    let (result, times) = self.fuse(&work, members, method, &fused, observer)?;
+                    let (result, times) =
+                        self.fuse(&work, members, method, fusion, request, observer)?;
                     emit(result, times)?;
                 }
             }
@@ -549,12 +546,10 @@ impl<'a> Localizer<'a> {
         work: &QueryWork<'_>,
         members: &[usize],
         method: Method,
+        fusion: Fusion,
         request: &Request,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(QueryResult, StageTimes), Cancelled> {
-        let [fusion] = request.fusions[..] else {
-            unreachable!("one fusion at a time");
-        };
         let solved: Vec<(&Problem, usize, &MethodOutcome)> = members
             .iter()
             .filter_map(|&problem| {
@@ -616,7 +611,11 @@ impl<'a> Localizer<'a> {
                 truth,
             )
         };
-        let explained = self.explain_wrong(&mut result, work.frame, request, observer);
+        let asked = Request {
+            fusions: vec![fusion],
+            ..request.clone()
+        };
+        let explained = self.explain_wrong(&mut result, work.frame, &asked, observer);
         observer.end_fusion(&result);
         explained?;
         let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
