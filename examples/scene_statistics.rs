@@ -233,6 +233,7 @@ fn pairs(
                 memo: Memo::off(),
             }),
             uncertainty_radius_m: 2.0 * distance_m,
+            prior_m: None,
             seed: 0,
         };
         let [indirect, direct] = [Method::FB, Method::MI]

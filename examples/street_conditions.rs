@@ -194,6 +194,7 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
                 query: Arc::clone(&query),
                 reference: Arc::clone(reference),
                 uncertainty_radius_m: options.radius_m,
+                prior_m: None,
                 seed: options.seed,
             };
             let run = |method| {

@@ -23,7 +23,7 @@ pub use index_file::IndexFile;
 pub use job::{Job, JobError};
 pub use loaded::Loaded;
 pub use pausing::RunMode;
-pub use run::{Part, Run, Span, StageBar};
+pub use run::{Explaining, Part, Run, Span, StageBar};
 pub use task::Task;
 
 use message::Message;
@@ -103,6 +103,12 @@ impl Session {
                 Message::Waits { breakpoint } => self.state = RunState::Paused { breakpoint },
                 Message::Goes => self.state = RunState::Running,
                 Message::Ended { result, times } => self.run.end(*result, times),
+                Message::Explaining {
+                    method,
+                    tried,
+                    remedies,
+                } => self.run.go_on_explaining(method, tried, remedies),
+                Message::Explained(result) => self.run.explain(*result),
                 Message::Finished => self.state = RunState::Finished,
                 Message::Cancelled => self.state = RunState::Cancelled,
                 Message::Broke(why) => self.state = RunState::Broken(why),

@@ -81,6 +81,7 @@ fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
         query: scene.query(known(index(query)?)?)?,
         reference: scene.reference(known(index(reference)?)?)?,
         uncertainty_radius_m: 15.0,
+        prior_m: None,
         seed: 0,
     })
 }

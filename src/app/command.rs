@@ -52,6 +52,8 @@ pub enum Command {
         /// Whether to look backwards.
         back: bool,
     },
+    /// Look for what would have helped the results that are wrong, or look no more.
+    Explain,
     /// Localise all queries, without stepping, to know which fail.
     RunAllQueries,
     /// Choose the references in another way.
@@ -195,6 +197,7 @@ pub fn shortcuts() -> Vec<Shortcut> {
             Command::NextQuery { back: true },
             "Previous query",
         ),
+        keys(NONE, Key::E, Command::Explain, "What would have helped?"),
         keys(
             NONE,
             Key::N,

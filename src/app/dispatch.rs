@@ -53,6 +53,7 @@ impl App {
             Command::SelectQuery(query) => state.select_query(query),
             Command::NextQuery { back } => state.next_query(back, |_, _| true),
             Command::NextFailure { back } => state.next_failure(back),
+            Command::Explain => state.switch_explaining(),
             Command::RunAllQueries => state.queries.run_all(&state.setup),
             Command::PickReferences(pick) => state.pick_references(pick),
             Command::SetReferences(frames) => state.set_references(frames),

@@ -13,6 +13,7 @@ use super::view_options::{CompareMode, ViewOptions};
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::params::Params;
+use crate::run::Protocol;
 use crate::scene::FrameStore;
 use crate::session::{Breakpoints, Run, RunMode, RunState, Session};
 
@@ -215,6 +216,21 @@ impl AppState {
         self.hovered = None;
         self.options.selected_feature = None;
         self.prober.forget();
+    }
+
+    /// Explains the results that are wrong, or no longer; what was computed is at hand.
+    pub(super) fn switch_explaining(&mut self) {
+        let explain = &mut self.setup.task.protocol.explain;
+        *explain = match *explain {
+            0 => Protocol::EXPLAINING_RUNS,
+            _ => 0,
+        };
+        let words = match *explain {
+            0 => "Nothing is explained any more",
+            _ => "Results that are wrong are localised again, to see what would have helped",
+        };
+        self.restart_run();
+        self.note(words, false);
     }
 
     /// What all queries were run with holds no longer.

@@ -65,7 +65,10 @@ fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
         }
         RunState::Running => {
             ui.spinner();
-            ui.label("Running");
+            ui.label(match &state.run().explaining {
+                Some(explaining) => explaining.to_string(),
+                None => "Running".to_owned(),
+            });
         }
         RunState::Paused { breakpoint: None } => {
             ui.label("Paused");

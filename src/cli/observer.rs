@@ -1,11 +1,13 @@
 //! The observer of the command line's queries: a progress bar, and perhaps a recording.
 
+use std::time::Instant;
+
 use posescope::event::{Event, KindSet};
 use posescope::geometry::Pose;
 use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
-use posescope::session::StopAtBreakpoint;
+use posescope::session::{Explaining, StopAtBreakpoint};
 use posescope::sink::Progress;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
@@ -19,6 +21,8 @@ pub struct CliObserver {
     progress: Option<Progress>,
     /// Query and reference of each problem.
     tasks: Vec<String>,
+    /// When the explanation at work began.
+    explaining_since: Instant,
 }
 
 impl CliObserver {
@@ -29,6 +33,7 @@ impl CliObserver {
             bar,
             progress: None,
             tasks: Vec::new(),
+            explaining_since: Instant::now(),
         }
     }
 }
@@ -83,6 +88,26 @@ impl LocalizeObserver for CliObserver {
         self.bar.inc(1);
         if let Some(recorder) = &mut self.recorder {
             recorder.end_method(result, times);
+        }
+    }
+
+    fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
+        if tried == 0 {
+            self.explaining_since = Instant::now();
+        }
+        let explaining = Explaining {
+            method: result.method,
+            tried,
+            remedies,
+            since: self.explaining_since,
+        };
+        self.bar
+            .set_message(format!("{} {explaining}", result.query));
+    }
+
+    fn explained(&mut self, result: &QueryResult) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.explained(result);
         }
     }
 

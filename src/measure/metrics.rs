@@ -1,7 +1,8 @@
 //! What the results of many queries amount to.
 //!
-//! Medians and RMSE are over successes ([`Verdict`]), once over those of the method, once over
-//! queries that all methods succeed on; their rotation is the greatest Euler angle, as in the paper.
+//! Medians and RMSE are over successes ([`Verdict`]) of the method, and once more over queries that
+//! all methods report as solved, whatever the error, as in the paper: its medians exceed any failure
+//! radius. Their rotation is the greatest Euler angle, as there.
 //! In the recall, which goes by the rotation angle, a failure has an infinite error.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,6 +46,26 @@ pub struct Row {
     /// The verdicts, the primary one first.
     #[serde(default)]
     pub diagnosis: Vec<Finding>,
+    /// The references.
+    #[serde(default)]
+    pub references: Vec<String>,
+    /// What the cost was like, if a cost was minimised.
+    #[serde(default)]
+    pub cost: Option<CostOfRow>,
+}
+
+/// What the statistics want to know of a cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CostOfRow {
+    /// Whether the result lies where the grid of positions ends.
+    #[serde(default)]
+    pub on_rim: bool,
+    /// From how far around the truth the coarse positions lead to it \[m\].
+    #[serde(default)]
+    pub basin_m: Option<f64>,
+    /// What the cheapest coarse minimum elsewhere costs more.
+    #[serde(default)]
+    pub basin_margin: Option<f64>,
 }
 
 /// A verdict without its words.
@@ -58,6 +79,11 @@ impl Row {
     /// Whether there is a pose and, where the truth is known, a near one.
     pub fn is_success(&self, failure_radius_m: f64) -> bool {
         self.verdict(failure_radius_m).is_success()
+    }
+
+    /// Whether a direct method's result lies where its grid ends.
+    pub fn is_on_rim(&self) -> bool {
+        self.cost.is_some_and(|cost| cost.on_rim)
     }
 
     /// What became of the query.
@@ -164,15 +190,22 @@ pub struct Measures {
     pub method: Method,
     /// How many queries were asked.
     pub queries: usize,
-    /// How many queries have a pose.
+    /// How many queries have a pose: the method itself reports them as solved, whatever the error.
     pub poses: usize,
+    /// How many of these do not lie on the rim of a direct method's grid, where a search has not
+    /// converged within its range (paper, section 4.2).
+    #[serde(default)]
+    pub off_rim: usize,
+    /// How many queries had no reference; they count as failures.
+    #[serde(default)]
+    pub without_reference: usize,
     /// How many queries have a pose within the failure radius.
     pub successes: usize,
     /// Successes over queries.
     pub success_rate: f64,
     /// Errors of the successes.
     pub of_successes: Spread,
-    /// The same over queries that every method of the run succeeds on.
+    /// The same over queries that every method of the run reports as solved, whatever the errors.
     pub of_common: Spread,
     /// Shares of the queries within [`RECALL_LIMITS`], with failures counted as infinite; nothing
     /// where the truth is not known.
@@ -189,6 +222,16 @@ pub struct Measures {
 }
 
 impl Measures {
+    /// A number of queries as a share of all.
+    pub fn share(&self, count: usize) -> f64 {
+        share(count, self.queries)
+    }
+
+    /// Successes over the queries that had a reference.
+    pub fn success_rate_with_reference(&self) -> f64 {
+        share(self.successes, self.queries - self.without_reference)
+    }
+
     /// Share of the queries within limits \[m, °\], with failures counted as infinite.
     pub fn recall_within(&self, limit_m: f64, limit_deg: f64) -> Option<f64> {
         let errors = self.errors.as_ref()?;
@@ -221,17 +264,17 @@ pub fn measure(rows: &[Row], failure_radius_m: f64) -> Vec<Measures> {
 
 fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Measures> {
     let mut methods: Vec<Method> = Vec::new();
-    let mut succeeded: BTreeMap<Method, BTreeSet<&str>> = BTreeMap::new();
+    let mut solved: BTreeMap<Method, BTreeSet<&str>> = BTreeMap::new();
     for row in rows {
         if !methods.contains(&row.method) {
             methods.push(row.method);
         }
-        let of_method = succeeded.entry(row.method).or_default();
-        if row.is_success(failure_radius_m) {
+        let of_method = solved.entry(row.method).or_default();
+        if row.status == Status::Ok {
             of_method.insert(&row.query);
         }
     }
-    let is_common = |query: &str| succeeded.values().all(|queries| queries.contains(query));
+    let is_common = |query: &str| solved.values().all(|queries| queries.contains(query));
     let measure = |method: Method| {
         let of_method = rows.iter().copied().filter(|row| row.method == method);
         let rows: Vec<&Row> = of_method.collect();
@@ -254,10 +297,12 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
             method,
             queries: rows.len(),
             poses: count(&|row| row.status == Status::Ok),
+            off_rim: count(&|row| row.status == Status::Ok && !row.is_on_rim()),
+            without_reference: count(&|row| row.references.is_empty()),
             successes: count(&success),
             success_rate: share(count(&success), rows.len()),
             of_successes: errors_of(&success),
-            of_common: errors_of(&|row| success(row) && is_common(&row.query)),
+            of_common: errors_of(&|row| is_common(&row.query)),
             recall: None,
             verdicts: BTreeMap::new(),
             chance: Chance::of(
@@ -304,6 +349,8 @@ pub(super) mod tests {
             }),
             initial_error: None,
             diagnosis: Vec::new(),
+            references: vec!["000000".to_owned()],
+            cost: None,
         }
     }
 
@@ -332,16 +379,35 @@ pub(super) mod tests {
         assert_eq!(fb.success_rate, 0.75);
         assert_eq!(fb.of_successes.median_m, Some(0.2));
         assert_eq!(mi.of_successes.median_m, Some(2.0));
-        // Both succeed on a and c.
-        assert_eq!(fb.of_common.count, 2);
-        assert_eq!(fb.of_common.median_m, Some(0.35));
-        assert_eq!(mi.of_common.median_deg, Some(1.0));
+        // Both have a pose of a, b and c, though that of b is 12 m off.
+        assert_eq!(fb.of_common.count, 3);
+        assert_eq!(fb.of_common.median_m, Some(0.2));
+        assert_eq!(mi.of_common.median_m, Some(3.0));
         let rmse = mi.of_successes.rmse_m.expect("there are successes");
         assert!((rmse - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
         // Failures are infinite: they count among the queries, never among those within a limit.
         assert_eq!(fb.recall, Some([0.5, 0.5, 0.75]));
         assert_eq!(mi.recall, Some([0.0, 0.0, 0.75]));
         assert_eq!(mi.recall_within(100.0, 180.0), Some(0.75));
+    }
+
+    #[test]
+    fn minima_on_the_rim_and_queries_without_a_reference_are_counted_apart() {
+        let mut rows = vec![
+            row("a", "mi", Some(1.0)),
+            row("b", "mi", Some(3.0)),
+            row("c", "mi", None),
+        ];
+        rows[1].cost = Some(CostOfRow {
+            on_rim: true,
+            ..CostOfRow::default()
+        });
+        rows[2].references.clear();
+        let measures = &measure(&rows, 10.0)[0];
+        assert_eq!((measures.poses, measures.off_rim), (2, 1));
+        assert_eq!(measures.without_reference, 1);
+        assert!((measures.success_rate - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(measures.success_rate_with_reference(), 1.0);
     }
 
     #[test]

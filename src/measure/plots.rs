@@ -3,7 +3,10 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::metrics::Measures;
+mod basins;
+mod causes;
+
+use super::metrics::{Measures, Row};
 use super::tables::slug;
 use crate::method::Method;
 use crate::run::Experiment;
@@ -22,12 +25,15 @@ const COLORS: [(Method, RGBColor); 4] = [
 
 /// One line of a plot.
 struct Line {
+    /// Whose line it is, which says its colour.
     method: Method,
+    /// Its corners.
     points: Vec<(f64, f64)>,
 }
 
-/// The success rate over what the experiment varies, and the recall over the translation error.
-pub fn plots(run: &RunFile, measures: &[Measures]) -> Vec<Plot> {
+/// The success rate over what the experiment varies, the recall over the translation error, what went
+/// wrong over the distance of the reference, and how wide and deep the basins of the truth are.
+pub fn plots(run: &RunFile, measures: &[Measures], rows: &[Row]) -> Vec<Plot> {
     let mut all = Vec::new();
     for pair in &run.pairs {
         let of_pair: Vec<&Measures> = measures
@@ -57,6 +63,21 @@ pub fn plots(run: &RunFile, measures: &[Measures]) -> Vec<Plot> {
         if !lines.is_empty() {
             let axis = "translation error (m), failures infinite";
             all.push((name("recall"), draw(axis, "queries (%)", &lines, false)));
+        }
+        let of_pair: Vec<&Row> = rows
+            .iter()
+            .filter(|row| {
+                let queries = row.query_scene.as_ref().unwrap_or(&row.scene);
+                row.scene == pair.scene && *queries == pair.query_scene
+            })
+            .collect();
+        for &method in &run.protocol.methods {
+            if let Some(plot) = causes::draw(method, &of_pair) {
+                all.push((name(&format!("causes-{method}")), plot));
+            }
+        }
+        for (what, axis, lines) in basins::curves(&run.protocol.methods, &of_pair) {
+            all.push((name(what), draw(axis, "queries (%)", &lines, false)));
         }
     }
     all

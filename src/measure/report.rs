@@ -74,7 +74,7 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
         write(&path("csv"), &csv)?;
         write(&path("tex"), table.latex().as_bytes())?;
     }
-    for (name, svg) in plots::plots(run, &measures) {
+    for (name, svg) in plots::plots(run, &measures, &rows) {
         let path = folder.join("plots").join(format!("{name}.svg"));
         let svg = svg.map_err(|message| FolderError::io(&path)(std::io::Error::other(message)))?;
         write(&path, svg.as_bytes())?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::loaded::Loaded;
 use super::run::Part;
 use crate::localize::{QueryResult, References, StageTimes};
+use crate::method::Method;
 use crate::trace::Record;
 
 /// What the worker says to the session.
@@ -21,6 +22,14 @@ pub(super) enum Message {
         result: Box<QueryResult>,
         times: Option<StageTimes>,
     },
+    /// Remedies are being tried on a result.
+    Explaining {
+        method: Method,
+        tried: usize,
+        remedies: usize,
+    },
+    /// A result that was told before, explained.
+    Explained(Box<QueryResult>),
     Finished,
     Cancelled,
     Broke(String),

@@ -266,6 +266,18 @@ impl LocalizeObserver for PausingObserver {
         });
     }
 
+    fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
+        let _ = self.send(Message::Explaining {
+            method: result.method,
+            tried,
+            remedies,
+        });
+    }
+
+    fn explained(&mut self, result: &QueryResult) {
+        let _ = self.send(Message::Explained(Box::new(result.clone())));
+    }
+
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         Some(Arc::clone(&self.control.attention))
     }

@@ -1,7 +1,9 @@
 //! What a run has told, in the order in which it was told.
 
+use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::loaded::Loaded;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
@@ -24,6 +26,8 @@ pub struct Run {
     history: History,
     spans: Vec<Span>,
     stages: Vec<StageBar>,
+    /// What would have helped a result is being looked for.
+    pub explaining: Option<Explaining>,
     /// Positions in `stages` of those that are open, the outermost first.
     open: Vec<usize>,
 }
@@ -54,6 +58,42 @@ impl Part {
             Self::Reference(_, reference) => Some(reference),
             Self::Retrieval | Self::Fusion(_) => None,
         }
+    }
+}
+
+/// How far the search for what would have helped a result is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Explaining {
+    /// The method whose result went wrong.
+    pub method: Method,
+    /// Remedies that were tried.
+    pub tried: usize,
+    /// Remedies there are to try.
+    pub remedies: usize,
+    /// When the first of them began.
+    pub since: Instant,
+}
+
+/// Such as `MI: what would have helped? 3 of 12 tried, 2 s, 6 s to go`.
+impl fmt::Display for Explaining {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            method,
+            tried,
+            remedies,
+            since,
+        } = self;
+        let seconds = since.elapsed().as_secs_f64();
+        let name = method.name().to_uppercase();
+        write!(
+            f,
+            "{name}: what would have helped? {tried} of {remedies} tried, {seconds:.0} s"
+        )?;
+        if *tried > 0 {
+            let left = seconds / *tried as f64 * remedies.saturating_sub(*tried) as f64;
+            write!(f, ", {left:.0} s to go")?;
+        }
+        Ok(())
     }
 }
 
@@ -141,6 +181,33 @@ impl Run {
         if let Some(span) = self.spans.last_mut() {
             span.result = Some(result);
             span.times = times;
+        }
+    }
+
+    pub(super) fn go_on_explaining(&mut self, method: Method, tried: usize, remedies: usize) {
+        let begun = self.explaining.filter(|_| tried > 0);
+        self.explaining = Some(Explaining {
+            method,
+            tried,
+            remedies,
+            since: begun.map_or_else(Instant::now, |begun| begun.since),
+        });
+    }
+
+    /// Puts an explained result in the place of the one that was told first.
+    pub(super) fn explain(&mut self, explained: QueryResult) {
+        self.explaining = None;
+        let is_same = |result: &QueryResult| {
+            result.method == explained.method
+                && result.fusion == explained.fusion
+                && result.references == explained.references
+        };
+        let results = self
+            .spans
+            .iter_mut()
+            .filter_map(|span| span.result.as_mut());
+        for result in results.filter(|result| is_same(result)) {
+            *result = explained.clone();
         }
     }
 

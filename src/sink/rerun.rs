@@ -21,6 +21,7 @@ mod recorder;
 mod report;
 mod retrieval;
 mod scene;
+mod story;
 mod stream;
 mod surface;
 mod targets;

@@ -391,6 +391,7 @@ fn fb_localises_at_the_real_door() {
         query: scene.query(query).expect("readable"),
         reference: scene.reference(reference).expect("readable"),
         uncertainty_radius_m: 5.0,
+        prior_m: None,
         seed: 0,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());

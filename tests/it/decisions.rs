@@ -34,6 +34,7 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
     // The query is 1 m from the reference.
     let near = Problem {
         uncertainty_radius_m: 0.5,
+        prior_m: None,
         ..solvable()
     };
     let refused = outcome(Method::FB, &near, &Params::default()).pose;
@@ -47,6 +48,13 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
         let pose = outcome(Method::FB, &near, &with(&[accepting])).pose;
         assert!(pose.is_ok(), "{accepting}");
     }
+    // Who searches no disc goes by the prior, where there is one.
+    let far_prior = Problem {
+        prior_m: Some(20.0),
+        ..near
+    };
+    let pose = outcome(Method::FB, &far_prior, &Params::default()).pose;
+    assert!(pose.is_ok(), "{pose:?}");
 }
 
 #[test]

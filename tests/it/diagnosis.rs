@@ -1,17 +1,21 @@
 //! Verdicts: what is said of results that are right, wrong or missing.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use posescope::code::Code;
 use posescope::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope::event::KindSet;
 use posescope::geometry::Pose;
 use posescope::localize::{
-    LocalizeError, Localizer, NoObserver, QueryResult, Request, localize_traced,
+    LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request, StageTimes,
+    localize_traced,
 };
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query};
-use posescope::trace::Trace;
+use posescope::trace::{Cancelled, Record, Sink, Trace};
 
 use crate::binary::posescope;
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
@@ -225,6 +229,108 @@ fn what_is_said_to_help_helps() {
     }
     // A result that is right needs no explanation.
     assert_eq!(run(&Params::default(), 12).explanation, None);
+}
+
+/// Notes what is told of explanations, and stops after so many remedies.
+#[derive(Default)]
+struct Listener {
+    told: Vec<String>,
+    most: Option<usize>,
+    flag: Arc<AtomicBool>,
+}
+
+impl Sink for Listener {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        Err(Cancelled)
+    }
+}
+
+impl LocalizeObserver for Listener {
+    fn end_method(&mut self, result: &QueryResult, _times: &StageTimes) {
+        assert_eq!(result.explanation, None);
+        self.told.push(result.method.to_string());
+    }
+    fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
+        assert!(tried < remedies);
+        self.told.push(format!("{} {tried}", result.method));
+        if self.most == Some(tried) {
+            self.flag.store(true, Ordering::Release);
+        }
+    }
+    fn explained(&mut self, result: &QueryResult) {
+        assert!(result.explanation.is_some());
+        self.told.push(format!("{} explained", result.method));
+    }
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(Arc::clone(&self.flag))
+    }
+}
+
+#[test]
+fn all_answers_come_before_explanations_and_a_stopped_one_says_that_it_is_incomplete() {
+    let scene = Walls::new();
+    let params = with(&["grid.coarse_step=3", "grid.fine_range=0.2"]);
+    let request = Request {
+        radius_m: 3.0,
+        references: vec![0].into(),
+        fusions: Vec::new(),
+        setting: None,
+    };
+    let run = |listener: &mut Listener| {
+        let localizer = Localizer::new(&scene, &scene, &params, 7)
+            .with_tolerance("0.4m,5deg".parse().expect("a tolerance"))
+            .explaining(3);
+        let mut results = Vec::new();
+        let keep = |result: QueryResult, times: StageTimes| {
+            results.push((result, times));
+            Ok::<(), LocalizeError>(())
+        };
+        let (requests, methods) = ([request.clone()], [Method::PM, Method::MI]);
+        let done = localizer.localize(0, 1, &requests, &methods, listener, keep);
+        (results, done.is_ok())
+    };
+    let mut listener = Listener::default();
+    let (results, is_done) = run(&mut listener);
+    assert!(is_done);
+    let expected = [
+        "pm",
+        "mi",
+        "pm 0",
+        "pm 1",
+        "pm 2",
+        "pm explained",
+        "mi 0",
+        "mi 1",
+        "mi 2",
+        "mi explained",
+    ];
+    assert_eq!(listener.told, expected);
+    for (result, times) in &results {
+        // Had a remedy of another method done the work before, it would have taken no time.
+        assert!(times.total() > Duration::ZERO, "{}", result.method);
+        let explanation = result.explanation.as_ref().expect("it went wrong");
+        assert!(explanation.complete && explanation.runs == 3);
+    }
+    let mut stopped = Listener {
+        most: Some(1),
+        ..Listener::default()
+    };
+    let (results, is_done) = run(&mut stopped);
+    assert!(!is_done);
+    let explanations: Vec<_> = results
+        .iter()
+        .map(|(result, _)| &result.explanation)
+        .collect();
+    let first = explanations[0].as_ref().expect("it was begun");
+    assert!(!first.complete && first.runs == 1, "{first:?}");
+    // What was computed is handed out all the same.
+    assert_eq!((explanations.len(), explanations[1]), (2, &None));
 }
 
 #[test]

@@ -284,6 +284,7 @@ fn fb_localises_on_the_real_drive() {
         query: scene.query(query).expect("readable"),
         reference: scene.reference(reference).expect("readable"),
         uncertainty_radius_m: 10.0,
+        prior_m: None,
         seed: 0,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());

@@ -25,6 +25,7 @@ fn pair(query: &str, reference: &str) -> Option<(Problem, Pose)> {
         query: scene.query(frame(query)).expect("readable"),
         reference: scene.reference(frame(reference)).expect("readable"),
         uncertainty_radius_m: 15.0,
+        prior_m: None,
         seed: 0,
     };
     Some((problem, scene.pose(frame(query)).expect("is known")))

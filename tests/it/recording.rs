@@ -17,7 +17,7 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
-use posescope::trace::{Cancelled, Sink as _, Trace};
+use posescope::trace::{Cancelled, Fanout, Sink as _, Trace};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 
@@ -46,13 +46,18 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
     recorder.begin_query(0, std::slice::from_ref(&problem), Some(&truth));
     for &method in methods {
         recorder.begin_method(0, method);
+        let mut evidence = Evidence::default();
+        let mut both = Fanout::new(vec![&mut *recorder, &mut evidence]);
         let outcome = estimator::entry(method)
             .make(params)
-            .estimate(&problem, &mut Trace::to(recorder))
+            .estimate(&problem, &mut Trace::to(&mut both))
             .expect("a recorder never cancels");
-        let evidence = Evidence::default();
+        let tolerance = Tolerance {
+            translation_m: 0.4,
+            rotation_deg: 5.0,
+        };
         let subject = Subject::new(&problem, method, params, &outcome, &evidence);
-        let subject = subject.against(Some(&truth), Tolerance::default());
+        let subject = subject.against(Some(&truth), tolerance);
         let result = evaluate("two walls", &subject);
         recorder.end_method(&result, &StageTimes::default());
     }
@@ -204,6 +209,33 @@ fn every_promised_entity_is_on_its_timelines() {
 }
 
 #[test]
+fn a_recording_of_something_wrong_opens_on_it_with_the_result_beside_the_truth() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut params = Params::default();
+    let right = recorded(&folder, "right.rrd", &[Method::PM, Method::MI], &params);
+    // So few pixels say so little that another place wins.
+    for assignment in ["grid.coarse_step=3", "grid.fine_range=0.2"] {
+        params.assign(assignment).expect("a parameter");
+    }
+    let wrong = recorded(&folder, "wrong.rrd", &[Method::PM, Method::MI], &params);
+    let beside = ["at_result", "at_truth"].map(|place| entities::direct(Method::MI, place));
+    let has = |path: &Path, entity: &str| {
+        let paths = timelines(&chunks(path));
+        paths.keys().any(|known| known.starts_with(entity))
+    };
+    for entity in &beside {
+        assert!(has(&wrong, &format!("{entity}/synthetic")), "{entity}");
+        assert!(
+            has(&wrong, &format!("{entity}/joint_histogram")),
+            "{entity}"
+        );
+        assert!(!has(&right, entity), "{entity}");
+    }
+    assert!(layout(&wrong).contains("MI: result beside truth"));
+    assert!(!layout(&right).contains("result beside truth"));
+}
+
+#[test]
 fn two_recordings_of_one_run_are_equal() {
     let folder = tempfile::tempdir().expect("a folder");
     let first = chunks(&recorded(
@@ -269,11 +301,7 @@ fn a_second_query_begins_with_a_clean_slate_and_later_steps() {
     );
     assert!(evals.len() > 100);
     let found = timelines(&chunks);
-    assert!(
-        entities::OF_A_QUERY
-            .iter()
-            .all(|root| found.contains_key(*root))
-    );
+    assert!(entities::of_a_query().all(|root| found.contains_key(root)));
 }
 
 #[test]
@@ -423,7 +451,7 @@ fn a_ranking_is_recorded_with_a_picture_of_the_best_and_wiped_for_the_next_query
     }
     // The second query has no ranking, and shows none.
     assert!(found.contains_key("retrieval"));
-    assert!(entities::OF_A_QUERY.contains(&"retrieval"));
+    assert!(entities::of_a_query().any(|root| root == "retrieval"));
 }
 
 #[test]

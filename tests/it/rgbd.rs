@@ -357,6 +357,7 @@ fn fb_localises_in_the_real_kitchen() {
         query: scene.query(frame("25")).expect("readable"),
         reference: scene.reference(frame("0")).expect("readable"),
         uncertainty_radius_m: 2.0,
+        prior_m: None,
         seed: 0,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());

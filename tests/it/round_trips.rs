@@ -151,6 +151,7 @@ fn every_layout_leads_to_the_same_pose_within_what_it_can_say() {
             query: disk.query(1).expect("is complete"),
             reference: disk.reference(0).expect("is complete"),
             uncertainty_radius_m: 15.0,
+            prior_m: None,
             seed: 0,
         };
         let outcome = localize(&problem, Method::FB, &Params::default());

@@ -56,6 +56,7 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
             memo: Memo::off(),
         }),
         uncertainty_radius_m: 15.0,
+        prior_m: None,
         seed: 0,
     }
 }

@@ -59,6 +59,7 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
             memo: Memo::off(),
         }),
         uncertainty_radius_m: 3.0,
+        prior_m: None,
         seed: 7,
     }
 }

@@ -235,6 +235,39 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
 }
 
 #[test]
+fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
+    let mut wrong = setup();
+    wrong.task.protocol.methods = vec![Method::MI];
+    wrong.task.protocol.right = "0.4m,5deg".parse().expect("a tolerance");
+    for assignment in ["grid.coarse_step=3", "grid.fine_range=0.2"] {
+        wrong.task.params.assign(assignment).expect("a parameter");
+    }
+    let mut window = window(wrong);
+    run_until_idle(&mut window);
+    press(&mut window, Modifiers::NONE, Key::F9);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    window.get_by_label("What would have helped?").click();
+    wait(&mut window, |app| {
+        app.app_state().setup.task.protocol.explain > 0
+    });
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    let explanation = |window: &Harness<'_, App>| {
+        let run = window.state().app_state().run();
+        let result = run.results().next().expect("a result");
+        result.explanation.clone()
+    };
+    let helped = explanation(&window).expect("it went wrong").helped;
+    let words = helped[0].args.join(" ");
+    assert!(is_said(&window, &words), "{words}");
+    assert!(window.state().app_state().run().explaining.is_none());
+    let line = window.state().app_state().setup.command_line();
+    assert!(line.contains("--explain 12"), "{line}");
+    press(&mut window, Modifiers::NONE, Key::E);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    assert_eq!(explanation(&window), None);
+}
+
+#[test]
 fn the_filter_takes_the_keyboard_once_and_lets_it_go() {
     let mut window = window(setup());
     run_until_idle(&mut window);

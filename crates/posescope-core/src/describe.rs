@@ -120,6 +120,7 @@ pub struct Described {
 
 /// Why a parameter could not be set.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ParamError {
     /// No parameter has this key.
     #[error("there is no parameter `{key}`{}; `posescope params` lists all", hint(.nearest))]

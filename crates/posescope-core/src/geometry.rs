@@ -13,6 +13,7 @@ pub type Pose = Isometry3<f64>;
 
 /// Why a 3 × 4 matrix is not a rigid transform.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NotRigid {
     /// An entry is NaN or infinite.
     #[error("the matrix has an entry that is not a finite number")]

@@ -4,6 +4,10 @@
 //! The grid is centred on the reference camera and uses its axes: right (x) and forward (z), then
 //! yaw about its up axis (−y). Height, pitch and roll stay the reference's.
 
+mod basin;
+
+pub use basin::Basin;
+
 use nalgebra::{Translation3, Vector3};
 
 use crate::describe::parameters;
@@ -38,6 +42,17 @@ parameters! {
         /// less than 1 % is covered. At 0.15 and above the right basin is cut off when the query is
         /// 8 to 10 m ahead.
         pub coverage_floor: f64 = number("coverage_floor", "", 0.0..=1.0),
+    }
+}
+
+impl GridParams {
+    /// Whether an offset lies where the grid of a search within `radius_m` ends, in position or yaw: its
+    /// basin may go on outside.
+    pub fn is_on_rim(&self, offset: &Offset, radius_m: f64) -> bool {
+        let distance_m = offset.right_m.hypot(offset.forward_m);
+        let yaw_deg = offset.yaw_rad.to_degrees().abs();
+        distance_m > radius_m - 0.5 * self.coarse_step_m
+            || yaw_deg > self.yaw_range_deg - 0.5 * self.yaw_step_deg
     }
 }
 
@@ -268,12 +283,11 @@ impl Lattice {
             return Some(offset);
         }
         let (right, forward) = (along(column, self.columns), along(row, self.rows));
-        if right.hypot(forward) > self.reach_m + 1e-9 {
-            return None;
-        }
         offset.right_m += right;
         offset.forward_m += forward;
-        Some(offset)
+        // The disc is the reference's, wherever a later round has its centre.
+        let is_inside = offset.right_m.hypot(offset.forward_m) <= self.reach_m + 1e-9;
+        is_inside.then_some(offset)
     }
 
     /// The cells that are hypotheses, with their offsets, in scan order.
@@ -400,6 +414,37 @@ mod tests {
         };
         let refused = Lattice::new(Phase::PositionFine, Offset::default(), 1.0, &params);
         assert_eq!(refused.expect_err("4 million").cells, 2001.0 * 2001.0);
+    }
+
+    #[test]
+    fn a_later_round_stays_within_the_disc_of_the_reference() {
+        let centre = Offset {
+            right_m: 8.0,
+            forward_m: -1.0,
+            yaw_rad: 0.1,
+        };
+        let lattice = lattice(Phase::PositionCoarse, centre, 10.0);
+        let distances: Vec<f64> = lattice
+            .hypotheses()
+            .map(|(_, offset)| offset.right_m.hypot(offset.forward_m))
+            .collect();
+        assert!(distances.len() > 50);
+        assert!(distances.iter().all(|&distance| distance <= 10.0 + 1e-9));
+    }
+
+    #[test]
+    fn the_rim_is_the_last_step_of_positions_and_of_yaws() {
+        let params = GridParams::default();
+        let is_on_rim = |right_m, yaw_deg: f64| {
+            let offset = Offset {
+                right_m,
+                forward_m: 0.0,
+                yaw_rad: yaw_deg.to_radians(),
+            };
+            params.is_on_rim(&offset, 10.0)
+        };
+        assert!(is_on_rim(-9.6, 0.0) && is_on_rim(0.0, 9.8));
+        assert!(!is_on_rim(9.4, 0.0) && !is_on_rim(0.0, -9.4));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 /// Why a photo, a camera, a pose or a radius cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
     /// The grey values are not as many as the image has pixels.
     #[error("{given} grey values given, {width} x {height} px need {}", u64::from(*width) * u64::from(*height))]

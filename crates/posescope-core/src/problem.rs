@@ -133,10 +133,12 @@ pub struct Problem {
     pub query: Arc<Query>,
     /// The photo, pose and cloud that are known.
     pub reference: Arc<ReferenceTuple>,
-    /// How far from the reference the query may be \[m\].
-    ///
-    /// The direct methods search this disc, and the feature-based method rejects a pose outside.
+    /// How far from the reference the direct methods search \[m\].
     pub uncertainty_radius_m: f64,
+    /// How far from the reference the query may be as far as anybody knows \[m\]: the feature-based
+    /// method, which searches no disc, rejects a pose outside. `None` where that is the radius of the
+    /// search.
+    pub prior_m: Option<f64>,
     /// Every random choice of an estimator derives from this.
     pub seed: u64,
 }
@@ -160,8 +162,14 @@ impl Problem {
             query: query.into(),
             reference: reference.into(),
             uncertainty_radius_m,
+            prior_m: None,
             seed: 0,
         })
+    }
+
+    /// How far from the reference a pose is to be believed \[m\].
+    pub fn believed_within_m(&self) -> f64 {
+        self.prior_m.unwrap_or(self.uncertainty_radius_m)
     }
 
     /// The pose of a camera whose pose in the reference camera's frame is `reference_from_query`.

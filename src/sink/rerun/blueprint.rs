@@ -5,7 +5,7 @@ use rerun::blueprint::components::{Corner2D, Eye3DKind};
 use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGrid3D, PlotLegend};
 
 use super::entities;
-use super::layout::{self, BlueprintNode, BlueprintView};
+use super::layout::{BlueprintNode, BlueprintView};
 use super::stream::Stream;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
@@ -27,12 +27,24 @@ pub(super) struct LayoutInput<'a> {
     pub(super) references: usize,
     /// Ranked frames that have a picture.
     pub(super) ranked: usize,
+    /// What is known at the end.
+    pub(super) focus: Focus,
+}
+
+/// What the layout leads the eye to, once the results are known; nothing before.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Focus {
+    /// The estimators whose results are wrong or missing, of a hybrid the one that it took.
+    pub(super) wrong: Vec<Method>,
+    /// Of those, the ones that are shown at their result and at the truth.
+    pub(super) beside_truth: Vec<Method>,
+    /// What is to be seen in the world at once, in the frame of the first reference camera \[m\].
+    pub(super) places: Vec<[f64; 3]>,
 }
 
 /// Sends the layout for a run.
 pub(super) fn send(stream: &mut Stream, input: &LayoutInput<'_>) {
-    let root = root(input);
-    stream.send_layout(|id, recording| layout::send(&root, id, recording));
+    stream.send_layout(&root(input));
 }
 
 /// Names and colours of what is plotted.
@@ -74,6 +86,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         first,
         references,
         ranked,
+        ref focus,
     } = *input;
     let viewpoints = &Viewpoints(first);
     let mut words: Vec<BlueprintNode> = vec![
@@ -88,22 +101,29 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         words.push(BlueprintView::new("TextDocument", "Ranking", entities::RETRIEVAL_TABLE).into());
     }
     let left = BlueprintNode::Column(vec![
-        (3.0, overview(viewpoints).into()),
+        (3.0, overview(viewpoints, &focus.places).into()),
         (2.0, BlueprintNode::Tabs(words)),
     ]);
     let mut rows = Vec::new();
     if shows_features(methods) {
         rows.push((1.0, feature_row()));
     }
-    let direct: Vec<BlueprintNode> = estimator::direct_methods(methods)
+    let mut direct = estimator::direct_methods(methods);
+    // The tab of what went wrong is the open one.
+    direct.sort_by_key(|method| !focus.wrong.contains(method));
+    let share = match direct.first() {
+        Some(first) if focus.wrong.contains(first) => 1.8,
+        _ => 1.2,
+    };
+    let direct: Vec<BlueprintNode> = direct
         .into_iter()
-        .map(|method| direct_row(method, viewpoints))
+        .map(|method| direct_row(method, focus, viewpoints))
         .collect();
     // Three rows would leave too little height for the photos.
     if rows.is_empty() {
         rows.extend(direct.into_iter().map(|row| (1.0, row)));
     } else if !direct.is_empty() {
-        rows.push((1.2, BlueprintNode::Tabs(direct)));
+        rows.push((share, BlueprintNode::Tabs(direct)));
     }
     let methods = BlueprintNode::Column(rows);
     let right = if ranked > 0 {
@@ -134,7 +154,7 @@ fn ranks(ranked: usize) -> BlueprintNode {
     )
 }
 
-fn overview(viewpoints: &Viewpoints<'_>) -> BlueprintView {
+fn overview(viewpoints: &Viewpoints<'_>, places: &[[f64; 3]]) -> BlueprintView {
     BlueprintView::new("3D", "World", "/")
         // The maps of PM and MI lie in the same place: each has a view of its own.
         .of([
@@ -142,7 +162,7 @@ fn overview(viewpoints: &Viewpoints<'_>) -> BlueprintView {
             "- /world/search/**",
             "- /world/correspondences/outlier/**",
         ])
-        .with("EyeControls3D", viewpoints.behind())
+        .with("EyeControls3D", viewpoints.behind(places))
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
 }
 
@@ -181,7 +201,40 @@ fn feature_row() -> BlueprintNode {
     )
 }
 
-fn direct_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
+fn direct_row(method: Method, focus: &Focus, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
+    let search = search_row(method, viewpoints);
+    if !focus.beside_truth.contains(&method) {
+        return search;
+    }
+    let name = method.name().to_uppercase();
+    // What the search compares lies beside what it should have found.
+    let at = |place: &str, what: &str| -> BlueprintNode {
+        let pictures = match has_histogram(method) {
+            true => ["synthetic", "joint_histogram"],
+            false => ["synthetic", "residual"],
+        };
+        let view = |part: &str| {
+            let title = format!("{name} at the {what}: {}", part.replace('_', " "));
+            let origin = entities::direct(method, &format!("{place}/{part}"));
+            (1.0, BlueprintView::new("2D", title, origin).into())
+        };
+        BlueprintNode::Column(pictures.map(view).into())
+    };
+    let beside = row(
+        &format!("{name}: result beside truth"),
+        vec![
+            (1.0, at(entities::AT_RESULT, "result")),
+            (1.0, at(entities::AT_TRUTH, "truth")),
+        ],
+    );
+    row(
+        &name,
+        vec![(1.0, BlueprintNode::Tabs(vec![beside, search]))],
+    )
+}
+
+/// The search of a direct method, step by step.
+fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     let name = method.name().to_uppercase();
     let image = |what: &str, part: &str| -> BlueprintNode {
         BlueprintView::new(
@@ -227,7 +280,7 @@ fn direct_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
         .into(),
     ]);
     row(
-        &name,
+        &format!("{name}: search"),
         vec![
             (
                 3.0,
@@ -271,9 +324,24 @@ fn plot(name: impl Into<String>, origin: impl Into<String>) -> BlueprintView {
 struct Viewpoints<'a>(&'a Problem);
 
 impl Viewpoints<'_> {
-    /// Looks over the reference camera's shoulder.
-    fn behind(&self) -> EyeControls3D {
-        self.at([-2.0, -5.0, -9.0], [0.0, 0.0, 10.0], [0.0, -1.0, 0.0])
+    /// Looks over the reference camera's shoulder, from so far that all places are in sight.
+    fn behind(&self, places: &[[f64; 3]]) -> EyeControls3D {
+        let up = [0.0, -1.0, 0.0];
+        let Some(nearest) = places.iter().map(|place| place[2]).reduce(f64::min) else {
+            return self.at([-2.0, -5.0, -9.0], [0.0, 0.0, 10.0], up);
+        };
+        let span = |axis: usize| {
+            let values = || places.iter().map(|place| place[axis]);
+            let (least, most) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
+            ((least + most) / 2.0, most - least)
+        };
+        let ((middle_x, wide), (middle_z, long)) = (span(0), span(2));
+        let back = 9.0 + wide + 0.5 * long;
+        self.at(
+            [middle_x - 0.2 * back, -0.6 * back, nearest.min(0.0) - back],
+            [middle_x, 0.0, middle_z],
+            up,
+        )
     }
 
     /// Looks down on the whole disc of the search, with ahead upwards.

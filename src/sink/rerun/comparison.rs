@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use rerun::{Points3D, Scalars, SeriesLines, TextDocument, ViewCoordinates};
 
 use super::entities;
-use super::layout::{self, BlueprintNode, BlueprintView};
+use super::layout::{BlueprintNode, BlueprintView};
 use super::scene::Origin;
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets};
@@ -65,7 +65,7 @@ pub fn record_comparison(
     };
     stream.log_static(entities::REPORT, &TextDocument::from_markdown(report));
     let root = root(&methods);
-    stream.send_layout(|id, recording| layout::send(&root, id, recording));
+    stream.send_layout(&root);
     Ok(stream.close()?)
 }
 

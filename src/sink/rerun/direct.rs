@@ -54,34 +54,18 @@ impl DirectContext {
     }
 
     fn rendered(&mut self, event: &ViewRendered, context: &EventContext<'_>, stream: &mut Stream) {
-        let path = |part| entities::direct(context.method, part);
-        let Comparison {
-            view,
-            pairs,
-            score,
-            explanation,
-        } = event.comparison.as_ref();
-        stream.log_image(&path("synthetic"), png(picture::synthetic(view)));
-        match explanation {
-            Some(Explanation::Weights(weights)) => {
-                stream.log_image(&path("residual"), png(picture::residual(view, pairs)));
-                stream.log_image(&path("weights"), png(picture::weights(view, weights)));
-            }
-            Some(Explanation::JointHistogram(histogram)) => {
-                stream.log_image(
-                    &path("joint_histogram"),
-                    png(picture::joint_histogram(histogram)),
-                );
-                let entropies = [
-                    histogram.query_entropy,
-                    histogram.synthetic_entropy,
-                    histogram.joint_entropy,
-                ];
-                stream.log(&path("entropy"), &Scalars::new(entropies));
-            }
-            None => {}
+        let path = |part: &str| entities::direct(context.method, part);
+        let comparison = event.comparison.as_ref();
+        log_pictures(stream, comparison, &path);
+        if let Some(Explanation::JointHistogram(histogram)) = &comparison.explanation {
+            let entropies = [
+                histogram.query_entropy,
+                histogram.synthetic_entropy,
+                histogram.joint_entropy,
+            ];
+            stream.log(&path("entropy"), &Scalars::new(entropies));
         }
-        if let Some(cost) = score.cost {
+        if let Some(cost) = comparison.score.cost {
             stream.log(&path("best"), &Scalars::single(cost));
         }
         self.path.push(event.offset);
@@ -109,5 +93,31 @@ impl DirectContext {
         );
         self.costs.clear();
         self.coverages.clear();
+    }
+}
+
+/// Pictures of a synthetic view and of what the cost makes of it.
+pub(super) fn log_pictures(
+    stream: &mut Stream,
+    comparison: &Comparison,
+    path: &dyn Fn(&str) -> String,
+) {
+    let Comparison {
+        view,
+        pairs,
+        explanation,
+        ..
+    } = comparison;
+    stream.log_image(&path("synthetic"), png(picture::synthetic(view)));
+    match explanation {
+        Some(Explanation::Weights(weights)) => {
+            stream.log_image(&path("residual"), png(picture::residual(view, pairs)));
+            stream.log_image(&path("weights"), png(picture::weights(view, weights)));
+        }
+        Some(Explanation::JointHistogram(histogram)) => stream.log_image(
+            &path("joint_histogram"),
+            png(picture::joint_histogram(histogram)),
+        ),
+        None => {}
     }
 }

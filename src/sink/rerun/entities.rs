@@ -1,5 +1,6 @@
 //! Where things are in a recording: its application, its timelines, its entity paths.
 
+use crate::estimator;
 use crate::event::Side;
 use crate::method::Method;
 
@@ -15,17 +16,13 @@ pub const EVAL_TIMELINE: &str = "eval";
 
 /// Everything that has a place in the world.
 pub const WORLD: &str = "world";
-/// The roots of all that belongs to one query.
-pub const OF_A_QUERY: [&str; 8] = [
-    WORLD,
-    "query",
-    "fb",
-    "pm",
-    "mi",
-    "search",
-    "fusion",
-    "retrieval",
-];
+/// The roots of all that belongs to one query, whichever methods were asked.
+pub fn of_a_query() -> impl Iterator<Item = &'static str> {
+    let methods = estimator::methods().map(|method| method.name());
+    [WORLD, "query", "search", "fusion", "retrieval"]
+        .into_iter()
+        .chain(methods)
+}
 /// Inliers of the best trial so far, one row per improvement.
 pub const RANSAC_BEST: &str = "fb/ransac/best";
 /// Number of inliers of each trial.
@@ -126,8 +123,14 @@ pub fn yaw_curve(method: Method) -> String {
     format!("search/{}/yaw", method.name())
 }
 
+/// What a direct method shows at its result, below its name: see [`direct`].
+pub const AT_RESULT: &str = "at_result";
+/// The same at the truth.
+pub const AT_TRUTH: &str = "at_truth";
+
 /// Something that a direct method shows: `synthetic`, `residual`, `weights`, `joint_histogram`,
-/// `entropy`, `cost`, `coverage`, `best`.
+/// `entropy`, `cost`, `coverage`, `best`; below [`AT_RESULT`] and [`AT_TRUTH`] the pictures of both,
+/// where the result is wrong.
 pub fn direct(method: Method, part: &str) -> String {
     format!("{}/{part}", method.name())
 }

@@ -83,14 +83,17 @@ impl From<BlueprintView> for BlueprintNode {
     }
 }
 
-/// Sends a layout along with a recording, with the time panel on `step`, at the end of the run.
+/// Sends a layout along with a recording, with the time panel on `step`, at the end of the run. The one
+/// that is sent last holds; each `revision` is a layout of its own, because a viewer goes on with what
+/// it made of one that it knows.
 pub(super) fn send(
     root: &BlueprintNode,
     recording_id: &str,
+    revision: i64,
     recording: &RecordingStream,
 ) -> RecordingStreamResult<()> {
     let (stream, storage) = RecordingStreamBuilder::new(APPLICATION_ID)
-        .recording_id(format!("{recording_id}-blueprint"))
+        .recording_id(format!("{recording_id}-blueprint-{revision}"))
         .blueprint()
         .memory()?;
     stream.set_time_sequence("blueprint", 0);

@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
+use super::blueprint::Focus;
 use super::direct::DirectContext;
 use super::event_context::EventContext;
 use super::feature::FeatureContext;
 use super::fusion::FusionTables;
 use super::scene::{self, Origin, PlacedCamera};
+use super::story::{self, BesideTruth};
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
 use crate::estimator;
@@ -21,7 +23,7 @@ use crate::narration;
 use crate::palette;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
-use crate::render::{ColoredCloud, RenderParams, color_cloud};
+use crate::render::{ColoredCloud, color_cloud};
 use crate::trace::{Cancelled, Record, Sink};
 
 /// Puts runs into a Rerun recording, one query after the other.
@@ -32,7 +34,7 @@ pub struct Recorder {
     stream: Stream,
     configuration: String,
     failure_radius_m: f64,
-    render: RenderParams,
+    params: Params,
     methods: Vec<Method>,
     /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
     origin: Option<Origin>,
@@ -52,10 +54,16 @@ struct CurrentQuery {
     method: Option<Method>,
     /// Estimators that were recorded, by reference: the hybrid repeats what FB and MI did.
     recorded: BTreeSet<(usize, Method)>,
+    /// Whether the method at work can only repeat what was recorded before.
+    is_repetition: bool,
     clouds: BTreeSet<usize>,
     stages: Vec<Stage>,
     estimators: Vec<ActiveEstimator>,
     fusion: FusionTables,
+    /// Estimators that were shown at their result and at the truth.
+    beside_truth: Vec<Method>,
+    /// Ranked frames that have a picture.
+    ranked: usize,
 }
 
 /// An estimator whose events come in.
@@ -83,7 +91,7 @@ impl Recorder {
         let _ = params.merge_toml(&identity.configuration);
         Ok(Self {
             stream: Stream::open(targets, identity)?,
-            render: params.render,
+            params,
             configuration: identity.configuration.clone(),
             failure_radius_m: identity.failure_radius_m,
             methods: methods.to_vec(),
@@ -98,7 +106,8 @@ impl Recorder {
     ///
     /// # Errors
     /// The first error of the whole run.
-    pub fn close(self) -> Result<(), RecordError> {
+    pub fn close(mut self) -> Result<(), RecordError> {
+        self.lay_out_story();
         self.stream.close()
     }
 
@@ -128,13 +137,58 @@ impl Recorder {
             first,
             references: self.query.problems.len(),
             ranked,
+            focus: Focus::default(),
         };
         blueprint::send(&mut self.stream, &input);
     }
 
+    /// Sends the layout again, now that it is known what went wrong.
+    fn lay_out_story(&mut self) {
+        let Some(first) = self.query.problems.first() else {
+            return;
+        };
+        if self.query.results.is_empty() || self.stream.is_broken() {
+            return;
+        }
+        let CurrentQuery {
+            truth,
+            results,
+            beside_truth,
+            ranked,
+            ..
+        } = &self.query;
+        let input = blueprint::LayoutInput {
+            methods: &self.methods,
+            first,
+            references: self.query.problems.len(),
+            ranked: *ranked,
+            focus: story::focus(first, truth.as_ref(), results, beside_truth),
+        };
+        blueprint::send(&mut self.stream, &input);
+    }
+
+    /// A wrong result of a search beside the truth, once for every estimator and reference.
+    fn show_beside_truth(&mut self, result: &QueryResult) {
+        let (Some(problem), Some(truth)) = (self.query.problem(), self.query.truth) else {
+            return;
+        };
+        let Some(method) = story::responsible(result) else {
+            return;
+        };
+        let shown = BesideTruth {
+            problem,
+            truth: &truth,
+            params: &self.params,
+        };
+        if !self.query.beside_truth.contains(&method) && shown.log(method, result, &mut self.stream)
+        {
+            self.query.beside_truth.push(method);
+        }
+    }
+
     /// Nothing of the last query must be taken for the next one's.
     fn wipe(&mut self) {
-        for path in entities::OF_A_QUERY {
+        for path in entities::of_a_query() {
             self.stream.log(path, &rerun::Clear::recursive());
         }
     }
@@ -249,7 +303,7 @@ impl Recorder {
         let ReferenceTuple {
             photo, intrinsics, ..
         } = tuple;
-        color_cloud(&tuple.cloud, &photo.gray, intrinsics, &self.render)
+        color_cloud(&tuple.cloud, &photo.gray, intrinsics, &self.params.render)
     }
 
     fn fused(&mut self, event: &ReferencesFused) {
@@ -277,7 +331,8 @@ impl Recorder {
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         let path = narration::stages(&self.query.stages);
         self.say(&format!("{path}: {words}"), TextLogLevel::INFO);
-        self.lay_out(event.ranking.pictured().len());
+        self.query.ranked = event.ranking.pictured().len();
+        self.lay_out(self.query.ranked);
     }
 
     fn tell(&mut self, event: &Event) {
@@ -337,7 +392,7 @@ impl CurrentQuery {
         self.problems.get(self.reference)
     }
 
-    /// Whether the hybrid that runs now can only repeat what was recorded before.
+    /// Whether the method that begins now is a hybrid of which both parts were recorded before.
     fn is_repeated_hybrid(&self) -> bool {
         let was_recorded = |method| self.recorded.contains(&(self.reference, method));
         let here = self.method.and_then(estimator::find);
@@ -388,6 +443,8 @@ impl LocalizeObserver for Recorder {
         self.lay_out(0);
         self.query.reference = reference_index;
         self.query.method = Some(method);
+        // Decided once: while a hybrid runs, its own parts are recorded one after the other.
+        self.query.is_repetition = self.query.is_repeated_hybrid();
         self.query.stages.clear();
         self.query.estimators.clear();
     }
@@ -396,7 +453,21 @@ impl LocalizeObserver for Recorder {
         self.stream.advance();
         self.result_in_words(result);
         self.estimate(result);
+        self.show_beside_truth(result);
         self.query.results.push(result.clone());
+        self.report();
+        self.stream.flush_blocking();
+    }
+
+    fn explained(&mut self, explained: &QueryResult) {
+        let is_same = |result: &&mut QueryResult| {
+            result.method == explained.method
+                && result.fusion == explained.fusion
+                && result.references == explained.references
+        };
+        for result in self.query.results.iter_mut().filter(is_same) {
+            *result = explained.clone();
+        }
         self.report();
         self.stream.flush_blocking();
     }
@@ -414,7 +485,7 @@ impl Sink for Recorder {
     fn wanted(&self) -> KindSet {
         if self.stream.is_broken() {
             KindSet::NONE
-        } else if self.query.is_repeated_hybrid() {
+        } else if self.query.is_repetition {
             KindSet::of(&[Kind::BranchTaken])
         } else {
             KindSet::ALL

@@ -3,13 +3,12 @@
 use std::time::Duration;
 
 use rerun::log::ChunkBatcherConfig;
-use rerun::{
-    AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimeColumn,
-};
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, TimeColumn};
 
 use super::encode::Encoded;
 use super::entities::{APPLICATION_ID, EVAL_TIMELINE, QUERY_TIMELINE, STEP_TIMELINE};
 use super::file::RecordingFile;
+use super::layout::{self, BlueprintNode};
 use super::targets::OpenTargets;
 use super::{Identity, RecordError, Targets};
 
@@ -34,6 +33,8 @@ pub(super) struct Stream {
     query: i64,
     step: i64,
     eval: Option<i64>,
+    /// Layouts that were sent.
+    layouts: i64,
 }
 
 impl Stream {
@@ -59,15 +60,14 @@ impl Stream {
             query: 0,
             step: -1,
             eval: None,
+            layouts: 0,
         })
     }
 
-    /// Sends a layout; `send` is given the recording's id and its stream.
-    pub(super) fn send_layout(
-        &mut self,
-        send: impl FnOnce(&str, &RecordingStream) -> RecordingStreamResult<()>,
-    ) {
-        let sent = send(&self.id, &self.recording);
+    /// Sends a layout, which takes the place of the one before.
+    pub(super) fn send_layout(&mut self, root: &BlueprintNode) {
+        let sent = layout::send(root, &self.id, self.layouts, &self.recording);
+        self.layouts += 1;
         self.keep(sent.map_err(|error| unrecordable("the layout", &error)));
     }
 

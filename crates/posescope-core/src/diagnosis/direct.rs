@@ -10,12 +10,10 @@ use serde_json::json;
 
 use super::descent::compass_search;
 use super::{Code, Diagnosis, Subject, failure_alone, suspicion};
-use crate::camera::Intrinsics;
 use crate::estimator::{self, CostSummary};
 use crate::event::MinimumAssessed;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{GridParams, Offset, Phase, ScoredLattice};
-use crate::problem::{Problem, Query};
 use crate::render::{Score, Scorer};
 
 /// Coarse minima beside the result from which the cost is descended, to see whether a better search
@@ -76,14 +74,7 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
             summary,
             minimum,
         };
-        found = search.verdicts(&|camera| {
-            let problem = seen_by(subject.problem, camera);
-            let mut score = None;
-            estimator.with_scorer(&problem, &mut |scorer| {
-                score = scorer.score(&[truth]).first().copied();
-            });
-            score
-        });
+        found = search.verdicts();
     });
     found
 }
@@ -93,7 +84,11 @@ fn without_truth(subject: &Subject<'_>) -> Vec<Diagnosis> {
     let (Some(summary), Some(minimum)) = (subject.outcome.cost, subject.evidence.minimum) else {
         return failure_alone(subject);
     };
-    if !subject.trust.as_ref().is_some_and(|trust| trust.is_low()) {
+    if !subject
+        .trust
+        .as_ref()
+        .is_some_and(|trust| trust.is_doubtful())
+    {
         return Vec::new();
     }
     let radius_m = subject.problem.uncertainty_radius_m;
@@ -135,17 +130,18 @@ fn on_rim(minimum: &MinimumAssessed, radius_m: f64, grid: &GridParams) -> Option
         forward_m,
         yaw_rad,
     } = minimum.offset;
+    if !grid.is_on_rim(&minimum.offset, radius_m) {
+        return None;
+    }
     let distance_m = right_m.hypot(forward_m);
     let yaw_deg = yaw_rad.to_degrees().abs();
     let place = if distance_m > radius_m - 0.5 * grid.coarse_step_m {
         format!("{distance_m:.1} m from the reference, where the disc of {radius_m:.1} m ends")
-    } else if yaw_deg > grid.yaw_range_deg - 0.5 * grid.yaw_step_deg {
+    } else {
         format!(
             "at a yaw of {yaw_deg:.1}°, where the range of {:.1}° ends",
             grid.yaw_range_deg
         )
-    } else {
-        return None;
     };
     Some(Diagnosis::new(
         Code::D8,
@@ -171,19 +167,6 @@ fn hardly_covered(summary: &CostSummary) -> Option<Diagnosis> {
             json!({ "coverage": summary.coverage_best, "share_of_reference": share, "chance_level": summary.shuffled }),
         )
     })
-}
-
-/// The same problem, seen by another camera.
-fn seen_by(problem: &Problem, camera: Intrinsics) -> Problem {
-    let query = Query {
-        intrinsics: camera,
-        memo: problem.query.memo.shared(),
-        ..(*problem.query).clone()
-    };
-    Problem {
-        query: query.into(),
-        ..problem.clone()
-    }
 }
 
 /// What a place costs, and what shuffled pixels cost there.
@@ -220,11 +203,11 @@ struct SearchedCost<'a, 'cost> {
 }
 
 impl SearchedCost<'_, '_> {
-    fn verdicts(&self, seen_by: &dyn Fn(Intrinsics) -> Option<Score>) -> Vec<Diagnosis> {
+    fn verdicts(&self) -> Vec<Diagnosis> {
         let mut found = Vec::new();
         found.extend(suspicion::of_poses(self.subject));
         let near = self.best_near_truth();
-        found.extend(self.suspect_camera(near.as_ref(), seen_by));
+        found.extend(self.suspect_camera(near.as_ref()));
         found.extend(self.suspect_truth(near.as_ref()));
         if let Some(outside) = self.outside_grid() {
             found.push(outside);

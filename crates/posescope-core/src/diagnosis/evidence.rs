@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::depth::LiftedMatch;
 use crate::event::{ConsensusJudged, Event, Kind, KindSet, MinimumAssessed, PoseRefined, Side};
 use crate::features::{FeatureState, Features, Match};
-use crate::grid::ScoredLattice;
+use crate::grid::{Phase, ScoredLattice};
 use crate::trace::{Cancelled, Record, Sink};
 
 /// The events of one method on one problem that verdicts are drawn from. Their payloads are shared, so
@@ -33,6 +33,13 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// The first lattice of positions.
+    pub fn coarse(&self) -> Option<&ScoredLattice> {
+        let is_coarse =
+            |surface: &&Arc<ScoredLattice>| surface.lattice.phase == Phase::PositionCoarse;
+        self.surfaces.iter().find(is_coarse).map(AsRef::as_ref)
+    }
+
     /// What a hybrid of two methods would have told that fell back to the second.
     #[must_use]
     pub fn followed_by(&self, second: &Self) -> Self {

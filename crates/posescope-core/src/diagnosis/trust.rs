@@ -23,8 +23,13 @@ use crate::solver::{Correspondence, pose_covariance};
 /// The distance from the truth that [`Trust::probability`] speaks of \[m\].
 pub const WITHIN_M: f64 = 1.0;
 
-/// A pose of less probability has low confidence.
-pub const LOW_CONFIDENCE: f64 = 0.7;
+/// A pose of less probability has low confidence: of the queries that show nothing of their place, none
+/// should be believed.
+pub const LOW_CONFIDENCE: f64 = 0.9;
+
+/// A pose of less probability is more likely wrong than poses of low confidence are as a whole, so
+/// that what speaks against it is said without knowing the truth.
+const DOUBTFUL: f64 = 0.7;
 
 /// How far a pose is to be believed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,10 +79,19 @@ impl Trust {
         }
     }
 
-    /// Whether the pose is hardly to be believed.
+    /// Whether the pose has low confidence.
     pub fn is_low(&self) -> bool {
+        self.is_below(LOW_CONFIDENCE)
+    }
+
+    /// Whether the pose is so doubtful that what speaks against it counts.
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.is_below(DOUBTFUL)
+    }
+
+    fn is_below(&self, limit: f64) -> bool {
         self.probability
-            .is_some_and(|probability| probability < LOW_CONFIDENCE)
+            .is_some_and(|probability| probability < limit)
     }
 }
 
@@ -213,7 +227,7 @@ impl Inliers {
                 self.spread,
                 deviation_m.ln(),
                 self.median_residual_px,
-                distance_m / problem.uncertainty_radius_m,
+                distance_m / problem.believed_within_m(),
             ],
         }
     }

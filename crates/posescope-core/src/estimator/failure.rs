@@ -5,6 +5,7 @@ use crate::grid::LatticeTooLarge;
 
 /// A typed reason with its evidence. In statistics it counts as an infinite error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Failure {
     /// A photo shows hardly any texture.
     #[error(

@@ -1,4 +1,4 @@
-//! FB, the indirect feature-based method (paper, section 2.2 and appendix A).
+//! FB, the indirect feature-based method (paper, section 2.1 and appendix A).
 
 mod params;
 mod states;
@@ -401,7 +401,7 @@ impl FeatureBased {
             effective_area_px(&pixels, problem.query.intrinsics.area()),
         );
         let distance_m = reference_from_query.translation.vector.norm();
-        let radius_m = problem.uncertainty_radius_m;
+        let radius_m = problem.believed_within_m();
         let too_far = distance_m > radius_m * (1.0 + self.params.radius_slack);
         let verdict = if !self.params.accept.accepts(&acceptance) {
             Err(Failure::ChanceConsensus {

@@ -4,27 +4,25 @@
 //! to watch either.
 
 mod explain;
+mod fuse;
+mod judge;
+mod work;
 
 use std::sync::Arc;
 
-use self::explain::Unexplained;
-
+use self::work::{Answer, MethodOutcome, Place, QueryWork};
 use super::observer::checkpoint;
 use super::{
-    Agreement, LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings,
-    evaluate, localize_traced, tell_ranking,
+    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_traced,
+    tell_ranking,
 };
-use crate::diagnosis::{
-    Evidence, Member, Subject, Tolerance, diagnose_fusion, diagnose_ranking, fused_trust,
-};
-use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
+use crate::diagnosis::{Evidence, Tolerance};
+use crate::estimator::{self, Failure, hybrid_outcome};
 use crate::event::KindSet;
-use crate::features::remembered;
-use crate::fusion::{self, Fusion};
-use crate::geometry::{Pose, PoseError};
+use crate::fusion::Fusion;
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::{Problem, Query};
+use crate::problem::Problem;
 use crate::retrieval::ReferenceRanking;
 use crate::scene::{CachedScene, Scene, SceneError};
 use crate::trace::Fanout;
@@ -32,6 +30,7 @@ use crate::trace::{Cancelled, Sink, Trace};
 
 /// Why queries could not be localised, for those who have no error of their own.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LocalizeError {
     /// A frame cannot be read.
     #[error(transparent)]
@@ -69,33 +68,6 @@ pub struct Localizer<'a> {
     least_probability: Option<f64>,
     /// How often a query that went wrong is localised again to see what would have helped.
     runs_to_explain: usize,
-}
-
-/// What one method made of one problem.
-struct MethodOutcome {
-    /// What the estimator answered.
-    estimated: Outcome,
-    /// What is made of it: a pose of low confidence may be refused.
-    outcome: Outcome,
-    /// What the estimator told.
-    evidence: Evidence,
-    result: QueryResult,
-    times: StageTimes,
-}
-
-/// A query at work, with all that was found out about it.
-struct QueryWork<'a> {
-    query: &'a Query,
-    truth: Option<Pose>,
-    problems: Vec<Problem>,
-    /// The query's position in its scene.
-    frame: usize,
-    /// The reference and the radius of each problem \[m\].
-    places: Vec<(usize, f64)>,
-    /// Feature matches by problem, once they are known.
-    matches: Vec<Option<usize>>,
-    /// What each method made of each problem, in the order of [`estimator::methods`].
-    candidates: Vec<Vec<Option<MethodOutcome>>>,
 }
 
 impl<'a> Localizer<'a> {
@@ -203,13 +175,17 @@ impl<'a> Localizer<'a> {
         mut hand_out: impl FnMut(QueryResult, StageTimes) -> Result<(), E>,
     ) -> Result<(), E> {
         let loaded = self.queries.query(query)?;
-        let mut places: Vec<(usize, u64)> = Vec::new();
+        let mut places: Vec<Place> = Vec::new();
         let mut problems = Vec::new();
         let mut members: Vec<Vec<usize>> = Vec::new();
         for request in requests {
             let mut of_request = Vec::new();
             for &reference in &request.references.frames {
-                let place = (reference, request.radius_m.to_bits());
+                let place = Place {
+                    reference,
+                    radius_m: request.radius_m,
+                    within_m: request.references.within_m,
+                };
                 let known = places.iter().position(|known| *known == place);
                 of_request.push(match known {
                     Some(problem) => problem,
@@ -220,6 +196,7 @@ impl<'a> Localizer<'a> {
                             query: Arc::clone(&loaded),
                             reference: self.references.reference(reference)?,
                             uncertainty_radius_m: request.radius_m,
+                            prior_m: request.references.within_m,
                             seed: self.seed,
                         });
                         problems.len() - 1
@@ -237,19 +214,51 @@ impl<'a> Localizer<'a> {
                 .collect(),
             problems,
             frame: query,
-            places: places
-                .into_iter()
-                .map(|(reference, radius)| (reference, f64::from_bits(radius)))
-                .collect(),
+            places,
         };
         observer.begin_query(index, &work.problems, work.truth.as_ref());
         self.tell_rankings(requests, observer)?;
+        // Explained is what went wrong once every method has had its turn, so that all answers are
+        // there first and no method finds its work done by a remedy of another.
+        let mut unexplained = Vec::new();
+        let answered = self.answer(
+            &mut work,
+            requests.iter().zip(&members),
+            methods,
+            observer,
+            &mut |answer| match self.runs_to_explain {
+                0 => hand_out(answer.result, answer.times),
+                _ => {
+                    unexplained.push(answer);
+                    Ok(())
+                }
+            },
+        );
+        let explained = answered
+            .and_then(|()| Ok(self.explain_wrong(&mut unexplained, work.frame, observer)?));
+        for answer in unexplained {
+            hand_out(answer.result, answer.times)?;
+        }
+        explained
+    }
+
+    /// Lets every method answer every request.
+    fn answer<'r, E: From<Cancelled>>(
+        &self,
+        work: &mut QueryWork<'_>,
+        requests: impl Iterator<Item = (&'r Request, &'r Vec<usize>)> + Clone,
+        methods: &[Method],
+        observer: &mut dyn LocalizeObserver,
+        emit: &mut dyn FnMut(Answer) -> Result<(), E>,
+    ) -> Result<(), E> {
         for &method in methods {
-            for (request, members) in requests.iter().zip(&members) {
-                let truth = work.truth;
-                let mut emit = |result: QueryResult, times: StageTimes| {
-                    let result = self.with_ranking_judged(result, request, truth.as_ref());
-                    hand_out(self.marked(result, request.setting), times)
+            for (request, members) in requests.clone() {
+                let mut emit = |result: QueryResult, times: StageTimes, asked: Request| {
+                    emit(Answer {
+                        result: self.marked(result, request.setting),
+                        times,
+                        asked,
+                    })
                 };
                 if members.is_empty() {
                     let failure = Failure::NoReference {
@@ -262,27 +271,34 @@ impl<'a> Localizer<'a> {
                         fusions.collect()
                     };
                     for fusion in lines {
-                        let result = self.without_pose(&work, method, fusion, &failure);
-                        emit(result, StageTimes::default())?;
+                        let result = self.without_pose(work, method, fusion, &failure);
+                        let result = self.with_ranking_judged(result, request, work.truth.as_ref());
+                        emit(result, StageTimes::default(), request.clone())?;
                     }
                     continue;
                 }
                 for &problem in members {
-                    let is_fused = !request.fusions.is_empty();
-                    self.solve(&mut work, problem, method, is_fused, observer)?;
+                    self.solve(work, problem, method, request, observer)?;
                     if let (true, Some(candidate)) =
                         (request.fusions.is_empty(), work.candidate(problem, method))
                     {
-                        emit(candidate.result.clone(), candidate.times.clone())?;
+                        let result = candidate.result.clone();
+                        let result = self.with_ranking_judged(result, request, work.truth.as_ref());
+                        let asked = work.asked_alone(problem);
+                        emit(result, candidate.times.clone(), asked)?;
                     }
                 }
                 if !request.fusions.is_empty() {
-                    self.count_matches(&mut work, members, observer)?;
+                    self.count_matches(work, members, observer)?;
                 }
                 for &fusion in &request.fusions {
                     let (result, times) =
-                        self.fuse(&work, members, method, fusion, request, observer)?;
-                    emit(result, times)?;
+                        self.fuse(work, members, method, fusion, request, observer)?;
+                    let asked = Request {
+                        fusions: vec![fusion],
+                        ..request.clone()
+                    };
+                    emit(result, times, asked)?;
                 }
             }
         }
@@ -319,26 +335,6 @@ impl<'a> Localizer<'a> {
         }
     }
 
-    /// A result that is not right because retrieval found another place says so first.
-    fn with_ranking_judged(
-        &self,
-        mut result: QueryResult,
-        request: &Request,
-        truth: Option<&Pose>,
-    ) -> QueryResult {
-        let is_right = result
-            .error
-            .is_some_and(|error| self.tolerance.contains(&error));
-        let ranking = request.references.ranking.as_ref().zip(truth);
-        if !is_right
-            && let Some(verdict) = ranking
-                .and_then(|(ranking, truth)| diagnose_ranking(ranking, truth, request.radius_m))
-        {
-            result.diagnosis.insert(0, verdict);
-        }
-        result
-    }
-
     fn without_pose(
         &self,
         work: &QueryWork<'_>,
@@ -365,14 +361,14 @@ impl<'a> Localizer<'a> {
         work: &mut QueryWork<'_>,
         problem: usize,
         method: Method,
-        is_fused: bool,
+        request: &Request,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
         if work.candidate(problem, method).is_some() {
             return Ok(());
         }
         observer.begin_method(problem, method);
-        let mut candidate = match work.hybrid_parts(problem, method) {
+        let candidate = match work.hybrid_parts(problem, method) {
             Some((feature, direct)) => {
                 let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
@@ -397,49 +393,13 @@ impl<'a> Localizer<'a> {
             }
             None => self.estimate(work, problem, method, observer)?,
         };
-        // What is fused is explained as a whole.
-        let explained = if is_fused {
-            Ok(())
-        } else {
-            let (reference, radius_m) = work.places[problem];
-            let request = Request {
-                radius_m,
-                references: vec![reference].into(),
-                fusions: Vec::new(),
-                setting: None,
-            };
-            self.explain_wrong(&mut candidate.result, work.frame, &request, observer)
-        };
-        observer.end_method(&candidate.result, &candidate.times);
+        let told = self.with_ranking_judged(candidate.result.clone(), request, work.truth.as_ref());
+        observer.end_method(&told, &candidate.times);
         let row = estimator::methods().position(|known| known == method);
         if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
             *slot = Some(candidate);
         }
-        explained
-    }
-
-    /// Says of a wrong result what would have helped, if that is asked for.
-    fn explain_wrong(
-        &self,
-        result: &mut QueryResult,
-        query: usize,
-        request: &Request,
-        observer: &mut dyn LocalizeObserver,
-    ) -> Result<(), Cancelled> {
-        let is_right = |error: &PoseError| self.tolerance.contains(error);
-        let is_wrong =
-            result.initial_error.is_some() && !result.error.as_ref().is_some_and(is_right);
-        if self.runs_to_explain == 0 || !is_wrong {
-            return Ok(());
-        }
-        let unexplained = Unexplained {
-            result,
-            query,
-            request,
-        };
-        let (explanation, outcome) = self.explain(&unexplained, self.runs_to_explain, observer);
-        result.explanation = Some(explanation);
-        outcome
+        Ok(())
     }
 
     fn estimate(
@@ -461,202 +421,5 @@ impl<'a> Localizer<'a> {
         let outcome = localize_traced(&work.problems[problem], method, self.params, &mut trace)?;
         let times = timings.into_times();
         Ok(self.judged(work, problem, method, outcome, evidence, times))
-    }
-
-    fn judged(
-        &self,
-        work: &QueryWork<'_>,
-        problem: usize,
-        method: Method,
-        estimated: Outcome,
-        evidence: Evidence,
-        times: StageTimes,
-    ) -> MethodOutcome {
-        let solved = &work.problems[problem];
-        let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
-        let outcome = self.accepted(&subject);
-        let subject = Subject {
-            outcome: &outcome,
-            ..subject
-        };
-        let subject = subject.against(work.truth.as_ref(), self.tolerance);
-        let mut result = evaluate(self.references.name(), &subject);
-        if let Ok(pose) = &outcome.pose {
-            result.agreement = work.agreement(problem, method, pose);
-        }
-        MethodOutcome {
-            estimated,
-            outcome,
-            evidence,
-            result,
-            times,
-        }
-    }
-
-    /// The outcome, without its pose where that is less certain than asked for.
-    fn accepted(&self, subject: &Subject<'_>) -> Outcome {
-        let trust = subject.trust.as_ref();
-        let probability = trust.and_then(|trust| trust.probability);
-        match (self.least_probability, probability) {
-            (Some(needed), Some(probability)) if probability < needed => Outcome {
-                pose: Err(Failure::LowConfidence {
-                    probability,
-                    needed,
-                }),
-                ..subject.outcome.clone()
-            },
-            _ => subject.outcome.clone(),
-        }
-    }
-
-    /// FB counts them anyway; for the direct methods the same features are matched.
-    fn count_matches(
-        &self,
-        work: &mut QueryWork<'_>,
-        members: &[usize],
-        observer: &mut dyn LocalizeObserver,
-    ) -> Result<(), Cancelled> {
-        for &problem in members {
-            if work.matches[problem].is_some() {
-                continue;
-            }
-            checkpoint(observer)?;
-            let counted = estimator::methods().find_map(|method| {
-                let candidate = work.candidate(problem, method)?;
-                candidate.outcome.counts
-            });
-            work.matches[problem] = Some(match counted {
-                Some(counts) => counts.unique,
-                None => {
-                    let Problem {
-                        query, reference, ..
-                    } = &work.problems[problem];
-                    let surf = &self.params.surf;
-                    let query = remembered(&query.photo.gray, &query.memo, surf);
-                    let reference = remembered(&reference.photo.gray, &reference.memo, surf);
-                    count_matches(&query.value, &reference.value, &self.params.fb)
-                }
-            });
-        }
-        Ok(())
-    }
-
-    fn fuse(
-        &self,
-        work: &QueryWork<'_>,
-        members: &[usize],
-        method: Method,
-        fusion: Fusion,
-        request: &Request,
-        observer: &mut dyn LocalizeObserver,
-    ) -> Result<(QueryResult, StageTimes), Cancelled> {
-        let solved: Vec<(&Problem, usize, &MethodOutcome)> = members
-            .iter()
-            .filter_map(|&problem| {
-                let matches = work.matches[problem].unwrap_or_default();
-                let candidate = work.candidate(problem, method)?;
-                Some((&work.problems[problem], matches, candidate))
-            })
-            .collect();
-        let candidates: Vec<_> = solved
-            .iter()
-            .map(|(problem, matches, candidate)| fusion::Candidate {
-                reference: &problem.reference.name,
-                matches: *matches,
-                pose: candidate.outcome.pose.as_ref(),
-                fell_back: candidate.outcome.fell_back,
-            })
-            .collect();
-        observer.begin_fusion(method);
-        let sink: &mut dyn Sink = observer;
-        let (pose, shares) = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
-        let fused_members: Vec<Member<'_>> = shares
-            .iter()
-            .zip(&solved)
-            .map(|(share, (.., candidate))| Member {
-                share,
-                verdicts: &candidate.result.diagnosis,
-                trust: candidate.result.trust.as_ref(),
-            })
-            .collect();
-        let truth = work.truth.as_ref();
-        // Where one would start from with a single reference: the one with the most matches.
-        let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
-        let mut result = QueryResult {
-            references: solved
-                .iter()
-                .map(|(problem, ..)| problem.reference.name.clone())
-                .collect(),
-            fusion: Some(fusion),
-            initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
-                PoseError::between(truth, &problem.reference.world_from_camera)
-            }),
-            diagnosis: diagnose_fusion(&pose, &fused_members, truth, self.tolerance),
-            trust: pose
-                .as_ref()
-                .ok()
-                .and_then(|pose| fused_trust(pose, &fused_members)),
-            per_reference: Some(
-                solved
-                    .iter()
-                    .map(|(.., candidate)| candidate.result.nested())
-                    .collect(),
-            ),
-            ..QueryResult::new(
-                self.references.name(),
-                &work.query.name,
-                method,
-                self.seed,
-                pose.as_ref(),
-                truth,
-            )
-        };
-        let asked = Request {
-            fusions: vec![fusion],
-            ..request.clone()
-        };
-        let explained = self.explain_wrong(&mut result, work.frame, &asked, observer);
-        observer.end_fusion(&result);
-        explained?;
-        let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
-        Ok((result, times))
-    }
-}
-
-impl QueryWork<'_> {
-    /// How far the poses of the other methods that solved the problem are from this one.
-    fn agreement(&self, problem: usize, method: Method, pose: &Pose) -> Vec<Agreement> {
-        estimator::methods()
-            .filter(|other| *other != method)
-            .filter_map(|other| {
-                let candidate = self.candidate(problem, other)?;
-                let error = PoseError::between(candidate.outcome.pose.as_ref().ok()?, pose);
-                Some(Agreement {
-                    method: other,
-                    translation_m: error.translation_m,
-                    rotation_deg: error.rotation_deg,
-                })
-            })
-            .collect()
-    }
-
-    fn candidate(&self, problem: usize, method: Method) -> Option<&MethodOutcome> {
-        let row = estimator::methods().position(|known| known == method)?;
-        self.candidates.get(row)?.get(problem)?.as_ref()
-    }
-
-    /// The candidates of a hybrid's methods, where it can be made of them.
-    fn hybrid_parts(
-        &self,
-        problem: usize,
-        method: Method,
-    ) -> Option<(&MethodOutcome, &MethodOutcome)> {
-        let parts = estimator::find(method)?.hybrid()?;
-        let first = self.candidate(problem, parts.first)?;
-        let second = self.candidate(problem, parts.second)?;
-        let panicked = |candidate: &MethodOutcome| {
-            matches!(candidate.outcome.pose, Err(Failure::Internal { .. }))
-        };
-        (!panicked(first) && !panicked(second)).then_some((first, second))
     }
 }

@@ -40,6 +40,17 @@ pub trait LocalizeObserver: Sink {
         let _ = result;
     }
 
+    /// A result went wrong, and what would have helped is being looked for: so many of so many
+    /// remedies were tried. It tells nothing else.
+    fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
+        let _ = (result, tried, remedies);
+    }
+
+    /// A result that was told before, now with what would have helped.
+    fn explained(&mut self, result: &QueryResult) {
+        let _ = result;
+    }
+
     /// A flag that is raised when [`Sink::attend`] is to be called although nothing was told.
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         None

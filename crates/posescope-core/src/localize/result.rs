@@ -10,6 +10,9 @@ use crate::diagnosis::{Code, Diagnosis, Subject, Trust, diagnose};
 use crate::estimator::{self, CostSummary, Failure, FeatureCounts};
 use crate::fusion::Fusion;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
+#[cfg(doc)]
+use crate::grid::GridParams;
+use crate::grid::{Basin, Offset};
 use crate::method::Method;
 use crate::text::UnknownWord;
 
@@ -212,10 +215,22 @@ pub struct CostReport {
     pub coverage_reference: f64,
     /// Hypotheses that were scored.
     pub evaluations: u64,
+    /// Whether the estimate lies where the grid ends ([`GridParams::is_on_rim`]), so that the search has
+    /// not converged within its range.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub on_rim: bool,
+    /// From how far around the truth the coarse positions lead to it ([`Basin::radius_m`]), where the
+    /// truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub basin_m: Option<f64>,
+    /// What the cheapest coarse minimum elsewhere costs more than the one at the truth
+    /// ([`Basin::margin`]); negative where the cost prefers another place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub basin_margin: Option<f64>,
 }
 
 impl CostReport {
-    fn new(summary: &CostSummary, truth: Option<f64>) -> Self {
+    fn new(summary: &CostSummary, truth: Option<f64>, on_rim: bool, basin: Option<Basin>) -> Self {
         Self {
             initial: summary.initial,
             best: summary.best,
@@ -225,6 +240,9 @@ impl CostReport {
             coverage_best: summary.coverage_best,
             coverage_reference: summary.coverage_reference,
             evaluations: summary.evaluations,
+            on_rim,
+            basin_m: basin.map(|basin| basin.radius_m),
+            basin_margin: basin.and_then(|basin| basin.margin),
         }
     }
 }
@@ -245,6 +263,14 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
         estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost);
         cost
     });
+    let basin = truth.and_then(|truth| {
+        let place = Offset::of(&problem.reference_from_query(truth));
+        subject.evidence.coarse()?.basin(&place)
+    });
+    let on_rim = subject.evidence.minimum.is_some_and(|minimum| {
+        let grid = &subject.params.grid;
+        grid.is_on_rim(&minimum.offset, problem.uncertainty_radius_m)
+    });
     QueryResult {
         references: vec![problem.reference.name.clone()],
         initial_error: truth
@@ -253,7 +279,7 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
         cost: outcome
             .cost
             .as_ref()
-            .map(|summary| CostReport::new(summary, cost_at_truth)),
+            .map(|summary| CostReport::new(summary, cost_at_truth, on_rim, basin)),
         diagnosis: diagnose(subject),
         trust: subject.trust.clone(),
         ..QueryResult::new(

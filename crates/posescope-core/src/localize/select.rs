@@ -191,6 +191,7 @@ pub fn draw(mut candidates: Vec<usize>, count: usize, query: &str, seed: u64) ->
 
 /// Why no references can be chosen.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChoiceError {
     /// References are sought around the query, whose position nobody knows.
     #[error("the position of query {query} is not known; name a frame with --reference")]

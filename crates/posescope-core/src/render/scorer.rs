@@ -41,7 +41,7 @@ pub struct Scorer<'a> {
     intrinsics: Intrinsics,
     splat_px: usize,
     cost: &'a dyn Cost,
-    prepared: OnceLock<Prepared>,
+    prepared: OnceLock<Arc<Prepared>>,
     /// Those that no thread works with at present.
     idle: Mutex<Vec<Worker<'a>>>,
 }
@@ -67,6 +67,20 @@ impl<'a> Scorer<'a> {
         }
     }
 
+    /// The same query as another camera of the same size would have taken it.
+    #[must_use]
+    pub fn seen_by(&self, intrinsics: &Intrinsics) -> Self {
+        Self {
+            points: self.points,
+            query: Arc::clone(&self.query),
+            intrinsics: *intrinsics,
+            splat_px: self.splat_px,
+            cost: self.cost,
+            prepared: self.prepared.clone(),
+            idle: Mutex::default(),
+        }
+    }
+
     /// How many cameras to score at a time: few enough that a run can be stopped soon, enough for all
     /// threads of the current pool. At most [`MOST_AT_A_TIME`].
     pub fn at_a_time(&self) -> usize {
@@ -77,7 +91,7 @@ impl<'a> Scorer<'a> {
     pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
         let prepared = self
             .prepared
-            .get_or_init(|| Prepared::new(self.points, &self.query, self.cost));
+            .get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)));
         let score = |worker: &mut Option<Worker<'_>>, pose: &Pose| match worker {
             Some(worker) => worker.score(prepared, &self.query, &pose.inverse()),
             None => self.compare(pose).score,

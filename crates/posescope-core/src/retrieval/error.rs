@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 /// An index that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum IndexError {
     /// There is no file.
     #[error("{}: there is no retrieval index", .path.display())]

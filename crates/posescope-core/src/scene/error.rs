@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 /// A scene that cannot be used as asked.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// Neither a folder nor a built-in scene.
     #[error("{argument}: no such file or folder, and not the name of a built-in scene (street)")]

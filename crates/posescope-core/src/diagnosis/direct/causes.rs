@@ -19,11 +19,7 @@ use crate::render::Score;
 impl SearchedCost<'_, '_> {
     /// From the true pose, another focal length explains the query much better than any pose does with
     /// the stated one.
-    pub(super) fn suspect_camera(
-        &self,
-        near: Option<&Place>,
-        seen_by: &dyn Fn(Intrinsics) -> Option<Score>,
-    ) -> Option<Diagnosis> {
+    pub(super) fn suspect_camera(&self, near: Option<&Place>) -> Option<Diagnosis> {
         const TIMES: [f64; 8] = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.4];
         let stated = self.subject.problem.query.intrinsics;
         let camera = |at: &[f64; 3]| Intrinsics {
@@ -33,11 +29,12 @@ impl SearchedCost<'_, '_> {
             cy: stated.cy + at[2],
             ..stated
         };
-        // Another camera that sees next to nothing of the cloud is cheap by chance.
         let stated_score = self.scorer.score(&[self.truth])[0];
         let stated_cost = stated_score.eligible_cost(self.least_covered())?;
-        let least_covered = stated_score.covered / 2;
-        let cost = |at: &[f64; 3]| seen_by(camera(at))?.eligible_cost(least_covered);
+        let cost = |at: &[f64; 3]| {
+            let scores = self.scorer.seen_by(&camera(at)).score(&[self.truth]);
+            comparable_cost(scores.first()?, &stated_score)
+        };
         let best = TIMES
             .iter()
             .map(|times| [times.ln(), 0.0, 0.0])
@@ -401,6 +398,12 @@ impl SearchedCost<'_, '_> {
     }
 }
 
+/// What another camera costs; `None` for one that sees so little of the cloud that it is cheap by
+/// chance, as one of a much shorter focal length does.
+fn comparable_cost(other: &Score, stated: &Score) -> Option<f64> {
+    other.eligible_cost(stated.covered / 2)
+}
+
 /// Where the search turned away from the truth.
 #[derive(Default)]
 struct Loss {
@@ -467,4 +470,20 @@ fn lifted_to(offset: &Offset, truth: &Pose) -> Pose {
     pose.translation.y = truth.translation.y;
     pose.rotation = yaw(offset.yaw_rad) * (yaw(plane.yaw_rad).inverse() * truth.rotation);
     pose
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_that_sees_less_than_half_of_the_cloud_is_not_compared() {
+        let score = |covered| Score {
+            cost: Some(0.1),
+            covered,
+        };
+        let stated = score(1000);
+        assert_eq!(comparable_cost(&score(499), &stated), None);
+        assert_eq!(comparable_cost(&score(500), &stated), Some(0.1));
+    }
 }

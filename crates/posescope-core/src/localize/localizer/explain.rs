@@ -1,5 +1,6 @@
 //! What would have helped: a query that went wrong is localised again, differently.
 
+use super::work::Answer;
 use super::{LocalizeError, Localizer, Request};
 use crate::diagnosis::remedies::{Change, Remedy, remedies};
 use crate::geometry::PoseError;
@@ -8,59 +9,73 @@ use crate::localize::{Explanation, Helped, QueryResult, frames_within};
 use crate::method::Method;
 use crate::trace::Cancelled;
 
-/// A result that is to be explained.
-pub(super) struct Unexplained<'a> {
-    /// The result.
-    pub(super) result: &'a QueryResult,
-    /// The query's position in its scene.
-    pub(super) query: usize,
-    /// What was asked.
-    pub(super) request: &'a Request,
-}
-
 impl Localizer<'_> {
-    /// Tries at most `most` remedies on a result. Whoever watches hears nothing of them, but can stop
-    /// them.
-    pub(super) fn explain(
+    /// Says of every answer that is wrong what would have helped.
+    ///
+    /// # Errors
+    /// [`Cancelled`], and then the explanation at work is incomplete and says so.
+    pub(super) fn explain_wrong(
         &self,
-        unexplained: &Unexplained<'_>,
-        most: usize,
+        answers: &mut [Answer],
+        query: usize,
         observer: &mut dyn LocalizeObserver,
-    ) -> (Explanation, Result<(), Cancelled>) {
-        let mut explanation = Explanation::default();
-        let Unexplained {
-            result, request, ..
-        } = unexplained;
-        let Some(primary) = result.diagnosis.first() else {
-            return (explanation, Ok(()));
-        };
-        let candidates = remedies(primary.code, result.method, self.params(), request.radius_m);
-        for remedy in candidates.into_iter().take(most) {
-            if let Err(cancelled) = checkpoint(observer) {
-                return (explanation, Err(cancelled));
-            }
-            let Some(changed) = self.changed(unexplained, &remedy) else {
+    ) -> Result<(), Cancelled> {
+        for answer in answers {
+            let result = &answer.result;
+            let is_right = |error: &PoseError| self.tolerance.contains(error);
+            let is_measured = result.initial_error.is_some();
+            if !is_measured || result.error.as_ref().is_some_and(is_right) {
                 continue;
-            };
+            }
+            let mut explanation = Explanation::default();
+            let outcome = self.explain(answer, query, &mut explanation, observer);
+            answer.result.explanation = Some(explanation);
+            observer.explained(&answer.result);
+            outcome?;
+        }
+        Ok(())
+    }
+
+    /// Tries the remedies on an answer, at most as many as are to be tried. Whoever watches hears
+    /// nothing of what they do, but can stop them.
+    fn explain(
+        &self,
+        answer: &Answer,
+        query: usize,
+        explanation: &mut Explanation,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(), Cancelled> {
+        let Answer { result, asked, .. } = answer;
+        let candidates = result.diagnosis.first().map_or(Vec::new(), |primary| {
+            remedies(primary.code, result.method, self.params(), asked.radius_m)
+        });
+        let candidates: Vec<Changed> = candidates
+            .iter()
+            .filter_map(|remedy| self.changed(answer, query, remedy))
+            .take(self.runs_to_explain)
+            .collect();
+        for (tried, changed) in candidates.iter().enumerate() {
+            observer.explaining(result, tried, candidates.len());
+            checkpoint(observer)?;
             explanation.runs += 1;
-            if let Some(error) = changed.run(self, unexplained.query) {
+            if let Some(error) = changed.run(self, query) {
                 explanation.helped.push(Helped {
-                    args: changed.args,
+                    args: changed.args.clone(),
                     error,
                 });
             }
         }
         explanation.complete = true;
-        (explanation, Ok(()))
+        Ok(())
     }
 
-    fn changed(&self, unexplained: &Unexplained<'_>, remedy: &Remedy) -> Option<Changed> {
+    fn changed(&self, answer: &Answer, query: usize, remedy: &Remedy) -> Option<Changed> {
         let mut changed = Changed {
             params: self.params().clone(),
-            method: unexplained.result.method,
+            method: answer.result.method,
             request: Request {
                 setting: None,
-                ..unexplained.request.clone()
+                ..answer.asked.clone()
             },
             args: Vec::new(),
         };
@@ -74,6 +89,11 @@ impl Localizer<'_> {
                     option("set", assignment.clone());
                 }
                 Change::Radius(radius_m) => {
+                    // Without a prior of its own, the query is taken to be within the radius.
+                    let within_m = &mut changed.request.references.within_m;
+                    if *within_m == Some(changed.request.radius_m) {
+                        *within_m = Some(*radius_m);
+                    }
                     changed.request.radius_m = *radius_m;
                     option("radius", radius_m.to_string());
                 }
@@ -82,8 +102,8 @@ impl Localizer<'_> {
                     option("method", method.to_string());
                 }
                 Change::Reference(farther) => {
-                    let frame = self.farther_reference(unexplained, *farther)?;
-                    changed.request.references = vec![frame].into();
+                    let frame = self.farther_reference(&answer.asked, query, *farther)?;
+                    changed.request.references.frames = vec![frame];
                     option("reference", self.references().frames()[frame].clone());
                 }
             }
@@ -93,15 +113,15 @@ impl Localizer<'_> {
 
     /// The reference that is so many places farther from the one that was used, of those within the
     /// radius around it.
-    fn farther_reference(&self, unexplained: &Unexplained<'_>, farther: usize) -> Option<usize> {
-        let [used] = unexplained.request.references.frames[..] else {
+    fn farther_reference(&self, asked: &Request, query: usize, farther: usize) -> Option<usize> {
+        let [used] = asked.references.frames[..] else {
             return None;
         };
         let (references, queries) = (self.references(), self.queries());
         let is_same_scene = references.name() == queries.name();
         let place = references.pose(used)?;
-        let left_out = |frame: usize| frame == used || is_same_scene && frame == unexplained.query;
-        let radius_m = unexplained.request.radius_m;
+        let left_out = |frame: usize| frame == used || is_same_scene && frame == query;
+        let radius_m = asked.radius_m;
         let within = frames_within(references, &place, radius_m, &left_out);
         within.get(farther * within.len() / 3).copied()
     }

@@ -1,0 +1,126 @@
+//! One pose from those of several references.
+
+use super::work::{MethodOutcome, QueryWork};
+use super::{Localizer, Request};
+use crate::diagnosis::{Member, diagnose_fusion, fused_trust};
+use crate::estimator::{self, count_matches};
+use crate::features::remembered;
+use crate::fusion::{self, Fusion};
+use crate::geometry::PoseError;
+use crate::localize::observer::checkpoint;
+use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
+use crate::method::Method;
+use crate::problem::Problem;
+use crate::scene::Scene;
+use crate::trace::{Cancelled, Sink, Trace};
+
+impl Localizer<'_> {
+    /// FB counts them anyway; for the direct methods the same features are matched.
+    pub(super) fn count_matches(
+        &self,
+        work: &mut QueryWork<'_>,
+        members: &[usize],
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(), Cancelled> {
+        for &problem in members {
+            if work.matches[problem].is_some() {
+                continue;
+            }
+            checkpoint(observer)?;
+            let counted = estimator::methods().find_map(|method| {
+                let candidate = work.candidate(problem, method)?;
+                candidate.outcome.counts
+            });
+            work.matches[problem] = Some(match counted {
+                Some(counts) => counts.unique,
+                None => {
+                    let Problem {
+                        query, reference, ..
+                    } = &work.problems[problem];
+                    let surf = &self.params.surf;
+                    let query = remembered(&query.photo.gray, &query.memo, surf);
+                    let reference = remembered(&reference.photo.gray, &reference.memo, surf);
+                    count_matches(&query.value, &reference.value, &self.params.fb)
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// The result of one of a request's fusions.
+    pub(super) fn fuse(
+        &self,
+        work: &QueryWork<'_>,
+        members: &[usize],
+        method: Method,
+        fusion: Fusion,
+        request: &Request,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(QueryResult, StageTimes), Cancelled> {
+        let solved: Vec<(&Problem, usize, &MethodOutcome)> = members
+            .iter()
+            .filter_map(|&problem| {
+                let matches = work.matches[problem].unwrap_or_default();
+                let candidate = work.candidate(problem, method)?;
+                Some((&work.problems[problem], matches, candidate))
+            })
+            .collect();
+        let candidates: Vec<_> = solved
+            .iter()
+            .map(|(problem, matches, candidate)| fusion::Candidate {
+                reference: &problem.reference.name,
+                matches: *matches,
+                pose: candidate.outcome.pose.as_ref(),
+                fell_back: candidate.outcome.fell_back,
+            })
+            .collect();
+        observer.begin_fusion(method);
+        let sink: &mut dyn Sink = observer;
+        let (pose, shares) = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
+        let fused_members: Vec<Member<'_>> = shares
+            .iter()
+            .zip(&solved)
+            .map(|(share, (.., candidate))| Member {
+                share,
+                verdicts: &candidate.result.diagnosis,
+                trust: candidate.result.trust.as_ref(),
+            })
+            .collect();
+        let truth = work.truth.as_ref();
+        // Where one would start from with a single reference: the one with the most matches.
+        let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
+        let result = QueryResult {
+            references: solved
+                .iter()
+                .map(|(problem, ..)| problem.reference.name.clone())
+                .collect(),
+            fusion: Some(fusion),
+            initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
+                PoseError::between(truth, &problem.reference.world_from_camera)
+            }),
+            diagnosis: diagnose_fusion(&pose, &fused_members, truth, self.tolerance),
+            trust: pose
+                .as_ref()
+                .ok()
+                .and_then(|pose| fused_trust(pose, &fused_members)),
+            per_reference: Some(
+                solved
+                    .iter()
+                    .map(|(.., candidate)| candidate.result.nested())
+                    .collect(),
+            ),
+            ..QueryResult::new(
+                self.references.name(),
+                &work.query.name,
+                method,
+                self.seed,
+                pose.as_ref(),
+                truth,
+            )
+        };
+        let result = self.with_ranking_judged(result, request, truth);
+        observer.end_fusion(&result);
+        let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
+        Ok((result, times))
+    }
+}

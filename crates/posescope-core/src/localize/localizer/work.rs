@@ -1,0 +1,119 @@
+//! A query at work: what was asked of it and what every method made of it so far.
+
+use super::Request;
+use crate::diagnosis::Evidence;
+use crate::estimator::{self, Failure, Outcome};
+use crate::geometry::{Pose, PoseError};
+use crate::localize::{Agreement, QueryResult, References, StageTimes};
+use crate::method::Method;
+use crate::problem::{Problem, Query};
+
+/// What one method made of one problem.
+pub(super) struct MethodOutcome {
+    /// What the estimator answered.
+    pub(super) estimated: Outcome,
+    /// What is made of it: a pose of low confidence may be refused.
+    pub(super) outcome: Outcome,
+    /// What the estimator told.
+    pub(super) evidence: Evidence,
+    /// The outcome measured and judged.
+    pub(super) result: QueryResult,
+    /// How long its stages took.
+    pub(super) times: StageTimes,
+}
+
+/// A query at work, with all that was found out about it.
+pub(super) struct QueryWork<'a> {
+    /// The query.
+    pub(super) query: &'a Query,
+    /// Its true pose.
+    pub(super) truth: Option<Pose>,
+    /// One problem for each reference and radius.
+    pub(super) problems: Vec<Problem>,
+    /// The query's position in its scene.
+    pub(super) frame: usize,
+    /// What each problem was made of.
+    pub(super) places: Vec<Place>,
+    /// Feature matches by problem, once they are known.
+    pub(super) matches: Vec<Option<usize>>,
+    /// What each method made of each problem, in the order of [`estimator::methods`].
+    pub(super) candidates: Vec<Vec<Option<MethodOutcome>>>,
+}
+
+/// A reference, and what is known of the distance of the query \[m\].
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// The reference's position in its scene.
+    pub(super) reference: usize,
+    /// The radius of the search.
+    pub(super) radius_m: f64,
+    /// How far the query may be, as [`References::within_m`].
+    pub(super) within_m: Option<f64>,
+}
+
+/// A result as it is handed out, with what was asked for it.
+pub(super) struct Answer {
+    /// The result.
+    pub(super) result: QueryResult,
+    /// How long its stages took.
+    pub(super) times: StageTimes,
+    /// The request that this result alone answers.
+    pub(super) asked: Request,
+}
+
+impl QueryWork<'_> {
+    /// How far the poses of the other methods that solved the problem are from this one.
+    pub(super) fn agreement(&self, problem: usize, method: Method, pose: &Pose) -> Vec<Agreement> {
+        estimator::methods()
+            .filter(|other| *other != method)
+            .filter_map(|other| {
+                let candidate = self.candidate(problem, other)?;
+                let error = PoseError::between(candidate.outcome.pose.as_ref().ok()?, pose);
+                Some(Agreement {
+                    method: other,
+                    translation_m: error.translation_m,
+                    rotation_deg: error.rotation_deg,
+                })
+            })
+            .collect()
+    }
+
+    /// What a method made of a problem, if it had its turn.
+    pub(super) fn candidate(&self, problem: usize, method: Method) -> Option<&MethodOutcome> {
+        let row = estimator::methods().position(|known| known == method)?;
+        self.candidates.get(row)?.get(problem)?.as_ref()
+    }
+
+    /// The candidates of a hybrid's methods, where it can be made of them.
+    pub(super) fn hybrid_parts(
+        &self,
+        problem: usize,
+        method: Method,
+    ) -> Option<(&MethodOutcome, &MethodOutcome)> {
+        let parts = estimator::find(method)?.hybrid()?;
+        let first = self.candidate(problem, parts.first)?;
+        let second = self.candidate(problem, parts.second)?;
+        let panicked = |candidate: &MethodOutcome| {
+            matches!(candidate.outcome.pose, Err(Failure::Internal { .. }))
+        };
+        (!panicked(first) && !panicked(second)).then_some((first, second))
+    }
+
+    /// The request that gives the result of a problem by itself.
+    pub(super) fn asked_alone(&self, problem: usize) -> Request {
+        let Place {
+            reference,
+            radius_m,
+            within_m,
+        } = self.places[problem];
+        Request {
+            radius_m,
+            references: References {
+                within_m,
+                ..vec![reference].into()
+            },
+            fusions: Vec::new(),
+            setting: None,
+        }
+    }
+}
