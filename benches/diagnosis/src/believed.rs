@@ -23,8 +23,24 @@ use rayon::prelude::*;
 
 const METHODS: [Method; 4] = Method::PAPER;
 
-/// Counts by what was done and method: results, and those that were not to be.
-type Counts = BTreeMap<(&'static str, &'static str), (usize, usize)>;
+/// Results by what was done and method.
+type Counts = BTreeMap<(&'static str, &'static str), Tally>;
+
+/// Results that were not to be, all results, and the greatest probability that was said.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    bad: usize,
+    all: usize,
+    most: f64,
+}
+
+impl Tally {
+    fn add(&mut self, is_bad: bool, probability: f64) {
+        self.bad += usize::from(is_bad);
+        self.all += 1;
+        self.most = self.most.max(probability);
+    }
+}
 
 fn main() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
@@ -67,9 +83,11 @@ fn main() -> Result<(), String> {
 }
 
 fn add(all: &mut Counts, some: Counts) {
-    for (key, (bad, count)) in some {
+    for (key, tally) in some {
         let entry = all.entry(key).or_default();
-        *entry = (entry.0 + bad, entry.1 + count);
+        entry.bad += tally.bad;
+        entry.all += tally.all;
+        entry.most = entry.most.max(tally.most);
     }
 }
 
@@ -82,11 +100,9 @@ fn print(title: &str, counts: &Counts) {
     kinds.dedup();
     for kind in kinds {
         let cells = METHODS.map(|method| {
-            let (bad, count) = counts
-                .get(&(kind, method.name()))
-                .copied()
-                .unwrap_or_default();
-            format!("{bad} of {count}")
+            let tally = counts.get(&(kind, method.name())).copied();
+            let Tally { bad, all, most } = tally.unwrap_or_default();
+            format!("{bad} of {all}, at most {most:.2}")
         });
         println!("| {kind} | {} |", cells.join(" | "));
     }
@@ -119,12 +135,17 @@ fn unknowable(place: &Place<'_>) -> Counts {
         let mut case = case.clone();
         case.query.photo = photo;
         for result in case.results(&METHODS, false) {
+            let is_believed = result.status == Status::Ok && result.diagnosis.is_empty();
             let entry = counts.entry((kind, result.method.name())).or_default();
-            entry.0 += usize::from(result.status == Status::Ok && result.diagnosis.is_empty());
-            entry.1 += 1;
+            entry.add(is_believed, probability(&result));
         }
     }
     counts
+}
+
+fn probability(result: &QueryResult) -> f64 {
+    let trust = result.trust.as_ref();
+    trust.and_then(|trust| trust.probability).unwrap_or(0.0)
 }
 
 /// The query and the reference of the place in two conditions each.
@@ -167,8 +188,7 @@ fn right(place: &Place<'_>, conditions: &[(Condition, Traversal); 5]) -> Counts 
                 ("low confidence alone", is_doubted(withheld)),
             ] {
                 let entry = counts.entry((kind, known.method.name())).or_default();
-                entry.0 += usize::from(bad);
-                entry.1 += 1;
+                entry.add(bad, probability(withheld));
             }
         }
     }

@@ -8,9 +8,10 @@
 //! reliability by tenths.
 //!
 //! Options: `--places N` (40), `--seed N` (0), `--dump FILE` to keep the signals, `--from FILE` to use
-//! those of an earlier run.
+//! those of an earlier run, `--diagrams FOLDER` for reliability and ROC as SVG.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{DMatrix, DVector};
@@ -23,6 +24,7 @@ use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::trace::Trace;
+use posescope_diagnosis::diagrams::{self, Scored, said_and_was, tenths};
 use posescope_diagnosis::places::frame_of;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -58,6 +60,7 @@ impl Sample {
 fn main() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
     let (mut places, mut seed, mut dump, mut from) = (40, 0, None, None);
+    let mut diagrams = None;
     while let Some(argument) = arguments.next() {
         let value = arguments
             .next()
@@ -72,6 +75,7 @@ fn main() -> Result<(), String> {
             "--seed" => seed = number()? as u64,
             "--dump" => dump = Some(value),
             "--from" => from = Some(value),
+            "--diagrams" => diagrams = Some(value),
             other => return Err(format!("unknown argument {other}")),
         }
     }
@@ -103,7 +107,39 @@ fn main() -> Result<(), String> {
     println!("```");
     judge("As posescope has them now", &samples, &methods);
     judge("With these coefficients", &refitted, &methods);
+    diagrams.map_or(Ok(()), |folder| {
+        draw(Path::new(&folder), &samples, &methods)
+    })
+}
+
+/// Both diagrams of the poses that were not fitted on.
+fn draw(folder: &Path, samples: &[Sample], methods: &[&str]) -> Result<(), String> {
+    let pooled = std::iter::once("all");
+    let scored: Vec<(String, Vec<Scored>)> = methods
+        .iter()
+        .copied()
+        .chain(pooled)
+        .map(|method| (method.to_uppercase(), scored(samples, method, false)))
+        .collect();
+    let diagrams = [
+        ("reliability.svg", diagrams::reliability(&scored)?),
+        ("roc.svg", diagrams::roc(&scored)?),
+    ];
+    for (name, svg) in diagrams {
+        let path = folder.join(name);
+        std::fs::write(&path, svg).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
     Ok(())
+}
+
+/// Probabilities and whether they were right, of one method or of `all`.
+fn scored(samples: &[Sample], method: &str, is_for_fitting: bool) -> Vec<Scored> {
+    samples
+        .iter()
+        .filter(|s| s.is_for_fitting() == is_for_fitting)
+        .filter(|s| method == "all" || s.method == method)
+        .filter_map(|s| Some((s.probability?, s.is_near)))
+        .collect()
 }
 
 fn collect(places: usize, seed: u64) -> Vec<Sample> {
@@ -356,12 +392,7 @@ fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
         };
         let pooled = std::iter::once("all");
         for method in methods.iter().copied().chain(pooled) {
-            let scored: Vec<(f64, bool)> = samples
-                .iter()
-                .filter(|s| s.is_for_fitting() == is_for_fitting)
-                .filter(|s| method == "all" || s.method == method)
-                .filter_map(|s| Some((s.probability?, s.is_near)))
-                .collect();
+            let scored = scored(samples, method, is_for_fitting);
             if scored.is_empty() {
                 continue;
             }
@@ -375,11 +406,7 @@ fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
             );
         }
     }
-    let mut all: Vec<(f64, bool)> = samples
-        .iter()
-        .filter(|s| !s.is_for_fitting())
-        .filter_map(|s| Some((s.probability?, s.is_near)))
-        .collect();
+    let mut all = scored(samples, "all", false);
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     println!("\nOther pairs, all methods, by tenths: probability said / share within 1 m\n");
     for bin in tenths(&all) {
@@ -388,24 +415,8 @@ fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
     }
 }
 
-/// A probability, and whether the pose is near.
-type Scored = (f64, bool);
-
-/// Ten bins of equal count of sorted samples.
-fn tenths(sorted: &[(f64, bool)]) -> impl Iterator<Item = &[(f64, bool)]> {
-    (0..10)
-        .map(|k| &sorted[k * sorted.len() / 10..(k + 1) * sorted.len() / 10])
-        .filter(|bin| !bin.is_empty())
-}
-
-fn said_and_was(bin: &[(f64, bool)]) -> (f64, f64) {
-    let count = bin.len() as f64;
-    let said = bin.iter().map(|s| s.0).sum::<f64>() / count;
-    (said, bin.iter().filter(|s| s.1).count() as f64 / count)
-}
-
 /// Expected calibration error over ten bins of equal count.
-fn calibration_error(scored: &[(f64, bool)]) -> f64 {
+fn calibration_error(scored: &[Scored]) -> f64 {
     let mut sorted = scored.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     tenths(&sorted)
@@ -417,7 +428,7 @@ fn calibration_error(scored: &[(f64, bool)]) -> f64 {
 }
 
 /// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
-fn area_under_curve(scored: &[(f64, bool)]) -> f64 {
+fn area_under_curve(scored: &[Scored]) -> f64 {
     let (near, far): (Vec<Scored>, Vec<Scored>) = scored.iter().copied().partition(|s| s.1);
     let wins: f64 = near
         .iter()
