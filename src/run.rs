@@ -9,7 +9,7 @@ mod scene_pair;
 
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
 pub use experiment::{
-    Defaults, Draw, DrawError, Experiment, default_failure_radius_m, default_prior_m, defaults,
+    Defaults, Draw, DrawError, Experiment, PaperProtocol, default_failure_radius_m, defaults,
 };
 pub use protocol::Protocol;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};

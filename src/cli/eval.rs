@@ -6,8 +6,8 @@ use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
 use posescope::params::Params;
 use posescope::run::{
-    Draw, Execution, Experiment, RUN_SCHEMA, RunFile, RunFolder, ScenePair, Scenes,
-    default_failure_radius_m, default_prior_m, defaults, merge, read_run,
+    Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunFile, RunFolder, ScenePair, Scenes,
+    defaults, merge, read_run,
 };
 use posescope::scene::{self, Retriever, Scene};
 
@@ -115,13 +115,14 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
     let defaults = defaults(args.experiment);
     let first = scenes.references.first();
     let scene_name = first.map(|scene| scene.name()).unwrap_or_default();
+    let paper = args.paper.unwrap_or(PaperProtocol::of_scene(scene_name));
     let mut protocol = args.protocol.over(defaults.protocol);
     let is_single = protocol.references.count() == 1;
     if is_single && args.protocol.fusion.is_empty() && args.experiment != Some(Experiment::Multi) {
         protocol.fusions = Vec::new();
     }
     if args.experiment == Some(Experiment::Large) {
-        protocol.prior_m = protocol.prior_m.or(Some(default_prior_m(scene_name)));
+        protocol.prior_m = protocol.prior_m.or(Some(paper.prior_m()));
     }
     let radii_m = match args.radius.as_slice() {
         [] => defaults.radii_m.to_vec(),
@@ -148,7 +149,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
         limit: args.limit.map(|limit| limit as usize),
         failure_radius_m: args
             .failure_radius
-            .unwrap_or_else(|| default_failure_radius_m(scene_name)),
+            .unwrap_or_else(|| paper.failure_radius_m()),
         shard: args.shard,
         pairs: pairs(&draw, scenes)?,
         params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),

@@ -1,7 +1,7 @@
 //! The figures that the paper reports, to stand beside ours.
 //!
 //! Fu, Pertuz, Matas, Kämäräinen, *Performance Analysis and Robustification of Single-query 6-DoF
-//! Camera Pose Estimation*, CVIU 2019, tables 1 to 4. In table 4 the rows are taken as references and
+//! Camera Pose Estimation*, CVIU 2019, tables 3 to 6. In table 6 the rows are taken as references and
 //! the columns as queries.
 
 use std::sync::LazyLock;
@@ -30,7 +30,7 @@ static ALL: LazyLock<Vec<PaperFigure>> = LazyLock::new(|| {
 /// What a figure of the paper is found by.
 #[derive(Clone, Copy, Debug)]
 pub struct FigureKey<'a> {
-    /// The table's number.
+    /// The table's number in the paper, 3 to 6.
     pub table: u8,
     /// The references' scene.
     pub scene: &'a str,
@@ -67,6 +67,14 @@ pub fn figure(key: &FigureKey<'_>) -> Option<f64> {
         .map(|figure| figure.value)
 }
 
+/// Whether the paper has any figure for these scenes of references and queries.
+pub fn has_scene(scene: &str, query_scene: Option<&str>) -> bool {
+    ALL.iter().any(|figure| {
+        let mut fields = figure.key.split(',').skip(1);
+        fields.next() == Some(scene) && fields.next() == Some(query_scene.unwrap_or_default())
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,7 +82,7 @@ mod tests {
     #[test]
     fn figures_are_found_where_the_paper_has_them_and_nowhere_else() {
         let single = FigureKey {
-            table: 1,
+            table: 3,
             scene: "kitti/00",
             query_scene: None,
             method: "pm",
@@ -85,7 +93,7 @@ mod tests {
         };
         assert_eq!(figure(&single), Some(14.85));
         let multi = FigureKey {
-            table: 2,
+            table: 4,
             method: "fb",
             radius_m: Some(10.0),
             references: 5,
@@ -95,7 +103,7 @@ mod tests {
         };
         assert_eq!(figure(&multi), Some(0.045));
         let large = FigureKey {
-            table: 4,
+            table: 6,
             scene: "robotcar/night",
             query_scene: Some("robotcar/rain"),
             method: "hy",

@@ -1,4 +1,4 @@
-//! 1 − normalised mutual information, the cost of MI (paper, section 2.4).
+//! 1 − normalised mutual information, the cost of MI (paper, section 2.3).
 
 use super::{
     Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
