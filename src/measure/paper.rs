@@ -68,6 +68,7 @@ pub fn figure(key: &FigureKey<'_>) -> Option<f64> {
 }
 
 /// Whether the paper has any figure for these scenes of references and queries.
+#[cfg(feature = "cli")]
 pub fn has_scene(scene: &str, query_scene: Option<&str>) -> bool {
     ALL.iter().any(|figure| {
         let mut fields = figure.key.split(',').skip(1);
