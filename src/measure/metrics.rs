@@ -60,6 +60,9 @@ pub struct CostOfRow {
     /// Whether the result lies where the grid of positions ends.
     #[serde(default)]
     pub on_rim: bool,
+    /// The cost at the result.
+    #[serde(default)]
+    pub best: f64,
     /// From how far around the truth the coarse positions lead to it \[m\].
     #[serde(default)]
     pub basin_m: Option<f64>,

@@ -31,8 +31,8 @@ pub(super) fn curves(
         ),
         (
             "margin",
-            "cost of the best minimum elsewhere over that at the truth, at least",
-            of(|basin| basin.basin_margin),
+            "best minimum elsewhere over that at the truth, at least (% of the cost at the result)",
+            of(|basin| Some(100.0 * basin.basin_margin? / basin.best)),
         ),
     ];
     let has_lines = |(.., lines): &(_, _, Vec<Line>)| !lines.is_empty();

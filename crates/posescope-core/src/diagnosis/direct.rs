@@ -183,6 +183,11 @@ impl AgainstChance {
     fn deviations(&self) -> f64 {
         (self.mean - self.cost) / self.deviation.max(1e-12)
     }
+
+    /// The share of the cost of shuffled pixels that is saved.
+    fn gain(&self) -> f64 {
+        1.0 - self.cost / self.mean
+    }
 }
 
 /// A place and what it costs.

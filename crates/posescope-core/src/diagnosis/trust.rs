@@ -25,7 +25,7 @@ pub const WITHIN_M: f64 = 1.0;
 
 /// A pose of less probability has low confidence: of the queries that show nothing of their place, none
 /// should be believed.
-pub const LOW_CONFIDENCE: f64 = 0.9;
+pub const LOW_CONFIDENCE: f64 = 0.95;
 
 /// A pose of less probability is more likely wrong than poses of low confidence are as a whole, so
 /// that what speaks against it is said without knowing the truth.

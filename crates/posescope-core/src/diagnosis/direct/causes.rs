@@ -14,7 +14,7 @@ use crate::diagnosis::{Code, Diagnosis, trust};
 use crate::estimator;
 use crate::geometry::{Pose, PoseError, yaw};
 use crate::grid::{Offset, Phase, ScoredLattice};
-use crate::render::Score;
+use crate::render::{Score, Scorer};
 
 impl SearchedCost<'_, '_> {
     /// From the true pose, another focal length explains the query much better than any pose does with
@@ -56,6 +56,17 @@ impl SearchedCost<'_, '_> {
             .map_or(f64::INFINITY, |near| near.cost)
             .min(self.summary.best);
         let camera = camera(&best.at);
+        // A cost can also fall because dark falls on dark: pixels must go together better than the same
+        // pixels shuffled do, and by more than they do with the stated camera.
+        let otherwise = self.against_chance_of(&self.scorer.seen_by(&camera), &self.truth)?;
+        let stated_gain = near
+            .and_then(|near| self.gain(&near.offset))
+            .into_iter()
+            .chain(self.gain(&self.minimum.offset))
+            .fold(0.0, f64::max);
+        if otherwise.deviations() < BEYOND_CHANCE || otherwise.gain() < stated_gain + TELLING_GAIN {
+            return None;
+        }
         (rival - best.cost > TELLING_GAIN * chance).then(|| {
             Diagnosis::new(
                 Code::X1,
@@ -216,7 +227,11 @@ impl SearchedCost<'_, '_> {
 
     /// What chance gives at a pose, and what the images cost there.
     fn against_chance(&self, offset: &Offset) -> Option<AgainstChance> {
-        let compared = self.scorer.compare(&offset.reference_from_camera());
+        self.against_chance_of(self.scorer, &offset.reference_from_camera())
+    }
+
+    fn against_chance_of(&self, scorer: &Scorer<'_>, pose: &Pose) -> Option<AgainstChance> {
+        let compared = scorer.compare(pose);
         let subject = self.subject;
         let responsible = trust::responsible(subject.method, subject.outcome);
         let entry = estimator::find(responsible)?.cost()?;
@@ -238,8 +253,7 @@ impl SearchedCost<'_, '_> {
     }
 
     fn gain(&self, offset: &Offset) -> Option<f64> {
-        let AgainstChance { cost, mean, .. } = self.against_chance(offset)?;
-        Some(1.0 - cost / mean)
+        Some(self.against_chance(offset)?.gain())
     }
 
     fn is_beyond_chance(&self, offset: &Offset) -> bool {
