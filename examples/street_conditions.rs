@@ -195,6 +195,7 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
                 reference: Arc::clone(reference),
                 uncertainty_radius_m: options.radius_m,
                 seed: options.seed,
+                matches: None,
             };
             let run = |method| {
                 estimator::entry(method)

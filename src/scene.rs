@@ -7,6 +7,7 @@ mod cloud_file;
 mod colmap;
 mod depth_image;
 mod described;
+mod estimates;
 mod file_scene;
 mod kitti;
 mod kitti_format;
@@ -24,6 +25,7 @@ mod view_crop;
 pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
 
+pub use estimates::read_estimates;
 pub use kitti::KittiOdometry;
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 

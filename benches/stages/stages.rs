@@ -82,6 +82,7 @@ fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
         reference: scene.reference(known(index(reference)?)?)?,
         uncertainty_radius_m: 15.0,
         seed: 0,
+        matches: None,
     })
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
     Draw, Execution, Experiment, RUN_SCHEMA, RunFile, RunFolder, ScenePair, Scenes,
@@ -11,7 +12,7 @@ use posescope::run::{
 };
 use posescope::scene::{self, Retriever, Scene};
 
-use super::args::EvalArgs;
+use super::args::{EvalArgs, check_known};
 use super::diff;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
@@ -22,6 +23,16 @@ use super::terminal::Terminal;
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     use_threads(args.protocol.threads)?;
+    if args.merge.is_empty() {
+        let gated: Vec<Method> = args.gate.iter().map(Gate::method).collect();
+        let others: Vec<Method> = args
+            .protocol
+            .estimates
+            .iter()
+            .map(|file| file.method)
+            .collect();
+        check_known(&gated, &others)?;
+    }
     let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
     let run = if args.merge.is_empty() {
         execute(args, &folder, terminal)?
@@ -115,7 +126,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
     let defaults = defaults(args.experiment);
     let first = scenes.references.first();
     let scene_name = first.map(|scene| scene.name()).unwrap_or_default();
-    let mut protocol = args.protocol.over(defaults.protocol);
+    let mut protocol = args.protocol.over(defaults.protocol)?;
     let is_single = protocol.references.count() == 1;
     if is_single && args.protocol.fusion.is_empty() && args.experiment != Some(Experiment::Multi) {
         protocol.fusions = Vec::new();

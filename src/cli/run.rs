@@ -39,15 +39,16 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let references = open(&task.scene)?;
     let others = task.queries.as_deref().map(open).transpose()?;
     let queries = others.as_deref().unwrap_or(references.as_ref());
+    let localizer = task.protocol.configured(Localizer::new(
+        references.as_ref(),
+        queries,
+        &task.params,
+        task.protocol.seed,
+    ));
     let plan = Plan {
         args,
         task: &task,
-        localizer: task.protocol.configured(Localizer::new(
-            references.as_ref(),
-            queries,
-            &task.params,
-            task.protocol.seed,
-        )),
+        localizer: localizer.with_foreign(task.protocol.foreign(queries)?),
     };
     let tasks = plan.queries()?;
     let mut json = match &args.json {

@@ -2,10 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::estimates_file::EstimatesFile;
 use crate::diagnosis::Tolerance;
+use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::localize::{Localizer, Selection};
 use crate::method::Method;
+use crate::scene::{Scene, SceneError, read_estimates};
 
 /// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
 /// of everything in it are here.
@@ -33,6 +36,9 @@ pub struct Protocol {
     /// How often a query that went wrong is localised again, at most, to see what would have helped.
     #[serde(default, skip_serializing_if = "is_default")]
     pub explain: usize,
+    /// Poses of other systems, which are methods beside ours.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub estimates: Vec<EstimatesFile>,
 }
 
 /// For what is written only where somebody asked for it.
@@ -52,6 +58,7 @@ impl Default for Protocol {
             right: Tolerance::default(),
             accept: None,
             explain: 0,
+            estimates: Vec::new(),
         }
     }
 }
@@ -69,6 +76,18 @@ impl Protocol {
             .with_tolerance(self.right)
             .accepting_from(self.accept)
             .explaining(self.explain)
+    }
+
+    /// What other systems answered about the frames of the queries' scene.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is of another scene.
+    pub fn foreign(&self, queries: &dyn Scene) -> Result<Foreign, SceneError> {
+        let mut foreign = Foreign::default();
+        for EstimatesFile { method, path } in &self.estimates {
+            foreign = foreign.with_estimates(*method, read_estimates(path, queries)?);
+        }
+        Ok(foreign)
     }
 
     /// How far from a query's known position its references may be \[m\], with this uncertainty

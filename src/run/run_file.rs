@@ -3,13 +3,16 @@
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::estimates_file::EstimatesFile;
 use super::experiment::Experiment;
 use super::protocol::{Protocol, is_default};
 use super::scene_pair::{QueryCamera, ScenePair};
 use crate::diagnosis::Tolerance;
+use crate::estimator::{find, methods};
 use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
+use crate::text::UnknownWord;
 
 /// The version of the file's form.
 pub const RUN_SCHEMA: &str = "posescope.run/1";
@@ -112,6 +115,8 @@ struct RunFileForm {
     accept: Option<f64>,
     #[serde(default, skip_serializing_if = "is_default")]
     explain: usize,
+    #[serde(default, skip_serializing_if = "is_default")]
+    estimates: Vec<EstimatesFile>,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
@@ -138,6 +143,7 @@ impl From<RunFileForm> for RunFile {
                 right: form.right,
                 accept: form.accept,
                 explain: form.explain,
+                estimates: form.estimates,
             },
             radii_m: form.radii_m,
             share: form.share,
@@ -170,6 +176,7 @@ impl From<RunFile> for RunFileForm {
             right: run.protocol.right,
             accept: run.protocol.accept,
             explain: run.protocol.explain,
+            estimates: run.protocol.estimates,
             seed: run.protocol.seed,
             shard: run.shard,
             pairs: run.pairs,
@@ -211,6 +218,14 @@ impl Places {
         if run.protocol.methods.is_empty() {
             let message = "a run has at least one method".to_owned();
             return Some((self.methods.span().start, message));
+        }
+        let unknown = run.protocol.methods.iter().find(|method| {
+            let mut brought = run.protocol.estimates.iter();
+            find(**method).is_none() && !brought.any(|file| file.method == **method)
+        });
+        if let Some(method) = unknown {
+            let error = UnknownWord::among(method.name(), "method", methods().map(Method::name));
+            return Some((self.methods.span().start, error.to_string()));
         }
         let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
         if run.radii_m.is_empty() || !run.radii_m.iter().all(is_length) {

@@ -9,6 +9,7 @@ mod data;
 mod decisions;
 mod diagnosis;
 mod evaluation;
+mod foreign;
 mod frame_cache;
 mod imports;
 mod kitti;

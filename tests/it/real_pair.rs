@@ -26,6 +26,7 @@ fn pair(query: &str, reference: &str) -> Option<(Problem, Pose)> {
         reference: scene.reference(frame(reference)).expect("readable"),
         uncertainty_radius_m: 15.0,
         seed: 0,
+        matches: None,
     };
     Some((problem, scene.pose(frame(query)).expect("is known")))
 }

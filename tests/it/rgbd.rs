@@ -358,6 +358,7 @@ fn fb_localises_in_the_real_kitchen() {
         reference: scene.reference(frame("0")).expect("readable"),
         uncertainty_radius_m: 2.0,
         seed: 0,
+        matches: None,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());
     let truth = scene.pose(frame("25")).expect("is known");

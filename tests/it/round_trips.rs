@@ -152,6 +152,7 @@ fn every_layout_leads_to_the_same_pose_within_what_it_can_say() {
             reference: disk.reference(0).expect("is complete"),
             uncertainty_radius_m: 15.0,
             seed: 0,
+            matches: None,
         };
         let outcome = localize(&problem, Method::FB, &Params::default());
         // Depths up to 13 m are too few to agree on a pose 9 m on.

@@ -57,6 +57,7 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
         }),
         uncertainty_radius_m: 15.0,
         seed: 0,
+        matches: None,
     }
 }
 

@@ -60,6 +60,7 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
         }),
         uncertainty_radius_m: 3.0,
         seed: 7,
+        matches: None,
     }
 }
 

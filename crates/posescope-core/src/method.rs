@@ -1,12 +1,17 @@
 //! The methods that are compared, by their names.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::fmt;
+use std::sync::{Mutex, PoisonError};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A method by its short name, which is the same on the command line, in results and in recordings.
 ///
 /// Which methods there are says the registry of the estimators ([`crate::estimator::all`]): the four
-/// of the paper are known by name here, any other is a line in a registry.
+/// of the paper are known by name here, any other is a line in a registry. A method that is in none is
+/// another system, whose answers somebody brought ([`Self::called`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Method(&'static str);
 
@@ -27,6 +32,29 @@ impl Method {
     /// The method of a name that a registry gives.
     pub const fn named(name: &'static str) -> Self {
         Self(name)
+    }
+
+    /// The method that goes by a name which somebody chose: another system, whose answers stand beside
+    /// ours. Names are kept until the program ends; there are as many as somebody gives.
+    ///
+    /// # Errors
+    /// [`MethodNameError`] where the name could not stand in a list of methods or an entity path.
+    pub fn called(name: &str) -> Result<Self, MethodNameError> {
+        static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_.+".contains(c);
+        let starts_well = name.starts_with(|c: char| c.is_ascii_lowercase());
+        if !starts_well || !name.chars().all(is_plain) || name.len() > LONGEST_NAME {
+            return Err(MethodNameError(name.chars().take(LONGEST_NAME).collect()));
+        }
+        let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(Self(match names.get(name) {
+            Some(known) => known,
+            None => {
+                let kept: &'static str = Box::leak(name.into());
+                names.insert(kept);
+                kept
+            }
+        }))
     }
 
     /// The short name.
@@ -68,7 +96,41 @@ impl PartialOrd for Method {
     }
 }
 
-crate::serde_as_text!(Method);
+/// Characters of a name at most; tables have columns of about this width.
+const LONGEST_NAME: usize = 24;
+
+/// What is no name of a method.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` cannot name a method: lower-case letters, digits and -_.+ expected, a letter first, \
+     {LONGEST_NAME} at most"
+)]
+pub struct MethodNameError(String);
+
+impl Serialize for Method {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.0)
+    }
+}
+
+/// Results name other systems too, so that any name is read that could be one.
+impl<'de> Deserialize<'de> for Method {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name: Called = crate::text::parsed(deserializer)?;
+        Ok(name.0)
+    }
+}
+
+/// Reads a name as [`Method::called`] does.
+struct Called(Method);
+
+impl std::str::FromStr for Called {
+    type Err = MethodNameError;
+
+    fn from_str(name: &str) -> Result<Self, MethodNameError> {
+        Method::called(name).map(Self)
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -82,6 +144,22 @@ mod tests {
             let json = serde_json::to_string(&method).expect("a string");
             assert_eq!(json, format!("\"{}\"", method.name()));
             assert_eq!(serde_json::from_str::<Method>(&json).ok(), Some(method));
+        }
+    }
+
+    #[test]
+    fn another_system_goes_by_any_plain_name() {
+        let method = Method::called("superglue-2").expect("a plain name");
+        assert_eq!(method, Method::named("superglue-2"));
+        assert_eq!(Method::called("mi"), Ok(Method::MI));
+        assert_eq!(
+            serde_json::from_str::<Method>("\"superglue-2\"").ok(),
+            Some(method)
+        );
+        let long = "x".repeat(25);
+        for wrong in ["", "Mi", "2d", "a b", "a/b", "a@b", "a,b", "é", &long] {
+            assert!(Method::called(wrong).is_err(), "{wrong}");
+            assert!(serde_json::from_str::<Method>(&format!("{wrong:?}")).is_err());
         }
     }
 }

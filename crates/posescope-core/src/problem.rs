@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
+use crate::features::PairMatches;
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::input::InputError;
@@ -139,6 +140,8 @@ pub struct Problem {
     pub uncertainty_radius_m: f64,
     /// Every random choice of an estimator derives from this.
     pub seed: u64,
+    /// Matches that somebody brought; without them, features are found and matched.
+    pub matches: Option<Arc<PairMatches>>,
 }
 
 impl Problem {
@@ -161,6 +164,7 @@ impl Problem {
             reference: reference.into(),
             uncertainty_radius_m,
             seed: 0,
+            matches: None,
         })
     }
 

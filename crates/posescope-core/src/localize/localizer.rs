@@ -5,6 +5,7 @@
 
 mod explain;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use self::explain::Unexplained;
@@ -12,14 +13,15 @@ use self::explain::Unexplained;
 use super::observer::checkpoint;
 use super::{
     Agreement, LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings,
-    evaluate, localize_traced, tell_ranking,
+    evaluate, localize_by, localize_traced, tell_ranking,
 };
 use crate::diagnosis::{
     Evidence, Member, Subject, Tolerance, diagnose_fusion, diagnose_ranking, fused_trust,
 };
-use crate::estimator::{self, Failure, Outcome, count_matches, hybrid_outcome};
+use crate::estimator::{self, Failure, Given, Outcome, count_matches, hybrid_outcome};
 use crate::event::KindSet;
-use crate::features::remembered;
+use crate::features::{PairMatches, remembered};
+use crate::foreign::Foreign;
 use crate::fusion::{self, Fusion};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
@@ -69,6 +71,8 @@ pub struct Localizer<'a> {
     least_probability: Option<f64>,
     /// How often a query that went wrong is localised again to see what would have helped.
     runs_to_explain: usize,
+    /// What other systems answered.
+    foreign: Foreign,
 }
 
 /// What one method made of one problem.
@@ -94,8 +98,8 @@ struct QueryWork<'a> {
     places: Vec<(usize, f64)>,
     /// Feature matches by problem, once they are known.
     matches: Vec<Option<usize>>,
-    /// What each method made of each problem, in the order of [`estimator::methods`].
-    candidates: Vec<Vec<Option<MethodOutcome>>>,
+    /// What each method made of each problem.
+    candidates: BTreeMap<Method, Vec<Option<MethodOutcome>>>,
 }
 
 impl<'a> Localizer<'a> {
@@ -124,6 +128,7 @@ impl<'a> Localizer<'a> {
             tolerance: Tolerance::default(),
             least_probability: None,
             runs_to_explain: 0,
+            foreign: Foreign::default(),
         }
     }
 
@@ -137,6 +142,7 @@ impl<'a> Localizer<'a> {
             tolerance: self.tolerance,
             least_probability: self.least_probability,
             runs_to_explain: 0,
+            foreign: self.foreign.clone(),
         }
     }
 
@@ -174,6 +180,13 @@ impl<'a> Localizer<'a> {
             least_probability,
             ..self
         }
+    }
+
+    /// The same localizer, with what other systems answered about the queries: their poses are methods
+    /// beside ours, their matches take the place of those of SURF.
+    #[must_use]
+    pub fn with_foreign(self, foreign: Foreign) -> Self {
+        Self { foreign, ..self }
     }
 
     /// The scene of the queries, its frames remembered.
@@ -216,9 +229,11 @@ impl<'a> Localizer<'a> {
                     None => {
                         places.push(place);
                         checkpoint(observer)?;
+                        let reference = self.references.reference(reference)?;
                         problems.push(Problem {
+                            matches: self.foreign.matches(&loaded.name, &reference.name)?,
                             query: Arc::clone(&loaded),
-                            reference: self.references.reference(reference)?,
+                            reference,
                             uncertainty_radius_m: request.radius_m,
                             seed: self.seed,
                         });
@@ -232,9 +247,7 @@ impl<'a> Localizer<'a> {
             query: &loaded,
             truth: self.queries.pose(query),
             matches: vec![None; problems.len()],
-            candidates: estimator::methods()
-                .map(|_| problems.iter().map(|_| None).collect())
-                .collect(),
+            candidates: BTreeMap::new(),
             problems,
             frame: query,
             places: places
@@ -411,10 +424,9 @@ impl<'a> Localizer<'a> {
             self.explain_wrong(&mut candidate.result, work.frame, &request, observer)
         };
         observer.end_method(&candidate.result, &candidate.times);
-        let row = estimator::methods().position(|known| known == method);
-        if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
-            *slot = Some(candidate);
-        }
+        let of_method = work.candidates.entry(method).or_default();
+        of_method.resize_with(work.problems.len(), || None);
+        of_method[problem] = Some(candidate);
         explained
     }
 
@@ -458,7 +470,14 @@ impl<'a> Localizer<'a> {
             Some(flag) => Trace::watched(&mut fanout, flag),
             None => Trace::to(&mut fanout),
         };
-        let outcome = localize_traced(&work.problems[problem], method, self.params, &mut trace)?;
+        let asked = &work.problems[problem];
+        let outcome = match self.foreign.estimates(method) {
+            Some(estimates) => {
+                let given = Given::new(method, Arc::clone(estimates));
+                localize_by(&given, asked, &mut trace)?
+            }
+            None => localize_traced(asked, method, self.params, &mut trace)?,
+        };
         let times = timings.into_times();
         Ok(self.judged(work, problem, method, outcome, evidence, times))
     }
@@ -521,16 +540,21 @@ impl<'a> Localizer<'a> {
                 continue;
             }
             checkpoint(observer)?;
-            let counted = estimator::methods().find_map(|method| {
-                let candidate = work.candidate(problem, method)?;
+            let counted = work.candidates.values().find_map(|of_method| {
+                let candidate = of_method.get(problem)?.as_ref()?;
                 candidate.outcome.counts
             });
-            work.matches[problem] = Some(match counted {
-                Some(counts) => counts.unique,
-                None => {
-                    let Problem {
-                        query, reference, ..
-                    } = &work.problems[problem];
+            let Problem {
+                query,
+                reference,
+                matches,
+                ..
+            } = &work.problems[problem];
+            work.matches[problem] = Some(match (counted, matches.as_deref()) {
+                (Some(counts), _) => counts.unique,
+                (None, Some(PairMatches::Found(found))) => found.count(),
+                (None, Some(PairMatches::Absent)) => 0,
+                (None, None) => {
                     let surf = &self.params.surf;
                     let query = remembered(&query.photo.gray, &query.memo, surf);
                     let reference = remembered(&reference.photo.gray, &reference.memo, surf);
@@ -626,7 +650,8 @@ impl<'a> Localizer<'a> {
 impl QueryWork<'_> {
     /// How far the poses of the other methods that solved the problem are from this one.
     fn agreement(&self, problem: usize, method: Method, pose: &Pose) -> Vec<Agreement> {
-        estimator::methods()
+        let others = self.candidates.keys().copied();
+        others
             .filter(|other| *other != method)
             .filter_map(|other| {
                 let candidate = self.candidate(problem, other)?;
@@ -641,8 +666,7 @@ impl QueryWork<'_> {
     }
 
     fn candidate(&self, problem: usize, method: Method) -> Option<&MethodOutcome> {
-        let row = estimator::methods().position(|known| known == method)?;
-        self.candidates.get(row)?.get(problem)?.as_ref()
+        self.candidates.get(&method)?.get(problem)?.as_ref()
     }
 
     /// The candidates of a hybrid's methods, where it can be made of them.
