@@ -30,6 +30,7 @@ pub use posescope_core::{
 
 #[cfg(feature = "app")]
 pub mod app;
+pub mod doctor;
 pub mod measure;
 #[cfg(feature = "rerun")]
 mod narration;

@@ -15,8 +15,10 @@ mod kitti_raw;
 pub mod layout;
 mod lens;
 mod lines;
+mod pair_matches;
 mod photo_file;
 mod retriever;
+mod robotcar;
 mod seven_scenes;
 mod trajectory;
 mod tum;
@@ -27,6 +29,7 @@ pub use posescope_street as street;
 
 pub use estimates::read_estimates;
 pub use kitti::KittiOdometry;
+pub use pair_matches::{MatchFolder, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are asked.
@@ -34,6 +37,7 @@ pub const ALL: &[Entry] = &[
     street::ENTRY,
     kitti::ENTRY,
     kitti_raw::ENTRY,
+    robotcar::ENTRY,
     tum::ENTRY,
     seven_scenes::ENTRY,
     colmap::ENTRY,

@@ -1,6 +1,7 @@
 //! The arguments.
 
 use std::fmt;
+use std::net::IpAddr;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -51,6 +52,9 @@ pub enum Command {
     Diff(DiffArgs),
     /// Write the poses or tables of a run in formats of other programs
     Export(ExportArgs),
+    /// Check a scene: what is there, what is missing, and which of the usual mistakes it has; exit code 3
+    /// if it cannot work
+    Doctor(DoctorArgs),
     /// Write the built-in street to disk in the layout of a data set, one drive per condition
     Synth(SynthArgs),
     /// Build the retrieval index of a scene, which --references retrieve:K asks
@@ -116,6 +120,9 @@ pub struct RunArgs {
     pub task: TaskArgs,
     #[command(flatten)]
     pub recording: RecordingArgs,
+    /// Write the matches of the feature-based method into this folder, in the form that --matches reads
+    #[arg(long, value_name = "DIR")]
+    pub export_matches: Option<PathBuf>,
     /// Write the results as JSON, one object per line; - for stdout
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -221,6 +228,10 @@ pub struct ProtocolArgs {
     /// KITTI, COLMAP's images.txt or `name qw qx qy qz x y z` as visuallocalization.net takes it
     #[arg(long, value_name = "NAME=FILE")]
     pub estimates: Vec<EstimatesFile>,
+    /// Take the matches of the feature-based method from this folder, instead of finding them: hloc's
+    /// features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair
+    #[arg(long, value_name = "DIR")]
+    pub matches: Option<PathBuf>,
     /// Fuse the poses of several references into one, by each of these [default: none, and each
     /// reference gives its own; eval: r-wavg]
     #[arg(long, value_name = "maxf,avg,wavg,r-wavg", value_delimiter = ',')]
@@ -274,6 +285,7 @@ impl ProtocolArgs {
             accept: self.accept.or(defaults.accept),
             explain: self.explain.unwrap_or(defaults.explain),
             estimates: self.estimates.clone(),
+            matches: self.matches.clone().or(defaults.matches),
         })
     }
 }
@@ -314,9 +326,10 @@ pub struct RecordingArgs {
     /// Start a Rerun viewer and send the recording to it
     #[arg(long)]
     pub spawn: bool,
-    /// Serve the recording, so that viewers can connect to this process
-    #[arg(long)]
-    pub serve: bool,
+    /// Serve the recording, so that viewers can connect to this process; at 127.0.0.1, which other
+    /// machines do not reach, unless an address is given
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1")]
+    pub serve: Option<IpAddr>,
 }
 
 #[derive(Debug, Args)]
@@ -470,6 +483,21 @@ pub struct SynthArgs {
     /// Write into a folder that is not empty, replacing sequences of the same names
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Where the frames are, as for `run`
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Write the cloud of a frame on its photo
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// Save a recording of the frames that were compared, with their clouds in the world and on the photos
+    #[arg(long, value_name = "FILE.rrd")]
+    pub save: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -7,15 +7,17 @@ use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_ro
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Draw, Execution, Experiment, RUN_SCHEMA, RunFile, RunFolder, ScenePair, Scenes,
+    Draw, Execution, Experiment, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair, Scenes,
     default_failure_radius_m, default_prior_m, defaults, merge, read_run,
 };
 use posescope::scene::{self, Retriever, Scene};
+use posescope::session::command_line;
 
 use super::args::{EvalArgs, check_known};
 use super::diff;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
+use super::interrupt::Interrupt;
 use super::output;
 use super::run::use_threads;
 use super::terminal::Terminal;
@@ -72,7 +74,9 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     };
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(folder.done() as u64);
-    let mut observer = FailureRecordings::new(args, &folder, &run, &params, bar.clone())?;
+    let interrupt = Interrupt::listen();
+    let mut observer =
+        FailureRecordings::new(args, &folder, &run, &params, bar.clone(), interrupt.clone())?;
     let execution = Execution {
         run: &run,
         scenes: &scenes,
@@ -82,8 +86,28 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     let outcome = execution.run_remaining(&mut folder, &mut observer);
     bar.finish_and_clear();
     observer.close();
-    outcome?;
-    Ok(run)
+    match outcome {
+        Err(RunError::Cancelled(_)) if interrupt.is_raised() => {
+            let (done, all) = (folder.done(), run.items().count());
+            Err(CliError::Interrupted(format!(
+                "{done} of {all} queries are done; go on with: {}",
+                resuming()
+            )))
+        }
+        outcome => {
+            outcome?;
+            Ok(run)
+        }
+    }
+}
+
+/// The command line that goes on with this run.
+fn resuming() -> String {
+    let mut words: Vec<String> = std::env::args().skip(1).collect();
+    if !words.iter().any(|word| word == "--resume") {
+        words.push("--resume".to_owned());
+    }
+    command_line(&words)
 }
 
 fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>, CliError> {

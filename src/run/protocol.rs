@@ -1,5 +1,8 @@
 //! How queries are localised, whichever they are.
 
+use std::path::PathBuf;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::estimates_file::EstimatesFile;
@@ -8,7 +11,7 @@ use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::localize::{Localizer, Selection};
 use crate::method::Method;
-use crate::scene::{Scene, SceneError, read_estimates};
+use crate::scene::{MatchFolder, Scene, SceneError, read_estimates};
 
 /// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
 /// of everything in it are here.
@@ -19,6 +22,10 @@ pub struct Protocol {
     /// How far from the query's known position references may be \[m\]; without it, as far as the
     /// uncertainty radius. See [`Self::reach_m`].
     pub prior_m: Option<f64>,
+    /// Poses of other systems, which are methods beside ours: read before the methods, some of which
+    /// they name.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub estimates: Vec<EstimatesFile>,
     /// The methods, in the order of their results.
     pub methods: Vec<Method>,
     /// What to make of several references: one pose by each of these, or without any a pose for each
@@ -36,9 +43,9 @@ pub struct Protocol {
     /// How often a query that went wrong is localised again, at most, to see what would have helped.
     #[serde(default, skip_serializing_if = "is_default")]
     pub explain: usize,
-    /// Poses of other systems, which are methods beside ours.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub estimates: Vec<EstimatesFile>,
+    /// A folder of matches that take the place of those of SURF.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matches: Option<PathBuf>,
 }
 
 /// For what is written only where somebody asked for it.
@@ -59,6 +66,7 @@ impl Default for Protocol {
             accept: None,
             explain: 0,
             estimates: Vec::new(),
+            matches: None,
         }
     }
 }
@@ -86,6 +94,9 @@ impl Protocol {
         let mut foreign = Foreign::default();
         for EstimatesFile { method, path } in &self.estimates {
             foreign = foreign.with_estimates(*method, read_estimates(path, queries)?);
+        }
+        if let Some(folder) = &self.matches {
+            foreign = foreign.with_matches(Arc::new(MatchFolder::open(folder)?));
         }
         Ok(foreign)
     }

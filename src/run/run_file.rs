@@ -1,5 +1,7 @@
 //! `run.toml`: everything that an evaluation was asked, and over which queries.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
@@ -99,6 +101,9 @@ struct RunFileForm {
     format: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     experiment: Option<Experiment>,
+    // Before the methods, some of which it names.
+    #[serde(default, skip_serializing_if = "is_default")]
+    estimates: Vec<EstimatesFile>,
     methods: Vec<Method>,
     references: Selection,
     fusions: Vec<Fusion>,
@@ -115,8 +120,8 @@ struct RunFileForm {
     accept: Option<f64>,
     #[serde(default, skip_serializing_if = "is_default")]
     explain: usize,
-    #[serde(default, skip_serializing_if = "is_default")]
-    estimates: Vec<EstimatesFile>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    matches: Option<PathBuf>,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
@@ -144,6 +149,7 @@ impl From<RunFileForm> for RunFile {
                 accept: form.accept,
                 explain: form.explain,
                 estimates: form.estimates,
+                matches: form.matches,
             },
             radii_m: form.radii_m,
             share: form.share,
@@ -177,6 +183,7 @@ impl From<RunFile> for RunFileForm {
             accept: run.protocol.accept,
             explain: run.protocol.explain,
             estimates: run.protocol.estimates,
+            matches: run.protocol.matches,
             seed: run.protocol.seed,
             shard: run.shard,
             pairs: run.pairs,

@@ -124,6 +124,9 @@ impl Task {
         for estimates in &protocol.estimates {
             option("estimates", estimates);
         }
+        if let Some(folder) = &protocol.matches {
+            option("matches", &folder.display());
+        }
         for change in self.params.changes() {
             option("set", &change);
         }
@@ -135,10 +138,14 @@ impl Task {
 
     /// The command line that asks the same of a query, for a POSIX shell. See [`Self::arguments`].
     pub fn command_line(&self, query: &str, references: &[String]) -> String {
-        let arguments = self.arguments(query, references);
-        let words: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
-        format!("posescope {}", words.join(" "))
+        command_line(&self.arguments(query, references))
     }
+}
+
+/// The command line with these arguments, for a POSIX shell.
+pub fn command_line(arguments: &[String]) -> String {
+    let words: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
+    format!("posescope {}", words.join(" "))
 }
 
 fn joined(names: &[impl Display]) -> String {
@@ -181,6 +188,7 @@ mod tests {
                 accept: Some(0.75),
                 explain: 4,
                 estimates: vec!["other=my poses.txt".parse().expect("a file")],
+                matches: Some("hloc".into()),
             },
             params,
             breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
@@ -195,7 +203,7 @@ mod tests {
             "posescope run street --format street --queries street:night --query 000070 \
              --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
              --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 \
-             --estimates 'other=my poses.txt' --set fb.ratio=0.75 --break 'inliers < 10'"
+             --estimates 'other=my poses.txt' --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
         );
         let by_hand = Task {
             by_hand: true,

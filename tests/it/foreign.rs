@@ -14,6 +14,10 @@ use crate::binary::posescope;
 use crate::small_sequence::SmallSequence;
 
 fn results(output: &Output) -> Vec<QueryResult> {
+    // A program knows the names that it was given.
+    for name in ["other", "tum", "kitti", "model", "vloc"] {
+        Method::called(name).expect("a plain name");
+    }
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
     let lines = String::from_utf8_lossy(&output.stdout);
@@ -76,7 +80,8 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
             let Some(pose) = ours.pose.clone() else {
                 continue;
             };
-            fs::write(&file, named_poses(&[ours.clone()], Method::MI)).expect("writable");
+            fs::write(&file, named_poses(std::slice::from_ref(&ours), Method::MI))
+                .expect("writable");
             let given = format!("other={}", file.display());
             let (query, reference) = (ours.query.as_str(), ours.references[0].as_str());
             let output = run(

@@ -5,8 +5,6 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
 /// A method by its short name, which is the same on the command line, in results and in recordings.
 ///
 /// Which methods there are says the registry of the estimators ([`crate::estimator::all`]): the four
@@ -40,21 +38,24 @@ impl Method {
     /// # Errors
     /// [`MethodNameError`] where the name could not stand in a list of methods or an entity path.
     pub fn called(name: &str) -> Result<Self, MethodNameError> {
-        static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
         let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_.+".contains(c);
         let starts_well = name.starts_with(|c: char| c.is_ascii_lowercase());
         if !starts_well || !name.chars().all(is_plain) || name.len() > LONGEST_NAME {
             return Err(MethodNameError(name.chars().take(LONGEST_NAME).collect()));
         }
+        if let Some(known) = Self::known(name) {
+            return Ok(known);
+        }
+        let kept: &'static str = Box::leak(name.into());
         let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(Self(match names.get(name) {
-            Some(known) => known,
-            None => {
-                let kept: &'static str = Box::leak(name.into());
-                names.insert(kept);
-                kept
-            }
-        }))
+        names.insert(kept);
+        Ok(Self(kept))
+    }
+
+    /// The method of a name that [`Self::called`] was given before.
+    pub(crate) fn known(name: &str) -> Option<Self> {
+        let names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+        names.get(name).copied().map(Self)
     }
 
     /// The short name.
@@ -96,6 +97,9 @@ impl PartialOrd for Method {
     }
 }
 
+/// The names that somebody chose.
+static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+
 /// Characters of a name at most; tables have columns of about this width.
 const LONGEST_NAME: usize = 24;
 
@@ -107,30 +111,7 @@ const LONGEST_NAME: usize = 24;
 )]
 pub struct MethodNameError(String);
 
-impl Serialize for Method {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.0)
-    }
-}
-
-/// Results name other systems too, so that any name is read that could be one.
-impl<'de> Deserialize<'de> for Method {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let name: Called = crate::text::parsed(deserializer)?;
-        Ok(name.0)
-    }
-}
-
-/// Reads a name as [`Method::called`] does.
-struct Called(Method);
-
-impl std::str::FromStr for Called {
-    type Err = MethodNameError;
-
-    fn from_str(name: &str) -> Result<Self, MethodNameError> {
-        Method::called(name).map(Self)
-    }
-}
+crate::serde_as_text!(Method);
 
 #[cfg(test)]
 mod tests {
@@ -159,7 +140,8 @@ mod tests {
         let long = "x".repeat(25);
         for wrong in ["", "Mi", "2d", "a b", "a/b", "a@b", "a,b", "é", &long] {
             assert!(Method::called(wrong).is_err(), "{wrong}");
-            assert!(serde_json::from_str::<Method>(&format!("{wrong:?}")).is_err());
         }
+        // What nobody brought is no method.
+        assert!(serde_json::from_str::<Method>("\"sift-of-nobody\"").is_err());
     }
 }
