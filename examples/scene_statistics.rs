@@ -235,6 +235,7 @@ fn pairs(
             uncertainty_radius_m: 2.0 * distance_m,
             prior_m: None,
             seed: 0,
+            matches: None,
         };
         let [indirect, direct] = [Method::FB, Method::MI]
             .map(|method| estimator::entry(method).make(&Params::default()));

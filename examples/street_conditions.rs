@@ -196,6 +196,7 @@ fn localize(drives: &[(Condition, Traversal)], options: &Options, place: usize) 
                 uncertainty_radius_m: options.radius_m,
                 prior_m: None,
                 seed: options.seed,
+                matches: None,
             };
             let run = |method| {
                 estimator::entry(method)

@@ -4,11 +4,14 @@ mod args;
 mod demo;
 mod demo_settings;
 mod diff;
+mod doctor;
 mod eval;
 mod export;
 mod failure;
 mod failures;
 mod index;
+mod interrupt;
+mod match_export;
 mod observer;
 mod output;
 mod params;
@@ -55,6 +58,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),
         Some(Command::Index(args)) => index::index(args, &terminal),
+        Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params),
     }

@@ -23,13 +23,14 @@ pub use posescope_core::{
     localize_traced,
 };
 pub use posescope_core::{
-    camera, cloud, code, cost, depth, describe, diagnosis, estimator, event, features, fusion,
-    geometry, grid, history, image, localize, memo, method, params, problem, render, retrieval,
-    robust, solver, text, trace,
+    camera, cloud, code, cost, depth, describe, diagnosis, estimator, event, features, foreign,
+    fusion, geometry, grid, history, image, localize, memo, method, params, problem, render,
+    retrieval, robust, solver, text, trace,
 };
 
 #[cfg(feature = "app")]
 pub mod app;
+pub mod doctor;
 pub mod measure;
 #[cfg(feature = "rerun")]
 mod narration;

@@ -1,5 +1,6 @@
 //! Experiments over many queries, and the folders that their results go to.
 
+mod estimates_file;
 mod execute;
 mod experiment;
 mod protocol;
@@ -7,6 +8,7 @@ mod run_file;
 mod run_folder;
 mod scene_pair;
 
+pub use estimates_file::EstimatesFile;
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
 pub use experiment::{
     Defaults, Draw, DrawError, Experiment, PaperProtocol, default_failure_radius_m, defaults,

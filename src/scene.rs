@@ -7,6 +7,7 @@ mod cloud_file;
 mod colmap;
 mod depth_image;
 mod described;
+mod estimates;
 mod file_scene;
 mod kitti;
 mod kitti_format;
@@ -14,8 +15,10 @@ mod kitti_raw;
 pub mod layout;
 mod lens;
 mod lines;
+mod pair_matches;
 mod photo_file;
 mod retriever;
+mod robotcar;
 mod seven_scenes;
 mod trajectory;
 mod tum;
@@ -24,7 +27,9 @@ mod view_crop;
 pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
 pub use posescope_street as street;
 
+pub use estimates::read_estimates;
 pub use kitti::KittiOdometry;
+pub use pair_matches::{MatchFolder, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are asked.
@@ -32,6 +37,7 @@ pub const ALL: &[Entry] = &[
     street::ENTRY,
     kitti::ENTRY,
     kitti_raw::ENTRY,
+    robotcar::ENTRY,
     tum::ENTRY,
     seven_scenes::ENTRY,
     colmap::ENTRY,

@@ -83,6 +83,7 @@ fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
         uncertainty_radius_m: 15.0,
         prior_m: None,
         seed: 0,
+        matches: None,
     })
 }
 

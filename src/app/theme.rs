@@ -41,7 +41,8 @@ pub fn method(method: Method) -> Color32 {
         [0x8D, 0xD3, 0xC7],
     ];
     let place = estimator::methods().position(|known| known == method);
-    let place = place.unwrap_or_default();
+    // Other systems are behind all of ours.
+    let place = place.unwrap_or_else(|| estimator::all().len());
     let paper = Method::PAPER.len();
     rgb(match COLORS.get(place) {
         Some(&color) => color,

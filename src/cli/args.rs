@@ -1,5 +1,7 @@
 //! The arguments.
 
+use std::fmt;
+use std::net::IpAddr;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -12,10 +14,11 @@ use posescope::localize::Selection;
 use posescope::measure::{Format, Gate, Tolerance};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::run::{Experiment, PaperProtocol, Protocol, Shard};
+use posescope::run::{EstimatesFile, Experiment, PaperProtocol, Protocol, Shard};
 use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 use posescope::session::{Breakpoint, Task};
+use posescope::text::UnknownWord;
 
 use super::failure::CliError;
 
@@ -49,6 +52,9 @@ pub enum Command {
     Diff(DiffArgs),
     /// Write the poses or tables of a run in formats of other programs
     Export(ExportArgs),
+    /// Check a scene: what is there, what is missing, and which of the usual mistakes it has; exit code 3
+    /// if it cannot work
+    Doctor(DoctorArgs),
     /// Write the built-in street to disk in the layout of a data set, one drive per condition
     Synth(SynthArgs),
     /// Build the retrieval index of a scene, which --references retrieve:K asks
@@ -114,6 +120,9 @@ pub struct RunArgs {
     pub task: TaskArgs,
     #[command(flatten)]
     pub recording: RecordingArgs,
+    /// Write the matches of the feature-based method into this folder, in the form that --matches reads
+    #[arg(long, value_name = "DIR")]
+    pub export_matches: Option<PathBuf>,
     /// Write the results as JSON, one object per line; - for stdout
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -176,7 +185,7 @@ impl TaskArgs {
             by_hand: !self.reference.is_empty(),
             index: self.index.clone(),
             radius_m: self.radius,
-            protocol: self.protocol.over(Protocol::default()),
+            protocol: self.protocol.over(Protocol::default())?,
             params: self.protocol.config.resolve()?,
             breakpoints: self.breakpoints.clone(),
         })
@@ -213,8 +222,16 @@ pub struct ProtocolArgs {
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub prior: Option<f64>,
     /// The methods to run [default: fb,pm,mi,hy]
-    #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',')]
+    #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',', value_parser = method)]
     pub method: Vec<Method>,
+    /// Poses that another system found, as a method of this name beside ours; repeatable. FILE is TUM,
+    /// KITTI, COLMAP's images.txt or `name qw qx qy qz x y z` as visuallocalization.net takes it
+    #[arg(long, value_name = "NAME=FILE")]
+    pub estimates: Vec<EstimatesFile>,
+    /// Take the matches of the feature-based method from this folder, instead of finding them: hloc's
+    /// features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair
+    #[arg(long, value_name = "DIR")]
+    pub matches: Option<PathBuf>,
     /// Fuse the poses of several references into one, by each of these [default: none, and each
     /// reference gives its own; eval: r-wavg]
     #[arg(long, value_name = "maxf,avg,wavg,r-wavg", value_delimiter = ',')]
@@ -241,18 +258,24 @@ pub struct ProtocolArgs {
 }
 
 impl ProtocolArgs {
-    /// What was given, and the defaults for the rest. Methods are put in the order of the registry.
-    pub fn over(&self, defaults: Protocol) -> Protocol {
-        let methods = match self.method.as_slice() {
+    /// What was given, and the defaults for the rest. Methods are put in the order of the registry, and
+    /// behind them the other systems.
+    pub fn over(&self, defaults: Protocol) -> Result<Protocol, CliError> {
+        let wanted = match self.method.as_slice() {
             [] => &defaults.methods,
             wanted => wanted,
         };
-        Protocol {
+        let others: Vec<Method> = self.estimates.iter().map(|file| file.method).collect();
+        check_known(wanted, &others)?;
+        if let Some(twice) = (1..others.len()).find(|&at| others[..at].contains(&others[at])) {
+            let message = format!("--estimates {} is given twice", others[twice]);
+            return Err(CliError::Usage(message));
+        }
+        let ours = estimator::methods().filter(|method| wanted.contains(method));
+        Ok(Protocol {
             references: self.references.unwrap_or(defaults.references),
             prior_m: self.prior.or(defaults.prior_m),
-            methods: estimator::methods()
-                .filter(|method| methods.contains(method))
-                .collect(),
+            methods: ours.chain(others).collect(),
             fusions: match self.fusion.as_slice() {
                 [] => defaults.fusions,
                 wanted => wanted.to_vec(),
@@ -261,7 +284,33 @@ impl ProtocolArgs {
             right: self.right.unwrap_or(defaults.right),
             accept: self.accept.or(defaults.accept),
             explain: self.explain.unwrap_or(defaults.explain),
-        }
+            estimates: self.estimates.clone(),
+            matches: self.matches.clone().or(defaults.matches),
+        })
+    }
+}
+
+/// A method of ours or a name that another system may go by.
+fn method(name: &str) -> Result<Method, String> {
+    Method::called(name).map_err(|_| UnknownMethod(name).to_string())
+}
+
+/// Every method that is asked for is one of ours or goes by the name of given poses.
+pub fn check_known(asked: &[Method], others: &[Method]) -> Result<(), CliError> {
+    let mut asked = asked.iter();
+    match asked.find(|method| estimator::find(**method).is_none() && !others.contains(method)) {
+        Some(unknown) => Err(CliError::Usage(UnknownMethod(unknown.name()).to_string())),
+        None => Ok(()),
+    }
+}
+
+struct UnknownMethod<'a>(&'a str);
+
+impl fmt::Display for UnknownMethod<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let known = estimator::methods().map(Method::name);
+        let error = UnknownWord::among(self.0, "method", known);
+        write!(f, "{error}, or a name that --estimates gives")
     }
 }
 
@@ -277,9 +326,10 @@ pub struct RecordingArgs {
     /// Start a Rerun viewer and send the recording to it
     #[arg(long)]
     pub spawn: bool,
-    /// Serve the recording, so that viewers can connect to this process
-    #[arg(long)]
-    pub serve: bool,
+    /// Serve the recording, so that viewers can connect to this process; at 127.0.0.1, which other
+    /// machines do not reach, unless an address is given
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1")]
+    pub serve: Option<IpAddr>,
 }
 
 #[derive(Debug, Args)]
@@ -389,7 +439,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Results of this method only, as the following
-    #[arg(long)]
+    #[arg(long, value_parser = method)]
     pub method: Option<Method>,
     /// Results of this fusion
     #[arg(long)]
@@ -437,6 +487,21 @@ pub struct SynthArgs {
     /// Write into a folder that is not empty, replacing sequences of the same names
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Where the frames are, as for `run`
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Write the cloud of a frame on its photo
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// Save a recording of the frames that were compared, with their clouds in the world and on the photos
+    #[arg(long, value_name = "FILE.rrd")]
+    pub save: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

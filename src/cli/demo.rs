@@ -32,6 +32,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
                 save: Some(recording.clone()),
                 ..RecordingArgs::default()
             },
+            export_matches: None,
             json: None,
         },
         terminal,

@@ -4,17 +4,20 @@ use std::path::{Path, PathBuf};
 
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
+use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunFile, RunFolder, ScenePair, Scenes,
-    defaults, merge, read_run,
+    Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
+    ScenePair, Scenes, defaults, merge, read_run,
 };
 use posescope::scene::{self, Retriever, Scene};
+use posescope::session::command_line;
 
-use super::args::EvalArgs;
+use super::args::{EvalArgs, check_known};
 use super::diff;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
+use super::interrupt::Interrupt;
 use super::output;
 use super::run::use_threads;
 use super::terminal::Terminal;
@@ -22,6 +25,16 @@ use super::terminal::Terminal;
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     use_threads(args.protocol.threads)?;
+    if args.merge.is_empty() {
+        let gated: Vec<Method> = args.gate.iter().map(Gate::method).collect();
+        let others: Vec<Method> = args
+            .protocol
+            .estimates
+            .iter()
+            .map(|file| file.method)
+            .collect();
+        check_known(&gated, &others)?;
+    }
     let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
     let run = if args.merge.is_empty() {
         execute(args, &folder, terminal)?
@@ -61,7 +74,9 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     };
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(folder.done() as u64);
-    let mut observer = FailureRecordings::new(args, &folder, &run, &params, bar.clone())?;
+    let interrupt = Interrupt::listen();
+    let mut observer =
+        FailureRecordings::new(args, &folder, &run, &params, bar.clone(), interrupt.clone())?;
     let execution = Execution {
         run: &run,
         scenes: &scenes,
@@ -71,8 +86,28 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     let outcome = execution.run_remaining(&mut folder, &mut observer);
     bar.finish_and_clear();
     observer.close();
-    outcome?;
-    Ok(run)
+    match outcome {
+        Err(RunError::Cancelled(_)) if interrupt.is_raised() => {
+            let (done, all) = (folder.done(), run.items().count());
+            Err(CliError::Interrupted(format!(
+                "{done} of {all} queries are done; go on with: {}",
+                resuming()
+            )))
+        }
+        outcome => {
+            outcome?;
+            Ok(run)
+        }
+    }
+}
+
+/// The command line that goes on with this run.
+fn resuming() -> String {
+    let mut words: Vec<String> = std::env::args().skip(1).collect();
+    if !words.iter().any(|word| word == "--resume") {
+        words.push("--resume".to_owned());
+    }
+    command_line(&words)
 }
 
 fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>, CliError> {
@@ -116,7 +151,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
     let first = scenes.references.first();
     let scene_name = first.map(|scene| scene.name()).unwrap_or_default();
     let paper = args.paper.unwrap_or(PaperProtocol::of_scene(scene_name));
-    let mut protocol = args.protocol.over(defaults.protocol);
+    let mut protocol = args.protocol.over(defaults.protocol)?;
     let is_single = protocol.references.count() == 1;
     if is_single && args.protocol.fusion.is_empty() && args.experiment != Some(Experiment::Multi) {
         protocol.fusions = Vec::new();

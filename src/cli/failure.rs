@@ -8,13 +8,15 @@ use posescope::describe::ParamError;
 use posescope::localize::ChoiceError;
 use posescope::run::{DrawError, FolderError, RunError};
 use posescope::scene::{NoIndex, SceneError};
-use posescope::sink::rerun::{ComparisonError, RecordError};
+use posescope::sink::rerun::{CheckupError, ComparisonError, RecordError};
 use posescope::trace::Cancelled;
 
 const DONE: u8 = 0;
 const NOT_GOOD_ENOUGH: u8 = 1;
 const USAGE: u8 = 2;
 const BAD_DATA: u8 = 3;
+/// What shells say of a process that Ctrl-C ended.
+const INTERRUPTED: u8 = 130;
 /// The exit code of a panic.
 pub const INTERNAL: u8 = 4;
 
@@ -46,6 +48,12 @@ pub enum CliError {
     /// A gate or a comparison says no.
     #[error("{0}")]
     NotGoodEnough(String),
+    /// A scene that cannot work, or has a mistake in it.
+    #[error("{0}")]
+    Unhealthy(String),
+    /// Somebody pressed Ctrl-C; what was done until then is kept.
+    #[error("stopped by Ctrl-C; {0}")]
+    Interrupted(String),
     /// A breakpoint ended the run: what was asked for.
     #[error("{0}")]
     Stopped(#[from] Cancelled),
@@ -83,7 +91,9 @@ impl CliError {
             | Self::Choice(_)
             | Self::Draw(_)
             | Self::Folder(_)
+            | Self::Unhealthy(_)
             | Self::Record(_) => BAD_DATA,
+            Self::Interrupted(_) => INTERRUPTED,
         })
     }
 }
@@ -95,6 +105,15 @@ impl From<RunError> for CliError {
             RunError::Choice(error) => error.into(),
             RunError::Cancelled(cancelled) => Self::Stopped(cancelled),
             RunError::Folder(error) => error.into(),
+        }
+    }
+}
+
+impl From<CheckupError> for CliError {
+    fn from(error: CheckupError) -> Self {
+        match error {
+            CheckupError::Scene(error) => error.into(),
+            CheckupError::Record(error) => error.into(),
         }
     }
 }

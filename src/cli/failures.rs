@@ -16,6 +16,7 @@ use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
 use super::args::EvalArgs;
 use super::failure::CliError;
+use super::interrupt::Interrupt;
 use super::observer::CliObserver;
 
 const FOLDER: &str = "failures";
@@ -75,6 +76,7 @@ impl<'a> FailureRecordings<'a> {
         run: &RunFile,
         params: &'a Params,
         bar: indicatif::ProgressBar,
+        interrupt: Interrupt,
     ) -> Result<Self, CliError> {
         let path = folder.path().join(FOLDER);
         fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
@@ -107,7 +109,7 @@ impl<'a> FailureRecordings<'a> {
             failure_radius_m: run.failure_radius_m,
             several_pairs,
             bar,
-            observer: CliObserver::new(indicatif::ProgressBar::hidden(), None),
+            observer: CliObserver::new(indicatif::ProgressBar::hidden(), None, interrupt),
             dropped: still_dropped.lines().count(),
         })
     }

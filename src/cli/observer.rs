@@ -1,5 +1,7 @@
 //! The observer of the command line's queries: a progress bar, and perhaps a recording.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use posescope::event::{Event, KindSet};
@@ -12,28 +14,45 @@ use posescope::sink::Progress;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
 
+use super::interrupt::Interrupt;
+use super::match_export::MatchExport;
+
 /// A bar that moves on with every method that is done, and a recorder.
 pub struct CliObserver {
     pub recorder: Option<Recorder>,
+    /// Writes matches, if that is asked for.
+    pub export: Option<MatchExport>,
     /// Ends the run at a breakpoint, if there are any.
     pub stop: Option<StopAtBreakpoint>,
+    interrupt: Interrupt,
     bar: indicatif::ProgressBar,
     progress: Option<Progress>,
     /// Query and reference of each problem.
     tasks: Vec<String>,
     /// When the explanation at work began.
     explaining_since: Instant,
+    problems: Vec<Problem>,
+    /// The problem at work.
+    problem: usize,
 }
 
 impl CliObserver {
-    pub fn new(bar: indicatif::ProgressBar, recorder: Option<Recorder>) -> Self {
+    pub fn new(
+        bar: indicatif::ProgressBar,
+        recorder: Option<Recorder>,
+        interrupt: Interrupt,
+    ) -> Self {
         Self {
             recorder,
+            export: None,
             stop: None,
+            interrupt,
             bar,
             progress: None,
             tasks: Vec::new(),
             explaining_since: Instant::now(),
+            problems: Vec::new(),
+            problem: 0,
         }
     }
 }
@@ -44,7 +63,11 @@ impl Sink for CliObserver {
             return KindSet::ALL;
         }
         let recorder = self.recorder.as_ref();
-        recorder.map_or(KindSet::NONE, |recorder| recorder.wanted())
+        let recorded = recorder.map_or(KindSet::NONE, |recorder| recorder.wanted());
+        match &self.export {
+            Some(_) => recorded.union(MatchExport::wanted()),
+            None => recorded,
+        }
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
@@ -58,10 +81,17 @@ impl Sink for CliObserver {
             }
             _ => {}
         }
-        match &mut self.stop {
-            Some(stop) => stop.accept(record),
-            None => Ok(()),
+        if let (Some(export), Some(problem)) = (&mut self.export, self.problems.get(self.problem)) {
+            export.accept(record, problem);
         }
+        if let Some(stop) = &mut self.stop {
+            stop.accept(record)?;
+        }
+        self.interrupt.check()
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.interrupt.check()
     }
 }
 
@@ -70,6 +100,9 @@ impl LocalizeObserver for CliObserver {
         let name =
             |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);
         self.tasks = problems.iter().map(name).collect();
+        if self.export.is_some() {
+            self.problems = problems.to_vec();
+        }
         self.progress = None;
         if let Some(recorder) = &mut self.recorder {
             recorder.begin_query(index, problems, truth);
@@ -79,6 +112,7 @@ impl LocalizeObserver for CliObserver {
     fn begin_method(&mut self, problem: usize, method: Method) {
         let task = self.tasks.get(problem).cloned().unwrap_or_default();
         self.progress = Some(Progress::new(self.bar.clone(), task));
+        self.problem = problem;
         if let Some(recorder) = &mut self.recorder {
             recorder.begin_method(problem, method);
         }
@@ -115,6 +149,10 @@ impl LocalizeObserver for CliObserver {
         if let Some(recorder) = &mut self.recorder {
             recorder.begin_fusion(method);
         }
+    }
+
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(self.interrupt.attention())
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {

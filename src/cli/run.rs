@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use posescope::estimator;
 use posescope::localize::{
     Chooser, Localizer, NoObserver, QueryResult, Ranking, References, Request, Selection,
 };
+use posescope::method::Method;
 use posescope::run::default_failure_radius_m;
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
@@ -12,6 +14,8 @@ use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
 use super::failure::CliError;
+use super::interrupt::Interrupt;
+use super::match_export::MatchExport;
 use super::observer::CliObserver;
 use super::output::{self, JsonLines};
 use super::story::story;
@@ -39,15 +43,16 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let references = open(&task.scene)?;
     let others = task.queries.as_deref().map(open).transpose()?;
     let queries = others.as_deref().unwrap_or(references.as_ref());
+    let localizer = task.protocol.configured(Localizer::new(
+        references.as_ref(),
+        queries,
+        &task.params,
+        task.protocol.seed,
+    ));
     let plan = Plan {
         args,
         task: &task,
-        localizer: task.protocol.configured(Localizer::new(
-            references.as_ref(),
-            queries,
-            &task.params,
-            task.protocol.seed,
-        )),
+        localizer: localizer.with_foreign(task.protocol.foreign(queries)?),
     };
     let tasks = plan.queries()?;
     let mut json = match &args.json {
@@ -57,8 +62,14 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let mut results = Vec::new();
     let methods = &task.protocol.methods;
     let estimates = tasks.iter().map(|task| task.references.frames.len());
-    let bar = terminal.bar((estimates.sum::<usize>() * methods.len()) as u64);
-    let mut observer = CliObserver::new(bar.clone(), plan.recorder(&tasks)?);
+    let estimates_planned = estimates.sum::<usize>() * methods.len();
+    let bar = terminal.bar(estimates_planned as u64);
+    let interrupt = Interrupt::listen();
+    let mut observer = CliObserver::new(bar.clone(), plan.recorder(&tasks)?, interrupt.clone());
+    if let Some(folder) = &args.export_matches {
+        plan.check_features()?;
+        observer.export = Some(MatchExport::to(folder)?);
+    }
     if !task.breakpoints.is_empty() {
         let breakpoints = Breakpoints::new(task.breakpoints.iter().cloned());
         observer.stop = Some(StopAtBreakpoint::new(breakpoints));
@@ -91,12 +102,29 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let (Some(breakpoint), false) = (reached, terminal.is_quiet()) {
         eprintln!("Stopped at {breakpoint}");
     }
+    let is_interrupted = interrupt.is_raised();
+    // A recording that is served stays until somebody ends that.
+    interrupt.release();
     let closed = observer.recorder.map_or(Ok(()), Recorder::close);
     match outcome {
+        Err(CliError::Stopped(_)) if is_interrupted => {
+            closed?;
+            shown?;
+            let (done, all) = (results.len(), estimates_planned);
+            return Err(CliError::Interrupted(format!(
+                "{done} of {all} results are done"
+            )));
+        }
         Ok(()) | Err(CliError::Stopped(_)) => {}
         Err(error) => return Err(error),
     }
     closed?;
+    if let (Some(export), Some(folder)) = (observer.export, &args.export_matches) {
+        let written = export.close()?;
+        if !terminal.is_quiet() {
+            eprintln!("Matches: {} ({written} pairs)", folder.display());
+        }
+    }
     shown?;
     if let (Some(path), false) = (&args.recording.save, terminal.is_quiet()) {
         eprintln!("Recording: {0} (open it with `rerun {0}`)", path.display());
@@ -116,6 +144,21 @@ pub fn use_threads(threads: Option<std::num::NonZeroUsize>) -> Result<(), CliErr
 }
 
 impl Plan<'_> {
+    /// Matches can be written only where some are found.
+    fn check_features(&self) -> Result<(), CliError> {
+        let mut methods = self.task.protocol.methods.iter().copied();
+        let has_features = |method: Method| {
+            let hybrid = estimator::find(method).and_then(|entry| entry.hybrid());
+            method == Method::FB || hybrid.is_some_and(|parts| parts.first == Method::FB)
+        };
+        match methods.any(has_features) {
+            true => Ok(()),
+            false => Err(CliError::Usage(
+                "--export-matches writes the matches of fb; --method fb expected".to_owned(),
+            )),
+        }
+    }
+
     fn failure_radius_m(&self) -> f64 {
         default_failure_radius_m(self.localizer.references().name())
     }

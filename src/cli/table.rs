@@ -75,6 +75,17 @@ fn evidence(result: &QueryResult) -> String {
             .unwrap_or_default();
         return format!("cost {:.4}{truth}{shuffled}", cost.best);
     }
+    if !result.costs_at_pose.is_empty() {
+        let costs = result.costs_at_pose.iter().map(|at_pose| {
+            let number = |cost: Option<f64>| cost.map_or("none".to_owned(), |c| format!("{c:.4}"));
+            let truth = at_pose
+                .truth
+                .map(|_| format!(" (truth {})", number(at_pose.truth)));
+            let (method, cost) = (at_pose.method, number(at_pose.cost));
+            format!("{method} {cost}{}", truth.unwrap_or_default())
+        });
+        return costs.collect::<Vec<_>>().join(", ");
+    }
     if let (Some(fusion), Some(alone)) = (&result.fusion, &result.per_reference) {
         let found = alone.iter().filter(|one| one.status == Status::Ok).count();
         return format!("{fusion} of {}, {found} with a pose", alone.len());

@@ -70,7 +70,7 @@ impl FromStr for Gate {
         let (left, right) = text.split_once(sign).ok_or_else(expected)?;
         let (metric, method) = left.trim().rsplit_once('@').ok_or_else(expected)?;
         let limit: f64 = right.trim().parse().map_err(|_| expected())?;
-        let method: Method = method.parse().map_err(|_| expected())?;
+        let method = Method::called(method).map_err(|_| expected())?;
         if !limit.is_finite() {
             return Err(expected());
         }
@@ -102,6 +102,11 @@ fn metric_of(text: &str) -> Option<Metric> {
 }
 
 impl Gate {
+    /// The method that it looks at.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
     /// Holds it against the figures of a run. A figure that does not exist passes no gate.
     pub fn check(&self, measures: &[Measures]) -> GateResult {
         let of_method = measures.iter().filter(|one| one.method == self.method);

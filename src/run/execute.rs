@@ -122,6 +122,7 @@ impl Execution<'_> {
             let protocol = &self.run.protocol;
             let localizer = Localizer::new(references, queries, self.params, protocol.seed);
             let localizer = protocol.configured(localizer);
+            let localizer = localizer.with_foreign(protocol.foreign(queries)?);
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
                 let results = self.results(item, &localizer, &left_out, observer)?;

@@ -1,11 +1,17 @@
 //! How queries are localised, whichever they are.
 
+use std::path::PathBuf;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
+use super::estimates_file::EstimatesFile;
 use crate::diagnosis::Tolerance;
+use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::localize::{Localizer, Selection};
 use crate::method::Method;
+use crate::scene::{MatchFolder, Scene, SceneError, read_estimates};
 
 /// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
 /// of everything in it are here.
@@ -16,6 +22,10 @@ pub struct Protocol {
     /// How far from the query's known position references may be \[m\]; without it, as far as the
     /// uncertainty radius. See [`Self::reach_m`].
     pub prior_m: Option<f64>,
+    /// Poses of other systems, which are methods beside ours: read before the methods, some of which
+    /// they name.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub estimates: Vec<EstimatesFile>,
     /// The methods, in the order of their results.
     pub methods: Vec<Method>,
     /// What to make of several references: one pose by each of these, or without any a pose for each
@@ -33,6 +43,9 @@ pub struct Protocol {
     /// How often a query that went wrong is localised again, at most, to see what would have helped.
     #[serde(default, skip_serializing_if = "is_default")]
     pub explain: usize,
+    /// A folder of matches that take the place of those of SURF.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matches: Option<PathBuf>,
 }
 
 /// For what is written only where somebody asked for it.
@@ -52,6 +65,8 @@ impl Default for Protocol {
             right: Tolerance::default(),
             accept: None,
             explain: 0,
+            estimates: Vec::new(),
+            matches: None,
         }
     }
 }
@@ -69,6 +84,21 @@ impl Protocol {
             .with_tolerance(self.right)
             .accepting_from(self.accept)
             .explaining(self.explain)
+    }
+
+    /// What other systems answered about the frames of the queries' scene.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is of another scene.
+    pub fn foreign(&self, queries: &dyn Scene) -> Result<Foreign, SceneError> {
+        let mut foreign = Foreign::default();
+        for EstimatesFile { method, path } in &self.estimates {
+            foreign = foreign.with_estimates(*method, read_estimates(path, queries)?);
+        }
+        if let Some(folder) = &self.matches {
+            foreign = foreign.with_matches(Arc::new(MatchFolder::open(folder)?));
+        }
+        Ok(foreign)
     }
 
     /// How far from a query's known position its references may be \[m\], with this uncertainty

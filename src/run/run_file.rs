@@ -1,15 +1,20 @@
 //! `run.toml`: everything that an evaluation was asked, and over which queries.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::estimates_file::EstimatesFile;
 use super::experiment::Experiment;
 use super::protocol::{Protocol, is_default};
 use super::scene_pair::{QueryCamera, ScenePair};
 use crate::diagnosis::Tolerance;
+use crate::estimator::{find, methods};
 use crate::fusion::Fusion;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
+use crate::text::UnknownWord;
 
 /// The version of the file's form.
 pub const RUN_SCHEMA: &str = "posescope.run/1";
@@ -96,6 +101,9 @@ struct RunFileForm {
     format: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     experiment: Option<Experiment>,
+    // Before the methods, some of which it names.
+    #[serde(default, skip_serializing_if = "is_default")]
+    estimates: Vec<EstimatesFile>,
     methods: Vec<Method>,
     references: Selection,
     fusions: Vec<Fusion>,
@@ -112,6 +120,8 @@ struct RunFileForm {
     accept: Option<f64>,
     #[serde(default, skip_serializing_if = "is_default")]
     explain: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    matches: Option<PathBuf>,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
@@ -138,6 +148,8 @@ impl From<RunFileForm> for RunFile {
                 right: form.right,
                 accept: form.accept,
                 explain: form.explain,
+                estimates: form.estimates,
+                matches: form.matches,
             },
             radii_m: form.radii_m,
             share: form.share,
@@ -170,6 +182,8 @@ impl From<RunFile> for RunFileForm {
             right: run.protocol.right,
             accept: run.protocol.accept,
             explain: run.protocol.explain,
+            estimates: run.protocol.estimates,
+            matches: run.protocol.matches,
             seed: run.protocol.seed,
             shard: run.shard,
             pairs: run.pairs,
@@ -211,6 +225,14 @@ impl Places {
         if run.protocol.methods.is_empty() {
             let message = "a run has at least one method".to_owned();
             return Some((self.methods.span().start, message));
+        }
+        let unknown = run.protocol.methods.iter().find(|method| {
+            let mut brought = run.protocol.estimates.iter();
+            find(**method).is_none() && !brought.any(|file| file.method == **method)
+        });
+        if let Some(method) = unknown {
+            let error = UnknownWord::among(method.name(), "method", methods().map(Method::name));
+            return Some((self.methods.span().start, error.to_string()));
         }
         let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
         if run.radii_m.is_empty() || !run.radii_m.iter().all(is_length) {

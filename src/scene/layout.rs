@@ -6,6 +6,7 @@ mod colmap;
 mod described;
 mod kitti;
 mod kitti_raw;
+mod robotcar;
 mod seven_scenes;
 mod tum;
 
@@ -83,6 +84,7 @@ pub struct Layout {
 pub const LAYOUTS: &[Layout] = &[
     kitti::LAYOUT,
     kitti_raw::LAYOUT,
+    robotcar::LAYOUT,
     tum::LAYOUT,
     seven_scenes::LAYOUT,
     colmap::LAYOUT,

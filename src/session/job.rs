@@ -13,7 +13,7 @@ use crate::localize::{
     ChoiceError, Chooser, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking,
     References, Request, Selection, words_of,
 };
-use crate::scene::{FrameStore, NoIndex, Scene};
+use crate::scene::{FrameStore, NoIndex, Scene, SceneError};
 
 /// One query, its references, and what to do with them.
 #[derive(Clone)]
@@ -40,6 +40,9 @@ pub enum JobError {
     /// A frame cannot be read, or the job was cancelled.
     #[error(transparent)]
     Localize(#[from] LocalizeError),
+    /// What another system answered cannot be read.
+    #[error(transparent)]
+    Foreign(#[from] SceneError),
     /// References cannot be chosen.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
@@ -136,6 +139,7 @@ impl Job {
             &task.params,
             protocol.seed,
         ));
+        let localizer = localizer.with_foreign(protocol.foreign(self.queries.as_ref())?);
         let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
         let request = Request {

@@ -93,8 +93,20 @@ impl Task {
         if let Some(prior_m) = protocol.prior_m {
             option("prior", &prior_m);
         }
-        if protocol.methods != Method::PAPER {
-            option("method", &joined(&protocol.methods));
+        let ours = |method: &&Method| {
+            protocol
+                .estimates
+                .iter()
+                .all(|file| file.method != **method)
+        };
+        let ours: Vec<Method> = protocol.methods.iter().filter(ours).copied().collect();
+        if ours != Method::PAPER {
+            let methods = if ours.is_empty() {
+                &protocol.methods
+            } else {
+                &ours
+            };
+            option("method", &joined(methods));
         }
         if !protocol.fusions.is_empty() {
             option("fusion", &joined(&protocol.fusions));
@@ -109,6 +121,12 @@ impl Task {
         if protocol.explain > 0 {
             option("explain", &protocol.explain);
         }
+        for estimates in &protocol.estimates {
+            option("estimates", estimates);
+        }
+        if let Some(folder) = &protocol.matches {
+            option("matches", &folder.display());
+        }
         for change in self.params.changes() {
             option("set", &change);
         }
@@ -120,10 +138,14 @@ impl Task {
 
     /// The command line that asks the same of a query, for a POSIX shell. See [`Self::arguments`].
     pub fn command_line(&self, query: &str, references: &[String]) -> String {
-        let arguments = self.arguments(query, references);
-        let words: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
-        format!("posescope {}", words.join(" "))
+        command_line(&self.arguments(query, references))
     }
+}
+
+/// The command line with these arguments, for a POSIX shell.
+pub fn command_line(arguments: &[String]) -> String {
+    let words: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
+    format!("posescope {}", words.join(" "))
 }
 
 fn joined(names: &[impl Display]) -> String {
@@ -157,7 +179,7 @@ mod tests {
             protocol: Protocol {
                 references: "retrieve:3".parse().expect("a choice"),
                 prior_m: Some(80.0),
-                methods: vec![Method::FB, Method::MI],
+                methods: vec![Method::FB, Method::MI, Method::named("other")],
                 fusions: ["avg", "r-wavg"]
                     .map(|name| name.parse().expect("a fusion"))
                     .to_vec(),
@@ -165,6 +187,8 @@ mod tests {
                 right: "0.5m,2deg".parse().expect("a tolerance"),
                 accept: Some(0.75),
                 explain: 4,
+                estimates: vec!["other=my poses.txt".parse().expect("a file")],
+                matches: Some("hloc".into()),
             },
             params,
             breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
@@ -178,7 +202,8 @@ mod tests {
             task().command_line("000070", &[]),
             "posescope run street --format street --queries street:night --query 000070 \
              --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
-             --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 --set fb.ratio=0.75 --break 'inliers < 10'"
+             --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 \
+             --estimates 'other=my poses.txt' --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
         );
         let by_hand = Task {
             by_hand: true,

@@ -7,6 +7,7 @@
 //! killed leaves a readable recording of everything up to the last view or stage.
 
 mod blueprint;
+mod checkup;
 mod comparison;
 mod direct;
 mod encode;
@@ -27,6 +28,7 @@ mod surface;
 mod targets;
 mod viewer;
 
+pub use checkup::{CheckupError, record_checkup};
 pub use comparison::{ComparisonError, record_comparison};
 pub use error::RecordError;
 pub use recorder::Recorder;

@@ -393,6 +393,7 @@ fn fb_localises_at_the_real_door() {
         uncertainty_radius_m: 5.0,
         prior_m: None,
         seed: 0,
+        matches: None,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));

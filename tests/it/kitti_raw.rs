@@ -286,6 +286,7 @@ fn fb_localises_on_the_real_drive() {
         uncertainty_radius_m: 10.0,
         prior_m: None,
         seed: 0,
+        matches: None,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));

@@ -27,6 +27,7 @@ fn pair(query: &str, reference: &str) -> Option<(Problem, Pose)> {
         uncertainty_radius_m: 15.0,
         prior_m: None,
         seed: 0,
+        matches: None,
     };
     Some((problem, scene.pose(frame(query)).expect("is known")))
 }

@@ -359,6 +359,7 @@ fn fb_localises_in_the_real_kitchen() {
         uncertainty_radius_m: 2.0,
         prior_m: None,
         seed: 0,
+        matches: None,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());
     let truth = scene.pose(frame("25")).expect("is known");

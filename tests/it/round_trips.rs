@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use nalgebra::{Point2, Point3};
+use image::RgbImage;
+use nalgebra::{Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion};
 use posescope::camera::Intrinsics;
 use posescope::geometry::{Pose, PoseError};
 use posescope::localize::localize;
@@ -50,7 +51,13 @@ fn written(layout: &Layout, street: &Street, root: &Path) -> Box<dyn Scene> {
     }
     writer.finish().expect("writable");
     let place = root.join((layout.place)("dusk"));
-    let opened = scene::open(place.to_str().expect("a plain path"), None);
+    let place = place.to_str().expect("a plain path");
+    // One frame in ten would be too few.
+    let argument = match layout.name {
+        "robotcar" => format!("{place}:all"),
+        _ => place.to_owned(),
+    };
+    let opened = scene::open(&argument, None);
     opened.unwrap_or_else(|error| panic!("{}: {error}", layout.name))
 }
 
@@ -58,6 +65,14 @@ fn written(layout: &Layout, street: &Street, root: &Path) -> Box<dyn Scene> {
 fn street_from_world(layout: &Layout, street: &Street) -> Pose {
     match layout.name {
         "kitti-raw" => street.pose(0).expect("is known"),
+        // North, east, down, in the UTM zone of Oxford.
+        "robotcar" => {
+            let turn = Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
+            let turn = Rotation3::from_matrix_unchecked(turn);
+            let rotation = UnitQuaternion::from_rotation_matrix(&turn);
+            let origin = Translation3::new(5_735_000.0, 620_000.0, -110.0);
+            Pose::from_parts(origin, rotation).inverse()
+        }
         _ => Pose::identity(),
     }
 }
@@ -73,7 +88,11 @@ fn photos_cameras_poses_and_times_come_back_from_every_layout() {
         for (frame, index) in WRITTEN.into_iter().enumerate() {
             let [read, expected] = [disk.photo(frame), street.photo(index)];
             let [read, expected] = [read, expected].map(|photo| photo.expect("readable").color);
-            assert_eq!(read, expected, "{}", layout.name);
+            match layout.name {
+                // A sensor with one colour at each pixel has lost the others.
+                "robotcar" => assert!(mean_difference(&read, &expected) < 6.0),
+                _ => assert_eq!(read, expected, "{}", layout.name),
+            }
             let (read, expected) = (disk.intrinsics(frame), street.intrinsics(index));
             let Intrinsics { fx, fy, cx, cy, .. } = expected;
             assert!((read.fx - fx).abs() + (read.fy - fy).abs() < 1e-9);
@@ -89,6 +108,17 @@ fn photos_cameras_poses_and_times_come_back_from_every_layout() {
             }
         }
     }
+}
+
+/// Of grey values, on average.
+fn mean_difference(a: &Option<RgbImage>, b: &Option<RgbImage>) -> f64 {
+    let [a, b] = [a, b].map(|photo| photo.as_ref().expect("has colours").as_raw());
+    let sum: f64 = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| f64::from(a.abs_diff(*b)))
+        .sum();
+    sum / a.len() as f64
 }
 
 /// The depth that the street has at a pixel, if it is one surface there.
@@ -126,6 +156,29 @@ fn clouds_come_back_from_every_layout() {
                     assert!(scan.iter().any(is_scanned), "{read}");
                 }
             }
+            "robotcar" => {
+                // Scans of both frames, the nearest in every small square, those of the LMS in its plane.
+                assert!(cloud.len() > 3000, "{}", cloud.len());
+                let from_other = street.pose(WRITTEN[1]).expect("is known").inverse()
+                    * street.pose(WRITTEN[0]).expect("is known");
+                let other = street
+                    .cloud(WRITTEN[0])
+                    .expect("is there")
+                    .points
+                    .into_iter();
+                let all: Vec<Point3<f32>> = other
+                    .map(|point| (from_other * point.cast::<f64>()).cast())
+                    .chain(scan.iter().copied())
+                    .collect();
+                for read in cloud.iter().step_by(97) {
+                    let pixel = camera.project(&read.cast()).expect("is ahead");
+                    assert!(camera.contains(&pixel));
+                    assert!(
+                        all.iter().any(|point| (read - point).norm() < 0.04),
+                        "{read}"
+                    );
+                }
+            }
             "tum" | "7scenes" => {
                 let unit_m = if layout.name == "tum" { 0.0002 } else { 0.001 };
                 assert!(cloud.len() > 3000, "{}", cloud.len());
@@ -153,6 +206,7 @@ fn every_layout_leads_to_the_same_pose_within_what_it_can_say() {
             uncertainty_radius_m: 15.0,
             prior_m: None,
             seed: 0,
+            matches: None,
         };
         let outcome = localize(&problem, Method::FB, &Params::default());
         // Depths up to 13 m are too few to agree on a pose 9 m on.
@@ -163,8 +217,13 @@ fn every_layout_leads_to_the_same_pose_within_what_it_can_say() {
         };
         let error = PoseError::between(&disk.pose(1).expect("is known"), &pose);
         println!("{}: {error}", layout.name);
+        let (metres, degrees) = match layout.name {
+            // What the reference's scanner did not see, that of the other frame did: some of it is hidden.
+            "robotcar" => (2.0, 2.0),
+            _ => (0.5, 1.0),
+        };
         assert!(
-            error.translation_m < 0.5 && error.rotation_deg < 1.0,
+            error.translation_m < metres && error.rotation_deg < degrees,
             "{}: {error}",
             layout.name
         );

@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use tempfile::TempDir;
 
 use crate::small_sequence::SmallSequence;
-use crate::{colmap, kitti_raw, rgbd, scene_toml};
+use crate::{colmap, kitti_raw, rgbd, robotcar, scene_toml};
 
 /// A small scene of a format on disk, and its argument.
 struct Sample {
@@ -53,6 +53,14 @@ fn sample(format: &str) -> Sample {
             root
         }
         "kitti-raw" => kitti_raw::write(&root),
+        "robotcar" => {
+            let traversal = robotcar::write_part(&root, 40..46);
+            return Sample {
+                root: written,
+                argument: format!("{}:all", text(&traversal)),
+                _folder: Box::new(folder),
+            };
+        }
         other => panic!("a small scene of the format {other} is wanted here"),
     };
     Sample {

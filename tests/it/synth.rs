@@ -58,6 +58,7 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
         uncertainty_radius_m: 15.0,
         prior_m: None,
         seed: 0,
+        matches: None,
     }
 }
 

@@ -61,6 +61,7 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
         uncertainty_radius_m: 3.0,
         prior_m: None,
         seed: 7,
+        matches: None,
     }
 }
 

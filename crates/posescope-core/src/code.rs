@@ -74,6 +74,8 @@ codes! {
     H1,
     /// the right place was ranked too low
     V1,
+    /// another system gave no answer
+    E1,
     /// low confidence
     L1,
     /// the ground truth or a calibration is suspect

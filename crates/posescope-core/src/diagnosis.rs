@@ -10,6 +10,7 @@
 //! | `suspicion` | X1: the truth, a calibration or the units cannot be right |
 //! | `direct` | D1 to D8: the search, the cost, or what it was not allowed to move |
 //! | `feature` | R1 to R9: where the true matches went |
+//! | `foreign` | those of a direct method that need a pose alone, for poses of other systems |
 //! | `combined` | H1, F1, V1: hybrids, fusions, retrieval |
 //! | `trust` | L1: how far a pose is to be believed without knowing the truth |
 //!
@@ -20,6 +21,7 @@ mod descent;
 mod direct;
 mod evidence;
 mod feature;
+mod foreign;
 mod matches;
 pub mod remedies;
 mod suspicion;
@@ -146,6 +148,7 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         let of_method = match estimator::find(responsible).map(|entry| &entry.parts) {
             Some(Parts::Features) => feature::diagnose(subject),
             Some(Parts::Cost(_)) => direct::diagnose(subject),
+            None => foreign::diagnose(subject),
             _ => failure_alone(subject),
         };
         let combined = combined::of_hybrid(subject, responsible);

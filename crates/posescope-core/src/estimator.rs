@@ -8,11 +8,13 @@
 mod direct;
 mod failure;
 mod feature;
+mod given;
 mod hybrid;
 
 pub use direct::Direct;
 pub use failure::Failure;
 pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches, projected_cloud};
+pub use given::Given;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 
 use std::str::FromStr;
@@ -217,7 +219,7 @@ pub fn direct_methods(methods: &[Method]) -> Vec<Method> {
 }
 
 /// The registry's entry of a method; `None` for one that is in none, such as that of a cost of one's
-/// own ([`Direct::searching`]).
+/// own ([`Direct::searching`]) or another system's answers ([`Given`]).
 pub fn find(method: Method) -> Option<&'static Entry> {
     all().iter().find(|entry| entry.method == method)
 }
@@ -231,11 +233,13 @@ pub fn entry(method: Method) -> &'static Entry {
     find(method).unwrap_or_else(|| panic!("{method} is in no registry"))
 }
 
+/// Reads the name of a method in a registry, or of another system that was named before.
 impl FromStr for Method {
     type Err = UnknownWord;
 
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
-        let found = methods().find(|method| method.name() == text);
+        let ours = methods().find(|method| method.name() == text);
+        let found = ours.or_else(|| Method::known(text));
         found.ok_or_else(|| UnknownWord::among(text, "method", methods().map(Method::name)))
     }
 }

@@ -21,6 +21,7 @@
 
 mod descriptor;
 mod detector;
+mod found;
 mod hessian;
 mod integral;
 mod matching;
@@ -32,6 +33,7 @@ mod surf;
 
 use nalgebra::Point2;
 
+pub use found::{FoundMatches, PairMatches};
 pub use matching::{
     Match, MatchVerdict, Neighbours, classify, nearest_neighbours, nearest_neighbours_interruptible,
 };

@@ -45,6 +45,7 @@ pub mod estimator;
 pub mod event;
 pub mod features;
 pub mod files;
+pub mod foreign;
 pub mod fusion;
 pub mod geometry;
 pub mod grid;

@@ -1,12 +1,15 @@
 //! The methods that are compared, by their names.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::fmt;
+use std::sync::{Mutex, PoisonError};
 
 /// A method by its short name, which is the same on the command line, in results and in recordings.
 ///
 /// Which methods there are says the registry of the estimators ([`crate::estimator::all`]): the four
-/// of the paper are known by name here, any other is a line in a registry.
+/// of the paper are known by name here, any other is a line in a registry. A method that is in none is
+/// another system, whose answers somebody brought ([`Self::called`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Method(&'static str);
 
@@ -27,6 +30,32 @@ impl Method {
     /// The method of a name that a registry gives.
     pub const fn named(name: &'static str) -> Self {
         Self(name)
+    }
+
+    /// The method that goes by a name which somebody chose: another system, whose answers stand beside
+    /// ours. Names are kept until the program ends; there are as many as somebody gives.
+    ///
+    /// # Errors
+    /// [`MethodNameError`] where the name could not stand in a list of methods or an entity path.
+    pub fn called(name: &str) -> Result<Self, MethodNameError> {
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_.+".contains(c);
+        let starts_well = name.starts_with(|c: char| c.is_ascii_lowercase());
+        if !starts_well || !name.chars().all(is_plain) || name.len() > LONGEST_NAME {
+            return Err(MethodNameError(name.chars().take(LONGEST_NAME).collect()));
+        }
+        if let Some(known) = Self::known(name) {
+            return Ok(known);
+        }
+        let kept: &'static str = Box::leak(name.into());
+        let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+        names.insert(kept);
+        Ok(Self(kept))
+    }
+
+    /// The method of a name that [`Self::called`] was given before.
+    pub(crate) fn known(name: &str) -> Option<Self> {
+        let names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+        names.get(name).copied().map(Self)
     }
 
     /// The short name.
@@ -68,6 +97,20 @@ impl PartialOrd for Method {
     }
 }
 
+/// The names that somebody chose.
+static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+
+/// Characters of a name at most; tables have columns of about this width.
+const LONGEST_NAME: usize = 24;
+
+/// What is no name of a method.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` cannot name a method: lower-case letters, digits and -_.+ expected, a letter first, \
+     {LONGEST_NAME} at most"
+)]
+pub struct MethodNameError(String);
+
 crate::serde_as_text!(Method);
 
 #[cfg(test)]
@@ -83,5 +126,22 @@ mod tests {
             assert_eq!(json, format!("\"{}\"", method.name()));
             assert_eq!(serde_json::from_str::<Method>(&json).ok(), Some(method));
         }
+    }
+
+    #[test]
+    fn another_system_goes_by_any_plain_name() {
+        let method = Method::called("superglue-2").expect("a plain name");
+        assert_eq!(method, Method::named("superglue-2"));
+        assert_eq!(Method::called("mi"), Ok(Method::MI));
+        assert_eq!(
+            serde_json::from_str::<Method>("\"superglue-2\"").ok(),
+            Some(method)
+        );
+        let long = "x".repeat(25);
+        for wrong in ["", "Mi", "2d", "a b", "a/b", "a@b", "a,b", "é", &long] {
+            assert!(Method::called(wrong).is_err(), "{wrong}");
+        }
+        // What nobody brought is no method.
+        assert!(serde_json::from_str::<Method>("\"sift-of-nobody\"").is_err());
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
+use crate::features::PairMatches;
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::input::InputError;
@@ -141,6 +142,8 @@ pub struct Problem {
     pub prior_m: Option<f64>,
     /// Every random choice of an estimator derives from this.
     pub seed: u64,
+    /// Matches that somebody brought; without them, features are found and matched.
+    pub matches: Option<Arc<PairMatches>>,
 }
 
 impl Problem {
@@ -164,6 +167,7 @@ impl Problem {
             uncertainty_radius_m,
             prior_m: None,
             seed: 0,
+            matches: None,
         })
     }
 

@@ -1,13 +1,15 @@
 //! All queries with what is known of them.
 
+use std::collections::BTreeSet;
+
 use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ViewContext, theme};
-use crate::estimator;
 use crate::event::Side;
 use crate::localize::{QueryResult, Verdict};
+use crate::method::Method;
 
 /// The list of queries.
 #[derive(Default)]
@@ -76,7 +78,8 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize) {
 pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
     let failure_radius_m = context.setup.failure_radius_m;
     ui.spacing_mut().item_spacing.x = 2.0;
-    for method in estimator::methods() {
+    let methods: BTreeSet<Method> = results.iter().map(|result| result.method).collect();
+    for method in methods {
         for result in results.iter().filter(|r| r.method == method) {
             let (mark, color) = match result.verdict(failure_radius_m) {
                 Verdict::NoPose => ("×", theme::ESTIMATE),

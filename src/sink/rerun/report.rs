@@ -31,6 +31,7 @@ pub(super) fn markdown(
     text += &errors(results, failure_radius_m);
     text += &features(results);
     text += &costs(results);
+    text += &costs_at_poses(results);
     text += &changes(configuration);
     let Origin(origin) = origin;
     text += &format!(
@@ -161,6 +162,31 @@ fn costs(results: &[QueryResult]) -> String {
                 &cost.evaluations.to_string(),
             ],
         );
+    }
+    text + "\n"
+}
+
+/// What our costs say of the poses of other systems.
+fn costs_at_poses(results: &[QueryResult]) -> String {
+    let mut text = String::new();
+    for result in results {
+        for at_pose in &result.costs_at_pose {
+            if text.is_empty() {
+                text += "## Costs at the poses of other systems\n\n| pose | cost of | pose | truth | \
+                         coverage |\n|:--|:--|--:|--:|--:|\n";
+            }
+            let number = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.4}"));
+            row(
+                &mut text,
+                &[
+                    result.method.name(),
+                    at_pose.method.name(),
+                    &number(at_pose.cost),
+                    &number(at_pose.truth),
+                    &format!("{:.2} %", 100.0 * at_pose.coverage),
+                ],
+            );
+        }
     }
     text + "\n"
 }

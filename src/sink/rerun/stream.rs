@@ -56,7 +56,7 @@ impl Stream {
             file,
             error: None,
             viewer_lost: false,
-            serves: targets.serve,
+            serves: targets.serve.is_some(),
             query: 0,
             step: -1,
             eval: None,

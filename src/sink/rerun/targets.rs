@@ -1,7 +1,7 @@
 //! Where a recording goes, and what it is known by.
 
 use std::io;
-use std::net::{Ipv4Addr, TcpListener};
+use std::net::{IpAddr, TcpListener};
 use std::path::PathBuf;
 
 use rerun::external::re_uri::RedapUri;
@@ -23,8 +23,8 @@ pub struct Targets {
     pub connect: Option<String>,
     /// Whether to start a viewer.
     pub spawn: bool,
-    /// Whether to serve the recording to viewers that connect to this process.
-    pub serve: bool,
+    /// The address at which the recording is served to viewers that connect to this process.
+    pub serve: Option<IpAddr>,
 }
 
 /// What the stable id of a recording follows from.
@@ -63,7 +63,7 @@ pub(super) struct OpenTargets {
 impl Targets {
     /// Whether there is no target at all.
     pub fn is_none(&self) -> bool {
-        self.save.is_none() && self.connect.is_none() && !self.spawn && !self.serve
+        self.save.is_none() && self.connect.is_none() && !self.spawn && self.serve.is_none()
     }
 
     /// Opens all targets.
@@ -82,8 +82,8 @@ impl Targets {
         if self.spawn {
             sinks.push(Box::new(spawn()?));
         }
-        if self.serve {
-            sinks.push(Box::new(serve()?));
+        if let Some(address) = self.serve {
+            sinks.push(Box::new(serve(address)?));
         }
         Ok(OpenTargets { sinks, file })
     }
@@ -125,13 +125,13 @@ fn spawn() -> Result<Viewer, RecordError> {
     connect(&format!("rerun+http://127.0.0.1:{}/proxy", viewer.port))
 }
 
-/// Binds to all interfaces, as Rerun does.
-fn serve() -> Result<GrpcServerSink, RecordError> {
+/// Serves at one address only. Web pages of other origins are refused by Rerun's server.
+fn serve(address: IpAddr) -> Result<GrpcServerSink, RecordError> {
     let port = DEFAULT_SERVER_PORT;
     let refused = |source| RecordError::Serve { port, source };
     // The server would find out on its own thread, and only log it.
-    TcpListener::bind((Ipv4Addr::UNSPECIFIED, port)).map_err(refused)?;
-    GrpcServerSink::new("0.0.0.0", port, ServerOptions::default())
+    TcpListener::bind((address, port)).map_err(refused)?;
+    GrpcServerSink::new(&address.to_string(), port, ServerOptions::default())
         .map_err(|error| refused(io::Error::other(error)))
 }
 

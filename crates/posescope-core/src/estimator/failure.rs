@@ -116,6 +116,14 @@ pub enum Failure {
         /// Why that one failed.
         failure: Box<Failure>,
     },
+    /// Another system was asked, and its answers have none here.
+    #[error("{answers} has no {missing}")]
+    NotAnswered {
+        /// Whose answers.
+        answers: String,
+        /// What is not among them.
+        missing: String,
+    },
     /// The pose is less certain than somebody asked for.
     #[error(
         "the pose is within 1 m with a probability of {probability:.2}, and {needed:.2} is asked for"
@@ -148,6 +156,7 @@ impl Failure {
             Self::NothingComparable { .. } | Self::FlatCost { .. } => Code::D5,
             Self::LatticeTooLarge(_) => Code::D9,
             Self::NoReferenceSucceeded { failure, .. } => failure.code(),
+            Self::NotAnswered { .. } => Code::E1,
             Self::LowConfidence { .. } => Code::L1,
             Self::Internal { .. } => Code::X9,
         }

@@ -19,8 +19,8 @@ use crate::event::{
     MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    Features, Match, MatchVerdict, SurfParams, classify, nearest_neighbours_interruptible,
-    remembered_interruptible,
+    Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams, classify,
+    nearest_neighbours_interruptible, remembered_interruptible,
 };
 use crate::geometry::Pose;
 use crate::memo::{Exact, MemoId, Recalled, Remembered};
@@ -228,13 +228,21 @@ impl FeatureBased {
         side: Side,
         problem: &Problem,
         trace: &mut Trace<'_>,
-    ) -> Result<Recalled<Features>, Cancelled> {
+    ) -> Result<Recalled<Features>, Halt> {
         let (photo, memo) = match side {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let checkpoint = || trace.checkpoint();
-        let features = remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?;
+        let features = match found_elsewhere(problem)? {
+            Some(found) => Recalled::made(Arc::clone(match side {
+                Side::Query => &found.query,
+                Side::Reference => &found.reference,
+            })),
+            None => {
+                let checkpoint = || trace.checkpoint();
+                remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?
+            }
+        };
         trace.emit(|| FeaturesDetected {
             side,
             features: Arc::clone(&features.value),
@@ -248,7 +256,11 @@ impl FeatureBased {
         query: &Features,
         reference: &Features,
         trace: &mut Trace<'_>,
-    ) -> Result<Recalled<Decisions>, Cancelled> {
+    ) -> Result<Recalled<Decisions>, Halt> {
+        if let Some(found) = found_elsewhere(problem)? {
+            let decisions = Decisions(Arc::clone(&found.decisions));
+            return Ok(Recalled::made(Arc::new(decisions)));
+        }
         let mut find = || {
             let checkpoint = || trace.checkpoint();
             best_matches(query, reference, &self.params, checkpoint).map(Decisions)
@@ -262,7 +274,7 @@ impl FeatureBased {
             ratio: Exact::of(&self.params.ratio),
             unique: self.params.unique,
         };
-        problem.query.memo.try_recall(key, find)
+        Ok(problem.query.memo.try_recall(key, find)?)
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -424,6 +436,21 @@ impl FeatureBased {
         })?;
         verdict?;
         Ok(problem.world_from_query(&reference_from_query))
+    }
+}
+
+/// The matches that somebody brought, if any: what finds and matches features else.
+fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> {
+    match problem.matches.as_deref() {
+        None => Ok(None),
+        Some(PairMatches::Found(found)) => Ok(Some(found)),
+        Some(PairMatches::Absent) => Err(Failure::NotAnswered {
+            answers: "the folder of matches".to_owned(),
+            missing: format!(
+                "matches of {} with {}",
+                problem.query.name, problem.reference.name
+            ),
+        }),
     }
 }
 

@@ -8,17 +8,19 @@ mod fuse;
 mod judge;
 mod work;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use self::work::{Answer, MethodOutcome, Place, QueryWork};
 use super::observer::checkpoint;
 use super::{
-    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_traced,
-    tell_ranking,
+    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_by,
+    localize_traced, tell_ranking,
 };
 use crate::diagnosis::{Evidence, Tolerance};
-use crate::estimator::{self, Failure, hybrid_outcome};
+use crate::estimator::{Failure, Given, hybrid_outcome};
 use crate::event::KindSet;
+use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::method::Method;
 use crate::params::Params;
@@ -68,6 +70,8 @@ pub struct Localizer<'a> {
     least_probability: Option<f64>,
     /// How often a query that went wrong is localised again to see what would have helped.
     runs_to_explain: usize,
+    /// What other systems answered.
+    foreign: Foreign,
 }
 
 impl<'a> Localizer<'a> {
@@ -96,6 +100,7 @@ impl<'a> Localizer<'a> {
             tolerance: Tolerance::default(),
             least_probability: None,
             runs_to_explain: 0,
+            foreign: Foreign::default(),
         }
     }
 
@@ -109,6 +114,7 @@ impl<'a> Localizer<'a> {
             tolerance: self.tolerance,
             least_probability: self.least_probability,
             runs_to_explain: 0,
+            foreign: self.foreign.clone(),
         }
     }
 
@@ -146,6 +152,13 @@ impl<'a> Localizer<'a> {
             least_probability,
             ..self
         }
+    }
+
+    /// The same localizer, with what other systems answered about the queries: their poses are methods
+    /// beside ours, their matches take the place of those of SURF.
+    #[must_use]
+    pub fn with_foreign(self, foreign: Foreign) -> Self {
+        Self { foreign, ..self }
     }
 
     /// The scene of the queries, its frames remembered.
@@ -192,9 +205,11 @@ impl<'a> Localizer<'a> {
                     None => {
                         places.push(place);
                         checkpoint(observer)?;
+                        let reference = self.references.reference(reference)?;
                         problems.push(Problem {
+                            matches: self.foreign.matches(&loaded.name, &reference.name)?,
                             query: Arc::clone(&loaded),
-                            reference: self.references.reference(reference)?,
+                            reference,
                             uncertainty_radius_m: request.radius_m,
                             prior_m: request.references.within_m,
                             seed: self.seed,
@@ -209,9 +224,7 @@ impl<'a> Localizer<'a> {
             query: &loaded,
             truth: self.queries.pose(query),
             matches: vec![None; problems.len()],
-            candidates: estimator::methods()
-                .map(|_| problems.iter().map(|_| None).collect())
-                .collect(),
+            candidates: BTreeMap::new(),
             problems,
             frame: query,
             places,
@@ -395,10 +408,9 @@ impl<'a> Localizer<'a> {
         };
         let told = self.with_ranking_judged(candidate.result.clone(), request, work.truth.as_ref());
         observer.end_method(&told, &candidate.times);
-        let row = estimator::methods().position(|known| known == method);
-        if let Some(slot) = row.and_then(|row| work.candidates.get_mut(row)?.get_mut(problem)) {
-            *slot = Some(candidate);
-        }
+        let of_method = work.candidates.entry(method).or_default();
+        of_method.resize_with(work.problems.len(), || None);
+        of_method[problem] = Some(candidate);
         Ok(())
     }
 
@@ -418,7 +430,14 @@ impl<'a> Localizer<'a> {
             Some(flag) => Trace::watched(&mut fanout, flag),
             None => Trace::to(&mut fanout),
         };
-        let outcome = localize_traced(&work.problems[problem], method, self.params, &mut trace)?;
+        let asked = &work.problems[problem];
+        let outcome = match self.foreign.estimates(method) {
+            Some(estimates) => {
+                let given = Given::new(method, Arc::clone(estimates));
+                localize_by(&given, asked, &mut trace)?
+            }
+            None => localize_traced(asked, method, self.params, &mut trace)?,
+        };
         let times = timings.into_times();
         Ok(self.judged(work, problem, method, outcome, evidence, times))
     }

@@ -56,6 +56,9 @@ pub struct QueryResult {
     pub counts: Option<FeatureCounts>,
     /// What the cost was like, if a cost was minimised.
     pub cost: Option<CostReport>,
+    /// What our costs say of a pose that another system found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub costs_at_pose: Vec<CostAtPose>,
     /// Why the pose is wrong, missing or hardly to be believed, the primary verdict first.
     pub diagnosis: Vec<Diagnosis>,
     /// What was tried to make a wrong pose right, if it was asked for.
@@ -247,6 +250,47 @@ impl CostReport {
     }
 }
 
+/// What a cost says of a pose that nobody searched by it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CostAtPose {
+    /// The method that searches this cost.
+    pub method: Method,
+    /// The cost at the pose; none where too little can be compared.
+    pub cost: Option<f64>,
+    /// The cost at the true pose, where that is known.
+    pub truth: Option<f64>,
+    /// Share of the image that is covered at the pose.
+    pub coverage: f64,
+}
+
+/// The costs of every method that searches one, at a pose of the query.
+fn costs_at(subject: &Subject<'_>, pose: &Pose) -> Vec<CostAtPose> {
+    let problem = subject.problem;
+    let mut poses = vec![problem.reference_from_query(pose)];
+    poses.extend(
+        subject
+            .truth
+            .map(|truth| problem.reference_from_query(truth)),
+    );
+    let searching = estimator::all()
+        .iter()
+        .filter(|entry| entry.cost().is_some());
+    let mut costs = Vec::new();
+    for entry in searching {
+        let estimator = entry.make(subject.params);
+        estimator.with_scorer(problem, &mut |scorer| {
+            let scores = scorer.score(&poses);
+            costs.push(CostAtPose {
+                method: entry.method,
+                cost: scores[0].cost,
+                truth: scores.get(1).and_then(|score| score.cost),
+                coverage: f64::from(scores[0].covered) / problem.query.intrinsics.area(),
+            });
+        });
+    }
+    costs
+}
+
 /// Measures an outcome against the true pose, where it is known, and says what is wrong with it.
 pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
     let Subject {
@@ -280,6 +324,11 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
             .cost
             .as_ref()
             .map(|summary| CostReport::new(summary, cost_at_truth, on_rim, basin)),
+        costs_at_pose: match &outcome.pose {
+            // A method that is in no registry is another system.
+            Ok(pose) if estimator::find(method).is_none() => costs_at(subject, pose),
+            _ => Vec::new(),
+        },
         diagnosis: diagnose(subject),
         trust: subject.trust.clone(),
         ..QueryResult::new(
@@ -329,6 +378,7 @@ impl QueryResult {
             initial_error: None,
             counts: None,
             cost: None,
+            costs_at_pose: Vec::new(),
             diagnosis: pose.err().map(Diagnosis::of_failure).into_iter().collect(),
             explanation: None,
             trust: None,

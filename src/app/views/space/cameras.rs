@@ -99,7 +99,7 @@ impl CameraKind {
 /// A method's place among all.
 fn place(method: Method) -> usize {
     let found = estimator::methods().position(|known| known == method);
-    found.unwrap_or_default()
+    found.unwrap_or_else(|| estimator::all().len())
 }
 
 /// A camera somewhere in the scene.

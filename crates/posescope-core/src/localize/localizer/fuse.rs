@@ -3,8 +3,8 @@
 use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
 use crate::diagnosis::{Member, diagnose_fusion, fused_trust};
-use crate::estimator::{self, count_matches};
-use crate::features::remembered;
+use crate::estimator::count_matches;
+use crate::features::{PairMatches, remembered};
 use crate::fusion::{self, Fusion};
 use crate::geometry::PoseError;
 use crate::localize::observer::checkpoint;
@@ -27,16 +27,21 @@ impl Localizer<'_> {
                 continue;
             }
             checkpoint(observer)?;
-            let counted = estimator::methods().find_map(|method| {
-                let candidate = work.candidate(problem, method)?;
+            let counted = work.candidates.values().find_map(|of_method| {
+                let candidate = of_method.get(problem)?.as_ref()?;
                 candidate.outcome.counts
             });
-            work.matches[problem] = Some(match counted {
-                Some(counts) => counts.unique,
-                None => {
-                    let Problem {
-                        query, reference, ..
-                    } = &work.problems[problem];
+            let Problem {
+                query,
+                reference,
+                matches,
+                ..
+            } = &work.problems[problem];
+            work.matches[problem] = Some(match (counted, matches.as_deref()) {
+                (Some(counts), _) => counts.unique,
+                (None, Some(PairMatches::Found(found))) => found.count(),
+                (None, Some(PairMatches::Absent)) => 0,
+                (None, None) => {
                     let surf = &self.params.surf;
                     let query = remembered(&query.photo.gray, &query.memo, surf);
                     let reference = remembered(&reference.photo.gray, &reference.memo, surf);

@@ -1,5 +1,7 @@
 //! A query at work: what was asked of it and what every method made of it so far.
 
+use std::collections::BTreeMap;
+
 use super::Request;
 use crate::diagnosis::Evidence;
 use crate::estimator::{self, Failure, Outcome};
@@ -36,8 +38,8 @@ pub(super) struct QueryWork<'a> {
     pub(super) places: Vec<Place>,
     /// Feature matches by problem, once they are known.
     pub(super) matches: Vec<Option<usize>>,
-    /// What each method made of each problem, in the order of [`estimator::methods`].
-    pub(super) candidates: Vec<Vec<Option<MethodOutcome>>>,
+    /// What each method made of each problem.
+    pub(super) candidates: BTreeMap<Method, Vec<Option<MethodOutcome>>>,
 }
 
 /// A reference, and what is known of the distance of the query \[m\].
@@ -64,7 +66,8 @@ pub(super) struct Answer {
 impl QueryWork<'_> {
     /// How far the poses of the other methods that solved the problem are from this one.
     pub(super) fn agreement(&self, problem: usize, method: Method, pose: &Pose) -> Vec<Agreement> {
-        estimator::methods()
+        let others = self.candidates.keys().copied();
+        others
             .filter(|other| *other != method)
             .filter_map(|other| {
                 let candidate = self.candidate(problem, other)?;
@@ -80,8 +83,7 @@ impl QueryWork<'_> {
 
     /// What a method made of a problem, if it had its turn.
     pub(super) fn candidate(&self, problem: usize, method: Method) -> Option<&MethodOutcome> {
-        let row = estimator::methods().position(|known| known == method)?;
-        self.candidates.get(row)?.get(problem)?.as_ref()
+        self.candidates.get(&method)?.get(problem)?.as_ref()
     }
 
     /// The candidates of a hybrid's methods, where it can be made of them.

@@ -1,0 +1,119 @@
+//! `posescope doctor`: whether a scene can work, and which of the usual mistakes is in it.
+
+use std::fmt::Write as _;
+
+use posescope::doctor::{Agreement, Examination, Remark, examine};
+use posescope::scene::{self, Scene};
+use posescope::sink::rerun::{Targets, record_checkup};
+
+use super::args::DoctorArgs;
+use super::failure::CliError;
+use super::output;
+use super::terminal::Terminal;
+
+/// Runs the command.
+pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
+    let scene = scene::open(&args.scene, args.format.as_deref())?;
+    let found = examine(scene.as_ref())?;
+    if let (Some(path), Some(picture)) = (&args.picture, &found.picture) {
+        let io = |error: image::ImageError| std::io::Error::other(error.to_string());
+        let written = picture.save_with_format(path, image::ImageFormat::Png);
+        written.map_err(io).map_err(CliError::io(path))?;
+    }
+    if let Some(path) = &args.save {
+        let targets = Targets {
+            save: Some(path.clone()),
+            ..Targets::default()
+        };
+        record_checkup(&targets, scene.as_ref(), &found.compared)?;
+    }
+    if !terminal.is_quiet() {
+        output::print(&report(scene.as_ref(), &found).trim_end())?;
+    }
+    match found.is_broken() {
+        true => Err(CliError::Unhealthy(verdict(scene.as_ref(), &found))),
+        false => Ok(()),
+    }
+}
+
+/// In one line, why it cannot work.
+fn verdict(scene: &dyn Scene, found: &Examination) -> String {
+    let name = scene.name();
+    if let Some(finding) = &found.finding {
+        return format!("{name}: {}; {}", finding.mistake.about(), finding.remedy);
+    }
+    let broken = found.remarks.iter().find_map(|remark| match remark {
+        Remark::Broken(why) => Some(why.as_str()),
+        Remark::Odd(_) => None,
+    });
+    format!("{name}: {}", broken.unwrap_or("it cannot work"))
+}
+
+fn report(scene: &dyn Scene, found: &Examination) -> String {
+    let mut text = String::new();
+    let there = &found.inventory;
+    let mut line = |what: &str, words: &str| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{what:<11}{words}");
+    };
+    line("scene", scene.name());
+    line(
+        "frames",
+        &format!(
+            "{}, {} with a pose, {} with a cloud, {} with a time",
+            there.frames, there.with_pose, there.with_cloud, there.with_time
+        ),
+    );
+    for camera in there.cameras.iter().take(3) {
+        line("camera", camera);
+    }
+    if there.cameras.len() > 3 {
+        line("", &format!("and {} more", there.cameras.len() - 3));
+    }
+    if let Some([least, median, greatest]) = there.steps_m {
+        line(
+            "way",
+            &format!(
+                "{:.1} m, steps of {least:.2} to {greatest:.2} m, median {median:.2} m",
+                there.way_m
+            ),
+        );
+    }
+    for (frame, points, depth) in &there.clouds {
+        let depth = depth.map_or("nothing in view".to_owned(), |depth| {
+            format!("median depth in view {depth:.1} m")
+        });
+        line("cloud", &format!("{frame}: {points} points, {depth}"));
+    }
+    if let Some(agreement) = &found.agreement {
+        line("agreement", &numbers(agreement));
+    }
+    for remark in &found.remarks {
+        match remark {
+            Remark::Broken(why) => line("broken", why),
+            Remark::Odd(why) => line("odd", why),
+        }
+    }
+    match &found.finding {
+        Some(finding) => {
+            line("mistake", finding.mistake.about());
+            line("remedy", &finding.remedy);
+            line("then", &numbers(&finding.otherwise));
+        }
+        None if found.agreement.is_some() => {
+            line("mistakes", "none of the usual ones fits the photos better");
+        }
+        None => line("mistakes", "nothing could be compared with the photos"),
+    }
+    text
+}
+
+fn numbers(agreement: &Agreement) -> String {
+    let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.2}"));
+    let carried = agreement.carried.map(f64::tanh);
+    format!(
+        "photo to photo {} (correlation), depth edges on image edges {} (log)",
+        number(carried),
+        number(agreement.edges)
+    )
+}

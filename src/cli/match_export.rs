@@ -1,0 +1,76 @@
+//! Writing the matches of the feature-based method, in the form that `--matches` reads.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use posescope::event::{Event, Kind, KindSet, Side};
+use posescope::features::Features;
+use posescope::problem::Problem;
+use posescope::scene::write_matches;
+use posescope::trace::Record;
+
+use super::failure::CliError;
+
+/// Writes a file for each pair, as soon as it is matched.
+pub struct MatchExport {
+    folder: PathBuf,
+    query: Option<Arc<Features>>,
+    reference: Option<Arc<Features>>,
+    written: usize,
+    broken: Option<CliError>,
+}
+
+impl MatchExport {
+    /// Into this folder, which is made.
+    pub fn to(folder: &Path) -> Result<Self, CliError> {
+        std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            query: None,
+            reference: None,
+            written: 0,
+            broken: None,
+        })
+    }
+
+    pub fn wanted() -> KindSet {
+        KindSet::of(&[Kind::FeaturesDetected, Kind::MatchesDecided])
+    }
+
+    /// Takes in what was told of a problem. The first error is kept, and nothing is written after it.
+    pub fn accept(&mut self, record: &Record, problem: &Problem) {
+        match &record.event {
+            Event::FeaturesDetected(detected) => {
+                let features = Some(Arc::clone(&detected.features));
+                match detected.side {
+                    Side::Query => self.query = features,
+                    Side::Reference => self.reference = features,
+                }
+            }
+            Event::MatchesDecided(decided) if self.broken.is_none() => {
+                let (Some(query), Some(reference)) = (&self.query, &self.reference) else {
+                    return;
+                };
+                let written = write_matches(
+                    &self.folder,
+                    (&problem.query.name, query),
+                    (&problem.reference.name, reference),
+                    &decided.decisions,
+                );
+                match written {
+                    Ok(()) => self.written += 1,
+                    Err(error) => self.broken = Some(CliError::io(&self.folder)(error)),
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// How many files were written.
+    pub fn close(self) -> Result<usize, CliError> {
+        match self.broken {
+            Some(error) => Err(error),
+            None => Ok(self.written),
+        }
+    }
+}

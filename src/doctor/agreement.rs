@@ -1,0 +1,238 @@
+//! How well clouds, photos, cameras and poses fit together: two numbers that any reading of a scene can be
+//! held to.
+//!
+//! - *Edges*: depth edges of a cloud should fall on edges of its photo (Levinson and Thrun, *Automatic
+//!   Online Calibration of Cameras and Lasers*, RSS 2013). It sees what is wrong within a frame.
+//! - *Carried values*: grey values that points take from their own photo should be found where the pose of
+//!   another frame puts the points. It sees what is wrong with poses, scale and depth.
+
+use image::GrayImage;
+use nalgebra::{Point2, Point3};
+
+use crate::camera::Intrinsics;
+
+/// Points in view below which nothing is said.
+const FEWEST_POINTS: usize = 150;
+
+/// The strength of image edges, fading with the distance from them, so that an edge which is missed by a
+/// few pixels still attracts.
+pub(super) struct EdgeMap {
+    width: usize,
+    height: usize,
+    strength: Vec<f32>,
+}
+
+impl EdgeMap {
+    /// Looks for edges in a photo.
+    pub(super) fn of(photo: &GrayImage) -> Self {
+        /// What is left of an edge one pixel away.
+        const FADING: f32 = 0.80;
+        /// Share of an edge's own pixel, so that the ridge stays sharp.
+        const SHARP: f32 = 1.0 / 3.0;
+        /// Differences beyond this are edges like any other [grey values].
+        const STRONGEST: f32 = 60.0;
+        let (width, height) = (photo.width() as usize, photo.height() as usize);
+        let values = photo.as_raw();
+        let at = |x: usize, y: usize| f32::from(values[y * width + x]);
+        let mut edges = vec![0.0_f32; width * height];
+        for y in 1..height.saturating_sub(1) {
+            for x in 1..width.saturating_sub(1) {
+                let horizontal = at(x + 1, y - 1) + 2.0 * at(x + 1, y) + at(x + 1, y + 1)
+                    - at(x - 1, y - 1)
+                    - 2.0 * at(x - 1, y)
+                    - at(x - 1, y + 1);
+                let vertical = at(x - 1, y + 1) + 2.0 * at(x, y + 1) + at(x + 1, y + 1)
+                    - at(x - 1, y - 1)
+                    - 2.0 * at(x, y - 1)
+                    - at(x + 1, y - 1);
+                edges[y * width + x] = (horizontal.hypot(vertical) / 4.0).min(STRONGEST);
+            }
+        }
+        let mut faded = edges.clone();
+        let spread = |faded: &mut Vec<f32>, x: usize, y: usize, dx: isize, dy: isize| {
+            let (nx, ny) = (x.checked_add_signed(dx), y.checked_add_signed(dy));
+            if let (Some(nx), Some(ny)) = (nx, ny)
+                && nx < width
+                && ny < height
+            {
+                let from = FADING * faded[ny * width + nx];
+                let here = &mut faded[y * width + x];
+                *here = here.max(from);
+            }
+        };
+        for y in 0..height {
+            for x in 0..width {
+                for (dx, dy) in [(-1, 0), (-1, -1), (0, -1), (1, -1)] {
+                    spread(&mut faded, x, y, dx, dy);
+                }
+            }
+        }
+        for y in (0..height).rev() {
+            for x in (0..width).rev() {
+                for (dx, dy) in [(1, 0), (1, 1), (0, 1), (-1, 1)] {
+                    spread(&mut faded, x, y, dx, dy);
+                }
+            }
+        }
+        let strength = edges.iter().zip(&faded);
+        Self {
+            width,
+            height,
+            strength: strength
+                .map(|(edge, faded)| SHARP * edge + (1.0 - SHARP) * faded)
+                .collect(),
+        }
+    }
+
+    fn at(&self, pixel: &Point2<f64>) -> Option<f32> {
+        let (x, y) = (pixel.x, pixel.y);
+        let is_inside =
+            x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64;
+        is_inside.then(|| {
+            let (left, top) = (x as usize, y as usize);
+            let (right, down) = ((x - left as f64) as f32, (y - top as f64) as f32);
+            let value = |x: usize, y: usize| self.strength[y * self.width + x];
+            let upper = value(left, top) * (1.0 - right) + value(left + 1, top) * right;
+            let lower = value(left, top + 1) * (1.0 - right) + value(left + 1, top + 1) * right;
+            upper * (1.0 - down) + lower * down
+        })
+    }
+}
+
+/// A point as a camera sees it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub(super) pixel: Point2<f64>,
+    /// Depth \[m\].
+    pub(super) depth: f64,
+}
+
+/// The logarithm of how much stronger image edges are at depth edges than at other points; `None` where
+/// too little is in view.
+pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
+    let inside: Vec<(Seen, f32)> = seen
+        .iter()
+        .filter_map(|seen| Some((*seen, map.at(&seen.pixel)?)))
+        .collect();
+    if inside.len() < FEWEST_POINTS {
+        return None;
+    }
+    let weights = depth_edges(map.width, map.height, &inside);
+    let (mut weight_sum, mut at_edges, mut at_all) = (0.0, 0.0, 0.0);
+    for ((_, strength), weight) in inside.iter().zip(&weights) {
+        weight_sum += weight;
+        at_edges += weight * f64::from(*strength);
+        at_all += f64::from(*strength);
+    }
+    let mean = at_all / inside.len() as f64;
+    if weight_sum < FEWEST_POINTS as f64 / 10.0 || mean <= 0.0 {
+        return None;
+    }
+    Some((at_edges / weight_sum / mean).max(1e-3).ln())
+}
+
+/// How far each point stands out before what is beside it, 0 … 1.
+fn depth_edges(width: usize, height: usize, inside: &[(Seen, f32)]) -> Vec<f64> {
+    /// Cells are such that a scan of 64 beams has a point in most of them.
+    const CELLS_ACROSS: usize = 250;
+    const NEIGHBOURS: [(isize, isize); 6] = [(-1, 0), (1, 0), (-2, 0), (2, 0), (0, -1), (0, -2)];
+    let cell = (width / CELLS_ACROSS).max(1);
+    let (columns, rows) = (width / cell + 1, height / cell + 1);
+    let mut nearest = vec![f64::INFINITY; columns * rows];
+    let place = |seen: &Seen| {
+        let (x, y) = (seen.pixel.x as usize / cell, seen.pixel.y as usize / cell);
+        (x, y)
+    };
+    for (seen, _) in inside {
+        let (x, y) = place(seen);
+        let here = &mut nearest[y * columns + x];
+        *here = here.min(seen.depth);
+    }
+    inside
+        .iter()
+        .map(|(seen, _)| {
+            let (x, y) = place(seen);
+            // What is hidden by the same cell's nearest point has no edge to show.
+            if seen.depth > 1.05 * nearest[y * columns + x] {
+                return 0.0;
+            }
+            let behind = NEIGHBOURS.iter().filter_map(|&(dx, dy)| {
+                let (nx, ny) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
+                let beside = (nx < columns && ny < rows).then(|| nearest[ny * columns + nx])?;
+                (beside.is_finite() && beside > 1.15 * seen.depth)
+                    .then(|| ((beside - seen.depth) / seen.depth).min(1.0))
+            });
+            behind.fold(0.0, f64::max)
+        })
+        .collect()
+}
+
+/// The correlation of the grey values of points in two photos, as Fisher's z; `None` where fewer points are
+/// in view of both than `least`.
+pub(super) fn carried_agreement(
+    from: (&GrayImage, &[Option<Seen>]),
+    to: (&GrayImage, &[Option<Seen>]),
+    least: usize,
+) -> Option<f64> {
+    let pairs: Vec<(f64, f64)> = from
+        .1
+        .iter()
+        .zip(to.1)
+        .filter_map(|(a, b)| {
+            let a = value(from.0, &a.as_ref()?.pixel)?;
+            let b = value(to.0, &b.as_ref()?.pixel)?;
+            Some((a, b))
+        })
+        .collect();
+    if pairs.len() < least.max(FEWEST_POINTS) {
+        return None;
+    }
+    let count = pairs.len() as f64;
+    let mean_a = pairs.iter().map(|pair| pair.0).sum::<f64>() / count;
+    let mean_b = pairs.iter().map(|pair| pair.1).sum::<f64>() / count;
+    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+    for (a, b) in pairs {
+        let (a, b) = (a - mean_a, b - mean_b);
+        aa += a * a;
+        bb += b * b;
+        ab += a * b;
+    }
+    let correlation = ab / (aa * bb).sqrt();
+    correlation
+        .is_finite()
+        .then(|| correlation.clamp(-0.999, 0.999).atanh())
+}
+
+fn value(photo: &GrayImage, pixel: &Point2<f64>) -> Option<f64> {
+    let (x, y) = (pixel.x, pixel.y);
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    let is_inside = x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64;
+    is_inside.then(|| {
+        let (left, top) = (x as usize, y as usize);
+        let (right, down) = (x - left as f64, y - top as f64);
+        let at = |x: usize, y: usize| f64::from(photo.as_raw()[y * width + x]);
+        let upper = at(left, top) * (1.0 - right) + at(left + 1, top) * right;
+        let lower = at(left, top + 1) * (1.0 - right) + at(left + 1, top + 1) * right;
+        upper * (1.0 - down) + lower * down
+    })
+}
+
+/// Where a camera sees a point, through a lens that bends by `k1` more than the camera says.
+pub(super) fn project(camera: &Intrinsics, k1: f64, point: &Point3<f64>) -> Option<Seen> {
+    /// Nearer points are those of the vehicle itself \[m\].
+    const NEAREST_M: f64 = 1e-6;
+    if point.z <= NEAREST_M {
+        return None;
+    }
+    let (x, y) = (point.x / point.z, point.y / point.z);
+    let bent = 1.0 + k1 * (x * x + y * y);
+    // Beyond the fold of the polynomial a point would be seen twice.
+    let is_folded = 1.0 + 3.0 * k1 * (x * x + y * y) <= 0.0;
+    (!is_folded).then(|| Seen {
+        pixel: Point2::new(
+            camera.fx * x * bent + camera.cx,
+            camera.fy * y * bent + camera.cy,
+        ),
+        depth: point.z,
+    })
+}

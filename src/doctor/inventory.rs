@@ -1,0 +1,186 @@
+//! What a scene has, and whether its numbers can be what they say they are.
+
+use crate::geometry::Pose;
+use crate::scene::Scene;
+
+/// Clouds that are looked at.
+const CLOUDS: usize = 3;
+/// Median depths beyond which a cloud is hardly in metres \[m\]; a map of a table has 0.3, one of a valley
+/// 200.
+const DEPTHS_M: (f64, f64) = (0.1, 400.0);
+
+/// What is there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inventory {
+    /// Frames in all.
+    pub frames: usize,
+    /// Frames with a pose.
+    pub with_pose: usize,
+    /// Frames with a cloud.
+    pub with_cloud: usize,
+    /// Frames with a time.
+    pub with_time: usize,
+    /// Sizes of photos and their fields of view.
+    pub cameras: Vec<String>,
+    /// How long the way from pose to pose is \[m\].
+    pub way_m: f64,
+    /// Least, median and greatest step from frame to frame \[m\].
+    pub steps_m: Option<[f64; 3]>,
+    /// Points of the clouds that were looked at, and their median depth before the camera \[m\].
+    pub clouds: Vec<(String, usize, Option<f64>)>,
+}
+
+/// Something that is hardly right, in words.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Remark {
+    /// Nothing can be localised with it.
+    Broken(String),
+    /// It may be meant so.
+    Odd(String),
+}
+
+/// Looks at all that a scene says without comparing it with its photos.
+pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
+    let mut remarks = Vec::new();
+    let frames = scene.frames();
+    let poses: Vec<Option<Pose>> = (0..frames.len()).map(|frame| scene.pose(frame)).collect();
+    let references: Vec<usize> = (0..frames.len())
+        .filter(|&f| poses[f].is_some() && scene.has_cloud(f))
+        .collect();
+    let mut inventory = Inventory {
+        frames: frames.len(),
+        with_pose: poses.iter().flatten().count(),
+        with_cloud: (0..frames.len())
+            .filter(|&frame| scene.has_cloud(frame))
+            .count(),
+        with_time: (0..frames.len())
+            .filter(|&frame| scene.time_s(frame).is_some())
+            .count(),
+        cameras: cameras(scene),
+        ..Inventory::default()
+    };
+    if references.is_empty() {
+        let missing = match (inventory.with_pose, inventory.with_cloud) {
+            (0, 0) => "no frame has a pose or a cloud",
+            (0, _) => "no frame has a pose",
+            (_, 0) => "no frame has a cloud",
+            _ => "no frame has both a pose and a cloud",
+        };
+        remarks.push(Remark::Broken(format!(
+            "{missing}: nothing can be localised against this scene; its photos can be queries of another \
+             (--queries)"
+        )));
+    }
+    steps(&poses, &mut inventory, &mut remarks);
+    times(scene, &mut remarks);
+    for at in 0..CLOUDS.min(references.len()) {
+        let frame = references[at * (references.len() - 1) / CLOUDS.min(references.len()).max(1)];
+        cloud(scene, frame, &mut inventory, &mut remarks);
+    }
+    for &frame in [references.first(), references.last()]
+        .iter()
+        .copied()
+        .flatten()
+    {
+        if let Err(error) = scene.photo(frame) {
+            remarks.push(Remark::Broken(error.to_string()));
+        }
+    }
+    remarks.dedup();
+    (inventory, remarks)
+}
+
+fn cameras(scene: &dyn Scene) -> Vec<String> {
+    let mut cameras = Vec::new();
+    for frame in 0..scene.frames().len() {
+        let camera = scene.intrinsics(frame);
+        let across = 2.0
+            * (f64::from(camera.width) / 2.0 / camera.fx)
+                .atan()
+                .to_degrees();
+        let words = format!(
+            "{}x{} px, focal length {:.1} px, centre ({:.1}, {:.1}), {across:.0}° across",
+            camera.width, camera.height, camera.fx, camera.cx, camera.cy
+        );
+        if !cameras.contains(&words) {
+            cameras.push(words);
+        }
+    }
+    cameras
+}
+
+fn steps(poses: &[Option<Pose>], inventory: &mut Inventory, remarks: &mut Vec<Remark>) {
+    let known: Vec<&Pose> = poses.iter().flatten().collect();
+    let mut steps: Vec<f64> = known
+        .windows(2)
+        .map(|two| (two[1].translation.vector - two[0].translation.vector).norm())
+        .collect();
+    inventory.way_m = steps.iter().sum();
+    if steps.is_empty() {
+        return;
+    }
+    steps.sort_by(f64::total_cmp);
+    let median = steps[steps.len() / 2];
+    inventory.steps_m = Some([steps[0], median, steps[steps.len() - 1]]);
+    if inventory.way_m == 0.0 {
+        remarks.push(Remark::Broken("all poses are at the same place".to_owned()));
+    }
+    if steps[steps.len() - 1] > 50.0 * median.max(0.1) && steps.len() > 10 {
+        remarks.push(Remark::Odd(format!(
+            "the greatest step from frame to frame is {:.1} m and the median {median:.2} m: is a pose \
+             missing or wrong?",
+            steps[steps.len() - 1]
+        )));
+    }
+}
+
+fn times(scene: &dyn Scene, remarks: &mut Vec<Remark>) {
+    let times: Vec<f64> = (0..scene.frames().len())
+        .filter_map(|f| scene.time_s(f))
+        .collect();
+    if let Some(back) = times.windows(2).position(|two| two[1] <= two[0]) {
+        remarks.push(Remark::Odd(format!(
+            "times do not grow: {} s after {} s",
+            times[back + 1],
+            times[back]
+        )));
+    }
+}
+
+fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &mut Vec<Remark>) {
+    let name = &scene.frames()[frame];
+    let cloud = match scene.cloud(frame) {
+        Ok(cloud) => cloud,
+        Err(error) => {
+            remarks.push(Remark::Broken(error.to_string()));
+            return;
+        }
+    };
+    let camera = scene.intrinsics(frame);
+    let mut depths: Vec<f64> = cloud
+        .points
+        .iter()
+        .map(|point| point.cast())
+        .filter(|point| {
+            camera
+                .project(point)
+                .is_some_and(|pixel| camera.contains(&pixel))
+        })
+        .map(|point| point.z)
+        .collect();
+    depths.sort_by(f64::total_cmp);
+    let median = depths.get(depths.len() / 2).copied();
+    if cloud.is_empty() || depths.is_empty() {
+        remarks.push(Remark::Broken(format!(
+            "none of the {} points of the cloud of {name} is in view of its camera: the frame of the cloud \
+             is not that of the camera",
+            cloud.len()
+        )));
+    }
+    if let Some(median) = median.filter(|depth| !(DEPTHS_M.0..DEPTHS_M.1).contains(depth)) {
+        remarks.push(Remark::Odd(format!(
+            "the median depth of the cloud of {name} is {median:.3} m: hardly metres"
+        )));
+    }
+    inventory.clouds.push((name.clone(), cloud.len(), median));
+}

@@ -1,0 +1,358 @@
+//! Other readings of a scene: what its numbers would mean if the usual mistake had been made.
+
+use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+
+/// A mistake that scenes are written or read with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Mistake {
+    /// Poses take world points to the camera, and are read as taking camera points to the world.
+    InversePose,
+    /// The axes of poses are those of a vehicle: forward, left, up.
+    PoseAxes,
+    /// The axes of clouds are those of a scanner: forward, left, up.
+    CloudAxes,
+    /// Camera parameters are those of another camera.
+    WrongCamera,
+    /// Clouds, or poses, are in millimetres.
+    Millimetres,
+    /// Quaternions have their scalar first and are read as having it last, or the other way round.
+    QuaternionOrder,
+    /// Each cloud belongs to the frame before or after.
+    CloudOfNeighbour,
+    /// Angles are in degrees and are read as radians, or the other way round.
+    Degrees,
+    /// Poses and clouds are those of the other camera of a stereo pair.
+    OtherStereoCamera,
+    /// Clouds are mirrored.
+    MirroredCloud,
+    /// Poses are in reverse order.
+    ReversedPoses,
+    /// The distortion was taken out of photos that had none.
+    UndistortedTwice,
+}
+
+impl Mistake {
+    /// What is wrong, in a phrase.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::InversePose => "the poses are inverted (world to camera, not camera to world)",
+            Self::PoseAxes => {
+                "the axes of the poses are forward, left, up, not right, down, forward"
+            }
+            Self::CloudAxes => {
+                "the clouds are in the axes of a scanner (forward, left, up), not right, down, forward"
+            }
+            Self::WrongCamera => "the camera parameters are those of another camera",
+            Self::Millimetres => {
+                "lengths of poses and clouds are not in the same unit (millimetres?)"
+            }
+            Self::QuaternionOrder => "the quaternions are in the other order (w first or last)",
+            Self::CloudOfNeighbour => "the clouds are one frame off",
+            Self::Degrees => {
+                "angles of the poses are in degrees read as radians, or the other way round"
+            }
+            Self::OtherStereoCamera => {
+                "poses and clouds are those of the other camera of a stereo pair"
+            }
+            Self::MirroredCloud => "the clouds are mirrored",
+            Self::ReversedPoses => "the poses are in reverse order",
+            Self::UndistortedTwice => {
+                "the photos are bent: undistorted twice, or with another lens's parameters"
+            }
+        }
+    }
+}
+
+/// One way to read a scene: as it says, or as a mistake would have it.
+#[derive(Clone, Debug)]
+pub(super) struct Reading {
+    pub(super) mistake: Mistake,
+    /// How it is to be put right, in words.
+    pub(super) remedy: String,
+    pub(super) change: Change,
+}
+
+/// What is read otherwise.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Change {
+    /// The pose of each frame.
+    Pose(fn(&Pose) -> Pose),
+    /// Whole trajectories, where one pose does not tell: the frame and all poses.
+    Poses(fn(usize, &[Option<Pose>]) -> Option<Pose>),
+    /// The points of each cloud.
+    Points(fn(&Point3<f64>) -> Point3<f64>),
+    /// The cloud of a frame so many further on.
+    Neighbour(isize),
+    /// Clouds and poses moved along the camera's own x axis \[m\].
+    Aside(f64),
+    /// Focal length times so much, centre moved \[px\].
+    Camera { times: f64, right: f64, down: f64 },
+    /// A lens that bends by so much more (k1).
+    Lens(f64),
+}
+
+impl Change {
+    pub(super) fn pose(&self, frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {
+        let stated = || poses.get(frame).copied().flatten();
+        match *self {
+            Self::Pose(read) => Some(read(&stated()?)),
+            Self::Poses(read) => read(frame, poses),
+            Self::Aside(right_m) => Some(stated()? * Pose::translation(right_m, 0.0, 0.0)),
+            _ => stated(),
+        }
+    }
+
+    pub(super) fn point(&self, point: &Point3<f64>) -> Point3<f64> {
+        match *self {
+            Self::Points(read) => read(point),
+            Self::Aside(right_m) => point - Vector3::new(right_m, 0.0, 0.0),
+            _ => *point,
+        }
+    }
+
+    pub(super) fn cloud_of(&self, frame: usize) -> Option<usize> {
+        match *self {
+            Self::Neighbour(step) => frame.checked_add_signed(step),
+            _ => Some(frame),
+        }
+    }
+
+    /// The camera, and how much more its lens bends.
+    pub(super) fn camera(&self, stated: &Intrinsics) -> (Intrinsics, f64) {
+        match *self {
+            Self::Camera { times, right, down } => {
+                let camera = Intrinsics {
+                    fx: stated.fx * times,
+                    fy: stated.fy * times,
+                    cx: stated.cx + right,
+                    cy: stated.cy + down,
+                    ..*stated
+                };
+                (camera, 0.0)
+            }
+            Self::Lens(k1) => (*stated, k1),
+            _ => (*stated, 0.0),
+        }
+    }
+}
+
+/// The readings that need no search.
+pub(super) fn readings() -> Vec<Reading> {
+    let reading = |mistake, remedy: &str, change| Reading {
+        mistake,
+        remedy: remedy.to_owned(),
+        change,
+    };
+    use Mistake as M;
+    vec![
+        reading(
+            M::InversePose,
+            "invert each pose",
+            Change::Pose(|pose| pose.inverse()),
+        ),
+        reading(
+            M::PoseAxes,
+            "turn the axes of each pose to right, down, forward",
+            Change::Pose(|pose| pose * flu_from_rdf()),
+        ),
+        reading(
+            M::PoseAxes,
+            "turn the axes of world and poses to right, down, forward",
+            Change::Pose(|pose| flu_from_rdf().inverse() * pose * flu_from_rdf()),
+        ),
+        reading(
+            M::CloudAxes,
+            "turn the axes of each cloud to right, down, forward",
+            Change::Points(|p| Point3::new(-p.y, -p.z, p.x)),
+        ),
+        reading(
+            M::Millimetres,
+            "divide the coordinates of clouds by 1000",
+            Change::Points(|p| p / 1000.0),
+        ),
+        reading(
+            M::Millimetres,
+            "divide the positions of poses by 1000",
+            Change::Points(|p| p * 1000.0),
+        ),
+        reading(
+            M::QuaternionOrder,
+            "read quaternions as w x y z",
+            Change::Pose(|pose| with_rotation(pose, |[x, y, z, w]| [y, z, w, x])),
+        ),
+        reading(
+            M::QuaternionOrder,
+            "read quaternions as x y z w",
+            Change::Pose(|pose| with_rotation(pose, |[x, y, z, w]| [w, x, y, z])),
+        ),
+        reading(
+            M::QuaternionOrder,
+            "read quaternions as w x y z, of world to camera",
+            Change::Pose(|pose| {
+                with_rotation(&pose.inverse(), |[x, y, z, w]| [y, z, w, x]).inverse()
+            }),
+        ),
+        reading(
+            M::QuaternionOrder,
+            "read quaternions as x y z w, of world to camera",
+            Change::Pose(|pose| {
+                with_rotation(&pose.inverse(), |[x, y, z, w]| [w, x, y, z]).inverse()
+            }),
+        ),
+        reading(
+            M::CloudOfNeighbour,
+            "take the cloud of the frame before",
+            Change::Neighbour(-1),
+        ),
+        reading(
+            M::CloudOfNeighbour,
+            "take the cloud of the frame after",
+            Change::Neighbour(1),
+        ),
+        reading(
+            M::Degrees,
+            "read the angles as degrees",
+            Change::Poses(angles_in_degrees),
+        ),
+        reading(
+            M::Degrees,
+            "read the angles as radians",
+            Change::Pose(angles_in_radians),
+        ),
+        reading(
+            M::MirroredCloud,
+            "turn the sign of the axis that points to the side",
+            Change::Points(|p| Point3::new(-p.x, p.y, p.z)),
+        ),
+        reading(
+            M::MirroredCloud,
+            "turn the sign of the axis that points up or down",
+            Change::Points(|p| Point3::new(p.x, -p.y, p.z)),
+        ),
+        reading(
+            M::ReversedPoses,
+            "turn the order of the poses round",
+            Change::Poses(|frame, poses| {
+                poses
+                    .get(poses.len().checked_sub(frame + 1)?)
+                    .copied()
+                    .flatten()
+            }),
+        ),
+    ]
+}
+
+/// From x right, y down, z forward to x forward, y left, z up.
+fn flu_from_rdf() -> Pose {
+    let turn = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let turn = Rotation3::from_matrix_unchecked(turn);
+    Pose::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_rotation_matrix(&turn),
+    )
+}
+
+/// The same position, its quaternion's parts in another order.
+fn with_rotation(pose: &Pose, order: fn([f64; 4]) -> [f64; 4]) -> Pose {
+    let q = pose.rotation.coords;
+    let [x, y, z, w] = order([q.x, q.y, q.z, q.w]);
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    Pose::from_parts(pose.translation, rotation)
+}
+
+/// Yaw about the camera's y axis, pitch about x, roll about z, in the order in which vehicles say them.
+fn angles(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
+    let m = rotation.to_rotation_matrix();
+    // R = Ry(yaw) Rx(pitch) Rz(roll).
+    let pitch = (-m[(1, 2)]).clamp(-1.0, 1.0).asin();
+    let yaw = m[(0, 2)].atan2(m[(2, 2)]);
+    let roll = m[(1, 0)].atan2(m[(1, 1)]);
+    [yaw, pitch, roll]
+}
+
+fn from_angles([yaw, pitch, roll]: [f64; 3]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), pitch)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll)
+}
+
+/// Radians that were taken for degrees: all angles are too small.
+fn angles_in_radians(pose: &Pose) -> Pose {
+    let turned = angles(&pose.rotation).map(f64::to_degrees);
+    Pose::from_parts(pose.translation, from_angles(turned))
+}
+
+/// Degrees that were taken for radians: all angles are too large, and whole turns of them are lost. The
+/// turns are those with which the camera looks where it goes.
+fn angles_in_degrees(frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {
+    use std::f64::consts::{PI, TAU};
+    /// Turns of 360 radians' worth of degrees, to either side.
+    const TURNS: i32 = 29;
+    let stated = poses.get(frame).copied().flatten()?;
+    let at = |frame: Option<usize>| {
+        let pose = poses.get(frame?).copied().flatten()?;
+        Some(pose.translation.vector)
+    };
+    let here = stated.translation.vector;
+    let ahead = at(frame.checked_add(1)).map(|next| next - here);
+    let way = ahead.or_else(|| at(frame.checked_sub(1)).map(|last| here - last))?;
+    let heading = way.x.atan2(way.z);
+    let [yaw, pitch, roll] = angles(&stated.rotation);
+    // Two triples of angles are the same rotation.
+    let readings = [[yaw, pitch, roll], [yaw + PI, PI - pitch, roll + PI]];
+    let off = |angles: &[f64; 3]| {
+        let turn = (angles[0] - heading).rem_euclid(TAU);
+        turn.min(TAU - turn) + angles[1].abs() + angles[2].abs()
+    };
+    let wrapped = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
+    let read = readings
+        .into_iter()
+        .flat_map(|[yaw, pitch, roll]| {
+            (-TURNS..=TURNS).map(move |turns| {
+                [
+                    (yaw + f64::from(turns) * TAU).to_radians(),
+                    wrapped(pitch).to_radians(),
+                    wrapped(roll).to_radians(),
+                ]
+            })
+        })
+        .min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    Some(Pose::from_parts(stated.translation, from_angles(read)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_that_were_taken_for_the_other_unit_are_found_again() {
+        let true_poses: Vec<Pose> = (0..20)
+            .map(|step| {
+                let yaw = 0.1 * f64::from(step) - 0.7;
+                let position = Translation3::new(10.0 * yaw.sin(), 0.0, 10.0 * yaw.cos());
+                // It looks where it goes, a little down and to the side.
+                let way = yaw + std::f64::consts::FRAC_PI_2;
+                Pose::from_parts(position, from_angles([way + 0.01, 0.02, -0.01]))
+            })
+            .collect();
+        let damaged = |by: f64| -> Vec<Option<Pose>> {
+            let read = |pose: &Pose| {
+                let angles = angles(&pose.rotation).map(|angle| angle * by);
+                Pose::from_parts(pose.translation, from_angles(angles))
+            };
+            true_poses.iter().map(|pose| Some(read(pose))).collect()
+        };
+        let degrees = damaged(1_f64.to_degrees());
+        let radians = damaged(1_f64.to_radians());
+        for (frame, pose) in true_poses.iter().enumerate() {
+            let read = angles_in_degrees(frame, &degrees).expect("it moves");
+            assert!(read.rotation.angle_to(&pose.rotation) < 1e-9, "{frame}");
+            let read = angles_in_radians(&radians[frame].expect("known"));
+            assert!(read.rotation.angle_to(&pose.rotation) < 1e-9, "{frame}");
+        }
+    }
+}

@@ -1,0 +1,368 @@
+//! Holding a scene, as it says and in other readings, to its own photos.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use image::GrayImage;
+use nalgebra::Point3;
+
+use super::agreement::{EdgeMap, Seen, carried_agreement, edge_agreement, project};
+use super::reading::{Change, Mistake, Reading, readings};
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+use crate::scene::{Scene, SceneError};
+
+/// Frames that are looked at, each with those after it.
+const ANCHORS: usize = 8;
+/// Where the frames are that an anchor's points are carried to, the first two that there are.
+const PARTNERS: [isize; 4] = [1, 3, -1, -3];
+const CARRIED_TO: usize = 2;
+/// Points of a cloud that are looked at; edges want a dense one.
+const MOST_POINTS: usize = 40_000;
+/// One point of so many is carried to other frames.
+const CARRIED: usize = 4;
+
+/// What must be gained by another reading, on average over frames, as a share of what can be gained.
+const TELLING_GAIN: f64 = 0.04;
+/// Frames that a number is searched with at least.
+const FEWEST_FRAMES: usize = 4;
+/// What must be gained in standard errors of the mean.
+const CERTAIN: f64 = 2.5;
+
+/// What photos are held to.
+struct Sight {
+    gray: GrayImage,
+    edges: EdgeMap,
+    camera: Intrinsics,
+}
+
+/// The frames that are looked at, with all poses.
+pub(super) struct Sample {
+    poses: Vec<Option<Pose>>,
+    sights: BTreeMap<usize, Sight>,
+    clouds: BTreeMap<usize, Vec<Point3<f64>>>,
+    anchors: Vec<usize>,
+}
+
+/// A reading that agrees better than what the scene says.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The mistake.
+    pub mistake: Mistake,
+    /// How it is to be put right.
+    pub remedy: String,
+    /// Agreement of the scene as it says.
+    pub stated: Agreement,
+    /// Agreement in the other reading.
+    pub otherwise: Agreement,
+}
+
+/// How well a reading fits the photos, on average; higher is better.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// Logarithm of the strength of image edges at depth edges beside that at other points.
+    pub edges: Option<f64>,
+    /// Correlation of grey values that points carry from photo to photo, as Fisher's z.
+    pub carried: Option<f64>,
+}
+
+/// The scores of one reading, frame by frame.
+struct Scores(Vec<Agreement>);
+
+impl Scores {
+    fn mean(&self) -> Agreement {
+        let mean = |part: fn(&Agreement) -> Option<f64>| {
+            let known: Vec<f64> = self.0.iter().filter_map(part).collect();
+            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+        };
+        Agreement {
+            edges: mean(|score| score.edges),
+            carried: mean(|score| score.carried),
+        }
+    }
+}
+
+/// What is worth more: a unit of Fisher's z or of the logarithm of edges.
+fn worth(score: &Agreement, weigh_edges: f64) -> f64 {
+    score.carried.unwrap_or(0.0) + weigh_edges * score.edges.unwrap_or(-0.2)
+}
+
+impl Sample {
+    /// Reads frames with pose and cloud, spread over the scene.
+    pub(super) fn read(scene: &dyn Scene) -> Result<Self, SceneError> {
+        let count = scene.frames().len();
+        let poses: Vec<Option<Pose>> = (0..count).map(|frame| scene.pose(frame)).collect();
+        let references: Vec<usize> = (0..count)
+            .filter(|&frame| poses[frame].is_some() && scene.has_cloud(frame))
+            .collect();
+        let many = ANCHORS.min(references.len());
+        let anchors: Vec<usize> = (0..many)
+            .map(|at| references[at * references.len() / many])
+            .collect();
+        let mut sample = Self {
+            poses,
+            sights: BTreeMap::new(),
+            clouds: BTreeMap::new(),
+            anchors,
+        };
+        for &anchor in &sample.anchors.clone() {
+            for frame in std::iter::once(anchor).chain(partners(anchor, count)) {
+                if let Entry::Vacant(place) = sample.sights.entry(frame) {
+                    let photo = scene.photo(frame)?;
+                    let sight = Sight {
+                        edges: EdgeMap::of(&photo.gray),
+                        gray: photo.gray,
+                        camera: scene.intrinsics(frame),
+                    };
+                    place.insert(sight);
+                }
+            }
+            for frame in [Some(anchor), anchor.checked_sub(1), Some(anchor + 1)] {
+                let Some(frame) = frame.filter(|&frame| frame < count && scene.has_cloud(frame))
+                else {
+                    continue;
+                };
+                if let Entry::Vacant(place) = sample.clouds.entry(frame) {
+                    let cloud = scene.cloud(frame)?;
+                    let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
+                    let points = cloud.points.iter().step_by(step);
+                    let points = points.map(|point| point.cast()).collect();
+                    place.insert(points);
+                }
+            }
+        }
+        Ok(sample)
+    }
+
+    /// Whether anything can be compared at all.
+    pub(super) fn is_empty(&self) -> bool {
+        self.anchors.is_empty()
+    }
+
+    pub(super) fn anchors(&self) -> &[usize] {
+        &self.anchors
+    }
+
+    /// Points of a frame's cloud as its camera sees them, and its photo.
+    pub(super) fn seen(&self, anchor: usize) -> Option<(&GrayImage, Vec<Seen>)> {
+        let sight = self.sights.get(&anchor)?;
+        let points = self.clouds.get(&anchor)?;
+        let seen = points
+            .iter()
+            .filter_map(|point| project(&sight.camera, 0.0, point));
+        Some((&sight.gray, seen.collect()))
+    }
+
+    fn scores(&self, change: Option<&Change>) -> Scores {
+        Scores(
+            self.anchors
+                .iter()
+                .map(|&anchor| self.score(anchor, change))
+                .collect(),
+        )
+    }
+
+    fn score(&self, anchor: usize, change: Option<&Change>) -> Agreement {
+        let stated = Change::Pose(|pose| *pose);
+        let change = change.unwrap_or(&stated);
+        let cloud = change
+            .cloud_of(anchor)
+            .and_then(|frame| self.clouds.get(&frame));
+        let (Some(sight), Some(cloud)) = (self.sights.get(&anchor), cloud) else {
+            return Agreement::default();
+        };
+        let points: Vec<Point3<f64>> = cloud.iter().map(|point| change.point(point)).collect();
+        let (camera, k1) = change.camera(&sight.camera);
+        let seen: Vec<Option<Seen>> = points
+            .iter()
+            .map(|point| project(&camera, k1, point))
+            .collect();
+        let in_front: Vec<Seen> = seen.iter().flatten().copied().collect();
+        let in_view = in_front
+            .iter()
+            .filter(|seen| camera.contains(&seen.pixel))
+            .count();
+        let carried_points: Vec<&Point3<f64>> = points.iter().step_by(CARRIED).collect();
+        let seen: Vec<Option<Seen>> = seen.into_iter().step_by(CARRIED).collect();
+        // Where hardly anything is in view, what agrees does so by chance.
+        let least = in_view / CARRIED / 20;
+        let carried: Vec<f64> = partners(anchor, self.poses.len())
+            .filter_map(|partner| {
+                let other = self.sights.get(&partner)?;
+                let here = change.pose(anchor, &self.poses)?;
+                let partner_from_anchor = change.pose(partner, &self.poses)?.inverse() * here;
+                let (camera, k1) = change.camera(&other.camera);
+                let there: Vec<Option<Seen>> = carried_points
+                    .iter()
+                    .map(|point| project(&camera, k1, &(partner_from_anchor * **point)))
+                    .collect();
+                let agreement =
+                    carried_agreement((&sight.gray, &seen), (&other.gray, &there), least);
+                // Points that are not in view of the next frame agree with nothing.
+                Some(agreement.unwrap_or(0.0))
+            })
+            .collect();
+        Agreement {
+            edges: edge_agreement(&sight.edges, &in_front),
+            carried: (!carried.is_empty())
+                .then(|| carried.iter().sum::<f64>() / carried.len() as f64),
+        }
+    }
+
+    /// The reading that fits better than what the scene says, if there is one.
+    pub(super) fn diagnose(&self) -> (Agreement, Option<Finding>) {
+        let stated = self.scores(None);
+        let mut best: Option<(f64, Reading, Scores)> = None;
+        for reading in readings().into_iter().chain(self.searched()) {
+            let scores = self.scores(Some(&reading.change));
+            let gain = gain(&stated, &scores, &reading.change);
+            log::debug!(
+                "{:?} {}: {gain:?} {:?}",
+                reading.mistake,
+                reading.remedy,
+                scores.mean()
+            );
+            if let Some(gain) = gain
+                && best.as_ref().is_none_or(|(known, ..)| gain > *known)
+            {
+                best = Some((gain, reading, scores));
+            }
+        }
+        let mean = stated.mean();
+        let finding = best.map(|(_, reading, scores)| Finding {
+            mistake: reading.mistake,
+            remedy: reading.remedy,
+            stated: mean,
+            otherwise: scores.mean(),
+        });
+        (mean, finding)
+    }
+
+    /// The readings with a number in them, each with the number that fits best.
+    fn searched(&self) -> Vec<Reading> {
+        let mut found = Vec::new();
+        let aside: Vec<f64> = (-20..=20).map(|step| 0.05 * f64::from(step)).collect();
+        if let Some(right_m) = self.best_of(&aside, &|right_m| Change::Aside(right_m))
+            && right_m.abs() > LEAST_ASIDE_M
+        {
+            found.push(Reading {
+                mistake: Mistake::OtherStereoCamera,
+                remedy: format!(
+                    "move camera and clouds by {right_m:.2} m along the camera's x axis"
+                ),
+                change: Change::Aside(right_m),
+            });
+        }
+        if let Some(camera) = self.best_camera() {
+            found.push(camera);
+        }
+        let bends: Vec<f64> = (-16..=16).map(|step| 0.03 * f64::from(step)).collect();
+        if let Some(k1) = self.best_of(&bends, &Change::Lens)
+            && self.bends_by_px(k1) > LEAST_PX
+        {
+            found.push(Reading {
+                mistake: Mistake::UndistortedTwice,
+                remedy: format!("a lens with k1 = {k1:.2} more fits the photos"),
+                change: Change::Lens(k1),
+            });
+        }
+        found
+    }
+
+    /// The value whose reading fits best.
+    fn best_of(&self, values: &[f64], change: &dyn Fn(f64) -> Change) -> Option<f64> {
+        let scored = values.iter().map(|&value| {
+            let mean = self.scores(Some(&change(value))).mean();
+            (value, worth(&mean, IN_FRAME))
+        });
+        let best = scored.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(best.0)
+    }
+
+    /// Focal length and centre, by turns.
+    fn best_camera(&self) -> Option<Reading> {
+        let first = self.sights.values().next()?.camera;
+        let step = f64::from(first.width) / 120.0;
+        let shifts: Vec<f64> = (-6..=6).map(|k| step * f64::from(k)).collect();
+        let scales: Vec<f64> = (-14..=14).map(|k| (0.025 * f64::from(k)).exp()).collect();
+        let (mut times, mut right, mut down) = (1.0, 0.0, 0.0);
+        for _ in 0..2 {
+            let camera = |times, right, down| Change::Camera { times, right, down };
+            times = self.best_of(&scales, &|times| camera(times, right, down))?;
+            right = self.best_of(&shifts, &|right| camera(times, right, down))?;
+            down = self.best_of(&shifts, &|down| camera(times, right, down))?;
+        }
+        let moved_px =
+            f64::hypot(right, down).max((times - 1.0_f64).abs() * f64::from(first.width) / 2.0);
+        (moved_px > LEAST_PX).then(|| Reading {
+            mistake: Mistake::WrongCamera,
+            remedy: format!(
+                "a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of \
+                 ({:.0}, {:.0}) fit the photos",
+                first.fx * times,
+                first.fx,
+                first.cx + right,
+                first.cy + down,
+                first.cx,
+                first.cy
+            ),
+            change: Change::Camera { times, right, down },
+        })
+    }
+
+    /// How far a bend moves pixels at the left and right rim.
+    fn bends_by_px(&self, k1: f64) -> f64 {
+        let Some(sight) = self.sights.values().next() else {
+            return 0.0;
+        };
+        let half = f64::from(sight.camera.width) / 2.0;
+        let x = half / sight.camera.fx;
+        (k1 * x * x).abs() * half
+    }
+}
+
+fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usize> {
+    let frames = PARTNERS
+        .iter()
+        .filter_map(move |&step| anchor.checked_add_signed(step));
+    frames.filter(move |&frame| frame < count).take(CARRIED_TO)
+}
+
+/// A camera that is moved less than this is the stated one \[m\].
+const LEAST_ASIDE_M: f64 = 0.12;
+/// A camera whose pixels move less than this is the stated one \[px\].
+const LEAST_PX: f64 = 8.0;
+/// Edges count as much as this where a mistake within a frame is looked for.
+const IN_FRAME: f64 = 1.0;
+
+/// What a reading gains, if that is telling.
+fn gain(stated: &Scores, other: &Scores, change: &Change) -> Option<f64> {
+    // A mistake in poses leaves the frames alone: their edges have no say.
+    let weigh_edges = match change {
+        Change::Pose(_) | Change::Poses(_) => 0.0,
+        _ => IN_FRAME,
+    };
+    let gains: Vec<f64> = stated
+        .0
+        .iter()
+        .zip(&other.0)
+        .filter(|(_, other)| other.edges.is_some() || other.carried.is_some())
+        .map(|(stated, other)| worth(other, weigh_edges) - worth(stated, weigh_edges))
+        .collect();
+    let count = gains.len() as f64;
+    // Where there are few frames, what fits two of them by chance must not pass for a mistake.
+    if gains.len() < FEWEST_FRAMES.min(stated.0.len()).max(2) || gains.len() * 2 < stated.0.len() {
+        return None;
+    }
+    let has_number = matches!(
+        change,
+        Change::Aside(_) | Change::Camera { .. } | Change::Lens(_)
+    );
+    if has_number && gains.len() < FEWEST_FRAMES {
+        return None;
+    }
+    let mean = gains.iter().sum::<f64>() / count;
+    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / count;
+    let error = (variance / (count - 1.0).max(1.0)).sqrt();
+    (mean > TELLING_GAIN && mean > CERTAIN * error).then_some(mean)
+}

@@ -1,0 +1,241 @@
+//! Matches that another system found, in a folder: those of hloc, or a file for each pair.
+//!
+//! | files | content |
+//! |---|---|
+//! | `QUERY_REFERENCE_matches.txt` | a match per line, `x y x y`: in the query and in the reference \[px\] |
+//! | `QUERY_REFERENCE_matches.npz` | `keypoints0`, `keypoints1`, `matches`, as SuperGlue's and LightGlue's demonstrations write them |
+//! | `*.h5` | features and matches as hloc writes them |
+//!
+//! The centre of the top-left pixel is at (0, 0) in all of them. A pair may be there the other way round.
+
+mod hloc;
+mod npz;
+mod text;
+
+use std::path::{Path, PathBuf};
+
+use posescope_core::features::{FoundMatches, PairMatches};
+use posescope_core::foreign::MatchSource;
+
+use self::hloc::HlocFiles;
+use super::SceneError;
+
+pub use self::text::write_matches;
+
+/// Keypoints of a photo at most: more than any photo of 8,000 × 8,000 pixels gives.
+const MOST_KEYPOINTS: usize = 1 << 20;
+
+/// How a pair is stored: with the query first, or with the reference first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    QueryFirst,
+    ReferenceFirst,
+}
+
+/// Keypoints of two photos by their positions \[px\], and the partner of each of the first.
+#[derive(Debug)]
+struct RawMatches {
+    first: Vec<[f32; 2]>,
+    second: Vec<[f32; 2]>,
+    partners: Vec<Option<usize>>,
+}
+
+impl RawMatches {
+    /// Checks that partners are there, and says so in terms of the file otherwise.
+    fn checked(self, path: &Path) -> Result<Self, SceneError> {
+        let error = |expected: String| SceneError::Content {
+            path: path.to_owned(),
+            expected,
+        };
+        if self.partners.len() != self.first.len() {
+            return Err(error(format!(
+                "a partner or none for each of {} keypoints expected, {} found",
+                self.first.len(),
+                self.partners.len()
+            )));
+        }
+        let most = self.first.len().max(self.second.len());
+        if most > MOST_KEYPOINTS {
+            return Err(error(format!(
+                "at most {MOST_KEYPOINTS} keypoints in a photo expected, {most} found"
+            )));
+        }
+        let mut named = self.partners.iter().flatten();
+        if let Some(beyond) = named.find(|&&partner| partner >= self.second.len()) {
+            return Err(error(format!(
+                "matches with one of {} keypoints expected, number {beyond} found",
+                self.second.len()
+            )));
+        }
+        let mut places = self.first.iter().chain(&self.second).flatten();
+        if places.any(|place| !place.is_finite()) {
+            return Err(error("finite positions of keypoints expected".to_owned()));
+        }
+        Ok(self)
+    }
+
+    /// As matches of the query with the reference.
+    fn of_query(self, order: Order) -> FoundMatches {
+        let Self {
+            first,
+            second,
+            partners,
+        } = self;
+        match order {
+            Order::QueryFirst => FoundMatches::new(&first, &second, &partners),
+            Order::ReferenceFirst => {
+                let mut turned = vec![None; second.len()];
+                for (index, &partner) in partners.iter().enumerate() {
+                    if let Some(partner) = partner {
+                        turned[partner] = turned[partner].or(Some(index));
+                    }
+                }
+                FoundMatches::new(&second, &first, &turned)
+            }
+        }
+    }
+}
+
+/// A folder with the matches of pairs of frames.
+pub struct MatchFolder {
+    folder: PathBuf,
+    hloc: Option<HlocFiles>,
+}
+
+impl MatchFolder {
+    /// Looks at what is in the folder; matches are read as they are asked for.
+    ///
+    /// # Errors
+    /// A folder that cannot be read or has no matches.
+    pub fn open(folder: &Path) -> Result<Self, SceneError> {
+        let io = |source| SceneError::Io {
+            path: folder.to_owned(),
+            source,
+        };
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(folder).map_err(io)? {
+            files.push(entry.map_err(io)?.path());
+        }
+        files.sort();
+        let has_ending =
+            |path: &&PathBuf, ending: &str| path.extension().is_some_and(|e| e == ending);
+        let h5: Vec<&PathBuf> = files.iter().filter(|path| has_ending(path, "h5")).collect();
+        let is_pair = |path: &PathBuf| {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            name.ends_with(PAIR_ENDING)
+        };
+        if h5.is_empty() && !files.iter().any(is_pair) {
+            return Err(SceneError::Content {
+                path: folder.to_owned(),
+                expected: format!(
+                    "hloc's features and matches (.h5) or files such as \
+                     QUERY_REFERENCE{PAIR_ENDING}.txt or .npz expected, none found"
+                ),
+            });
+        }
+        let hloc = match h5.as_slice() {
+            [] => None,
+            files => Some(HlocFiles::open(folder, files)?),
+        };
+        Ok(Self {
+            folder: folder.to_owned(),
+            hloc,
+        })
+    }
+
+    fn of_pair(&self, query: &str, reference: &str) -> Result<Option<FoundMatches>, SceneError> {
+        let orders = [
+            (Order::QueryFirst, query, reference),
+            (Order::ReferenceFirst, reference, query),
+        ];
+        for (order, first, second) in orders {
+            let file = |ending: &str| {
+                self.folder
+                    .join(format!("{}.{ending}", pair(first, second)))
+            };
+            let (text, npz) = (file("txt"), file("npz"));
+            let found = if text.is_file() {
+                Some(text::read(&text)?.checked(&text)?)
+            } else if npz.is_file() {
+                Some(npz::read(&npz)?.checked(&npz)?)
+            } else {
+                let found = self.hloc.as_ref().map(|hloc| hloc.read(first, second));
+                found.transpose()?.flatten()
+            };
+            if let Some(found) = found {
+                return Ok(Some(found.of_query(order)));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl MatchSource for MatchFolder {
+    fn matches(&self, query: &str, reference: &str) -> Result<Option<PairMatches>, SceneError> {
+        let found = self.of_pair(query, reference)?;
+        Ok(found.map(PairMatches::Found))
+    }
+}
+
+/// What the name of a pair's file ends with.
+const PAIR_ENDING: &str = "_matches";
+
+/// The name of a pair's file without its ending. A name that holds a folder keeps it, as hloc has it.
+fn pair(first: &str, second: &str) -> String {
+    let plain = |name: &str| name.replace(['/', '\\'], "-");
+    format!("{}_{}{PAIR_ENDING}", plain(first), plain(second))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn raw() -> RawMatches {
+        RawMatches {
+            first: vec![[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]],
+            second: vec![[4.0, 4.0], [5.0, 5.0]],
+            partners: vec![Some(1), None, Some(0)],
+        }
+    }
+
+    #[test]
+    fn a_pair_stored_the_other_way_round_is_the_same_pair() {
+        let pairs = |found: &FoundMatches| -> Vec<([f32; 2], [f32; 2])> {
+            let at = |features: &posescope_core::features::Features, index: usize| {
+                let keypoint = features.keypoints[index];
+                [keypoint.x, keypoint.y]
+            };
+            let decisions = found.decisions.iter().flatten();
+            let mut pairs: Vec<_> = decisions
+                .map(|d| (at(&found.query, d.query), at(&found.reference, d.reference)))
+                .collect();
+            pairs.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+            pairs
+        };
+        let direct = pairs(&raw().of_query(Order::QueryFirst));
+        assert_eq!(direct, [([1.0; 2], [5.0; 2]), ([3.0; 2], [4.0; 2])]);
+        let turned = pairs(&raw().of_query(Order::ReferenceFirst));
+        assert_eq!(turned, [([4.0; 2], [3.0; 2]), ([5.0; 2], [1.0; 2])]);
+    }
+
+    #[test]
+    fn partners_that_are_not_there_are_refused() {
+        let path = Path::new("a.npz");
+        assert!(raw().checked(path).is_ok());
+        let beyond = RawMatches {
+            partners: vec![Some(2), None, None],
+            ..raw()
+        };
+        let short = RawMatches {
+            partners: vec![None],
+            ..raw()
+        };
+        let infinite = RawMatches {
+            second: vec![[f32::INFINITY, 0.0]; 2],
+            ..raw()
+        };
+        for wrong in [beyond, short, infinite] {
+            assert!(wrong.checked(path).is_err());
+        }
+    }
+}

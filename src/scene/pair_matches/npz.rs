@@ -1,0 +1,170 @@
+//! Matches as `.npz`: `keypoints0` and `keypoints1` (N × 2), and `matches`, for each of the first the
+//! number of its partner or −1.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use zip::ZipArchive;
+
+use super::{MOST_KEYPOINTS, RawMatches};
+use crate::scene::SceneError;
+use crate::scene::lines::excerpt;
+
+/// Bytes of an array at most: as many keypoints as there may be, of two numbers of eight bytes.
+const MOST_BYTES: u64 = 16 * MOST_KEYPOINTS as u64 + 4096;
+
+/// Reads a file of matches.
+pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
+    let error = |expected: String| SceneError::Content {
+        path: path.to_owned(),
+        expected: expected.replace('\n', " "),
+    };
+    let file = File::open(path).map_err(|source| SceneError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mut archive =
+        ZipArchive::new(file).map_err(|why| error(format!("an .npz archive expected: {why}")))?;
+    let mut array = |name: &str| -> Result<Array, SceneError> {
+        let said = |why: &dyn std::fmt::Display| error(format!("{name}: {why}"));
+        let entry = archive
+            .by_name(&format!("{name}.npy"))
+            .map_err(|why| said(&why))?;
+        // The size that the archive announces may be wrong; no more than is allowed is read.
+        let mut bytes = Vec::new();
+        let read = entry.take(MOST_BYTES + 1).read_to_end(&mut bytes);
+        read.map_err(|why| said(&why))?;
+        if bytes.len() as u64 > MOST_BYTES {
+            return Err(said(&format!(
+                "an array of at most {MOST_BYTES} bytes expected"
+            )));
+        }
+        Array::parse(&bytes).map_err(|why| said(&why))
+    };
+    let first = array("keypoints0")?.points();
+    let second = array("keypoints1")?.points();
+    let matches = array("matches")?;
+    let points = |found: Option<Vec<[f32; 2]>>, name: &str| {
+        found.ok_or_else(|| error(format!("{name}: positions expected, an array N × 2")))
+    };
+    Ok(RawMatches {
+        first: points(first, "keypoints0")?,
+        second: points(second, "keypoints1")?,
+        partners: matches.partners().ok_or_else(|| {
+            error("matches: whole numbers expected, one for each keypoint".to_owned())
+        })?,
+    })
+}
+
+/// The numbers of an array, row by row.
+struct Array {
+    shape: Vec<u64>,
+    numbers: Vec<f64>,
+}
+
+impl Array {
+    /// Reads a `.npy` file: a magic number, a version, the length of a header, the header as a Python
+    /// dictionary, the numbers. The crates that read it bring a grammar of Python's literals, which takes
+    /// longer to build than all other formats of matches together.
+    fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let header = Header::read(bytes).ok_or("an array of numpy (.npy) expected")?;
+        let Header { shape, kind, data } = header;
+        let count = shape
+            .iter()
+            .try_fold(1_u64, |all, &side| all.checked_mul(side));
+        macro_rules! numbers {
+            ($type:ty) => {{
+                const BYTES: usize = size_of::<$type>();
+                if count.is_none_or(|count| count != (data.len() / BYTES) as u64) {
+                    return Err(format!(
+                        "an array of {shape:?} expected, the file is cut off or longer"
+                    ));
+                }
+                let read = |bytes: &[u8]| {
+                    let bytes = bytes.try_into().unwrap_or([0; BYTES]);
+                    <$type>::from_le_bytes(bytes) as f64
+                };
+                data.chunks_exact(BYTES).map(read).collect()
+            }};
+        }
+        let numbers: Vec<f64> = match kind {
+            "<f4" => numbers!(f32),
+            "<f8" => numbers!(f64),
+            "<i8" => numbers!(i64),
+            "<i4" => numbers!(i32),
+            "<i2" => numbers!(i16),
+            "<u8" => numbers!(u64),
+            "<u4" => numbers!(u32),
+            "<u2" => numbers!(u16),
+            _ => {
+                return Err(format!(
+                    "numbers <f4, <f8, <i2 … <i8 or <u2 … <u8 expected, `{}` found",
+                    excerpt(kind)
+                ));
+            }
+        };
+        Ok(Self { shape, numbers })
+    }
+
+    fn points(&self) -> Option<Vec<[f32; 2]>> {
+        let [_, 2] = self.shape.as_slice() else {
+            return None;
+        };
+        let pairs = self.numbers.chunks_exact(2);
+        Some(pairs.map(|pair| [pair[0] as f32, pair[1] as f32]).collect())
+    }
+
+    fn partners(&self) -> Option<Vec<Option<usize>>> {
+        (self.shape.len() == 1).then_some(())?;
+        let numbers = self.numbers.iter();
+        numbers
+            .map(|&number| match number {
+                -1.0 => Some(None),
+                _ if number >= 0.0 && number.fract() == 0.0 => Some(Some(number as usize)),
+                _ => None,
+            })
+            .collect()
+    }
+}
+
+/// What stands before the numbers.
+struct Header<'a> {
+    shape: Vec<u64>,
+    kind: &'a str,
+    data: &'a [u8],
+}
+
+impl<'a> Header<'a> {
+    fn read(bytes: &'a [u8]) -> Option<Self> {
+        let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+        let (&[major, _minor], rest) = rest.split_first_chunk()?;
+        let (length, rest) = match major {
+            1 => {
+                let (length, rest) = rest.split_first_chunk()?;
+                (usize::from(u16::from_le_bytes(*length)), rest)
+            }
+            2 | 3 => {
+                let (length, rest) = rest.split_first_chunk()?;
+                (usize::try_from(u32::from_le_bytes(*length)).ok()?, rest)
+            }
+            _ => return None,
+        };
+        let (text, data) = rest.split_at_checked(length)?;
+        let text = std::str::from_utf8(text).ok()?;
+        let value = |key: &str| {
+            let (_, after) = text.split_once(&format!("'{key}':"))?;
+            Some(after.trim_start())
+        };
+        // Rows first: what one writes who does not ask for something else.
+        value("fortran_order")?.starts_with("False").then_some(())?;
+        let (kind, _) = value("descr")?.strip_prefix('\'')?.split_once('\'')?;
+        let (sides, _) = value("shape")?.strip_prefix('(')?.split_once(')')?;
+        let sides = sides
+            .split(',')
+            .map(str::trim)
+            .filter(|side| !side.is_empty());
+        let shape = sides.map(|side| side.parse().ok()).collect::<Option<_>>()?;
+        Some(Self { shape, kind, data })
+    }
+}

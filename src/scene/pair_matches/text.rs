@@ -1,0 +1,64 @@
+//! Matches as text, a line each: `x y` in the first photo, `x y` in the second \[px\].
+
+use std::fmt::Write as _;
+use std::io;
+use std::path::Path;
+
+use posescope_core::features::{Features, Match, MatchVerdict};
+
+use super::{RawMatches, pair};
+use crate::scene::SceneError;
+use crate::scene::lines::TextFile;
+
+/// Reads a file of matches. What a line has behind its four numbers, such as a score, says nothing here.
+pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
+    let file = TextFile::read(path)?;
+    let mut found = RawMatches {
+        first: Vec::new(),
+        second: Vec::new(),
+        partners: Vec::new(),
+    };
+    for line in file.lines() {
+        let mut numbers = [0.0_f32; 4];
+        let mut words = line.words();
+        for number in &mut numbers {
+            let word = words
+                .next()
+                .ok_or_else(|| line.error("a line `x y x y` expected, it is cut off"))?;
+            line.number(word)?;
+            // Not by way of `f64`, which would round twice.
+            *number = word.parse().unwrap_or(f32::INFINITY);
+        }
+        let [x, y, other_x, other_y] = numbers;
+        found.partners.push(Some(found.second.len()));
+        found.first.push([x, y]);
+        found.second.push([other_x, other_y]);
+    }
+    Ok(found)
+}
+
+/// Writes the matches that stand out and are mutual into a folder, to the last bit, so that they read
+/// back to what they were.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_matches(
+    folder: &Path,
+    (query, features): (&str, &Features),
+    (reference, others): (&str, &Features),
+    decisions: &[Option<Match>],
+) -> io::Result<()> {
+    let mut text = format!(
+        "# matches of {query} with {reference}: x y in each [px], the centre of the top-left pixel at 0 0\n"
+    );
+    let is_match = |found: &&Match| found.verdict == MatchVerdict::Candidate;
+    for found in decisions.iter().flatten().filter(is_match) {
+        let at = features.keypoints[found.query];
+        let other = others.keypoints[found.reference];
+        // Digits enough to be read back to the same number.
+        let _ = writeln!(text, "{} {} {} {}", at.x, at.y, other.x, other.y);
+    }
+    std::fs::create_dir_all(folder)?;
+    let path = folder.join(format!("{}.txt", pair(query, reference)));
+    posescope_core::files::write_whole(&path, text.as_bytes())
+}

@@ -1,0 +1,185 @@
+//! Where the vehicle was: GPS/INS in the world, visual odometry from place to place.
+
+use std::path::Path;
+
+use super::super::SceneError;
+use super::super::lines::{Line, TextFile};
+use super::super::trajectory::between;
+use super::sdk::transform;
+use crate::geometry::Pose;
+
+/// Between poses this far apart in time, what lies between is not interpolated \[µs\]: the INS measures
+/// every 20 ms, the stereo camera every 62 ms.
+const LONGEST_GAP_US: u64 = 500_000;
+/// Slower than this the car stands \[m/s\]; the noise of a standing INS is a tenth of it.
+const STANDS_M_S: f64 = 0.5;
+/// The status of rows that can be believed.
+const GOOD: [&str; 1] = ["INS_SOLUTION_GOOD"];
+
+/// Poses by time \[µs\], in ascending order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Track {
+    samples: Vec<(u64, Pose)>,
+}
+
+impl Track {
+    fn new(mut samples: Vec<(u64, Pose)>) -> Self {
+        samples.sort_by_key(|(time, _)| *time);
+        samples.dedup_by_key(|(time, _)| *time);
+        Self { samples }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// The pose at a time, between two that are close.
+    pub(super) fn at(&self, time: u64) -> Option<Pose> {
+        let after = self.samples.partition_point(|(other, _)| *other < time);
+        let next = self.samples.get(after);
+        if let Some((_, pose)) = next.filter(|(other, _)| *other == time) {
+            return Some(*pose);
+        }
+        let (earlier, from) = self.samples.get(after.checked_sub(1)?)?;
+        let (later, to) = next?;
+        let gap = later - earlier;
+        (gap <= LONGEST_GAP_US).then(|| between(from, to, (time - earlier) as f64 / gap as f64))
+    }
+
+    /// The same track of something that is fixed to what moves.
+    pub(super) fn moved_by(&self, body_from_part: &Pose) -> Self {
+        let samples = self.samples.iter();
+        Self {
+            samples: samples
+                .map(|(time, pose)| (*time, pose * body_from_part))
+                .collect(),
+        }
+    }
+}
+
+/// When the car first moves and when it last stops \[µs\]; `None` where it never does.
+pub(super) fn first_and_last_motion(track: &Track) -> Option<(u64, u64)> {
+    /// Speeds are taken over at least this time \[µs\].
+    const OVER_US: u64 = 900_000;
+    let samples = &track.samples;
+    let moves = |at: usize| {
+        let (time, pose) = &samples[at];
+        let later = samples[at..]
+            .iter()
+            .find(|(later, _)| later - time >= OVER_US);
+        later.is_some_and(|(later, there)| {
+            let way_m = (there.translation.vector - pose.translation.vector).norm();
+            way_m / ((later - time) as f64 / super::PER_SECOND) > STANDS_M_S
+        })
+    };
+    let first = (0..samples.len()).find(|&at| moves(at))?;
+    let last = (first..samples.len()).rev().find(|&at| moves(at))?;
+    let stop = samples[last..]
+        .iter()
+        .find(|(later, _)| later - samples[last].0 >= OVER_US)?;
+    Some((samples[first].0, stop.0))
+}
+
+/// Reads `gps/ins.csv`: the INS in the world (north, east, down), where its status is good.
+pub(super) fn read_ins(path: &Path) -> Result<Track, SceneError> {
+    let file = TextFile::read(path)?;
+    let mut lines = file.lines();
+    let header = lines
+        .next()
+        .ok_or_else(|| file.error("a line of headings expected"))?;
+    let column = |name: &str| {
+        let found = header.words().position(|word| word == name);
+        found.ok_or_else(|| header.error(format!("a column `{name}` expected")))
+    };
+    let time = column("timestamp")?;
+    let status = column("ins_status")?;
+    let names = ["northing", "easting", "down", "roll", "pitch", "yaw"];
+    let columns = names.map(column);
+    let columns = columns.into_iter().collect::<Result<Vec<usize>, _>>()?;
+    let mut samples = Vec::new();
+    for line in lines {
+        let words: Vec<&str> = line.words().collect();
+        if !words
+            .get(status)
+            .is_some_and(|status| GOOD.contains(status))
+        {
+            continue;
+        }
+        let mut numbers = [0.0; 6];
+        for (number, &column) in numbers.iter_mut().zip(&columns) {
+            *number = line.number(word(&line, &words, column)?)?;
+        }
+        let [north, east, down, roll, pitch, yaw] = numbers;
+        let time = microseconds(&line, word(&line, &words, time)?)?;
+        samples.push((time, transform([north, east, down], [roll, pitch, yaw])));
+    }
+    Ok(Track::new(samples))
+}
+
+/// Reads `vo/vo.csv`: the motion of the vehicle from one photo to the next, chained.
+pub(super) fn read_odometry(path: &Path) -> Result<Track, SceneError> {
+    let file = TextFile::read(path)?;
+    let mut pose = Pose::identity();
+    let mut samples: Vec<(u64, Pose)> = Vec::new();
+    for line in file.lines().skip(1) {
+        let words: Vec<&str> = line.words().collect();
+        let mut numbers = [0.0; 6];
+        for (number, column) in numbers.iter_mut().zip(2..) {
+            *number = line.number(word(&line, &words, column)?)?;
+        }
+        // The columns are called source and destination; the motion is from the second to the first.
+        let at = microseconds(&line, word(&line, &words, 0)?)?;
+        let from = microseconds(&line, word(&line, &words, 1)?)?;
+        if samples.is_empty() {
+            samples.push((from.min(at), pose));
+        }
+        let [x, y, z, roll, pitch, yaw] = numbers;
+        pose *= transform([x, y, z], [roll, pitch, yaw]);
+        samples.push((at.max(from), pose));
+    }
+    Ok(Track::new(samples))
+}
+
+fn word<'a>(line: &Line<'_>, words: &[&'a str], column: usize) -> Result<&'a str, SceneError> {
+    words.get(column).copied().ok_or_else(|| {
+        line.error(format!(
+            "{} columns or more expected, {} found",
+            column + 1,
+            words.len()
+        ))
+    })
+}
+
+fn microseconds(line: &Line<'_>, word: &str) -> Result<u64, SceneError> {
+    word.parse()
+        .map_err(|_| line.error("a timestamp in microseconds expected"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parked_head_and_tail_are_told_from_the_drive() {
+        // A tenth of a second each: ten seconds parked, twenty at 5 m/s, ten parked.
+        let sample = |tick: u64| {
+            let way_m = 0.5 * tick.clamp(100, 300) as f64;
+            (tick * 100_000, Pose::translation(way_m, 0.0, 0.0))
+        };
+        let track = Track::new((0..400).map(sample).collect());
+        let (first, last) = first_and_last_motion(&track).expect("it moves");
+        assert!((9_000_000..=10_000_000).contains(&first), "{first}");
+        assert!((30_000_000..=31_000_000).contains(&last), "{last}");
+        let parked = Track::new((0..90).map(sample).collect());
+        assert!(first_and_last_motion(&parked).is_none());
+    }
+
+    #[test]
+    fn between_two_times_that_are_close_the_pose_is_between_too() {
+        let pose = |x: f64| Pose::translation(x, 0.0, 0.0);
+        let track = Track::new(vec![(0, pose(0.0)), (100, pose(1.0)), (900_000, pose(9.0))]);
+        assert_eq!(track.at(25), Some(pose(0.25)));
+        assert_eq!(track.at(100), Some(pose(1.0)));
+        assert!(track.at(500).is_none() && track.at(1_000_000).is_none());
+    }
+}

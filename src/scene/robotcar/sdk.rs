@@ -1,0 +1,163 @@
+//! The calibration that comes with the SDK: `models` and `extrinsics`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use image::{Rgb, RgbImage};
+use nalgebra::{Matrix3x4, Rotation3, Translation3, UnitQuaternion};
+
+use super::super::SceneError;
+use super::super::lines::TextFile;
+use crate::camera::Intrinsics;
+use crate::geometry::{Pose, pose_from_matrix};
+
+/// The SDK's folder.
+#[derive(Clone, Debug)]
+pub(super) struct Sdk {
+    folder: PathBuf,
+}
+
+impl Sdk {
+    /// Looks for it in a traversal's folder and beside it.
+    pub(super) fn find(traversal: &Path) -> Option<Self> {
+        let traversal = traversal.canonicalize().ok()?;
+        let places = [Some(traversal.as_path()), traversal.parent()];
+        let is_sdk =
+            |folder: &PathBuf| folder.join("models").is_dir() && folder.join("extrinsics").is_dir();
+        places
+            .into_iter()
+            .flatten()
+            .flat_map(|place| ["", "sdk", "robotcar-dataset-sdk"].map(|name| place.join(name)))
+            .find(is_sdk)
+            .map(|folder| Self { folder })
+    }
+
+    /// The transform of a sensor: for a camera from the vehicle to it, for a laser or the INS from it to
+    /// the vehicle.
+    pub(super) fn extrinsics(&self, sensor: &str) -> Result<Pose, SceneError> {
+        let file = TextFile::read(&self.folder.join(format!("extrinsics/{sensor}.txt")))?;
+        let [[x, y, z, roll, pitch, yaw]] = file.rows()?;
+        Ok(transform([x, y, z], [roll, pitch, yaw]))
+    }
+
+    /// The model of a camera, with its look-up table.
+    pub(super) fn camera_model(&self, name: &str) -> Result<CameraModel, SceneError> {
+        let file = TextFile::read(&self.folder.join(format!("models/{name}.txt")))?;
+        let mut lines = file.lines();
+        let mut next = || {
+            lines.next().ok_or_else(|| {
+                file.error("a line `fx fy cx cy` and four of a 4x4 matrix expected, it is cut off")
+            })
+        };
+        let [fx, fy, cx, cy] = next()?.numbers()?;
+        let rows: Vec<[f64; 4]> = (0..3)
+            .map(|_| next()?.numbers())
+            .collect::<Result<_, _>>()?;
+        let matrix = Matrix3x4::from_fn(|row, column| rows[row][column]);
+        let camera_from_image =
+            pose_from_matrix(&matrix).map_err(|error| file.error(error.to_string()))?;
+        let table = self
+            .folder
+            .join(format!("models/{name}_distortion_lut.bin"));
+        Ok(CameraModel {
+            intrinsics: Intrinsics {
+                fx,
+                fy,
+                cx,
+                cy,
+                width: 0,
+                height: 0,
+            },
+            camera_from_image,
+            table_path: table,
+            table: Arc::from([]),
+        })
+    }
+}
+
+/// The SDK's transform of a position and roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll).
+pub(super) fn transform(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
+    let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
+    Pose::from_parts(
+        Translation3::from(position),
+        UnitQuaternion::from_rotation_matrix(&rotation),
+    )
+}
+
+/// A camera, and what takes the distortion out of its photos.
+#[derive(Clone, Debug)]
+pub(super) struct CameraModel {
+    /// The pinhole of undistorted photos.
+    pub(super) intrinsics: Intrinsics,
+    /// From x right, y down, z forward to the camera's axes.
+    pub(super) camera_from_image: Pose,
+    table_path: PathBuf,
+    /// For each pixel where it is in the photo as it was taken \[px\].
+    table: Arc<[[f32; 2]]>,
+}
+
+impl CameraModel {
+    /// The same, for photos of a size, with the look-up table read.
+    pub(super) fn for_photos_of(self, (width, height): (u32, u32)) -> Result<Self, SceneError> {
+        let path = &self.table_path;
+        let bytes = std::fs::read(path).map_err(|source| SceneError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        let pixels = width as usize * height as usize;
+        if bytes.len() != pixels * 16 {
+            return Err(SceneError::Content {
+                path: path.clone(),
+                expected: format!(
+                    "a look-up table for photos of {width}x{height} pixels expected, {} bytes, {} found",
+                    pixels * 16,
+                    bytes.len()
+                ),
+            });
+        }
+        let number = |at: usize| {
+            let bytes = bytes[8 * at..8 * at + 8].try_into().unwrap_or([0; 8]);
+            f64::from_le_bytes(bytes) as f32
+        };
+        // All columns come first, then all rows.
+        let table = (0..pixels)
+            .map(|pixel| [number(pixel), number(pixels + pixel)])
+            .collect();
+        Ok(Self {
+            intrinsics: Intrinsics {
+                width,
+                height,
+                ..self.intrinsics
+            },
+            table,
+            ..self
+        })
+    }
+
+    /// The photo as a pinhole would have taken it; black where the lens saw nothing.
+    pub(super) fn undistorted(&self, raw: &RgbImage) -> RgbImage {
+        let (width, height) = raw.dimensions();
+        let values = raw.as_raw();
+        let mut straight = RgbImage::new(width, height);
+        for (pixel, &[x, y]) in straight.pixels_mut().zip(self.table.iter()) {
+            let is_inside =
+                x >= 0.0 && y >= 0.0 && x <= (width - 1) as f32 && y <= (height - 1) as f32;
+            if !is_inside {
+                continue;
+            }
+            let (left, top) = (x as u32, y as u32);
+            let (right, down) = (x - left as f32, y - top as f32);
+            let (next, below) = ((left + 1).min(width - 1), (top + 1).min(height - 1));
+            let at = |x: u32, y: u32, channel: usize| {
+                f32::from(values[3 * (y as usize * width as usize + x as usize) + channel])
+            };
+            *pixel = Rgb(std::array::from_fn(|channel| {
+                let upper = at(left, top, channel) * (1.0 - right) + at(next, top, channel) * right;
+                let lower =
+                    at(left, below, channel) * (1.0 - right) + at(next, below, channel) * right;
+                (upper * (1.0 - down) + lower * down).round() as u8
+            }));
+        }
+        straight
+    }
+}

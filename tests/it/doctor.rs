@@ -1,0 +1,182 @@
+//! `posescope doctor`: it names planted mistakes, and finds nothing wrong with good scenes.
+
+use std::fs;
+use std::path::Path;
+
+use posescope::doctor::{Mistake, examine};
+use posescope::scene::{self, Scene};
+use tempfile::TempDir;
+
+use crate::binary::posescope;
+use crate::data;
+use crate::planted::{Fault, Planted};
+use crate::small_sequence::SmallSequence;
+
+/// What each fault is to be called; half a pixel is less than clouds and photos agree by.
+const EXPECTED: [(Fault, Option<Mistake>); 16] = [
+    (Fault::Nothing, None),
+    (Fault::InversePose, Some(Mistake::InversePose)),
+    (Fault::PoseAxes, Some(Mistake::PoseAxes)),
+    (Fault::CloudAxes, Some(Mistake::CloudAxes)),
+    (Fault::WrongCamera, Some(Mistake::WrongCamera)),
+    (Fault::MillimetrePoses, Some(Mistake::Millimetres)),
+    (Fault::MillimetreClouds, Some(Mistake::Millimetres)),
+    (Fault::QuaternionOrder, Some(Mistake::QuaternionOrder)),
+    (Fault::HalfPixel, None),
+    (Fault::CloudOneFrameOff, Some(Mistake::CloudOfNeighbour)),
+    (Fault::DegreesForRadians, Some(Mistake::Degrees)),
+    (Fault::RadiansForDegrees, Some(Mistake::Degrees)),
+    (Fault::LeftForRight, Some(Mistake::OtherStereoCamera)),
+    (Fault::MirroredCloud, Some(Mistake::MirroredCloud)),
+    (Fault::ReversedPoses, Some(Mistake::ReversedPoses)),
+    (Fault::UndistortedTwice, Some(Mistake::UndistortedTwice)),
+];
+
+#[test]
+fn planted_mistakes_are_named() {
+    let street = scene::open("street", None).expect("is built in");
+    for (fault, expected) in EXPECTED {
+        let planted = Planted::new(street.as_ref(), fault, 0, 40);
+        let found = examine(&planted).expect("readable");
+        let named = found.finding.as_ref().map(|finding| finding.mistake);
+        println!("{fault:?}: {named:?} {:?}", found.remarks);
+        assert_eq!(named, expected, "{fault:?}");
+        assert_eq!(found.is_broken(), expected.is_some(), "{fault:?}");
+    }
+}
+
+/// Nothing is wrong with it.
+fn healthy(scene: &dyn Scene) {
+    let found = examine(scene).unwrap_or_else(|error| panic!("{error}"));
+    let finding = found
+        .finding
+        .as_ref()
+        .map(|finding| (finding.mistake, &finding.remedy));
+    println!(
+        "{}: {:?} {:?}",
+        scene.name(),
+        found.agreement,
+        found.remarks
+    );
+    assert_eq!(finding, None, "{}", scene.name());
+    assert!(!found.is_broken(), "{}: {:?}", scene.name(), found.remarks);
+}
+
+#[test]
+fn nothing_is_wrong_with_the_street() {
+    for condition in ["street:night", "street:rain"] {
+        let street = scene::open(condition, None).expect("is built in");
+        healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
+    }
+}
+
+#[test]
+fn nothing_is_wrong_with_real_scenes() {
+    for folder in [
+        "kitti/sequences/00",
+        "kitti_raw/2011_09_26/2011_09_26_drive_0013_sync",
+        "colmap/lund_door",
+    ] {
+        let Some(path) = data::sample(folder) else {
+            return;
+        };
+        let argument = path.to_str().expect("a plain path");
+        healthy(scene::open(argument, None).expect("opens").as_ref());
+    }
+}
+
+/// A folder with links to all that another has, but one file.
+fn without(folder: &Path, file: &str) -> TempDir {
+    let copy = TempDir::new().expect("a folder");
+    for entry in fs::read_dir(folder).expect("readable") {
+        let path = entry.expect("readable").path();
+        let name = path.file_name().expect("a name");
+        if name != file {
+            copied(&path, &copy.path().join(name));
+        }
+    }
+    copy
+}
+
+fn copied(from: &Path, to: &Path) {
+    if !from.is_dir() {
+        fs::copy(from, to).expect("writable");
+        return;
+    }
+    fs::create_dir(to).expect("writable");
+    for entry in fs::read_dir(from).expect("readable") {
+        let path = entry.expect("readable").path();
+        copied(&path, &to.join(path.file_name().expect("a name")));
+    }
+}
+
+#[test]
+fn depth_images_that_are_not_registered_as_a_file_says_are_found_out() {
+    let Some(path) = data::sample("7scenes/redkitchen") else {
+        return;
+    };
+    // With this file the reader takes depth and colour for one camera, of 585 px.
+    let stated = scene::open(path.to_str().expect("a plain path"), None).expect("opens");
+    let found = examine(stated.as_ref()).expect("readable");
+    let finding = found.finding.expect("the colour camera has 525 px");
+    assert_eq!(finding.mistake, Mistake::WrongCamera);
+    assert!(
+        finding.remedy.contains("of 529 px instead of 585"),
+        "{}",
+        finding.remedy
+    );
+    // Without it, the two cameras of the data set are what they are.
+    let copy = without(&path, "camera-intrinsics.txt");
+    let argument = copy.path().to_str().expect("a plain path");
+    healthy(scene::open(argument, None).expect("opens").as_ref());
+}
+
+#[test]
+fn a_scene_without_clouds_cannot_be_localised_against() {
+    let Some(path) = data::sample("kitti/sequences/06") else {
+        return;
+    };
+    let output = posescope()
+        .arg("doctor")
+        .arg(path)
+        .output()
+        .expect("the binary starts");
+    assert_eq!(output.status.code(), Some(3));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        message.contains("no frame has a cloud") && message.contains("--queries"),
+        "{message}"
+    );
+}
+
+#[test]
+fn the_command_reports_and_draws() {
+    let sequence = SmallSequence::write();
+    let folder = TempDir::new().expect("a folder");
+    let (picture, recording) = (folder.path().join("a.png"), folder.path().join("a.rrd"));
+    let output = posescope()
+        .arg("doctor")
+        .arg(sequence.folder())
+        .arg("--picture")
+        .arg(&picture)
+        .arg("--save")
+        .arg(&recording)
+        .output()
+        .expect("the binary starts");
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        table.contains("frames     3, 3 with a pose, 3 with a cloud"),
+        "{table}"
+    );
+    assert!(
+        table.lines().all(|line| line.chars().count() <= 120),
+        "{table}"
+    );
+    assert_eq!(image::open(&picture).expect("a picture").width(), 160);
+    assert!(std::fs::metadata(&recording).expect("a recording").len() > 1000);
+    let missing = posescope()
+        .args(["doctor", "nowhere"])
+        .output()
+        .expect("starts");
+    assert_eq!(missing.status.code(), Some(3));
+}

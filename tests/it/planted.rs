@@ -1,0 +1,185 @@
+//! A scene with one of the usual mistakes in it.
+
+use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use posescope::camera::Intrinsics;
+use posescope::cloud::Cloud;
+use posescope::geometry::Pose;
+use posescope::image::{GrayImage, Photo};
+use posescope::scene::{Scene, SceneError};
+
+/// What is planted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    Nothing,
+    InversePose,
+    PoseAxes,
+    CloudAxes,
+    WrongCamera,
+    MillimetrePoses,
+    MillimetreClouds,
+    QuaternionOrder,
+    HalfPixel,
+    CloudOneFrameOff,
+    DegreesForRadians,
+    RadiansForDegrees,
+    LeftForRight,
+    MirroredCloud,
+    ReversedPoses,
+    UndistortedTwice,
+}
+
+/// Some frames of a scene, with a mistake in what it says of them.
+pub struct Planted<'a> {
+    scene: &'a dyn Scene,
+    fault: Fault,
+    first: usize,
+    names: Vec<String>,
+}
+
+impl<'a> Planted<'a> {
+    pub fn new(scene: &'a dyn Scene, fault: Fault, first: usize, count: usize) -> Self {
+        Self {
+            scene,
+            fault,
+            first,
+            names: scene.frames()[first..first + count].to_vec(),
+        }
+    }
+
+    fn true_pose(&self, frame: usize) -> Option<Pose> {
+        self.scene.pose(self.first + frame)
+    }
+}
+
+/// From x right, y down, z forward to x forward, y left, z up.
+fn flu_from_rdf() -> Pose {
+    let turn = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let turn = Rotation3::from_matrix_unchecked(turn);
+    Pose::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_rotation_matrix(&turn),
+    )
+}
+
+/// The other camera of the pair is so far to the right \[m\].
+const BASELINE_M: f64 = 0.54;
+
+/// The pose whose yaw, pitch and roll are those of another, times a factor.
+fn with_angles_times(pose: &Pose, factor: f64) -> Pose {
+    let m = pose.rotation.to_rotation_matrix();
+    let pitch = (-m[(1, 2)]).asin();
+    let (yaw, roll) = (m[(0, 2)].atan2(m[(2, 2)]), m[(1, 0)].atan2(m[(1, 1)]));
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw * factor)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), pitch * factor)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll * factor);
+    Pose::from_parts(pose.translation, rotation)
+}
+
+/// The photo as it would be if the distortion of another lens were taken out of it.
+fn bent(photo: &GrayImage, camera: &Intrinsics, k1: f64) -> GrayImage {
+    let (width, height) = photo.dimensions();
+    GrayImage::from_fn(width, height, |x, y| {
+        let (u, v) = (
+            (f64::from(x) - camera.cx) / camera.fx,
+            (f64::from(y) - camera.cy) / camera.fy,
+        );
+        let times = 1.0 + k1 * (u * u + v * v);
+        let from_x = (camera.fx * u * times + camera.cx).round();
+        let from_y = (camera.fy * v * times + camera.cy).round();
+        let is_inside = from_x >= 0.0
+            && from_y >= 0.0
+            && from_x < f64::from(width)
+            && from_y < f64::from(height);
+        match is_inside {
+            true => *photo.get_pixel(from_x as u32, from_y as u32),
+            false => image::Luma([0]),
+        }
+    })
+}
+
+impl Scene for Planted<'_> {
+    fn name(&self) -> &str {
+        self.scene.name()
+    }
+
+    fn frames(&self) -> &[String] {
+        &self.names
+    }
+
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        let camera = self.scene.intrinsics(self.first + frame);
+        match self.fault {
+            Fault::WrongCamera => Intrinsics {
+                fx: camera.fx * 1.17,
+                fy: camera.fy * 1.17,
+                cx: camera.cx + 18.0,
+                ..camera
+            },
+            Fault::HalfPixel => Intrinsics {
+                cx: camera.cx + 0.5,
+                cy: camera.cy + 0.5,
+                ..camera
+            },
+            _ => camera,
+        }
+    }
+
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        let pose = self.true_pose(frame)?;
+        Some(match self.fault {
+            Fault::InversePose => pose.inverse(),
+            Fault::PoseAxes => pose * flu_from_rdf().inverse(),
+            Fault::MillimetrePoses => Pose::from_parts(
+                Translation3::from(pose.translation.vector * 1000.0),
+                pose.rotation,
+            ),
+            Fault::QuaternionOrder => {
+                let q = pose.rotation.coords;
+                let read = Quaternion::new(q.z, q.w, q.x, q.y);
+                Pose::from_parts(pose.translation, UnitQuaternion::from_quaternion(read))
+            }
+            Fault::DegreesForRadians => with_angles_times(&pose, 1_f64.to_degrees()),
+            Fault::RadiansForDegrees => with_angles_times(&pose, 1_f64.to_radians()),
+            Fault::LeftForRight => pose * Pose::translation(-BASELINE_M, 0.0, 0.0),
+            Fault::ReversedPoses => self.true_pose(self.names.len() - 1 - frame)?,
+            _ => pose,
+        })
+    }
+
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.scene.time_s(self.first + frame)
+    }
+
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.scene.has_cloud(self.first + frame)
+    }
+
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        let photo = self.scene.photo(self.first + frame)?;
+        Ok(match self.fault {
+            Fault::UndistortedTwice => {
+                let camera = self.scene.intrinsics(self.first + frame);
+                Photo::from_gray(bent(&photo.gray, &camera, -0.25))
+            }
+            _ => photo,
+        })
+    }
+
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        let of = match self.fault {
+            Fault::CloudOneFrameOff => frame + 1,
+            _ => frame,
+        };
+        let cloud = self.scene.cloud(self.first + of)?;
+        let moved = |change: &dyn Fn(&Point3<f32>) -> Point3<f32>| Cloud {
+            points: cloud.points.iter().map(change).collect(),
+        };
+        Ok(match self.fault {
+            Fault::CloudAxes => moved(&|p| Point3::new(p.z, -p.x, -p.y)),
+            Fault::MillimetreClouds => moved(&|p| p * 1000.0),
+            Fault::LeftForRight => moved(&|p| Point3::new(p.x + BASELINE_M as f32, p.y, p.z)),
+            Fault::MirroredCloud => moved(&|p| Point3::new(-p.x, p.y, p.z)),
+            _ => cloud,
+        })
+    }
+}
