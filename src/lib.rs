@@ -24,8 +24,8 @@ pub use posescope_core::{
 };
 pub use posescope_core::{
     camera, cloud, code, cost, depth, describe, diagnosis, estimator, event, features, fusion,
-    geometry, grid, history, image, localize, memo, method, params, problem, render, retrieval,
-    robust, solver, text, trace,
+    geometry, grid, history, image, judge, localize, memo, method, params, problem, render,
+    retrieval, robust, solver, text, trace,
 };
 
 #[cfg(feature = "app")]
