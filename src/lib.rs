@@ -24,7 +24,7 @@ pub use posescope_core::{
 };
 pub use posescope_core::{
     camera, cloud, code, cost, depth, describe, diagnosis, estimator, event, features, foreign,
-    fusion, geometry, grid, history, image, localize, memo, method, params, problem, render,
+    fusion, geometry, grid, history, image, judge, localize, memo, method, params, problem, render,
     retrieval, robust, solver, text, trace,
 };
 

@@ -1,10 +1,12 @@
 //! Decisions in words, for logs.
 
 use crate::event::{
-    Event, MinimumAssessed, Moment, ReferencesFused, ReferencesRanked, Side, Stage, ViewRendered,
+    CandidatesJudged, Event, MinimumAssessed, Moment, ReferencesFused, ReferencesRanked, Side,
+    Stage, StartsRefined, ViewRendered,
 };
 use crate::features::MatchVerdict;
 use crate::fusion::ShareOutcome;
+use crate::geometry::PoseError;
 use crate::grid::Offset;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 
@@ -89,6 +91,8 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::BranchTaken(event) => {
             format!("takes the pose of {}: {}", event.method.name(), event.why)
         }
+        Event::StartsRefined(event) => refined(event)?,
+        Event::CandidatesJudged(event) => judged(event),
         Event::ReferencesFused(event) => fused(event),
         Event::ReferencesRanked(event) => ranked(event),
         Event::HypothesisTried(_)
@@ -126,6 +130,32 @@ fn assessed(event: &MinimumAssessed) -> String {
         cost(event.initial),
         cost(event.shuffled),
         cost(event.runner_up)
+    )
+}
+
+fn refined(event: &StartsRefined) -> Option<String> {
+    let best = event.refinements.first()?;
+    let moved = PoseError::between(&best.start.pose, &best.pose);
+    let evaluations: u64 = event.refinements.iter().map(|one| one.evaluations).sum();
+    Some(format!(
+        "{} starts refined in {} freedoms by {evaluations} hypotheses; the best went {} and {} to cost \
+         {:.4} from {:.4}",
+        event.refinements.len(),
+        event.freedoms.count(),
+        moved.translation(),
+        moved.rotation(),
+        best.cost,
+        best.start.cost,
+    ))
+}
+
+fn judged(event: &CandidatesJudged) -> String {
+    format!(
+        "{} poses compared: {}; {:.1} standard deviations below the coarse positions, {:.1} are needed",
+        event.candidates.len(),
+        event.why,
+        event.deviations,
+        event.needed
     )
 }
 

@@ -125,12 +125,15 @@ fn color_of(bar: &StageBar) -> Color32 {
         (_, Some(false)) => theme::ESTIMATE,
         (Stage::Estimator(method), _) => theme::method(method),
         (Stage::Detect | Stage::Color, _) => Color32::from_rgb(0x6A, 0x8C, 0xAF),
-        (Stage::Retrieve | Stage::Match | Stage::Search(_), _) => {
+        (Stage::SearchCoarse | Stage::RefinePlane | Stage::RefineSix, _)
+        | (Stage::Retrieve | Stage::Match | Stage::MatchGuided | Stage::Search(_), _) => {
             Color32::from_rgb(0x8F, 0xA8, 0x6E)
         }
         (Stage::DepthLift, _) => Color32::from_rgb(0xB0, 0x9A, 0x5B),
         (Stage::Consensus, _) => Color32::from_rgb(0x9A, 0x7F, 0xB0),
-        (Stage::Accept | Stage::Assess | Stage::Fuse, _) => Color32::from_rgb(0x5F, 0x9E, 0x8F),
+        (Stage::Accept | Stage::Judge | Stage::Assess | Stage::Fuse, _) => {
+            Color32::from_rgb(0x5F, 0x9E, 0x8F)
+        }
     }
 }
 

@@ -180,7 +180,6 @@ mod tests {
     fn nonsense_is_refused_with_what_was_expected() {
         for wrong in [
             "success >= 0.9",
-            "success@xx >= 0.9",
             "success@fb = 0.9",
             "recall@fb >= 1",
             "recall@0.5,5@fb >= 1",

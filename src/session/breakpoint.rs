@@ -217,7 +217,9 @@ impl Breakpoint {
             .chain(&names)
             .chain(&stages)
             .chain(&phases)
-            .chain(&[Stage::Assess, Stage::Fuse])
+            .chain(&[Stage::MatchGuided, Stage::SearchCoarse])
+            .chain(&[Stage::RefinePlane, Stage::RefineSix])
+            .chain(&[Stage::Judge, Stage::Assess, Stage::Fuse])
             .map(|stage| stage.name())
             .collect()
     }

@@ -77,7 +77,10 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
             "did you mean `fb.ratio`",
         ),
         (&["--query", "5", "--set", "fb.ratio=7"], "0.1 … 1"),
-        (&["--query", "5", "--method", "xx"], "fb, pm, mi, hy or nid"),
+        (
+            &["--query", "5", "--method", "xx"],
+            "fb, pm, mi, hy, fb2, mi6, nid or robust",
+        ),
         (
             &["--query", "5", "--references", "best:1"],
             "random:K, nearest:K",

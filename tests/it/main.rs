@@ -18,6 +18,7 @@ mod kitti;
 mod kitti_raw;
 mod looks;
 mod memory;
+mod methods;
 mod own_cost;
 mod painted;
 mod pair_matches;

@@ -7,15 +7,23 @@
 
 mod direct;
 mod failure;
+mod fb2;
 mod feature;
 mod given;
 mod hybrid;
+mod mi6;
+mod own;
+mod robust;
 
 pub use direct::Direct;
 pub use failure::Failure;
+pub use fb2::{Guided, GuidedParams};
 pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches, projected_cloud};
 pub use given::Given;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
+pub use mi6::{SixFreedoms, SixParams};
+pub use own::Own;
+pub use robust::{Robust, RobustParams};
 
 use std::str::FromStr;
 use std::sync::LazyLock;
@@ -137,6 +145,8 @@ pub enum Parts {
     Cost(&'static cost::Entry),
     /// The pose of one method, and of another where that has none.
     Hybrid(HybridParts),
+    /// What is made of neither, and says so itself.
+    Own(Own),
 }
 
 impl Entry {
@@ -146,13 +156,15 @@ impl Entry {
             Parts::Features => Box::new(FeatureBased::new(params)),
             Parts::Cost(cost) => Box::new(Direct::new(cost, params)),
             Parts::Hybrid(parts) => Box::new(Hybrid::new(self.method, parts, params)),
+            Parts::Own(own) => (own.make)(params),
         }
     }
 
-    /// The cost that it searches by itself.
+    /// The cost that it searches by itself, or by which its views are explained.
     pub fn cost(&self) -> Option<&'static cost::Entry> {
         match self.parts {
             Parts::Cost(cost) => Some(cost),
+            Parts::Own(own) => own.cost(),
             Parts::Features | Parts::Hybrid(_) => None,
         }
     }
@@ -161,7 +173,7 @@ impl Entry {
     pub fn hybrid(&self) -> Option<HybridParts> {
         match self.parts {
             Parts::Hybrid(parts) => Some(parts),
-            Parts::Features | Parts::Cost(_) => None,
+            Parts::Features | Parts::Cost(_) | Parts::Own(_) => None,
         }
     }
 }
@@ -189,7 +201,10 @@ pub fn all() -> &'static [Entry] {
             about: cost.about,
             parts: Parts::Cost(cost),
         });
-        let mut all: Vec<_> = [FEATURE, HYBRID].into_iter().chain(direct).collect();
+        let mut all: Vec<_> = [FEATURE, HYBRID, fb2::ENTRY, mi6::ENTRY, robust::ENTRY]
+            .into_iter()
+            .chain(direct)
+            .collect();
         all.sort_by_key(|entry| entry.method);
         all
     });
@@ -279,12 +294,12 @@ mod tests {
     fn every_method_has_an_estimator() {
         let registered: Vec<_> = methods().collect();
         assert_eq!(registered[..4], Method::PAPER);
-        assert_eq!(registered.len(), cost::ALL.len() + 2);
+        assert_eq!(registered.len(), cost::ALL.len() + 5);
         for method in registered {
             assert_eq!(method.name().parse(), Ok(method));
         }
         let unknown = "sift".parse::<Method>().map_err(|error| error.to_string());
-        let words = "`sift` is no method; fb, pm, mi, hy or nid expected";
+        let words = "`sift` is no method; fb, pm, mi, hy, fb2, mi6, nid or robust expected";
         assert_eq!(unknown, Err(words.to_owned()));
     }
 }

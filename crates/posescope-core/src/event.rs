@@ -10,6 +10,7 @@ use crate::fusion::share::Share;
 use crate::geometry::Pose;
 use crate::grid::{Offset, Phase, ScoredLattice};
 use crate::image::Photo;
+use crate::judge::{Freedoms, Refined};
 use crate::method::Method;
 use crate::render::{ColoredCloud, Comparison, Score};
 use crate::retrieval::ReferenceRanking;
@@ -37,6 +38,8 @@ pub enum Stage {
     Match,
     /// FB: depth of the matched reference keypoints.
     DepthLift,
+    /// `fb2`: matching again where a pose says that features must be.
+    MatchGuided,
     /// FB: MLESAC over P3P hypotheses, refinement.
     Consensus,
     /// FB: is the result more than chance?
@@ -45,6 +48,14 @@ pub enum Stage {
     Color,
     /// PM, MI: one phase of the grid search.
     Search(Phase),
+    /// `mi6`: smaller copies of the photos are searched.
+    SearchCoarse,
+    /// `mi6`: the best coarse minima are refined in right, forward and yaw.
+    RefinePlane,
+    /// `mi6`, `robust`: poses are refined in all six freedoms.
+    RefineSix,
+    /// `robust`: the poses of several methods are compared.
+    Judge,
     /// PM, MI: what the result is worth.
     Assess,
     /// One pose from those of several references.
@@ -60,6 +71,7 @@ impl Stage {
             Self::Detect => "detect",
             Self::Match => "match",
             Self::DepthLift => "depth",
+            Self::MatchGuided => "match_guided",
             Self::Consensus => "ransac",
             Self::Accept => "accept",
             Self::Color => "color",
@@ -67,6 +79,10 @@ impl Stage {
             Self::Search(Phase::PositionFine) => "position_fine",
             Self::Search(Phase::YawCoarse) => "yaw_coarse",
             Self::Search(Phase::YawFine) => "yaw_fine",
+            Self::SearchCoarse => "search_coarse",
+            Self::RefinePlane => "refine_plane",
+            Self::RefineSix => "refine_six",
+            Self::Judge => "judge",
             Self::Assess => "assess",
             Self::Fuse => "fusion",
         }
@@ -169,6 +185,8 @@ events! {
     BranchTaken,
     ReferencesFused,
     ReferencesRanked,
+    StartsRefined,
+    CandidatesJudged,
 }
 
 /// A stage begins.
@@ -375,4 +393,39 @@ pub struct ReferencesRanked {
     /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
     /// read.
     pub photos: Arc<[Option<Arc<Photo>>]>,
+}
+
+/// Several starts were refined side by side.
+#[derive(Clone, Debug)]
+pub struct StartsRefined {
+    /// The directions in which they moved.
+    pub freedoms: Freedoms,
+    /// Where each started and ended, the least cost first.
+    pub refinements: Arc<[Refined]>,
+}
+
+/// The poses of several methods were refined under one cost and compared.
+#[derive(Clone, Debug)]
+pub struct CandidatesJudged {
+    /// The candidates, the answer first.
+    pub candidates: Arc<[JudgedPose]>,
+    /// How far the answer is below the costs of the coarse positions, in robust standard deviations.
+    pub deviations: f64,
+    /// How far it must be below them to be the answer.
+    pub needed: f64,
+    /// What the best candidate of each method costs, in words.
+    pub why: String,
+}
+
+/// A pose among several that were compared.
+#[derive(Clone, Debug)]
+pub struct JudgedPose {
+    /// The method whose pose it was.
+    pub method: Method,
+    /// The pose as the method gave it, and refined.
+    pub refined: Refined,
+    /// What its method made of it, if that matches features: the log likelihood of the matches.
+    pub log_likelihood: Option<f64>,
+    /// Whether its own method would have answered it.
+    pub accepted: bool,
 }

@@ -11,6 +11,8 @@
 //!    stay upright,
 //! 4. `descriptor` summarises the gradients around it in 64 numbers (4.2).
 //!
+//! [`sift`] is another: Lowe, *Distinctive Image Features from Scale-Invariant Keypoints*, IJCV 60(2), 2004.
+//!
 //! `matching` then compares the descriptors of two images: [`nearest_neighbours`] finds
 //! the two nearest of every descriptor, and [`classify`] says of each whether its best match
 //! is distinct, mutual, or neither.
@@ -28,6 +30,7 @@ mod matching;
 mod orientation;
 mod params;
 mod remembered;
+mod sift;
 mod state;
 mod surf;
 
@@ -39,6 +42,7 @@ pub use matching::{
 };
 pub use params::SurfParams;
 pub use remembered::{remembered, remembered_interruptible};
+pub use sift::{SiftDescriptor, SiftFeatures, SiftParams, sift, sift_interruptible};
 pub use state::FeatureState;
 pub use surf::{surf, surf_interruptible};
 
@@ -78,6 +82,7 @@ pub type Descriptor = [f32; 64];
 pub struct Features {
     /// Where the features are.
     pub keypoints: Vec<Keypoint>,
-    /// What they look like: `descriptors[i]` belongs to `keypoints[i]`.
+    /// What they look like: `descriptors[i]` belongs to `keypoints[i]`. Empty for features whose
+    /// descriptors are of another kind.
     pub descriptors: Vec<Descriptor>,
 }

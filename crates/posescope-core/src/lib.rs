@@ -52,6 +52,7 @@ pub mod grid;
 pub mod history;
 pub mod image;
 pub mod input;
+pub mod judge;
 pub mod localize;
 pub mod memo;
 pub mod method;

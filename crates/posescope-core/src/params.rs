@@ -10,9 +10,10 @@ use crate::cost::CostSettings;
 use crate::describe::{
     About, Choice, Describe, Described, Domain, ParamError, ParamVisitor, Value,
 };
-use crate::estimator::FeatureParams;
+use crate::estimator::{FeatureParams, GuidedParams, RobustParams, SixParams};
 use crate::features::SurfParams;
 use crate::grid::GridParams;
+use crate::judge::JudgeParams;
 use crate::render::RenderParams;
 use crate::retrieval::RetrievalParams;
 
@@ -29,6 +30,14 @@ pub struct Params {
     pub grid: GridParams,
     /// `pm`, `mi` and so on: a group for each registered cost.
     pub costs: CostSettings,
+    /// `fb2`: matching twice.
+    pub fb2: GuidedParams,
+    /// `judge`: the cost by which poses of several methods are compared.
+    pub judge: JudgeParams,
+    /// `mi6`: the search in six freedoms.
+    pub mi6: SixParams,
+    /// `robust`: the decision between the poses of several methods.
+    pub robust: RobustParams,
     /// `retrieval`: visual words, and the verification of what they find.
     pub retrieval: RetrievalParams,
 }
@@ -54,6 +63,10 @@ impl Params {
         for (group, params) in self.costs.groups() {
             visit(group, params);
         }
+        visit("fb2", &mut self.fb2);
+        visit("judge", &mut self.judge);
+        visit("mi6", &mut self.mi6);
+        visit("robust", &mut self.robust);
         visit("retrieval", &mut self.retrieval);
     }
 

@@ -226,9 +226,11 @@ impl ParamVisitor for Editor<'_, '_> {
         let names = value.names();
         let present = names[value.index()];
         let words = format!("one of {}", names.join(", "));
+        // Groups may have parameters of one name.
+        let salt = (self.group, about.name);
         self.row(about, present.to_owned(), words, |ui, label| {
             let mut chosen = None;
-            let shown = ComboBox::from_id_salt(about.name)
+            let shown = ComboBox::from_id_salt(salt)
                 .selected_text(present)
                 .show_ui(ui, |ui| {
                     for name in names {

@@ -75,7 +75,7 @@ impl Trust {
         match estimator::find(responsible(method, outcome))?.parts {
             Parts::Features => of_features(problem, params, evidence),
             Parts::Cost(_) => of_search(problem, method, outcome, evidence),
-            Parts::Hybrid(_) => None,
+            Parts::Hybrid(_) | Parts::Own(_) => None,
         }
     }
 
@@ -119,7 +119,7 @@ pub fn signals(
             Some(consensus.signals(problem, evidence))
         }
         Parts::Cost(_) => Some(Minimum::of(problem, outcome, evidence)?.signals()),
-        Parts::Hybrid(_) => None,
+        Parts::Hybrid(_) | Parts::Own(_) => None,
     }
 }
 

@@ -189,7 +189,7 @@ impl Direct {
         })
     }
 
-    fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
+    pub(super) fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
         let key = ColoringKey {
             render: Exact::of(&self.render),
@@ -205,7 +205,7 @@ impl Direct {
         })
     }
 
-    fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
+    pub(super) fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
         let channel = query.memo.recall(self.cost.query_channel_key(), || {
             self.cost.query_channel(&query.photo.gray)

@@ -92,6 +92,19 @@ pub enum Failure {
         /// Hypotheses that could be compared with the query.
         hypotheses: usize,
     },
+    /// The least cost is one that wrong poses have as well.
+    #[error(
+        "the least cost, {cost:.4}, is {deviations:.1} standard deviations below those of other poses, \
+         which chance explains; {needed:.1} are needed"
+    )]
+    ChanceMinimum {
+        /// The least cost.
+        cost: f64,
+        /// How far it is below the middle of the coarse positions' costs.
+        deviations: f64,
+        /// How far it would have to be.
+        needed: f64,
+    },
     /// The parameters ask for more hypotheses than can be scored and kept.
     #[error(transparent)]
     LatticeTooLarge(#[from] LatticeTooLarge),
@@ -154,6 +167,7 @@ impl Failure {
             Self::TooFewDepths { .. } => Code::R4,
             Self::OutsideRadius { .. } => Code::R9,
             Self::NothingComparable { .. } | Self::FlatCost { .. } => Code::D5,
+            Self::ChanceMinimum { .. } => Code::D6,
             Self::LatticeTooLarge(_) => Code::D9,
             Self::NoReferenceSucceeded { failure, .. } => failure.code(),
             Self::NotAnswered { .. } => Code::E1,

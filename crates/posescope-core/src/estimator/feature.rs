@@ -98,17 +98,31 @@ pub struct FeatureBased {
 
 impl Estimator for FeatureBased {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        let mut counts = FeatureCounts::default();
-        let pose = trace.stage(Stage::Estimator(Method::FB), |trace| {
-            self.localize(problem, &mut counts, trace)
-        });
-        Ok(Outcome {
-            pose: separate_failure(pose)?,
-            counts: Some(counts),
-            cost: None,
-            fell_back: false,
-        })
+        Ok(self.propose(problem, trace)?.outcome)
     }
+}
+
+/// What FB makes of a problem, and the pose that it judged.
+pub(super) struct Proposal {
+    /// The answer.
+    pub(super) outcome: Outcome,
+    /// The consensus that was accepted or refused; `None` where there was none.
+    pub(super) consensus: Option<Agreed>,
+}
+
+/// A consensus, in short.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Agreed {
+    /// The query camera in the reference camera's frame.
+    pub(super) reference_from_query: Pose,
+    /// The log likelihood of all correspondences.
+    pub(super) log_likelihood: f64,
+}
+
+/// What is known of a run, up to where it stops.
+struct Found<'a> {
+    counts: &'a mut FeatureCounts,
+    agreed: &'a mut Option<Agreed>,
 }
 
 impl FeatureBased {
@@ -120,11 +134,34 @@ impl FeatureBased {
         }
     }
 
-    /// The four steps of the paper. `counts` is true up to where it stops.
+    /// What [`Estimator::estimate`] answers, with the consensus behind it.
+    pub(super) fn propose(
+        &self,
+        problem: &Problem,
+        trace: &mut Trace<'_>,
+    ) -> Result<Proposal, Cancelled> {
+        let mut counts = FeatureCounts::default();
+        let mut consensus = None;
+        let pose = trace.stage(Stage::Estimator(Method::FB), |trace| {
+            self.localize(problem, &mut counts, &mut consensus, trace)
+        });
+        Ok(Proposal {
+            outcome: Outcome {
+                pose: separate_failure(pose)?,
+                counts: Some(counts),
+                cost: None,
+                fell_back: false,
+            },
+            consensus,
+        })
+    }
+
+    /// The four steps of the paper. `counts` and `agreed` are true up to where it stops.
     fn localize(
         &self,
         problem: &Problem,
         counts: &mut FeatureCounts,
+        agreed: &mut Option<Agreed>,
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
         let (query, reference) = trace.stage(Stage::Detect, |trace| {
@@ -137,7 +174,8 @@ impl FeatureBased {
             Ok::<_, Halt>((query, reference))
         })?;
         let mut states = FeatureStates::new(query.keypoints.len());
-        let outcome = self.match_and_solve(problem, &query, &reference, &mut states, counts, trace);
+        let found = Found { counts, agreed };
+        let outcome = self.match_and_solve(problem, &query, &reference, &mut states, found, trace);
         // The states are told for a failed query too: they show where its features went.
         if !matches!(outcome, Err(Halt::Cancelled)) {
             trace.emit(|| FeaturesClassified {
@@ -153,7 +191,7 @@ impl FeatureBased {
         query: &Features,
         reference: &Features,
         states: &mut FeatureStates,
-        counts: &mut FeatureCounts,
+        Found { counts, agreed }: Found<'_>,
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
         if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
@@ -217,6 +255,10 @@ impl FeatureBased {
         })?;
         states.after_consensus(&members, &consensus);
         counts.inliers = consensus.inliers.len();
+        *agreed = Some(Agreed {
+            reference_from_query: consensus.pose.inverse(),
+            log_likelihood: consensus.log_likelihood,
+        });
 
         trace.stage(Stage::Accept, |trace| {
             self.accept(problem, &correspondences, &consensus, trace)

@@ -6,8 +6,6 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DMatrixView};
 use rayon::prelude::*;
 
-use super::Descriptor;
-
 /// Descriptors compared at a time. The products of one block take 128 KiB and stay in the cache
 /// while they are searched.
 const QUERY_BLOCK: usize = 64;
@@ -52,9 +50,9 @@ impl Neighbours {
 /// work, and the nearest r is the one with the largest term in brackets. The distances of the two
 /// found are then taken directly, since the difference of large squares would be a poor measure of
 /// small distances.
-pub fn nearest_neighbours(
-    query: &[Descriptor],
-    reference: &[Descriptor],
+pub fn nearest_neighbours<const N: usize>(
+    query: &[[f32; N]],
+    reference: &[[f32; N]],
 ) -> Vec<Option<Neighbours>> {
     let Ok(found) = nearest_neighbours_interruptible(query, reference, || Ok::<_, Infallible>(()));
     found
@@ -65,15 +63,15 @@ pub fn nearest_neighbours(
 ///
 /// # Errors
 /// The errors of `checkpoint`.
-pub fn nearest_neighbours_interruptible<E>(
-    query: &[Descriptor],
-    reference: &[Descriptor],
+pub fn nearest_neighbours_interruptible<const N: usize, E>(
+    query: &[[f32; N]],
+    reference: &[[f32; N]],
     mut checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Vec<Option<Neighbours>>, E> {
     // With one descriptor per row, each column of the product belongs to one query.
     let rows = as_columns(reference).transpose();
     let half_squares: Vec<f32> = reference.iter().map(|r| 0.5 * squared_norm(r)).collect();
-    let search = |products: &mut DMatrix<f32>, block: &[Descriptor]| {
+    let search = |products: &mut DMatrix<f32>, block: &[[f32; N]]| {
         let mut best = vec![TopTwo::default(); block.len()];
         for start in (0..reference.len()).step_by(REFERENCE_BLOCK) {
             let count = REFERENCE_BLOCK.min(reference.len() - start);
@@ -83,7 +81,7 @@ pub fn nearest_neighbours_interruptible<E>(
                 best.search(products.as_slice(), &half_squares, start..start + count);
             }
         }
-        let neighbours = |(query, best): (&Descriptor, TopTwo)| best.resolve(query, reference);
+        let neighbours = |(query, best): (&[f32; N], TopTwo)| best.resolve(query, reference);
         block.iter().zip(best).map(neighbours).collect::<Vec<_>>()
     };
     // Whole blocks: a product does not depend on where the search is interrupted.
@@ -102,16 +100,16 @@ pub fn nearest_neighbours_interruptible<E>(
     Ok(found)
 }
 
-/// Descriptors as the columns of a 64-row matrix.
-fn as_columns(descriptors: &[Descriptor]) -> DMatrixView<'_, f32> {
-    DMatrixView::from_slice(descriptors.as_flattened(), 64, descriptors.len())
+/// Descriptors as the columns of a matrix with as many rows as they have numbers.
+fn as_columns<const N: usize>(descriptors: &[[f32; N]]) -> DMatrixView<'_, f32> {
+    DMatrixView::from_slice(descriptors.as_flattened(), N, descriptors.len())
 }
 
-fn squared_norm(descriptor: &Descriptor) -> f32 {
+fn squared_norm<const N: usize>(descriptor: &[f32; N]) -> f32 {
     descriptor.iter().map(|v| v * v).sum()
 }
 
-fn distance(a: &Descriptor, b: &Descriptor) -> f32 {
+fn distance<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
     let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
     squares.sum::<f32>().sqrt()
 }
@@ -160,7 +158,11 @@ impl TopTwo {
         }
     }
 
-    fn resolve(&self, query: &Descriptor, reference: &[Descriptor]) -> Option<Neighbours> {
+    fn resolve<const N: usize>(
+        &self,
+        query: &[f32; N],
+        reference: &[[f32; N]],
+    ) -> Option<Neighbours> {
         let neighbour = |rank: usize| {
             let index = self.indices[rank];
             let found = self.scores[rank] > f32::NEG_INFINITY;
@@ -258,6 +260,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::features::Descriptor;
 
     /// A unit descriptor in the plane of the first two axes.
     fn at(degrees: f32) -> Descriptor {

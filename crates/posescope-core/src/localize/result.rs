@@ -300,13 +300,18 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
         truth,
         ..
     } = *subject;
-    let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth| {
-        let estimator = estimator::find(method)?.make(subject.params);
-        let truth = [problem.reference_from_query(truth)];
-        let mut cost = None;
-        estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost);
-        cost
-    });
+    let cost_at_truth = truth
+        .filter(|_| outcome.cost.is_some())
+        .and_then(|truth_pose| {
+            let estimator = estimator::find(method)?.make(subject.params);
+            let truth = [problem.reference_from_query(truth_pose)];
+            let mut cost = None;
+            match estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost)
+            {
+                true => cost,
+                false => estimator.score_at(problem, truth_pose)?.cost,
+            }
+        });
     let basin = truth.and_then(|truth| {
         let place = Offset::of(&problem.reference_from_query(truth));
         subject.evidence.coarse()?.basin(&place)

@@ -241,7 +241,8 @@ fn best_so_far(
     let best = match estimator::find(method).map(|entry| &entry.parts) {
         Some(Parts::Features) => features.reference_from_query,
         Some(Parts::Hybrid(_)) => by_search.or(features.reference_from_query),
-        Some(Parts::Cost(_)) | None => by_search,
+        Some(Parts::Own(own)) if own.has_features => by_search.or(features.reference_from_query),
+        Some(Parts::Cost(_) | Parts::Own(_)) | None => by_search,
     };
     Some((method, best?))
 }

@@ -1,0 +1,651 @@
+//! `fb2`: the feature-based method with a better feature and a second look.
+//!
+//! As FB, but
+//!
+//! 1. features are SIFT, compared by the Hellinger kernel ([`crate::features::sift()`]),
+//! 2. depth comes from the points alone that the reference camera sees,
+//! 3. and after a first consensus, accepted or not, each reference feature with a depth is sought again
+//!    where the pose says that it must be, at the scale that it must have there, among the few query
+//!    features that are. Among so few the ratio may be loose.
+
+mod params;
+
+use std::sync::Arc;
+
+use nalgebra::Point2;
+
+pub use params::GuidedParams;
+
+use super::feature::Agreed;
+use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, own, separate_failure};
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use crate::depth::{LiftedMatch, ProjectedCloudIndex};
+use crate::event::{
+    ConsensusJudged, DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried,
+    MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
+};
+use crate::features::{
+    FeatureState, Features, Keypoint, Match, MatchVerdict, SiftFeatures, SiftParams, classify,
+    nearest_neighbours_interruptible, sift_interruptible,
+};
+use crate::geometry::Pose;
+use crate::image::Photo;
+use crate::memo::{Exact, Memo, Remembered};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::{Problem, ReferenceTuple};
+use crate::render::{RenderParams, color_cloud_by};
+use crate::robust::{Acceptance, MlesacError, effective_area_px, inliers_beyond_chance, mlesac};
+use crate::solver::{Correspondence, refine};
+use crate::trace::{Cancelled, Trace};
+
+/// The estimator in the registry.
+pub(super) const ENTRY: super::Entry = super::Entry {
+    method: Method::named("fb2"),
+    about: "indirect: SIFT, depth of visible points, and a second matching where the first pose says",
+    parts: super::Parts::Own(own::Own {
+        make: |params| Box::new(Guided::new(params)),
+        shows: None,
+        has_features: true,
+    }),
+};
+
+/// The fewest correspondences that fix a pose.
+const MINIMUM: usize = 4;
+/// Matchings after the first: each starts from the pose of the one before.
+const GUIDED_ROUNDS: usize = 2;
+/// Features that are sought again between two checkpoints.
+const SOUGHT_AT_A_TIME: usize = 512;
+
+/// The estimator with two matchings.
+pub struct Guided {
+    params: GuidedParams,
+    render: RenderParams,
+}
+
+/// Both photos' features, and what is known of the reference's.
+pub(super) struct Detected {
+    query: Arc<SiftFeatures>,
+    reference: Arc<SiftFeatures>,
+    /// The 3-D point of each reference feature, where it has one.
+    lifted: Arc<ReferencePoints>,
+}
+
+/// The depth of each feature of a reference.
+struct ReferencePoints(Vec<LiftedMatch>);
+
+impl Remembered for ReferencePoints {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+}
+
+/// Under what the depths are remembered.
+#[derive(PartialEq, Eq, Hash)]
+struct PointsKey {
+    sift: Exact<SiftParams>,
+    render: Exact<RenderParams>,
+    radius: Exact<f64>,
+    spread: Exact<f64>,
+}
+
+/// A match and the pixels that it says belong together.
+#[derive(Clone, Copy)]
+struct Pairing {
+    query: usize,
+    correspondence: Correspondence,
+}
+
+/// A pose with the matches that it was found among.
+struct Solved {
+    /// `camera_from_reference`.
+    pose: Pose,
+    pairings: Vec<Pairing>,
+    residuals_px: Vec<f64>,
+    inliers: Vec<usize>,
+    log_likelihood: f64,
+    trials: usize,
+    /// Whether the inliers are more than chance explains.
+    acceptance: Acceptance,
+}
+
+impl Guided {
+    /// The estimator with these parameters.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            params: params.fb2.clone(),
+            render: params.render.clone(),
+        }
+    }
+
+    /// What the estimator answers, with the consensus behind it, accepted or not.
+    pub(super) fn propose(
+        &self,
+        problem: &Problem,
+        trace: &mut Trace<'_>,
+    ) -> Result<(Outcome, Option<Agreed>), Cancelled> {
+        let mut counts = FeatureCounts::default();
+        let mut agreed = None;
+        let pose = trace.stage(Stage::Estimator(ENTRY.method), |trace| {
+            let detected = self.detect(problem, &mut counts, trace)?;
+            let first = self.match_freely(problem, &detected, &mut counts, trace)?;
+            let solved = self.match_again(problem, &detected, first, trace)?;
+            counts.inliers = solved.inliers.len();
+            counts.with_depth = counts.with_depth.max(solved.pairings.len());
+            agreed = Some(Agreed {
+                reference_from_query: solved.pose.inverse(),
+                log_likelihood: solved.log_likelihood,
+            });
+            trace.stage(Stage::Accept, |trace| self.accept(problem, &solved, trace))
+        });
+        let outcome = Outcome {
+            pose: separate_failure(pose)?,
+            counts: Some(counts),
+            cost: None,
+            fell_back: false,
+        };
+        Ok((outcome, agreed))
+    }
+
+    fn detect(
+        &self,
+        problem: &Problem,
+        counts: &mut FeatureCounts,
+        trace: &mut Trace<'_>,
+    ) -> Result<Detected, Halt> {
+        trace.stage(Stage::Detect, |trace| {
+            let mut of = |side, photo: &Photo, memo: &Memo| -> Result<_, Cancelled> {
+                let sift = &self.params.sift;
+                let found = memo.try_recall(Exact::of(sift), || {
+                    sift_interruptible(&photo.gray, sift, || trace.checkpoint())
+                })?;
+                trace.emit(|| FeaturesDetected {
+                    side,
+                    features: Arc::new(Features {
+                        keypoints: found.value.keypoints.clone(),
+                        descriptors: Vec::new(),
+                    }),
+                })?;
+                Ok(found)
+            };
+            let query = of(Side::Query, &problem.query.photo, &problem.query.memo)?;
+            let tuple = &problem.reference;
+            let reference = of(Side::Reference, &tuple.photo, &tuple.memo)?;
+            trace.note_reuse(query.reused && reference.reused);
+            counts.query_keypoints = query.value.keypoints.len();
+            counts.reference_keypoints = reference.value.keypoints.len();
+            if counts.query_keypoints < MINIMUM || counts.reference_keypoints < MINIMUM {
+                return Err(Halt::from(Failure::TooFewFeatures {
+                    query: counts.query_keypoints,
+                    reference: counts.reference_keypoints,
+                }));
+            }
+            Ok(Detected {
+                lifted: self.lifted(tuple, &reference.value),
+                query: query.value,
+                reference: reference.value,
+            })
+        })
+    }
+
+    /// The point of each reference feature, by the visible points alone.
+    fn lifted(&self, tuple: &ReferenceTuple, features: &SiftFeatures) -> Arc<ReferencePoints> {
+        let GuidedParams {
+            sift,
+            depth_radius_px,
+            depth_spread,
+            ..
+        } = &self.params;
+        let key = PointsKey {
+            sift: Exact::of(sift),
+            render: Exact::of(&self.render),
+            radius: Exact::of(depth_radius_px),
+            spread: Exact::of(depth_spread),
+        };
+        let lifted = tuple.memo.recall(key, || {
+            let visible = color_cloud_by(&tuple.cloud, &tuple.intrinsics, &self.render, |_, _| 0.0);
+            let visible = Cloud {
+                points: visible.points.iter().map(|point| point.position).collect(),
+            };
+            let index = ProjectedCloudIndex::new(&visible, &tuple.intrinsics);
+            let lift = |(number, keypoint): (usize, &Keypoint)| {
+                let pixel = keypoint.pixel();
+                let reading = index.read(&pixel, *depth_radius_px);
+                let depths = reading.within;
+                let even = depths.filter(|depths| depths.relative_spread() <= *depth_spread);
+                LiftedMatch {
+                    query: 0,
+                    reference: number,
+                    lidar_distance_px: reading.distance_px,
+                    depth_range_m: depths.map(|depths| (depths.least, depths.greatest)),
+                    point: even.map(|depths| tuple.intrinsics.unproject(&pixel, depths.nearest)),
+                }
+            };
+            ReferencePoints(features.keypoints.iter().enumerate().map(lift).collect())
+        });
+        lifted.value
+    }
+
+    /// The first matching, over the whole image, and its consensus.
+    fn match_freely(
+        &self,
+        problem: &Problem,
+        detected: &Detected,
+        counts: &mut FeatureCounts,
+        trace: &mut Trace<'_>,
+    ) -> Result<Solved, Halt> {
+        let decisions = trace.stage(Stage::Match, |trace| {
+            let (query, reference) = (&detected.query, &detected.reference);
+            let mut checkpoint = || trace.checkpoint();
+            let (query, reference) = (&query.descriptors, &reference.descriptors);
+            let forward = nearest_neighbours_interruptible(query, reference, &mut checkpoint)?;
+            let backward = nearest_neighbours_interruptible(reference, query, &mut checkpoint)?;
+            let decisions: Arc<[Option<Match>]> =
+                classify(&forward, &backward, self.params.ratio as f32).into();
+            trace.emit(|| MatchesDecided {
+                decisions: Arc::clone(&decisions),
+            })?;
+            Ok::<_, Halt>(decisions)
+        })?;
+        let passed = |found: &&Match| found.verdict != MatchVerdict::Ambiguous;
+        let is_unique = |found: &&Match| found.verdict == MatchVerdict::Candidate;
+        counts.ratio_passed = decisions.iter().flatten().filter(passed).count();
+        let unique: Vec<&Match> = decisions.iter().flatten().filter(is_unique).collect();
+        counts.unique = unique.len();
+        if unique.len() < MINIMUM {
+            return Err(Halt::from(Failure::TooFewMatches {
+                unique: unique.len(),
+                keypoints: counts.query_keypoints,
+            }));
+        }
+        let pairings = trace.stage(Stage::DepthLift, |trace| {
+            trace.emit(|| ProjectedCloud {
+                points: problem.reference.cloud.len(),
+                in_view: problem.reference.cloud.len(),
+            })?;
+            let lifted: Arc<[LiftedMatch]> = unique
+                .iter()
+                .map(|found| LiftedMatch {
+                    query: found.query,
+                    ..detected.lifted.0[found.reference]
+                })
+                .collect();
+            trace.emit(|| DepthsLifted {
+                matches: Arc::clone(&lifted),
+            })?;
+            let pairings = lifted
+                .iter()
+                .filter_map(|lifted| detected.pairing(lifted.query, lifted.reference));
+            Ok::<_, Halt>(pairings.collect::<Vec<_>>())
+        })?;
+        counts.with_depth = pairings.len();
+        if pairings.len() < MINIMUM {
+            return Err(Halt::from(Failure::TooFewDepths {
+                with_depth: pairings.len(),
+                unique: unique.len(),
+            }));
+        }
+        let pixels: Vec<Point2<f64>> = pairings.iter().map(|p| p.correspondence.pixel).collect();
+        let area_px = effective_area_px(&pixels, problem.query.intrinsics.area());
+        trace.stage(Stage::Consensus, |trace| {
+            self.consensus(problem, pairings, area_px, trace)
+        })
+    }
+
+    fn consensus(
+        &self,
+        problem: &Problem,
+        pairings: Vec<Pairing>,
+        area_px: f64,
+        trace: &mut Trace<'_>,
+    ) -> Result<Solved, Halt> {
+        let correspondences: Vec<_> = pairings.iter().map(|p| p.correspondence).collect();
+        let found = mlesac(
+            &correspondences,
+            &problem.query.intrinsics,
+            &self.params.mlesac,
+            problem.random_seed("mlesac of fb2"),
+            |trial| trace.emit(|| HypothesisTried { trial: *trial }),
+        );
+        let no_consensus = |best_inliers, trials| {
+            Halt::from(Failure::NoConsensus {
+                correspondences: correspondences.len(),
+                best_inliers,
+                trials,
+            })
+        };
+        let consensus = match found {
+            Ok(consensus) => consensus,
+            Err(MlesacError::TooFewCorrespondences { .. }) => return Err(no_consensus(0, 0)),
+            Err(MlesacError::NoModel {
+                trials,
+                best_inliers,
+            }) => return Err(no_consensus(best_inliers, trials)),
+            Err(MlesacError::Cancelled(cancelled)) => return Err(Halt::from(cancelled)),
+        };
+        trace.emit(|| PoseRefined {
+            reference_from_query: consensus.pose.inverse(),
+            inliers: consensus.inliers.len(),
+            correspondences: correspondences.len(),
+            trials: consensus.trials,
+        })?;
+        let acceptance = self.chance(consensus.inliers.len(), pairings.len(), area_px);
+        Ok(Solved {
+            pose: consensus.pose,
+            pairings,
+            residuals_px: consensus.residuals_px,
+            inliers: consensus.inliers,
+            log_likelihood: consensus.log_likelihood,
+            trials: consensus.trials,
+            acceptance,
+        })
+    }
+
+    /// Matches again where the pose says, and refines it on what agrees, as long as more agree.
+    ///
+    /// Whether the pose is more than chance says the first matching alone: what is sought where a pose
+    /// wants it agrees with that pose, and between unrelated streets every second pose would pass.
+    fn match_again(
+        &self,
+        problem: &Problem,
+        detected: &Detected,
+        first: Solved,
+        trace: &mut Trace<'_>,
+    ) -> Result<Solved, Halt> {
+        let mut best = first;
+        if self.params.guided {
+            for _ in 0..GUIDED_ROUNDS {
+                let guided = trace.stage(Stage::MatchGuided, |trace| {
+                    let guided = self.guided(problem, detected, &best, trace)?;
+                    if let Some(guided) = &guided {
+                        trace.emit(|| PoseRefined {
+                            reference_from_query: guided.pose.inverse(),
+                            inliers: guided.inliers.len(),
+                            correspondences: guided.pairings.len(),
+                            trials: guided.trials,
+                        })?;
+                    }
+                    Ok::<_, Halt>(guided)
+                })?;
+                match guided {
+                    Some(guided) if guided.inliers.len() > best.inliers.len() => {
+                        best = Solved {
+                            acceptance: best.acceptance,
+                            ..guided
+                        };
+                    }
+                    _ => break,
+                }
+            }
+        }
+        trace.emit(|| FeaturesClassified {
+            states: states(detected.query.keypoints.len(), &best),
+        })?;
+        Ok(best)
+    }
+
+    /// Matches where the pose of an earlier matching says that features must be.
+    fn guided(
+        &self,
+        problem: &Problem,
+        detected: &Detected,
+        before: &Solved,
+        trace: &mut Trace<'_>,
+    ) -> Result<Option<Solved>, Cancelled> {
+        let Solved {
+            pose, acceptance, ..
+        } = before;
+        let camera = &problem.query.intrinsics;
+        let windows = Windows::new(&detected.query.keypoints, camera, self.params.window_px);
+        // The best reference feature of each query feature.
+        let mut best: Vec<Option<(usize, f32)>> = vec![None; detected.query.keypoints.len()];
+        let numbers: Vec<usize> = (0..detected.reference.keypoints.len()).collect();
+        for some in numbers.chunks(SOUGHT_AT_A_TIME) {
+            trace.checkpoint()?;
+            for &number in some {
+                let Some((query, distance)) = self.sought(detected, &windows, camera, pose, number)
+                else {
+                    continue;
+                };
+                if best[query].is_none_or(|(_, least)| distance < least) {
+                    best[query] = Some((number, distance));
+                }
+            }
+        }
+        let pairings: Vec<Pairing> = best
+            .iter()
+            .enumerate()
+            .filter_map(|(query, found)| detected.pairing(query, (*found)?.0))
+            .collect();
+        if pairings.len() < MINIMUM {
+            return Ok(None);
+        }
+        let correspondences: Vec<_> = pairings.iter().map(|p| p.correspondence).collect();
+        let threshold = self.params.mlesac.inlier_threshold_px;
+        let mut pose = *pose;
+        let mut residuals_px = residuals(&correspondences, camera, &pose);
+        // From the window inwards, so that a first pose that is a few pixels off is pulled in.
+        for reach in [0.5 * self.params.window_px, threshold, threshold] {
+            let agreeing: Vec<_> = correspondences
+                .iter()
+                .zip(&residuals_px)
+                .filter(|(_, residual)| **residual < reach.max(threshold))
+                .map(|(correspondence, _)| *correspondence)
+                .collect();
+            if agreeing.len() < MINIMUM {
+                return Ok(None);
+            }
+            pose = refine(&agreeing, camera, &pose, self.params.mlesac.loss()).pose;
+            residuals_px = residuals(&correspondences, camera, &pose);
+        }
+        let inliers: Vec<usize> = (0..pairings.len())
+            .filter(|&i| residuals_px[i] < threshold)
+            .collect();
+        let sigma = self.params.mlesac.sigma_px;
+        // Here a false match may lie anywhere in its window.
+        let area_px = std::f64::consts::PI * self.params.window_px.powi(2);
+        Ok(Some(Solved {
+            pose,
+            log_likelihood: log_likelihood(&residuals_px, sigma, area_px),
+            acceptance: *acceptance,
+            residuals_px,
+            pairings,
+            inliers,
+            trials: 0,
+        }))
+    }
+
+    /// The query feature that a reference feature is, if one stands out where it must be.
+    fn sought(
+        &self,
+        detected: &Detected,
+        windows: &Windows,
+        camera: &Intrinsics,
+        pose: &Pose,
+        number: usize,
+    ) -> Option<(usize, f32)> {
+        let point = detected.lifted.0[number].point?;
+        let seen = pose * point;
+        let pixel = camera.project(&seen)?;
+        let keypoint = detected.reference.keypoints[number];
+        let scale = f64::from(keypoint.scale) * point.z / seen.z;
+        let descriptor = &detected.reference.descriptors[number];
+        let (mut nearest, mut second) = (None, f32::INFINITY);
+        let mut least = f32::INFINITY;
+        for query in windows.around(&pixel) {
+            let candidate = detected.query.keypoints[query];
+            let ratio = f64::from(candidate.scale) / scale;
+            if (candidate.pixel() - pixel).norm() > self.params.window_px
+                || ratio.max(1.0 / ratio) > self.params.scale_ratio
+            {
+                continue;
+            }
+            let other = &detected.query.descriptors[query];
+            let product: f32 = descriptor.iter().zip(other).map(|(a, b)| a * b).sum();
+            let distance = (2.0 - 2.0 * product).max(0.0).sqrt();
+            // One feature with two directions is no rival of itself.
+            let is_same = nearest.is_some_and(|known: usize| {
+                (detected.query.keypoints[known].pixel() - candidate.pixel()).norm() < 1.0
+            });
+            if distance < least {
+                if !is_same {
+                    second = least;
+                }
+                (nearest, least) = (Some(query), distance);
+            } else if distance < second && !is_same {
+                second = distance;
+            }
+        }
+        let stands_out = least < self.params.window_ratio as f32 * second;
+        nearest
+            .filter(|_| stands_out && least < MOST_DISTANCE)
+            .map(|query| (query, least))
+    }
+
+    /// Whether so many inliers are more than chance explains, where a false match lies anywhere in an
+    /// area \[px²\].
+    fn chance(&self, inliers: usize, correspondences: usize, area_px: f64) -> Acceptance {
+        let threshold = self.params.mlesac.inlier_threshold_px;
+        inliers_beyond_chance(inliers, correspondences, threshold, area_px)
+    }
+
+    fn accept(
+        &self,
+        problem: &Problem,
+        solved: &Solved,
+        trace: &mut Trace<'_>,
+    ) -> Result<Pose, Halt> {
+        let reference_from_query = solved.pose.inverse();
+        let acceptance = solved.acceptance;
+        let distance_m = reference_from_query.translation.vector.norm();
+        let radius_m = problem.believed_within_m();
+        let inliers = acceptance.inliers;
+        let verdict = if acceptance.needed.is_none_or(|needed| inliers < needed) {
+            Err(Failure::ChanceConsensus {
+                inliers,
+                correspondences: solved.pairings.len(),
+                needed: acceptance.needed.unwrap_or(solved.pairings.len() + 1),
+            })
+        } else if distance_m > radius_m * (1.0 + self.params.radius_slack) {
+            Err(Failure::OutsideRadius {
+                distance_m,
+                radius_m,
+            })
+        } else {
+            Ok(())
+        };
+        trace.emit(|| ConsensusJudged {
+            acceptance,
+            distance_m,
+            accepted: verdict.is_ok(),
+        })?;
+        verdict?;
+        Ok(problem.world_from_query(&reference_from_query))
+    }
+}
+
+/// Descriptors farther apart than this do not show the same thing, however alone they are.
+const MOST_DISTANCE: f32 = 0.8;
+
+impl Estimator for Guided {
+    fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+        Ok(self.propose(problem, trace)?.0)
+    }
+}
+
+impl Detected {
+    fn pairing(&self, query: usize, reference: usize) -> Option<Pairing> {
+        Some(Pairing {
+            query,
+            correspondence: Correspondence {
+                pixel: self.query.keypoints[query].pixel(),
+                point: self.lifted.0[reference].point?,
+            },
+        })
+    }
+}
+
+/// Keypoints by the square of the image that they lie in.
+struct Windows {
+    side: f64,
+    columns: usize,
+    rows: usize,
+    members: Vec<Vec<usize>>,
+}
+
+impl Windows {
+    fn new(keypoints: &[Keypoint], camera: &Intrinsics, side: f64) -> Self {
+        let along = |length: u32| (f64::from(length) / side) as usize + 1;
+        let (columns, rows) = (along(camera.width), along(camera.height));
+        let mut windows = Self {
+            side,
+            columns,
+            rows,
+            members: vec![Vec::new(); columns * rows],
+        };
+        for (number, keypoint) in keypoints.iter().enumerate() {
+            let (column, row) = windows.square(&keypoint.pixel());
+            windows.members[row * columns + column].push(number);
+        }
+        windows
+    }
+
+    fn square(&self, pixel: &Point2<f64>) -> (usize, usize) {
+        let place = |at: f64, count: usize| ((at.max(0.0) / self.side) as usize).min(count - 1);
+        (place(pixel.x, self.columns), place(pixel.y, self.rows))
+    }
+
+    /// The keypoints in the square of a pixel and those around it.
+    fn around(&self, pixel: &Point2<f64>) -> impl Iterator<Item = usize> + '_ {
+        let (column, row) = self.square(pixel);
+        let rows = row.saturating_sub(1)..(row + 2).min(self.rows);
+        rows.flat_map(move |row| {
+            let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+            columns
+                .flat_map(move |column| self.members[row * self.columns + column].iter().copied())
+        })
+    }
+}
+
+/// Reprojection errors \[px\]; infinite behind the camera.
+fn residuals(correspondences: &[Correspondence], camera: &Intrinsics, pose: &Pose) -> Vec<f64> {
+    let residual = |correspondence: &Correspondence| {
+        let pixel = camera.project(&(pose * correspondence.point));
+        pixel.map_or(f64::INFINITY, |pixel| (pixel - correspondence.pixel).norm())
+    };
+    correspondences.iter().map(residual).collect()
+}
+
+/// The log likelihood of the residuals where a true match is off by a Gaussian and a false one lies
+/// anywhere in the area, each as likely.
+fn log_likelihood(residuals_px: &[f64], sigma_px: f64, area_px: f64) -> f64 {
+    let variance = sigma_px * sigma_px;
+    let density = |residual: &f64| {
+        let gaussian = (-residual * residual / (2.0 * variance)).exp();
+        0.5 * gaussian / (std::f64::consts::TAU * variance) + 0.5 / area_px
+    };
+    residuals_px
+        .iter()
+        .map(|residual| density(residual).ln())
+        .sum()
+}
+
+/// The state in which every query feature ended.
+fn states(keypoints: usize, solved: &Solved) -> Arc<[FeatureState]> {
+    let mut states = vec![
+        FeatureState::RatioFailed {
+            ratio: f32::INFINITY
+        };
+        keypoints
+    ];
+    for (pairing, &residual_px) in solved.pairings.iter().zip(&solved.residuals_px) {
+        states[pairing.query] = FeatureState::Outlier { residual_px };
+    }
+    for &inlier in &solved.inliers {
+        states[solved.pairings[inlier].query] = FeatureState::Inlier {
+            residual_px: solved.residuals_px[inlier],
+        };
+    }
+    states.into()
+}

@@ -1,0 +1,260 @@
+//! `robust`: one judge between the families.
+//!
+//! HY takes FB's pose wherever FB accepts one, and MI's elsewhere. It follows FB where its matches agree
+//! on a wrong pose, and drops a right one that too few matches support. Here the poses of both families
+//! are refined in six freedoms under one cost, that of the [judge](crate::judge), and the cheapest is
+//! the answer. That features agree beyond chance earns their pose a small credit; that they do not costs
+//! it nothing.
+
+mod params;
+
+use std::sync::Arc;
+
+pub use params::RobustParams;
+
+use super::feature::Agreed;
+use super::mi6::Found;
+use super::{
+    CostSummary, Estimator, Failure, FeatureBased, Guided, Halt, Outcome, SixFreedoms, own,
+    separate_failure,
+};
+use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
+use crate::geometry::Pose;
+use crate::judge::{Judge, Refined, Start, shrink};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::render::Comparison;
+use crate::trace::{Cancelled, Trace};
+
+/// The estimator in the registry.
+pub(super) const ENTRY: super::Entry = super::Entry {
+    method: Method::named("robust"),
+    about: "the cheapest of the poses of fb, fb2 and mi6, refined under one cost",
+    parts: super::Parts::Own(own::Own {
+        make: |params| Box::new(Robust::new(params)),
+        shows: Some("mi"),
+        has_features: true,
+    }),
+};
+
+/// The estimator that takes the cheaper pose.
+pub struct Robust {
+    feature: FeatureBased,
+    guided: Guided,
+    six: SixFreedoms,
+    params: RobustParams,
+}
+
+/// A consensus of features, accepted by its method or not.
+struct Proposed {
+    method: Method,
+    agreed: Agreed,
+    accepted: bool,
+}
+
+impl Robust {
+    /// The estimator with these parameters.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            feature: FeatureBased::new(params),
+            guided: Guided::new(params),
+            six: SixFreedoms::new(params),
+            params: params.robust.clone(),
+        }
+    }
+
+    /// Refines the features' pose under the judge; `None` where it lies outside the disc, or covers too
+    /// little to have a cost.
+    fn refined(
+        &self,
+        problem: &Problem,
+        judge: &Judge,
+        agreed: &Agreed,
+        trace: &mut Trace<'_>,
+    ) -> Result<Option<Refined>, Cancelled> {
+        let pose = agreed.reference_from_query;
+        let reach = self.six.reach(problem);
+        if pose.translation.vector.norm() > reach {
+            return Ok(None);
+        }
+        let scores = judge.score(&[Pose::identity(), pose]);
+        let least_covered = self.six.least_covered(scores[0]);
+        let Some(cost) = scores[1].eligible_cost(least_covered) else {
+            return Ok(None);
+        };
+        let start = [Start { pose, cost }];
+        let plan = self.six.in_six();
+        let refined = shrink(&start, &plan, |poses| {
+            trace.checkpoint()?;
+            Ok::<_, Cancelled>(judge.costs(poses, least_covered))
+        })?;
+        let inside = refined
+            .first()
+            .filter(|one| one.pose.translation.vector.norm() <= reach);
+        Ok(inside.copied())
+    }
+
+    fn decide(
+        &self,
+        problem: &Problem,
+        proposed: &[Proposed],
+        trace: &mut Trace<'_>,
+    ) -> Result<(Pose, Option<CostSummary>), Halt> {
+        let judge = self.six.judge(problem);
+        let found = trace.stage(Stage::Estimator(super::mi6::ENTRY.method), |trace| {
+            self.six.search(problem, &judge, trace)
+        });
+        let found = separate_failure(found)?;
+        trace.stage(Stage::Judge, |trace| {
+            let Found {
+                refined,
+                summary,
+                spread,
+            } = match found {
+                Ok(found) => found,
+                Err(failure) => return unjudged(problem, proposed, failure, trace),
+            };
+            let mut candidates: Vec<JudgedPose> = refined
+                .iter()
+                .map(|&refined| JudgedPose {
+                    method: super::mi6::ENTRY.method,
+                    refined,
+                    log_likelihood: None,
+                    accepted: true,
+                })
+                .collect();
+            for proposed in proposed {
+                if let Some(refined) = self.refined(problem, &judge, &proposed.agreed, trace)? {
+                    candidates.push(JudgedPose {
+                        method: proposed.method,
+                        refined,
+                        log_likelihood: Some(proposed.agreed.log_likelihood),
+                        accepted: proposed.accepted,
+                    });
+                }
+            }
+            // The features' poses come last and the sort is stable: of equally cheap ones the search's
+            // stands.
+            let price = |candidate: &JudgedPose| {
+                let is_agreed = candidate.log_likelihood.is_some() && candidate.accepted;
+                let credit = if is_agreed { self.params.credit } else { 0.0 };
+                -spread.deviations(candidate.refined.cost) - credit
+            };
+            candidates.sort_by(|a, b| price(a).total_cmp(&price(b)));
+            let best = candidates[0].clone();
+            let deviations = spread.deviations(best.refined.cost);
+            let needed = self.params.deviations;
+            let why = why(&candidates);
+            trace.emit(|| CandidatesJudged {
+                candidates: Arc::from(candidates.as_slice()),
+                deviations,
+                needed,
+                why: why.clone(),
+            })?;
+            if deviations < needed {
+                return Err(Halt::from(Failure::ChanceMinimum {
+                    cost: best.refined.cost,
+                    deviations,
+                    needed,
+                }));
+            }
+            trace.emit(|| BranchTaken {
+                method: best.method,
+                why: why.clone(),
+            })?;
+            let pose = problem.world_from_query(&best.refined.pose);
+            let summary = CostSummary {
+                best: best.refined.cost,
+                ..summary
+            };
+            Ok((pose, Some(summary)))
+        })
+    }
+}
+
+/// Where nothing can be searched, the features' accepted pose stands as it is.
+fn unjudged(
+    problem: &Problem,
+    proposed: &[Proposed],
+    failure: Failure,
+    trace: &mut Trace<'_>,
+) -> Result<(Pose, Option<CostSummary>), Halt> {
+    // The last is that of the better features.
+    let Some(accepted) = proposed.iter().rev().find(|proposed| proposed.accepted) else {
+        return Err(Halt::from(failure));
+    };
+    trace.emit(|| BranchTaken {
+        method: accepted.method,
+        why: format!("there is no search to compare with: {failure}"),
+    })?;
+    let pose = problem.world_from_query(&accepted.agreed.reference_from_query);
+    Ok((pose, None))
+}
+
+/// Why the first candidate is the answer.
+fn why(candidates: &[JudgedPose]) -> String {
+    let best = &candidates[0];
+    let said = |candidate: &JudgedPose| {
+        let refused = if candidate.accepted {
+            ""
+        } else {
+            " (refused by itself)"
+        };
+        format!(
+            "{}{refused} {:.4}",
+            candidate.method, candidate.refined.cost
+        )
+    };
+    let mut methods = vec![best.method];
+    let mut others = Vec::new();
+    for candidate in &candidates[1..] {
+        if !methods.contains(&candidate.method) {
+            methods.push(candidate.method);
+            others.push(said(candidate));
+        }
+    }
+    match others.is_empty() {
+        true => format!("{}, and nothing to compare with", said(best)),
+        false => format!("{} against {}", said(best), others.join(", ")),
+    }
+}
+
+impl Estimator for Robust {
+    fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+        trace.stage(Stage::Estimator(ENTRY.method), |trace| {
+            let proposal = self.feature.propose(problem, trace)?;
+            let (guided, guided_agreed) = self.guided.propose(problem, trace)?;
+            let proposed: Vec<Proposed> = [
+                (Method::FB, proposal.consensus, &proposal.outcome),
+                (super::fb2::ENTRY.method, guided_agreed, &guided),
+            ]
+            .into_iter()
+            .filter_map(|(method, agreed, outcome)| {
+                Some(Proposed {
+                    method,
+                    agreed: agreed?,
+                    accepted: outcome.pose.is_ok(),
+                })
+            })
+            .collect();
+            let decided = self.decide(problem, &proposed, trace);
+            let outcome = match separate_failure(decided)? {
+                Ok((pose, summary)) => Outcome {
+                    pose: Ok(pose),
+                    cost: summary,
+                    ..proposal.outcome
+                },
+                Err(failure) => Outcome {
+                    counts: proposal.outcome.counts,
+                    ..Outcome::failed(failure)
+                },
+            };
+            Ok(outcome)
+        })
+    }
+
+    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
+        self.six.compare_at(problem, world_from_query)
+    }
+}

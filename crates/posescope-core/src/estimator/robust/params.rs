@@ -1,0 +1,25 @@
+//! Parameters of `robust`.
+
+use crate::describe::parameters;
+
+parameters! {
+    /// Parameters of the decision between the poses of several methods.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct RobustParams {
+        /// How far below the costs of the coarse positions the answer's cost must be, in robust standard
+        /// deviations of those costs; 0 answers always, as the direct methods do.
+        pub deviations: f64 = number("deviations", "", 0.0..=100.0),
+        /// What the pose of features that agree beyond chance is worth, in the same standard deviations:
+        /// it is taken where it costs at most so much more than the search's.
+        pub credit: f64 = number("credit", "", 0.0..=100.0),
+    }
+}
+
+impl Default for RobustParams {
+    fn default() -> Self {
+        Self {
+            deviations: 0.0,
+            credit: 1.0,
+        }
+    }
+}

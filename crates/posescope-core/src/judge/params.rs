@@ -1,0 +1,70 @@
+//! What the judge is told.
+
+use crate::describe::{choice, parameters};
+
+/// Which channels have a say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channels {
+    /// The grey value.
+    Intensity,
+    /// The grey value against its surroundings.
+    Contrast,
+    /// The strength of edges.
+    Gradient,
+    /// All three.
+    Three,
+}
+
+choice!(Channels:
+    Intensity = "intensity",
+    Contrast = "contrast",
+    Gradient = "gradient",
+    Three = "three",
+);
+
+impl Channels {
+    /// The places of those that have a say, in the order of [`super::CHANNELS`].
+    pub(super) fn places(self) -> std::ops::Range<usize> {
+        match self {
+            Self::Intensity => 0..1,
+            Self::Contrast => 1..2,
+            Self::Gradient => 2..3,
+            Self::Three => 0..3,
+        }
+    }
+}
+
+parameters! {
+    /// Parameters of the cost that judges the poses of `mi6`, `fb2` and `robust`.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct JudgeParams {
+        /// Which channels have a say: grey value, local contrast, strength of edges, or the mean of all.
+        pub channels: Channels = choice("channels"),
+        /// Whether normalised mutual information is taken less what chance gives as many pixels.
+        pub corrected: bool = flag("corrected"),
+        /// Standard deviation of the Gaussian that smooths the query.
+        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        /// Standard deviation of the Gaussian that smooths the reference photo before it colours the cloud.
+        pub reference_sigma_px: f64 = number("reference_sigma", "px", 0.0..=20.0),
+        /// Standard deviation of the Gaussian that smooths both photos before edges are sought.
+        pub edge_sigma_px: f64 = number("edge_sigma", "px", 0.0..=20.0),
+        /// Standard deviation of the surroundings that a grey value is held against for its contrast.
+        pub contrast_sigma_px: f64 = number("contrast_sigma", "px", 1.0..=200.0),
+        /// Bins per axis of each joint histogram.
+        pub bins: usize = count("bins", "", 2..=256),
+    }
+}
+
+impl Default for JudgeParams {
+    fn default() -> Self {
+        Self {
+            channels: Channels::Three,
+            corrected: true,
+            sigma_px: 1.5,
+            reference_sigma_px: 0.0,
+            edge_sigma_px: 1.5,
+            contrast_sigma_px: 20.0,
+            bins: 16,
+        }
+    }
+}

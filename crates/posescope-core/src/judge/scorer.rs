@@ -1,0 +1,341 @@
+//! What poses cost, many at once.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+use super::chance::corrected_distance;
+use super::channels::ChannelImages;
+use super::params::{Channels, JudgeParams};
+use crate::camera::Intrinsics;
+use crate::cost::{Pair, bin};
+use crate::geometry::Pose;
+use crate::image::{GrayImage, cubic_interpolated};
+use crate::memo::{Exact, Remembered};
+use crate::problem::Problem;
+use crate::render::{
+    Canvas, ColoredPoint, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values, color_cloud,
+};
+
+/// Poses that a thread takes at once.
+const PER_JOB: usize = 4;
+
+/// The bins of the three channels at one place.
+type Bins = [u8; 3];
+
+/// Scores query poses against one reference by the mean cost of three channels.
+pub struct Judge {
+    reference: Arc<ReferencePoints>,
+    query: Arc<QueryBins>,
+    intrinsics: Intrinsics,
+    splat_px: usize,
+    params: JudgeParams,
+    /// Those that no thread works with at present.
+    idle: Mutex<Vec<Worker>>,
+}
+
+struct QueryBins(Vec<Bins>);
+
+/// The coloured points of a reference, as they are drawn.
+struct ReferencePoints {
+    positions: PointArrays,
+    bins: Vec<Bins>,
+}
+
+impl Remembered for QueryBins {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+}
+
+impl Remembered for ReferencePoints {
+    fn heap_bytes(&self) -> usize {
+        self.bins.len() * (size_of::<Bins>() + 3 * size_of::<f32>())
+    }
+}
+
+#[derive(PartialEq, Eq, Hash)]
+struct QueryKey {
+    params: Exact<JudgeParams>,
+    shrink: u32,
+}
+
+#[derive(PartialEq, Eq, Hash)]
+struct ReferenceKey {
+    params: Exact<JudgeParams>,
+    render: Exact<RenderParams>,
+    shrink: u32,
+}
+
+impl Judge {
+    /// The judge of a problem. With `shrink` above 1 both photos are that many times smaller before
+    /// anything else is done: what it says then is coarse, cheap, and smooth over longer ways.
+    pub fn new(
+        problem: &Problem,
+        render: &RenderParams,
+        params: &JudgeParams,
+        shrink: u32,
+    ) -> Self {
+        let query = &problem.query;
+        let bins = query.memo.recall(
+            QueryKey {
+                params: Exact::of(params),
+                shrink,
+            },
+            || query_bins(&query.photo.gray, params, shrink),
+        );
+        let reference = &problem.reference;
+        let points = reference.memo.recall(
+            ReferenceKey {
+                params: Exact::of(params),
+                render: Exact::of(render),
+                shrink,
+            },
+            || reference_points(problem, render, params, shrink),
+        );
+        Self {
+            reference: points.value,
+            query: bins.value,
+            intrinsics: shrunk_camera(&query.intrinsics, shrink),
+            splat_px: render.splat_px,
+            params: params.clone(),
+            idle: Mutex::default(),
+        }
+    }
+
+    /// Points that the reference camera sees.
+    pub fn points(&self) -> usize {
+        self.reference.bins.len()
+    }
+
+    /// The scores of many cameras `reference_from_camera`, in their order, on all threads. `None` for
+    /// the cost where no pixel is covered or all channels are constant, and for images of more than 16
+    /// million pixels, which cannot be drawn.
+    pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+        let jobs = reference_from_camera.par_chunks(PER_JOB);
+        jobs.flat_map_iter(|poses| {
+            let idle = self.idle().pop();
+            let Some(mut worker) = idle.or_else(|| Worker::new(&self.intrinsics, self.splat_px))
+            else {
+                let nothing = Score {
+                    cost: None,
+                    covered: 0,
+                };
+                return vec![nothing; poses.len()];
+            };
+            let scores = poses.iter().map(|pose| worker.score(self, pose)).collect();
+            self.idle().push(worker);
+            scores
+        })
+        .collect()
+    }
+
+    /// The costs of some poses, `None` for those that cover fewer than `least_covered` pixels.
+    pub fn costs(&self, reference_from_camera: &[Pose], least_covered: u32) -> Vec<Option<f64>> {
+        let scores = self.score(reference_from_camera).into_iter();
+        scores
+            .map(|score| score.eligible_cost(least_covered))
+            .collect()
+    }
+
+    /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must
+    /// beat to mean anything.
+    pub fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {
+        let mut worker = Worker::new(&self.intrinsics, self.splat_px)?;
+        let mut pairs = worker.draw(self, reference_from_camera).to_vec();
+        let mut dealt: Vec<Bins> = pairs.iter().map(|pair| pair.synthetic).collect();
+        dealt.shuffle(&mut Pcg64::seed_from_u64(seed));
+        for (pair, synthetic) in pairs.iter_mut().zip(dealt) {
+            pair.synthetic = synthetic;
+        }
+        cost_of(&pairs, &self.params, &mut worker.counts)
+    }
+
+    /// How many poses to score at a time, so that a run can be stopped soon: at most
+    /// [`MOST_AT_A_TIME`].
+    pub fn at_a_time(&self) -> usize {
+        (32 * rayon::current_num_threads()).min(MOST_AT_A_TIME)
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A canvas and the three histograms of what is drawn on it.
+struct Worker {
+    canvas: Canvas<Bins>,
+    counts: Vec<u32>,
+}
+
+impl Worker {
+    fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
+        Some(Self {
+            canvas: Canvas::new(intrinsics, splat_px)?,
+            counts: Vec::new(),
+        })
+    }
+
+    fn draw(&mut self, judge: &Judge, reference_from_camera: &Pose) -> &[Pair<Bins>] {
+        let values = Values {
+            query: &judge.query.0,
+            points: &judge.reference.bins,
+        };
+        let camera_from_points = reference_from_camera.inverse();
+        let positions = &judge.reference.positions;
+        self.canvas.draw(positions, values, &camera_from_points)
+    }
+
+    fn score(&mut self, judge: &Judge, reference_from_camera: &Pose) -> Score {
+        let mut counts = std::mem::take(&mut self.counts);
+        let pairs = self.draw(judge, reference_from_camera);
+        let score = Score {
+            cost: cost_of(pairs, &judge.params, &mut counts),
+            covered: pairs.len() as u32,
+        };
+        self.counts = counts;
+        score
+    }
+}
+
+/// The mean cost of the channels over the pairs.
+fn cost_of(pairs: &[Pair<Bins>], params: &JudgeParams, counts: &mut Vec<u32>) -> Option<f64> {
+    let &JudgeParams {
+        bins,
+        channels,
+        corrected,
+        ..
+    } = params;
+    count(pairs, bins, channels, counts);
+    let cells = bins * bins;
+    let mut costs = [None; 3];
+    for place in channels.places() {
+        let counts = &counts[place * cells..][..cells];
+        costs[place] = corrected_distance(counts, bins, corrected);
+    }
+    mean(&costs[channels.places()])
+}
+
+/// The mean of the costs. A channel that is constant tells nothing, which costs 1; where all are, there
+/// is no cost.
+fn mean(costs: &[Option<f64>]) -> Option<f64> {
+    costs.iter().any(Option::is_some).then(|| {
+        let sum: f64 = costs.iter().map(|cost| cost.unwrap_or(1.0)).sum();
+        sum / costs.len() as f64
+    })
+}
+
+/// Counts the pairs of each channel in a joint histogram of its own.
+fn count(pairs: &[Pair<Bins>], bins: usize, channels: Channels, counts: &mut Vec<u32>) {
+    let cells = bins * bins;
+    counts.clear();
+    counts.resize(3 * cells, 0);
+    if channels != Channels::Three {
+        let place = channels.places().start;
+        let counts = &mut counts[place * cells..][..cells];
+        for pair in pairs {
+            counts[usize::from(pair.query[place]) * bins + usize::from(pair.synthetic[place])] += 1;
+        }
+        return;
+    }
+    let (first, others) = counts.split_at_mut(cells);
+    let (second, third) = others.split_at_mut(cells);
+    let cell = |query: u8, synthetic: u8| usize::from(query) * bins + usize::from(synthetic);
+    for Pair { query, synthetic } in pairs {
+        first[cell(query[0], synthetic[0])] += 1;
+        second[cell(query[1], synthetic[1])] += 1;
+        third[cell(query[2], synthetic[2])] += 1;
+    }
+}
+
+fn binned(values: [f32; 3], bins: usize) -> Bins {
+    values.map(|value| bin(value, bins) as u8)
+}
+
+fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> QueryBins {
+    let (photo, params) = shrunk(photo, params, shrink);
+    let ChannelImages([intensity, contrast, edges]) =
+        ChannelImages::of(&photo, params.sigma_px, &params);
+    let values = intensity.as_raw().iter().zip(contrast.as_raw());
+    let values = values.zip(edges.as_raw());
+    QueryBins(
+        values
+            .map(|((&intensity, &contrast), &edges)| {
+                binned([intensity, contrast, edges], params.bins)
+            })
+            .collect(),
+    )
+}
+
+fn reference_points(
+    problem: &Problem,
+    render: &RenderParams,
+    params: &JudgeParams,
+    shrink: u32,
+) -> ReferencePoints {
+    let reference = &problem.reference;
+    let photo = &reference.photo.gray;
+    let cloud = color_cloud(&reference.cloud, photo, &reference.intrinsics, render);
+    let (photo, params) = shrunk(photo, params, shrink);
+    let camera = shrunk_camera(&reference.intrinsics, shrink);
+    let channels = ChannelImages::of(&photo, params.reference_sigma_px, &params);
+    // A view that is smaller is covered by fewer points.
+    let points: Vec<ColoredPoint> = cloud.points.into_iter().step_by(shrink as usize).collect();
+    let bins = points.iter().map(|point| {
+        let pixel = camera.project(&point.position.cast()).unwrap_or_default();
+        let (x, y) = (pixel.x as f32, pixel.y as f32);
+        let intensity = match shrink {
+            1 if params.reference_sigma_px == 0.0 => cubic_interpolated(&photo, x, y),
+            _ => channels.value(0, x, y),
+        };
+        let values = [intensity, channels.value(1, x, y), channels.value(2, x, y)];
+        binned(values, params.bins)
+    });
+    ReferencePoints {
+        bins: bins.collect(),
+        positions: PointArrays::new(&points),
+    }
+}
+
+/// The photo with squares of `shrink` × `shrink` pixels as its pixels, and the parameters for it.
+fn shrunk(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> (GrayImage, JudgeParams) {
+    if shrink <= 1 {
+        return (photo.clone(), params.clone());
+    }
+    let (width, height) = (photo.width() / shrink, photo.height() / shrink);
+    let smaller = GrayImage::from_fn(width.max(1), height.max(1), |x, y| {
+        let columns = x * shrink..((x + 1) * shrink).min(photo.width());
+        let rows = y * shrink..((y + 1) * shrink).min(photo.height());
+        let count = (columns.len() * rows.len()).max(1) as u32;
+        let sum: u32 = rows
+            .flat_map(|row| columns.clone().map(move |column| (column, row)))
+            .map(|(column, row)| u32::from(photo.get_pixel(column, row).0[0]))
+            .sum();
+        image::Luma([((sum + count / 2) / count) as u8])
+    });
+    let params = JudgeParams {
+        contrast_sigma_px: params.contrast_sigma_px / f64::from(shrink),
+        ..params.clone()
+    };
+    (smaller, params)
+}
+
+/// The camera of the photo that [`shrunk`] makes.
+fn shrunk_camera(camera: &Intrinsics, shrink: u32) -> Intrinsics {
+    if shrink <= 1 {
+        return *camera;
+    }
+    let by = f64::from(shrink);
+    let centre = |c: f64| (c + 0.5) / by - 0.5;
+    Intrinsics {
+        fx: camera.fx / by,
+        fy: camera.fy / by,
+        cx: centre(camera.cx),
+        cy: centre(camera.cy),
+        width: (camera.width / shrink).max(1),
+        height: (camera.height / shrink).max(1),
+    }
+}

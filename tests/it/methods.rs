@@ -1,0 +1,154 @@
+//! The methods beside the paper's: what they say of their decisions, and what they keep.
+
+use image::{GrayImage, Luma};
+use posescope::estimator::{self, Outcome};
+use posescope::event::{CandidatesJudged, PhaseSearched, StartsRefined};
+use posescope::geometry::{Pose, PoseError};
+use posescope::history::History;
+use posescope::judge::{Channels, Judge, JudgeParams};
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::render::RenderParams;
+use posescope::trace::Trace;
+
+use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
+
+/// A query and a reference of different walls.
+fn problem_of_strangers() -> Problem {
+    problem(photo(1.0, 9), photo(0.0, 5), cloud_of_the_walls())
+}
+
+fn params(changes: &[&str]) -> Params {
+    let mut params = Params::default();
+    for change in changes {
+        params.assign(change).expect("a good value");
+    }
+    params
+}
+
+fn told(method: &str, problem: &Problem, params: &Params) -> (Outcome, History) {
+    let method: Method = method.parse().expect("a method");
+    let mut history = History::default();
+    let estimator = estimator::entry(method).make(params);
+    let outcome = estimator.estimate(problem, &mut Trace::to(&mut history));
+    (outcome.expect("nobody cancels"), history)
+}
+
+fn error(problem: &Problem, outcome: &Outcome) -> PoseError {
+    let truth = problem.world_from_query(&Pose::translation(0.0, 0.0, 1.0));
+    PoseError::between(&truth, outcome.pose.as_ref().expect("a pose"))
+}
+
+/// The same query in another light: darker to one side, and its tones bent.
+fn in_other_light(query: &GrayImage) -> GrayImage {
+    GrayImage::from_fn(query.width(), query.height(), |x, y| {
+        let value = f64::from(query.get_pixel(x, y).0[0]) / 255.0;
+        let light = 0.25 + 0.75 * f64::from(x) / f64::from(query.width());
+        Luma([(255.0 * light * value.powf(1.6)) as u8])
+    })
+}
+
+#[test]
+fn the_truth_costs_less_than_what_is_beside_it_in_any_channel_and_light() {
+    let query = in_other_light(&photo(1.0, 5));
+    for problem in [
+        solvable(),
+        problem(query, photo(0.0, 5), cloud_of_the_walls()),
+    ] {
+        for channels in [
+            Channels::Intensity,
+            Channels::Contrast,
+            Channels::Gradient,
+            Channels::Three,
+        ] {
+            let params = JudgeParams {
+                channels,
+                ..JudgeParams::default()
+            };
+            let judge = Judge::new(&problem, &RenderParams::default(), &params, 1);
+            let poses = [
+                Pose::translation(0.0, 0.0, 1.0),
+                Pose::translation(0.4, 0.0, 1.0),
+                Pose::translation(0.0, 0.3, 1.0),
+                Pose::translation(0.0, 0.0, 2.5),
+            ];
+            let costs: Vec<f64> = judge
+                .score(&poses)
+                .iter()
+                .map(|score| score.cost.expect("textured"))
+                .collect();
+            assert!(
+                costs[1..].iter().all(|cost| costs[0] < *cost),
+                "{channels:?} {costs:?}"
+            );
+            let shuffled = judge.shuffled(&poses[0], 3).expect("textured");
+            assert!((shuffled - 1.0).abs() < 0.02, "less chance: {shuffled}");
+        }
+    }
+}
+
+#[test]
+fn six_freedoms_are_searched_at_several_yaws_and_end_below_every_lattice() {
+    let problem = solvable();
+    let (outcome, history) = told("mi6", &problem, &params(&["mi6.yaws=3"]));
+    assert!(error(&problem, &outcome).translation_m < 0.1);
+    let best = outcome.cost.expect("it searched").best;
+    let surfaces: Vec<_> = history.all::<PhaseSearched>().collect();
+    assert_eq!(surfaces.len(), 3, "the fine level's");
+    for (_, searched) in surfaces {
+        let cell = searched.surface.minimum().expect("textured");
+        assert!(best < searched.surface.eligible_cost(cell).expect("a cost"));
+    }
+    let refined: Vec<_> = history.all::<StartsRefined>().collect();
+    assert_eq!(refined.len(), 2);
+    assert_eq!(refined[1].1.refinements[0].cost, best);
+    for (_, refined) in refined {
+        for one in refined.refinements.iter() {
+            assert!(one.cost <= one.start.cost);
+        }
+    }
+}
+
+#[test]
+fn matching_again_where_the_pose_says_adds_inliers() {
+    let problem = solvable();
+    let inliers = |changes: &[&str]| {
+        let (outcome, _) = told("fb2", &problem, &params(changes));
+        assert!(error(&problem, &outcome).translation_m < 0.3);
+        outcome.counts.expect("it matched").inliers
+    };
+    // A strict first ratio leaves much to be found the second time.
+    let (once, twice) = (
+        inliers(&["fb2.ratio=0.7", "fb2.guided=false"]),
+        inliers(&["fb2.ratio=0.7"]),
+    );
+    assert!(twice > once, "{once} {twice}");
+}
+
+#[test]
+fn robust_compares_all_families_and_says_what_each_costs() {
+    let problem = solvable();
+    let (outcome, history) = told("robust", &problem, &params(&["robust.credit=0"]));
+    assert!(error(&problem, &outcome).translation_m < 0.1);
+    let judged = history.last::<CandidatesJudged>().expect("it decided");
+    let costs: Vec<f64> = judged.candidates.iter().map(|c| c.refined.cost).collect();
+    assert!(costs.windows(2).all(|pair| pair[0] <= pair[1]), "{costs:?}");
+    assert_eq!(outcome.cost.expect("it searched").best, costs[0]);
+    for name in ["fb", "fb2", "mi6"] {
+        let is_there = judged.candidates.iter().any(|c| c.method.name() == name);
+        assert!(
+            is_there && judged.why.contains(name),
+            "{name}: {}",
+            judged.why
+        );
+    }
+    // A photo of other walls fits nowhere: with a threshold it is refused, and says how far it was.
+    let other = problem_of_strangers();
+    let (outcome, _) = told("robust", &other, &params(&["robust.deviations=100"]));
+    let failure = outcome.pose.expect_err("other walls");
+    assert!(
+        failure.to_string().contains("100.0 are needed"),
+        "{failure}"
+    );
+}
