@@ -58,7 +58,9 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
 
 /// What the result rests on, in a few words.
 fn evidence(result: &QueryResult) -> String {
-    if let Some(primary) = result.diagnosis.first() {
+    // That a pose is doubted says less than what speaks for it, and is said below the table.
+    let primary = result.diagnosis.first();
+    if let Some(primary) = primary.filter(|primary| primary.code.is_failure()) {
         return format!("{} {}", primary.code, primary.code.about());
     }
     if let Some(reason) = &result.reason {
