@@ -1,6 +1,7 @@
 //! What the methods are measured on: places of the street, and pairs of frames of a scene.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use posescope::geometry::{Pose, PoseError};
@@ -84,14 +85,15 @@ impl Places {
                 queries.insert(of_query, query(drive, frame)?);
             }
             let key = (of_reference.as_str(), chosen);
-            if !references.contains_key(&key) {
-                references.insert(key, reference(other, chosen)?);
-            }
+            let reference = match references.entry(key) {
+                Entry::Occupied(known) => Arc::clone(known.get()),
+                Entry::Vacant(place) => Arc::clone(place.insert(reference(other, chosen)?)),
+            };
             cases.push(Case {
                 cell: format!("{of_reference} → {of_query}"),
                 problem: Problem {
                     query: Arc::clone(&queries[of_query.as_str()]),
-                    reference: Arc::clone(&references[&key]),
+                    reference,
                     uncertainty_radius_m: self.radius_m,
                     prior_m: None,
                     matches: None,
@@ -135,21 +137,24 @@ pub fn pairs(
             if asked.is_none() {
                 asked = Some(query(scene, at)?);
             }
-            if !references.contains_key(&other) {
-                let made = reference(scene, other)?;
-                let made = ReferenceTuple {
-                    world_from_camera: known,
-                    memo: made.memo.shared(),
-                    ..ReferenceTuple::clone(&made)
-                };
-                references.insert(other, Arc::new(made));
-            }
+            let reference = match references.entry(other) {
+                Entry::Occupied(known) => Arc::clone(known.get()),
+                Entry::Vacant(place) => {
+                    let made = reference(scene, other)?;
+                    let made = ReferenceTuple {
+                        world_from_camera: known,
+                        memo: made.memo.shared(),
+                        ..ReferenceTuple::clone(&made)
+                    };
+                    Arc::clone(place.insert(Arc::new(made)))
+                }
+            };
             let query = asked.clone().expect("it was read");
             cases.push(Case {
                 cell: scene.name().to_owned(),
                 problem: Problem {
                     query,
-                    reference: Arc::clone(&references[&other]),
+                    reference,
                     uncertainty_radius_m: radius_m,
                     prior_m: None,
                     matches: None,
