@@ -5,6 +5,7 @@
 //! method. Any other estimator is one file, its `mod` line, its [`Entry`] in [`all`], and its kind in
 //! [`Parts`] where it is made of something new.
 
+mod consensus;
 mod direct;
 mod failure;
 mod fb2;

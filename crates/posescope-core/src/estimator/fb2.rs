@@ -9,21 +9,24 @@
 //!    features that are. Among so few the ratio may be loose.
 
 mod params;
+mod windows;
 
 use std::sync::Arc;
 
 use nalgebra::Point2;
 
 pub use params::GuidedParams;
+use windows::Windows;
 
+use super::consensus::FoundConsensus;
 use super::feature::Agreed;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, own, separate_failure};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::depth::{LiftedMatch, ProjectedCloudIndex};
 use crate::event::{
-    ConsensusJudged, DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried,
-    MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
+    DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried, MatchesDecided,
+    PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
     FeatureState, Features, Keypoint, Match, MatchVerdict, SiftFeatures, SiftParams, classify,
@@ -516,32 +519,17 @@ impl Guided {
         solved: &Solved,
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
-        let reference_from_query = solved.pose.inverse();
         let acceptance = solved.acceptance;
-        let distance_m = reference_from_query.translation.vector.norm();
-        let radius_m = problem.believed_within_m();
-        let inliers = acceptance.inliers;
-        let verdict = if acceptance.needed.is_none_or(|needed| inliers < needed) {
-            Err(Failure::ChanceConsensus {
-                inliers,
-                correspondences: solved.pairings.len(),
-                needed: acceptance.needed.unwrap_or(solved.pairings.len() + 1),
-            })
-        } else if distance_m > radius_m * (1.0 + self.params.radius_slack) {
-            Err(Failure::OutsideRadius {
-                distance_m,
-                radius_m,
-            })
-        } else {
-            Ok(())
-        };
-        trace.emit(|| ConsensusJudged {
+        let found = FoundConsensus {
+            reference_from_query: solved.pose.inverse(),
             acceptance,
-            distance_m,
-            accepted: verdict.is_ok(),
-        })?;
-        verdict?;
-        Ok(problem.world_from_query(&reference_from_query))
+            correspondences: solved.pairings.len(),
+            is_enough: acceptance
+                .needed
+                .is_some_and(|needed| acceptance.inliers >= needed),
+            slack: Some(self.params.radius_slack),
+        };
+        found.judged(problem, trace)
     }
 }
 
@@ -562,48 +550,6 @@ impl Detected {
                 pixel: self.query.keypoints[query].pixel(),
                 point: self.lifted.0[reference].point?,
             },
-        })
-    }
-}
-
-/// Keypoints by the square of the image that they lie in.
-struct Windows {
-    side: f64,
-    columns: usize,
-    rows: usize,
-    members: Vec<Vec<usize>>,
-}
-
-impl Windows {
-    fn new(keypoints: &[Keypoint], camera: &Intrinsics, side: f64) -> Self {
-        let along = |length: u32| (f64::from(length) / side) as usize + 1;
-        let (columns, rows) = (along(camera.width), along(camera.height));
-        let mut windows = Self {
-            side,
-            columns,
-            rows,
-            members: vec![Vec::new(); columns * rows],
-        };
-        for (number, keypoint) in keypoints.iter().enumerate() {
-            let (column, row) = windows.square(&keypoint.pixel());
-            windows.members[row * columns + column].push(number);
-        }
-        windows
-    }
-
-    fn square(&self, pixel: &Point2<f64>) -> (usize, usize) {
-        let place = |at: f64, count: usize| ((at.max(0.0) / self.side) as usize).min(count - 1);
-        (place(pixel.x, self.columns), place(pixel.y, self.rows))
-    }
-
-    /// The keypoints in the square of a pixel and those around it.
-    fn around(&self, pixel: &Point2<f64>) -> impl Iterator<Item = usize> + '_ {
-        let (column, row) = self.square(pixel);
-        let rows = row.saturating_sub(1)..(row + 2).min(self.rows);
-        rows.flat_map(move |row| {
-            let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
-            columns
-                .flat_map(move |column| self.members[row * self.columns + column].iter().copied())
         })
     }
 }

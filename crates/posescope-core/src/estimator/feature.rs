@@ -10,13 +10,14 @@ use nalgebra::Point2;
 
 pub use self::params::{DepthRule, FeatureParams};
 use self::states::FeatureStates;
+use super::consensus::FoundConsensus;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
 use crate::depth::{DepthReading, ProjectedCloudIndex};
 use crate::event::{
-    ConsensusJudged, DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried,
-    MatchesDecided, PoseRefined, ProjectedCloud, Side, Stage,
+    DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried, MatchesDecided,
+    PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
     Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams, classify,
@@ -454,30 +455,16 @@ impl FeatureBased {
             self.params.mlesac.inlier_threshold_px,
             effective_area_px(&pixels, problem.query.intrinsics.area()),
         );
-        let distance_m = reference_from_query.translation.vector.norm();
-        let radius_m = problem.believed_within_m();
-        let too_far = distance_m > radius_m * (1.0 + self.params.radius_slack);
-        let verdict = if !self.params.accept.accepts(&acceptance) {
-            Err(Failure::ChanceConsensus {
-                inliers,
-                correspondences: correspondences.len(),
-                needed: acceptance.needed.unwrap_or(correspondences.len() + 1),
-            })
-        } else if too_far && self.params.accept == AcceptanceRule::Consensus {
-            Err(Failure::OutsideRadius {
-                distance_m,
-                radius_m,
-            })
-        } else {
-            Ok(())
-        };
-        trace.emit(|| ConsensusJudged {
+        let found = FoundConsensus {
+            reference_from_query,
             acceptance,
-            distance_m,
-            accepted: verdict.is_ok(),
-        })?;
-        verdict?;
-        Ok(problem.world_from_query(&reference_from_query))
+            correspondences: correspondences.len(),
+            is_enough: self.params.accept.accepts(&acceptance),
+            // The paper's rule asks for inliers alone.
+            slack: (self.params.accept == AcceptanceRule::Consensus)
+                .then_some(self.params.radius_slack),
+        };
+        found.judged(problem, trace)
     }
 }
 
