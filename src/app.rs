@@ -12,6 +12,7 @@ mod adapter;
 mod camera;
 mod command;
 mod dispatch;
+mod headless;
 mod layout;
 mod navigation;
 mod prober;
@@ -19,6 +20,7 @@ mod queries;
 mod save;
 mod saved;
 mod setup;
+mod shot;
 mod shown;
 mod state;
 mod textures;
@@ -30,14 +32,17 @@ mod view_options;
 pub mod views;
 mod window;
 
+pub use camera::NamedPose;
 pub use command::{Command, Shortcut, shortcuts};
 pub use setup::{ReferencePick, Setup};
+pub use shot::{Moment, Shot, ShotError, shoot};
 pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note, Results};
 pub use view_context::ViewContext;
 pub use view_options::{CompareMode, ViewOptions};
 pub use window::{WindowError, has_display, open, window_options};
 
+use eframe::egui_wgpu::RenderState;
 use layout::Layout;
 
 /// The application.
@@ -52,10 +57,15 @@ pub struct App {
 impl App {
     /// The window's content for a setup. It starts to run at once, in the mode of the setup.
     pub fn new(creation: &eframe::CreationContext<'_>, setup: Setup) -> Self {
-        theme::install(&creation.egui_ctx);
+        let state = creation.wgpu_render_state.as_ref();
+        Self::of(&creation.egui_ctx, state, setup)
+    }
+
+    fn of(ctx: &egui::Context, render_state: Option<&RenderState>, setup: Setup) -> Self {
+        theme::install(ctx);
         Self {
-            state: AppState::new(setup, creation.egui_ctx.clone()),
-            layout: Layout::new(creation.wgpu_render_state.as_ref()),
+            state: AppState::new(setup, ctx.clone()),
+            layout: Layout::new(render_state),
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
@@ -79,9 +89,9 @@ impl App {
     }
 }
 
-impl eframe::App for App {
-    /// Runs for a hidden window too, so that a worker is never left unheard.
-    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+impl App {
+    /// Takes in what other threads have done, and does what was asked for.
+    fn update(&mut self, ctx: &egui::Context) {
         self.state.poll();
         for said in self.pictures.write() {
             match said {
@@ -94,7 +104,8 @@ impl eframe::App for App {
         }
     }
 
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+    /// Draws the window.
+    fn content(&mut self, ui: &mut egui::Ui) {
         command::read_keys(ui.ctx(), &self.commands);
         let Self {
             state,
@@ -115,5 +126,16 @@ impl eframe::App for App {
         for command in self.commands.take() {
             self.dispatch(command, ui.ctx());
         }
+    }
+}
+
+impl eframe::App for App {
+    /// Runs for a hidden window too, so that a worker is never left unheard.
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.update(ctx);
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.content(ui);
     }
 }

@@ -16,6 +16,8 @@ mod observer;
 mod output;
 mod params;
 mod run;
+#[cfg(feature = "app")]
+mod shot;
 mod story;
 mod synth;
 mod table;
@@ -54,6 +56,8 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::View(args)) => {
             view::view(args, posescope::session::RunMode::Paused, &terminal)
         }
+        #[cfg(feature = "app")]
+        Some(Command::Shot(args)) => shot::shot(args, &terminal),
         Some(Command::Eval(args)) => eval::eval(args, &terminal),
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),

@@ -76,7 +76,7 @@ pub fn open(setup: Setup, results: Results) -> Result<(), WindowError> {
     })
 }
 
-fn one_line(text: &str) -> String {
+pub(super) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

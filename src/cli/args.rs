@@ -1,5 +1,8 @@
 //! The arguments.
 
+#[cfg(feature = "app")]
+mod shot;
+
 use std::fmt;
 use std::net::IpAddr;
 use std::num::NonZeroUsize;
@@ -19,6 +22,9 @@ use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 use posescope::session::{Breakpoint, Task};
 use posescope::text::UnknownWord;
+
+#[cfg(feature = "app")]
+pub use shot::ShotArgs;
 
 use super::failure::CliError;
 
@@ -45,6 +51,9 @@ pub enum Command {
     /// Open the window: step through the estimators, see everything, try another pose
     #[cfg(feature = "app")]
     View(Box<ViewArgs>),
+    /// Save a picture of the window, or of one of its views, without a window
+    #[cfg(feature = "app")]
+    Shot(Box<ShotArgs>),
     /// Run an experiment over many queries into a run folder
     Eval(Box<EvalArgs>),
     /// List the queries that a run fixed, broke or changed against another; exit code 1 if it broke

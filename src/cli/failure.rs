@@ -45,6 +45,10 @@ pub enum CliError {
     Draw(#[from] DrawError),
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// There is nothing to draw with, or no room for the picture.
+    #[cfg(feature = "app")]
+    #[error("{0}")]
+    Picture(String),
     /// A gate or a comparison says no.
     #[error("{0}")]
     NotGoodEnough(String),
@@ -93,6 +97,8 @@ impl CliError {
             | Self::Folder(_)
             | Self::Unhealthy(_)
             | Self::Record(_) => BAD_DATA,
+            #[cfg(feature = "app")]
+            Self::Picture(_) => BAD_DATA,
             Self::Interrupted(_) => INTERRUPTED,
         })
     }

@@ -54,7 +54,7 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
 }
 
 /// What the window is opened on, and the results that are known already.
-fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, Results), CliError> {
+pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, Results), CliError> {
     let folder = Path::new(&args.scene);
     let (mut setup, results) = match folder.join("run.toml").is_file() {
         true => of_a_run(args, folder)?,

@@ -6,7 +6,8 @@
 //! conditions against references of all, and counts failure verdicts on poses that are right, with the
 //! truth and without: there should be hardly any.
 //!
-//! Options: `--places N` (40), `--seed N` (0).
+//! Options: `--places N` (40), `--seed N` (0), `--real yes` for the pairs of real photos below
+//! `POSESCOPE_DATA` instead of the street.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,7 +17,8 @@ use posescope::diagnosis::Tolerance;
 use posescope::localize::{QueryResult, Status};
 use posescope::method::Method;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
-use posescope_diagnosis::places::{Case, Drives, Place, frame_of};
+use posescope_diagnosis::places::{Case, Drives, Place, StreetPlace, frame_of};
+use posescope_diagnosis::real_pairs;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -44,31 +46,27 @@ impl Tally {
 
 fn main() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
-    let (mut places, mut seed) = (40, 0);
+    let (mut places, mut seed, mut is_real) = (40, 0, false);
     while let Some(argument) = arguments.next() {
         let value = arguments
             .next()
             .ok_or(format!("{argument} needs a value"))?;
-        let number: usize = value.parse().map_err(|_| format!("{value} is no number"))?;
+        let number = || {
+            value
+                .parse::<usize>()
+                .map_err(|_| format!("{value} is no number"))
+        };
         match argument.as_str() {
-            "--places" => places = number,
-            "--seed" => seed = number as u64,
+            "--places" => places = number()?,
+            "--real" => is_real = value == "yes",
+            "--seed" => seed = number()? as u64,
             other => return Err(format!("unknown argument {other}")),
         }
     }
-    let drives = Drives::new();
-    let conditions = Condition::ALL.map(|c| (c, Traversal::new(WORLD_SEED, c, Size::Full)));
-    let done = AtomicUsize::new(0);
-    let counted: Vec<(Counts, Counts)> = (0..places)
-        .into_par_iter()
-        .map(|number| {
-            let place = Place::numbered(&drives, number, seed);
-            let counts = (unknowable(&place), right(&place, &conditions));
-            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-            eprintln!("{count} of {places} places");
-            counts
-        })
-        .collect();
+    let counted = match is_real {
+        true => in_real_pairs()?,
+        false => on_the_street(places, seed),
+    };
     let (mut believed, mut alarms) = (Counts::new(), Counts::new());
     for (of_unknowable, of_right) in counted {
         add(&mut believed, of_unknowable);
@@ -80,6 +78,38 @@ fn main() -> Result<(), String> {
     );
     print("Poses that are right: failure verdicts", &alarms);
     Ok(())
+}
+
+/// What was counted at each place: of queries that cannot be known, and of those that were right.
+fn on_the_street(places: usize, seed: u64) -> Vec<(Counts, Counts)> {
+    let drives = Drives::new();
+    let conditions = Condition::ALL.map(|c| (c, Traversal::new(WORLD_SEED, c, Size::Full)));
+    let done = AtomicUsize::new(0);
+    let at = |number| {
+        let place = Place::numbered(&drives, number, seed);
+        let right = place.street().map(|street| {
+            let kept = in_two_conditions(&place, street, &conditions);
+            right(&kept)
+        });
+        let counts = (unknowable(&place), right.unwrap_or_default());
+        let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+        eprintln!("{count} of {places} places");
+        counts
+    };
+    (0..places).into_par_iter().map(at).collect()
+}
+
+fn in_real_pairs() -> Result<Vec<(Counts, Counts)>, String> {
+    let pairs = real_pairs::all()?;
+    if pairs.is_empty() {
+        println!("skipped: no data");
+    }
+    let counted = pairs.par_iter().enumerate().map(|(number, pair)| {
+        let place = Place::real(pair, number);
+        eprintln!("{}", pair.name);
+        (unknowable(&place), right(&[place.case()]))
+    });
+    Ok(counted.collect())
 }
 
 fn add(all: &mut Counts, some: Counts) {
@@ -116,7 +146,6 @@ fn unknowable(place: &Place<'_>) -> Counts {
     noise
         .pixels_mut()
         .for_each(|pixel| *pixel = Rgb([rng.random(); 3]));
-    let drive = &place.drives.elsewhere;
     let photos = [
         (
             "grey",
@@ -125,10 +154,7 @@ fn unknowable(place: &Place<'_>) -> Counts {
         ("noise", noise),
         ("mirrored", image::imageops::flip_horizontal(own)),
         ("upside down", image::imageops::rotate180(own)),
-        (
-            "another town",
-            drive.image(place.query % drive.frame_count()),
-        ),
+        ("another town", place.foreign_photo()),
     ];
     let mut counts = Counts::new();
     for (kind, photo) in photos {
@@ -149,10 +175,13 @@ fn probability(result: &QueryResult) -> f64 {
 }
 
 /// The query and the reference of the place in two conditions each.
-fn right(place: &Place<'_>, conditions: &[(Condition, Traversal); 5]) -> Counts {
-    let mut counts = Counts::new();
+fn in_two_conditions(
+    place: &Place<'_>,
+    street: &StreetPlace<'_>,
+    conditions: &[(Condition, Traversal); 5],
+) -> [Case; 2] {
     let (query, reference) = (place.number % 5, (place.number / 5) % 5);
-    let day = &place.drives.day;
+    let day = &street.drives.day;
     let nearest = |drive: &Traversal, frame: usize| {
         let target = day.world_from_camera(frame).translation.vector;
         let away = |k: &usize| (drive.world_from_camera(*k).translation.vector - target).norm();
@@ -160,11 +189,11 @@ fn right(place: &Place<'_>, conditions: &[(Condition, Traversal); 5]) -> Counts 
             .min_by(|a, b| away(a).total_cmp(&away(b)))
             .unwrap_or(0)
     };
-    for (query, reference) in [(query, query), (query, reference)] {
+    [(query, query), (query, reference)].map(|(query, reference)| {
         let (queries, references) = (&conditions[query].1, &conditions[reference].1);
-        let query = nearest(queries, place.query);
-        let reference = nearest(references, place.reference);
-        let case = Case {
+        let query = nearest(queries, street.query);
+        let reference = nearest(references, street.reference);
+        Case {
             query: frame_of(queries, query, &queries.world_from_camera(query)),
             references: vec![frame_of(
                 references,
@@ -172,7 +201,14 @@ fn right(place: &Place<'_>, conditions: &[(Condition, Traversal); 5]) -> Counts 
                 &references.world_from_camera(reference),
             )],
             ..place.case()
-        };
+        }
+    })
+}
+
+/// Failure verdicts and doubts on the poses that are right.
+fn right(cases: &[Case]) -> Counts {
+    let mut counts = Counts::new();
+    for case in cases {
         let (known, withheld) = (case.results(&METHODS, true), case.results(&METHODS, false));
         for (known, withheld) in known.iter().zip(&withheld) {
             let tolerance = Tolerance::default();

@@ -8,10 +8,13 @@
 //! reliability by tenths.
 //!
 //! Options: `--places N` (40), `--seed N` (0), `--dump FILE` to keep the signals, `--from FILE` to use
-//! those of an earlier run, `--diagrams FOLDER` for reliability and ROC as SVG.
+//! those of an earlier run, `--diagrams FOLDER` for reliability and ROC as SVG, `--real yes` to judge
+//! the pairs of real photos below `POSESCOPE_DATA` and nothing else.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{DMatrix, DVector};
@@ -25,13 +28,21 @@ use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::trace::Trace;
 use posescope_diagnosis::diagrams::{self, Scored, said_and_was, tenths};
+use posescope_diagnosis::frames::Frame;
 use posescope_diagnosis::places::frame_of;
+use posescope_diagnosis::real_pairs;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// The conditions whose pairs the probabilities are fitted on.
 const FITTED_ON: [Condition; 3] = [Condition::Overcast, Condition::Sun, Condition::Snow];
+
+/// The methods whose poses have a probability of their own.
+const JUDGED: [Method; 4] = [Method::FB, Method::PM, Method::MI, Method::named("nid")];
+
+/// Uncertainty of the reference's position [m].
+const RADIUS_M: f64 = 10.0;
 
 /// Queries that do not show their place are fitted on too.
 const UNKNOWABLE: &str = "unknowable";
@@ -60,7 +71,7 @@ impl Sample {
 fn main() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
     let (mut places, mut seed, mut dump, mut from) = (40, 0, None, None);
-    let mut diagrams = None;
+    let (mut diagrams, mut is_real) = (None, false);
     while let Some(argument) = arguments.next() {
         let value = arguments
             .next()
@@ -76,8 +87,12 @@ fn main() -> Result<(), String> {
             "--dump" => dump = Some(value),
             "--from" => from = Some(value),
             "--diagrams" => diagrams = Some(value),
+            "--real" => is_real = value == "yes",
             other => return Err(format!("unknown argument {other}")),
         }
+    }
+    if is_real {
+        return judge_real_pairs();
     }
     let samples = match from {
         Some(path) => read(&path)?,
@@ -86,9 +101,7 @@ fn main() -> Result<(), String> {
     if let Some(path) = dump {
         std::fs::write(&path, written(&samples)).map_err(|error| format!("{path}: {error}"))?;
     }
-    let mut methods: Vec<&str> = samples.iter().map(|s| s.method.as_str()).collect();
-    methods.sort_unstable();
-    methods.dedup();
+    let methods = methods_of(&samples);
     println!("## Coefficients\n\n```rust");
     let mut refitted = samples.clone();
     for method in &methods {
@@ -112,13 +125,37 @@ fn main() -> Result<(), String> {
     })
 }
 
+/// What is said of poses in pairs of real photos, which nothing was fitted on.
+fn judge_real_pairs() -> Result<(), String> {
+    let pairs = real_pairs::all()?;
+    if pairs.is_empty() {
+        println!("skipped: no data");
+        return Ok(());
+    }
+    let conditions = ["real".to_owned(), "real".to_owned()];
+    let samples: Vec<Sample> = pairs
+        .par_iter()
+        .flat_map_iter(|pair| {
+            let (query, truth) = query_of(&pair.query);
+            let reference = reference_of("reference", &pair.reference);
+            let problem = Problem::new(query, reference, RADIUS_M).expect("a radius");
+            of_problem(&problem, Some(&truth), &conditions)
+        })
+        .collect();
+    println!("{} pairs of real photos", pairs.len());
+    judge("As posescope has them now", &samples, &methods_of(&samples));
+    Ok(())
+}
+
+/// The methods that gave poses, by name.
+fn methods_of(samples: &[Sample]) -> Vec<String> {
+    let methods: BTreeSet<String> = samples.iter().map(|s| s.method.clone()).collect();
+    methods.into_iter().collect()
+}
+
 /// Both diagrams of the poses that were not fitted on.
-fn draw(folder: &Path, samples: &[Sample], methods: &[&str]) -> Result<(), String> {
-    let pooled = std::iter::once("all");
-    let scored: Vec<(String, Vec<Scored>)> = methods
-        .iter()
-        .copied()
-        .chain(pooled)
+fn draw(folder: &Path, samples: &[Sample], methods: &[String]) -> Result<(), String> {
+    let scored: Vec<(String, Vec<Scored>)> = with_pooled(methods)
         .map(|method| (method.to_uppercase(), scored(samples, method, false)))
         .collect();
     let diagrams = [
@@ -130,6 +167,14 @@ fn draw(folder: &Path, samples: &[Sample], methods: &[&str]) -> Result<(), Strin
         std::fs::write(&path, svg).map_err(|error| format!("{}: {error}", path.display()))?;
     }
     Ok(())
+}
+
+/// The methods, and all of them together.
+fn with_pooled(methods: &[String]) -> impl Iterator<Item = &str> {
+    methods
+        .iter()
+        .map(String::as_str)
+        .chain(std::iter::once("all"))
 }
 
 /// Probabilities and whether they were right, of one method or of `all`.
@@ -186,34 +231,18 @@ fn at(drives: &[(Condition, Traversal)], place: usize, seed: u64) -> Vec<Sample>
                 reference = (query + 1) % drive.frame_count();
             }
             let truth = drive.world_from_camera(query);
-            let frame = frame_of(drive, query, &truth);
-            let query = Query::new(
-                format!("{query:06}"),
-                Photo::from_color(frame.photo),
-                frame.intrinsics,
-            );
+            let (query, truth) = query_of(&frame_of(drive, query, &truth));
             let pose = drive.world_from_camera(reference);
-            let frame = frame_of(drive, reference, &pose);
-            let photo = Photo::from_color(frame.photo);
-            let tuple = ReferenceTuple::new(
-                format!("{reference:06}"),
-                photo,
-                frame.intrinsics,
-                pose,
-                frame.cloud,
-            );
-            (
-                *condition,
-                std::sync::Arc::new(query.expect("a whole frame")),
-                truth,
-                std::sync::Arc::new(tuple.expect("a whole frame")),
-            )
+            let name = format!("{reference:06}");
+            let reference = reference_of(&name, &frame_of(drive, reference, &pose));
+            (*condition, query, truth, reference)
         })
         .collect();
     let mut samples = Vec::new();
     for (query_condition, query, truth, _) in &problems {
         for (reference_condition, _, _, reference) in &problems {
-            let problem = Problem::new(query.clone(), reference.clone(), 10.0).expect("a radius");
+            let problem =
+                Problem::new(query.clone(), reference.clone(), RADIUS_M).expect("a radius");
             let conditions = [reference_condition, query_condition].map(|c| c.name().to_owned());
             samples.extend(of_problem(&problem, Some(truth), &conditions));
         }
@@ -223,13 +252,22 @@ fn at(drives: &[(Condition, Traversal)], place: usize, seed: u64) -> Vec<Sample>
     samples
 }
 
+fn query_of(frame: &Frame) -> (Arc<Query>, Pose) {
+    let photo = Photo::from_color(frame.photo.clone());
+    let query = Query::new("query", photo, frame.intrinsics).expect("a whole frame");
+    (Arc::new(query), frame.pose.expect("a frame with its pose"))
+}
+
+fn reference_of(name: &str, frame: &Frame) -> Arc<ReferenceTuple> {
+    let photo = Photo::from_color(frame.photo.clone());
+    let pose = frame.pose.expect("a frame with its pose");
+    let tuple = ReferenceTuple::new(name, photo, frame.intrinsics, pose, frame.cloud.clone());
+    Arc::new(tuple.expect("a whole frame"))
+}
+
 /// The place of a query that does not show it: mirrored, or of another town. Every other place is for
 /// fitting.
-fn unknowable(
-    query: &std::sync::Arc<Query>,
-    reference: &std::sync::Arc<ReferenceTuple>,
-    place: usize,
-) -> Vec<Sample> {
+fn unknowable(query: &Arc<Query>, reference: &Arc<ReferenceTuple>, place: usize) -> Vec<Sample> {
     let Some(color) = &query.photo.color else {
         return Vec::new();
     };
@@ -248,7 +286,7 @@ fn unknowable(
         .flat_map(|photo| {
             let query = Query::new("unknowable", Photo::from_color(photo), query.intrinsics);
             let query = query.expect("a photo of the same size");
-            let problem = Problem::new(query, reference.clone(), 10.0).expect("a radius");
+            let problem = Problem::new(query, reference.clone(), RADIUS_M).expect("a radius");
             of_problem(&problem, None, &[use_of.to_owned(), use_of.to_owned()])
         })
         .collect()
@@ -258,7 +296,7 @@ fn unknowable(
 fn of_problem(problem: &Problem, truth: Option<&Pose>, conditions: &[String; 2]) -> Vec<Sample> {
     let params = Params::default();
     let mut samples = Vec::new();
-    for method in estimator::methods().filter(|method| *method != Method::HY) {
+    for method in JUDGED {
         let mut evidence = Evidence::default();
         let estimator = estimator::entry(method).make(&params);
         let outcome = estimator
@@ -379,7 +417,7 @@ fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
     Some(std::iter::once(constant).chain(slopes).collect())
 }
 
-fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
+fn judge(title: &str, samples: &[Sample], methods: &[String]) {
     println!("\n## {title}\n");
     println!(
         "| judged on | method | poses | within 1 m | calibration error | AUC |\n|---|---|---|---|---|---|"
@@ -390,8 +428,7 @@ fn judge(title: &str, samples: &[Sample], methods: &[&str]) {
         } else {
             "other pairs"
         };
-        let pooled = std::iter::once("all");
-        for method in methods.iter().copied().chain(pooled) {
+        for method in with_pooled(methods) {
             let scored = scored(samples, method, is_for_fitting);
             if scored.is_empty() {
                 continue;

@@ -1,4 +1,4 @@
-//! Faults that are planted in a place of the street.
+//! Faults that are planted in a place.
 //!
 //! The table `docs/diagnosis/planted_faults.csv` says of each what verdict it should get. It was written
 //! before the rules.
@@ -144,10 +144,8 @@ fn mirrored_cloud(place: &Place<'_>) -> Option<Case> {
 }
 
 fn cloud_of_another_frame(place: &Place<'_>) -> Option<Case> {
-    let farther = place.drives.day.cloud(place.frame_at(place.reference, 12));
-    with_cloud(place, |_| {
-        farther.into_iter().map(|point| point.position).collect()
-    })
+    let farther = place.farther_cloud()?;
+    with_cloud(place, |_| farther.points)
 }
 
 fn in_view(camera: &Intrinsics, point: &Point3<f32>) -> bool {
@@ -157,7 +155,7 @@ fn in_view(camera: &Intrinsics, point: &Point3<f32>) -> bool {
 
 fn sparse_cloud(place: &Place<'_>) -> Option<Case> {
     const LEFT: usize = 30;
-    let camera = place.drives.day.intrinsics();
+    let camera = place.case().references[0].intrinsics;
     with_cloud(place, |points| {
         let seen: Vec<_> = points
             .iter()
@@ -184,7 +182,7 @@ fn cloud_behind(place: &Place<'_>) -> Option<Case> {
 
 fn bleeding_depths(place: &Place<'_>) -> Option<Case> {
     const BESIDE_PX: f64 = 40.0;
-    let camera = place.drives.day.intrinsics();
+    let camera = place.case().references[0].intrinsics;
     with_cloud(place, |points| {
         let cloud = Cloud {
             points: points.to_vec(),
@@ -232,9 +230,7 @@ fn mirrored_query(place: &Place<'_>) -> Option<Case> {
 }
 
 fn foreign_query(place: &Place<'_>) -> Option<Case> {
-    let drive = &place.drives.elsewhere;
-    let photo = drive.image(place.query % drive.frame_count());
-    with_photo(place, |own| *own = photo)
+    with_photo(place, |own| *own = place.foreign_photo())
 }
 
 fn gamma(place: &Place<'_>) -> Option<Case> {
@@ -247,8 +243,9 @@ fn gamma(place: &Place<'_>) -> Option<Case> {
 }
 
 fn night(place: &Place<'_>) -> Option<Case> {
-    let night = &place.drives.night;
-    let day = place.drives.day.world_from_camera(place.query);
+    let street = place.street()?;
+    let night = &street.drives.night;
+    let day = street.drives.day.world_from_camera(street.query);
     let distance = |frame: &usize| {
         (night.world_from_camera(*frame).translation.vector - day.translation.vector).norm()
     };
@@ -268,13 +265,15 @@ fn paste(photo: &mut RgbImage, other: &RgbImage, columns: std::ops::Range<u32>) 
 }
 
 fn occluder(place: &Place<'_>) -> Option<Case> {
-    let drive = &place.drives.elsewhere;
-    let other = drive.image((place.query + 40) % drive.frame_count());
+    let street = place.street()?;
+    let drive = &street.drives.elsewhere;
+    let other = drive.image((street.query + 40) % drive.frame_count());
     with_photo(place, |photo| paste(photo, &other, 0..photo.width() / 2))
 }
 
 fn moved_scenery(place: &Place<'_>) -> Option<Case> {
-    let other = place.drives.day.image(place.frame_at(place.query, 6));
+    let street = place.street()?;
+    let other = street.drives.day.image(street.frame_at(street.query, 6));
     with_photo(place, |photo| {
         let width = photo.width();
         paste(photo, &other, width * 35 / 100..width);
@@ -333,16 +332,18 @@ fn refused(place: &Place<'_>) -> Option<Case> {
 }
 
 fn turned_query(place: &Place<'_>, left_deg: f64) -> Option<Case> {
-    let pose = place.drives.day.world_from_camera(place.query);
+    let street = place.street()?;
+    let pose = street.drives.day.world_from_camera(street.query);
     let turned = pose * Pose::from_parts(Translation3::identity(), yaw(left_deg.to_radians()));
     let mut case = place.case();
-    case.query = place.frame_from(place.query, &turned);
+    case.query = street.frame_from(street.query, &turned);
     Some(case)
 }
 
 fn outside_disc(place: &Place<'_>) -> Option<Case> {
+    let street = place.street()?;
     let mut case = place.case();
-    case.references = vec![place.frame(place.frame_at(place.query, -15))];
+    case.references = vec![street.frame(street.frame_at(street.query, -15))];
     Some(case)
 }
 
@@ -354,10 +355,11 @@ fn narrow_yaw(place: &Place<'_>) -> Option<Case> {
 
 /// The query is moved half a coarse step against the reference and turned.
 fn bend(place: &Place<'_>) -> Option<Case> {
-    let reference = place.drives.day.world_from_camera(place.reference);
+    let street = place.street()?;
+    let reference = street.drives.day.world_from_camera(street.reference);
     let moved = Pose::from_parts(Translation3::new(1.5, 0.0, 4.5), yaw(-8_f64.to_radians()));
     let mut case = place.case();
-    case.query = place.frame_from(place.reference, &(reference * moved));
+    case.query = street.frame_from(street.reference, &(reference * moved));
     Some(case)
 }
 
@@ -369,11 +371,12 @@ fn coarse_steps(place: &Place<'_>) -> Option<Case> {
 }
 
 fn raised_camera(place: &Place<'_>) -> Option<Case> {
-    let pose = place.drives.day.world_from_camera(place.query);
+    let street = place.street()?;
+    let pose = street.drives.day.world_from_camera(street.query);
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -5_f64.to_radians());
     let raised = pose * Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down);
     let mut case = place.case();
-    case.query = place.frame_from(place.query, &raised);
+    case.query = street.frame_from(street.query, &raised);
     Some(case)
 }
 
@@ -385,13 +388,14 @@ fn low_coverage(place: &Place<'_>) -> Option<Case> {
 }
 
 fn bad_reference(place: &Place<'_>) -> Option<Case> {
+    let street = place.street()?;
     let mut case = place.case();
-    let mut bad = place.frame(place.frame_at(place.query, 4));
+    let mut bad = street.frame(street.frame_at(street.query, 4));
     bad.pose = bad
         .pose
         .map(|pose| pose * Pose::translation(0.0, 0.0, 15.0));
     case.references
-        .push(place.frame(place.frame_at(place.query, -4)));
+        .push(street.frame(street.frame_at(street.query, -4)));
     case.references.push(bad);
     case.chosen = vec![0, 1, 2].into();
     case.fusion = Fusion::all().find(|fusion| fusion.name == "avg");
@@ -399,8 +403,9 @@ fn bad_reference(place: &Place<'_>) -> Option<Case> {
 }
 
 fn duplicate_place(place: &Place<'_>) -> Option<Case> {
+    let street = place.street()?;
     let mut case = place.case();
-    let far = place.frame(place.frame_at(place.query, 150));
+    let far = street.frame(street.frame_at(street.query, 150));
     let right = case.references.remove(0);
     let poses = [far.pose, right.pose];
     case.references = vec![far, right];

@@ -5,3 +5,4 @@ pub mod diagrams;
 pub mod faults;
 pub mod frames;
 pub mod places;
+pub mod real_pairs;

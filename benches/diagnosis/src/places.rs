@@ -1,5 +1,6 @@
-//! Places of the street: a query and a reference a few metres apart, as they are without any fault.
+//! Places: a query and a reference a few metres apart, as they are without any fault.
 
+use image::RgbImage;
 use posescope::cloud::Cloud;
 use posescope::diagnosis::Tolerance;
 use posescope::fusion::Fusion;
@@ -12,6 +13,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
 use crate::frames::{Frame, Frames};
+use crate::real_pairs::RealPair;
 
 /// The drives that places are taken from.
 pub struct Drives {
@@ -41,16 +43,30 @@ impl Default for Drives {
     }
 }
 
-/// A query frame and a reference frame of a drive.
+/// A query and a reference.
 pub struct Place<'a> {
+    /// Where it is.
+    pub ground: Ground<'a>,
+    /// Number of the place.
+    pub number: usize,
+}
+
+/// Where a place is.
+pub enum Ground<'a> {
+    /// On the street, which can be seen from anywhere.
+    Street(StreetPlace<'a>),
+    /// Where somebody took two photos and scans.
+    Real(&'a RealPair),
+}
+
+/// A query frame and a reference frame of a drive.
+pub struct StreetPlace<'a> {
     /// The drives.
     pub drives: &'a Drives,
     /// The query's frame.
     pub query: usize,
     /// The reference's frame.
     pub reference: usize,
-    /// Number of the place.
-    pub number: usize,
 }
 
 /// A query to localise, and all that it is localised with.
@@ -73,7 +89,7 @@ pub struct Case {
 }
 
 impl<'a> Place<'a> {
-    /// The place of a number: a frame anywhere, and one 3 to 7 m before or behind it.
+    /// The place of the street with a number: a frame anywhere, and one 3 to 7 m before or behind it.
     pub fn numbered(drives: &'a Drives, number: usize, seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(1009).wrapping_add(number as u64));
         let frames = drives.day.frame_count();
@@ -84,13 +100,72 @@ impl<'a> Place<'a> {
             false => (query + frames - apart) % frames,
         };
         Self {
-            drives,
-            query,
-            reference,
+            ground: Ground::Street(StreetPlace {
+                drives,
+                query,
+                reference,
+            }),
             number,
         }
     }
 
+    /// A place of real photos and scans.
+    pub fn real(pair: &'a RealPair, number: usize) -> Self {
+        Self {
+            ground: Ground::Real(pair),
+            number,
+        }
+    }
+
+    /// The place on the street, if it is there.
+    pub fn street(&self) -> Option<&StreetPlace<'a>> {
+        match &self.ground {
+            Ground::Street(place) => Some(place),
+            Ground::Real(_) => None,
+        }
+    }
+
+    /// The place without any fault.
+    pub fn case(&self) -> Case {
+        let (query, reference) = match &self.ground {
+            Ground::Street(street) => (street.frame(street.query), street.frame(street.reference)),
+            Ground::Real(pair) => (pair.query.clone(), pair.reference.clone()),
+        };
+        Case {
+            query,
+            references: vec![reference],
+            chosen: vec![0].into(),
+            params: Params::default(),
+            radius_m: 10.0,
+            fusion: None,
+            seed: self.number as u64,
+        }
+    }
+
+    /// A photo of another town, of the query's size.
+    pub fn foreign_photo(&self) -> RgbImage {
+        match &self.ground {
+            Ground::Street(street) => {
+                let drive = &street.drives.elsewhere;
+                drive.image(street.query % drive.frame_count())
+            }
+            Ground::Real(pair) => pair.foreign_photo.clone(),
+        }
+    }
+
+    /// The cloud of a frame some 12 m farther than the reference.
+    pub fn farther_cloud(&self) -> Option<Cloud> {
+        match &self.ground {
+            Ground::Street(street) => {
+                let farther = street.frame_at(street.reference, 12);
+                Some(cloud_of(&street.drives.day, farther))
+            }
+            Ground::Real(pair) => pair.farther_cloud.clone(),
+        }
+    }
+}
+
+impl StreetPlace<'_> {
     /// The frame some metres behind the reference or before it.
     pub fn frame_at(&self, from: usize, metres: isize) -> usize {
         let frames = self.drives.day.frame_count() as isize;
@@ -110,31 +185,22 @@ impl<'a> Place<'a> {
     pub fn frame_from(&self, frame: usize, world_from_camera: &Pose) -> Frame {
         frame_of(&self.drives.day, frame, world_from_camera)
     }
+}
 
-    /// The place without any fault.
-    pub fn case(&self) -> Case {
-        Case {
-            query: self.frame(self.query),
-            references: vec![self.frame(self.reference)],
-            chosen: vec![0].into(),
-            params: Params::default(),
-            radius_m: 10.0,
-            fusion: None,
-            seed: self.number as u64,
-        }
+fn cloud_of(drive: &Traversal, frame: usize) -> Cloud {
+    let points = drive.cloud(frame).into_iter();
+    Cloud {
+        points: points.map(|point| point.position).collect(),
     }
 }
 
 /// A frame of a drive, seen from a pose.
 pub fn frame_of(drive: &Traversal, frame: usize, world_from_camera: &Pose) -> Frame {
-    let points = drive.cloud(frame);
     Frame {
         photo: drive.image_from(frame, world_from_camera),
         intrinsics: drive.intrinsics(),
         pose: Some(*world_from_camera),
-        cloud: Cloud {
-            points: points.into_iter().map(|point| point.position).collect(),
-        },
+        cloud: cloud_of(drive, frame),
     }
 }
 

@@ -5,16 +5,16 @@
 //! of 0.4°, around the truth and around the eight best coarse minima: the search failed if the cheapest
 //! of all is at the truth. D3 has to say the same.
 //!
-//! Options: `--cases N` (60), `--seed N` (0), `--misses` to print those that disagree.
-
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+//! For some of the cases the whole disc is searched too, in steps of 0.25 m and 1°.
+//!
+//! Options: `--cases N` (60), `--disc N` (20) of them over the whole disc, `--seed N` (0), `--misses` to
+//! print those that disagree.
 
 use posescope::code::Code;
 use posescope::diagnosis::{Evidence, Subject, Tolerance, diagnose};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
-use posescope::grid::Offset;
+use posescope::grid::{GridParams, Offset};
 use posescope::image::Photo;
 use posescope::method::Method;
 use posescope::params::Params;
@@ -30,16 +30,25 @@ use rayon::prelude::*;
 /// Coarse minima that are searched around.
 const MINIMA: usize = 8;
 
+/// Uncertainty of the reference's position [m].
+const RADIUS_M: f64 = 10.0;
+
+/// Places that are looked at in parallel.
+const PLACES_AT_ONCE: usize = 8;
+
 /// What was found out about one wrong pose.
 struct Compared {
     method: Method,
+    /// Whether the cheapest pose is at the truth, of those around the coarse minima.
     searched_says: bool,
+    /// The same of the whole disc, where that was searched.
+    disc_says: Option<bool>,
     verdict: Code,
     words: String,
 }
 
 fn main() -> Result<(), String> {
-    let (mut cases, mut seed, mut misses) = (60, 0, false);
+    let (mut cases, mut discs, mut seed, mut misses) = (60, 20, 0, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         if argument == "--misses" {
@@ -52,29 +61,33 @@ fn main() -> Result<(), String> {
         let number: usize = value.parse().map_err(|_| format!("{value} is no number"))?;
         match argument.as_str() {
             "--cases" => cases = number,
+            "--disc" => discs = number,
             "--seed" => seed = number as u64,
             other => return Err(format!("unknown argument {other}")),
         }
     }
     let drives = Condition::ALL.map(|c| Traversal::new(WORLD_SEED, c, Size::Full));
-    let found = Mutex::new(Vec::new());
-    let count = AtomicUsize::new(0);
-    // More places than are needed: most poses are right.
-    (0..20 * cases).into_par_iter().for_each(|place| {
-        if count.load(Ordering::Relaxed) >= cases {
-            return;
+    // More places than are needed: most poses are right. Some at a time, so that the same cases are
+    // counted whatever is done first.
+    let mut found: Vec<Compared> = Vec::new();
+    for first in (0..20 * cases).step_by(PLACES_AT_ONCE) {
+        if found.len() >= cases {
+            break;
         }
-        for compared in at(&drives, place, seed) {
-            count.fetch_add(1, Ordering::Relaxed);
-            if let Ok(mut found) = found.lock() {
-                found.push(compared);
-                eprintln!("{} of {cases} cases", found.len());
-            }
-        }
-    });
-    let found = found.into_inner().map_err(|error| error.to_string())?;
-    println!("| method | wrong poses | truth outside the grid | search failed | verdict agrees |");
-    println!("|---|---|---|---|---|");
+        let is_disc_searched = found.len() < discs;
+        let places: Vec<usize> = (first..first + PLACES_AT_ONCE).collect();
+        let of_places: Vec<Vec<Compared>> = places
+            .par_iter()
+            .map(|place| at(&drives, *place, seed, is_disc_searched))
+            .collect();
+        found.extend(of_places.into_iter().flatten());
+        eprintln!("{} of {cases} cases", found.len());
+    }
+    found.truncate(cases);
+    println!(
+        "| method | wrong poses | truth outside the grid | search failed | verdict agrees | verdict agrees with the whole disc |"
+    );
+    println!("|---|---|---|---|---|---|");
     for method in [Method::PM, Method::MI] {
         let of_method = found.iter().filter(|one| one.method == method);
         // Where the grid leaves the truth out, neither the search failed nor the cost.
@@ -83,23 +96,30 @@ fn main() -> Result<(), String> {
         let searched = own.iter().filter(|one| one.searched_says).count();
         let agrees = |one: &Compared| (one.verdict == Code::D3) == one.searched_says;
         let agreeing = own.iter().filter(|one| agrees(one)).count();
+        let by_disc = |one: &&&Compared| one.disc_says.is_some();
+        let agrees_with_disc = |one: &&&Compared| one.disc_says == Some(one.verdict == Code::D3);
+        let (with_disc, agreeing_with_disc) = (
+            own.iter().filter(by_disc).count(),
+            own.iter().filter(agrees_with_disc).count(),
+        );
         println!(
-            "| {method} | {} | {} | {searched} | {agreeing} of {} |",
+            "| {method} | {} | {} | {searched} | {agreeing} of {} | {agreeing_with_disc} of {with_disc} |",
             outside.len() + own.len(),
             outside.len(),
             own.len()
         );
-        for one in own.iter().filter(|one| misses && !agrees(one)) {
+        let is_miss = |one: &&&Compared| !agrees(one) || by_disc(one) && !agrees_with_disc(one);
+        for one in own.iter().filter(|one| misses && is_miss(one)) {
             println!(
-                "<!-- {method} dense: {}, verdict {}: {} -->",
-                one.searched_says, one.verdict, one.words
+                "<!-- {method} dense: {}, disc {:?}, verdict {}: {} -->",
+                one.searched_says, one.disc_says, one.verdict, one.words
             );
         }
     }
     Ok(())
 }
 
-fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Vec<Compared> {
+fn at(drives: &[Traversal; 5], place: usize, seed: u64, is_disc_searched: bool) -> Vec<Compared> {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(6007).wrapping_add(place as u64));
     let (queries, references) = (
         &drives[rng.random_range(0..5)],
@@ -122,7 +142,8 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Vec<Compared> {
     let frame = frame_of(references, reference, &pose);
     let photo = Photo::from_color(frame.photo);
     let reference = ReferenceTuple::new("reference", photo, frame.intrinsics, pose, frame.cloud);
-    let problem = Problem::new(query, reference.expect("a whole frame"), 10.0).expect("a radius");
+    let problem = Problem::new(query, reference.expect("a whole frame"), RADIUS_M);
+    let problem = problem.expect("a radius");
     let params = Params::default();
     let tolerance = Tolerance::default();
     let mut compared = Vec::new();
@@ -142,13 +163,14 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Vec<Compared> {
             continue;
         };
         let from_truth = problem.reference_from_query(&truth);
-        let mut searched_says = None;
+        let mut searched = None;
         estimator.with_scorer(&problem, &mut |scorer| {
-            searched_says = dense(scorer, &evidence, &from_truth, &tolerance);
+            searched = dense(scorer, &evidence, &from_truth, &tolerance, is_disc_searched);
         });
-        compared.extend(searched_says.map(|searched_says| Compared {
+        compared.extend(searched.map(|(searched_says, disc_says)| Compared {
             method,
             searched_says,
+            disc_says,
             verdict: primary.code,
             words: primary.text.clone(),
         }));
@@ -156,24 +178,17 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Vec<Compared> {
     compared
 }
 
-/// Whether the cheapest pose of all is at the truth; `None` where nothing there has a say.
+/// Whether the cheapest pose of all is at the truth: of those around the coarse minima, and of those in
+/// the whole disc too, if that is asked for. `None` where nothing there has a say.
 fn dense(
     scorer: &Scorer<'_>,
     evidence: &Evidence,
     truth: &Pose,
     tolerance: &Tolerance,
-) -> Option<bool> {
+    is_disc_searched: bool,
+) -> Option<(bool, Option<bool>)> {
     let coarse = evidence.surfaces.first()?;
-    let least = |centre: Offset, is_counted: &dyn Fn(&Offset) -> bool| {
-        let offsets: Vec<Offset> = (-5..=5)
-            .flat_map(|turn| (-10..=10).flat_map(move |z| (-10..=10).map(move |x| (turn, z, x))))
-            .map(|(turn, z, x)| Offset {
-                right_m: centre.right_m + 0.1 * f64::from(x),
-                forward_m: centre.forward_m + 0.1 * f64::from(z),
-                yaw_rad: centre.yaw_rad + (0.4 * f64::from(turn)).to_radians(),
-            })
-            .filter(is_counted)
-            .collect();
+    let least = |offsets: Vec<Offset>| {
         let poses: Vec<Pose> = offsets.iter().map(Offset::reference_from_camera).collect();
         let scores = scorer.score(&poses).into_iter();
         scores
@@ -183,14 +198,79 @@ fn dense(
     let is_right = |offset: &Offset| {
         tolerance.contains(&PoseError::between(truth, &offset.reference_from_camera()))
     };
-    let at_truth = least(Offset::of(truth), &is_right)?;
+    let around = |centre: Offset| {
+        let metres = Steps {
+            most: 1.0,
+            step: 0.1,
+        };
+        let degrees = Steps {
+            most: 2.0,
+            step: 0.4,
+        };
+        box_around(centre, metres, degrees)
+    };
+    let at_truth = least(around(Offset::of(truth)).filter(is_right).collect())?;
     let minima = coarse.local_minima().into_iter().take(MINIMA);
     let result = evidence.minimum.map(|minimum| minimum.offset);
     let centres = minima
         .filter_map(|(cell, _)| coarse.lattice.offset(cell))
         .chain(result);
     let elsewhere = centres
-        .filter_map(|centre| least(centre, &|offset| !is_right(offset)))
+        .filter_map(|centre| least(around(centre).filter(|o| !is_right(o)).collect()))
         .fold(f64::INFINITY, f64::min);
-    Some(at_truth < elsewhere)
+    let in_disc = is_disc_searched.then(|| {
+        let params = GridParams::default();
+        let metres = Steps {
+            most: RADIUS_M,
+            step: 0.25,
+        };
+        let degrees = Steps {
+            most: params.yaw_range_deg,
+            step: 1.0,
+        };
+        let centre = Offset {
+            right_m: 0.0,
+            forward_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        let disc = box_around(centre, metres, degrees)
+            .filter(|offset| offset.right_m.hypot(offset.forward_m) <= RADIUS_M)
+            .filter(|offset| !is_right(offset));
+        least(disc.collect()).unwrap_or(f64::INFINITY)
+    });
+    let says = |elsewhere: f64| at_truth < elsewhere;
+    Some((
+        says(elsewhere),
+        in_disc.map(|cost| says(cost.min(elsewhere))),
+    ))
+}
+
+/// From minus `most` to `most`.
+#[derive(Clone, Copy)]
+struct Steps {
+    most: f64,
+    step: f64,
+}
+
+impl Steps {
+    fn all(self) -> impl Iterator<Item = f64> + Clone {
+        let count = (self.most / self.step).round() as i32;
+        (-count..=count).map(move |k| self.step * f64::from(k))
+    }
+}
+
+/// A lattice of offsets around one, in metres to the right and forward, and in degrees.
+fn box_around(centre: Offset, metres: Steps, degrees: Steps) -> impl Iterator<Item = Offset> {
+    let places = move || {
+        metres
+            .all()
+            .flat_map(move |z| metres.all().map(move |x| (x, z)))
+    };
+    degrees.all().flat_map(move |turn| {
+        places().map(move |(x, z)| Offset {
+            right_m: centre.right_m + x,
+            forward_m: centre.forward_m + z,
+            yaw_rad: centre.yaw_rad + turn.to_radians(),
+        })
+    })
 }

@@ -250,7 +250,7 @@ fn few_matches(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosis
     let funnel = &matches.funnel;
     let counts = subject.outcome.counts?;
     let without_depth = if many_without_depth(matches, counts.unique) {
-        matches.wrong_depth + matches.no_depth
+        matches.wrong_depth + lost_for_depth(subject, matches)
     } else {
         0
     };
@@ -278,12 +278,26 @@ fn many_without_depth(matches: &TrueMatches, unique: usize) -> bool {
     4 * (matches.wrong_depth + matches.no_depth) >= unique
 }
 
+/// True matches that a better cloud would have kept. Where the cloud gives depths as clouds do, those
+/// that have none lie where no scan reaches, and more of them would not have come from there.
+fn lost_for_depth(subject: &Subject<'_>, matches: &TrueMatches) -> usize {
+    /// Share of the reference keypoints that a scan gives a depth at least.
+    const USUAL: f64 = 0.1;
+    let keypoints = subject
+        .outcome
+        .counts
+        .map_or(0, |counts| counts.reference_keypoints);
+    let is_usual = matches.funnel.with_depth as f64 >= USUAL * keypoints as f64;
+    if is_usual { 0 } else { matches.no_depth }
+}
+
 /// True matches whose depth is missing or wrong.
 fn bad_depths(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     let right = matches.funnel.lifted;
     let (wrong, missing) = (matches.wrong_depth, matches.no_depth);
     let counts = subject.outcome.counts?;
-    let starved = right < FEW_MATCHES && wrong + missing >= FEW_MATCHES.min(counts.unique / 2);
+    let lost = wrong + lost_for_depth(subject, matches);
+    let starved = right < FEW_MATCHES && lost >= FEW_MATCHES.min(counts.unique / 2);
     let misled =
         wrong >= FEW_MATCHES && wrong > right && !is_beyond_chance(subject, matches, right);
     let is_telling = many_without_depth(matches, counts.unique);
@@ -321,24 +335,36 @@ fn loose_geometry(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagno
     Some(Diagnosis::new(Code::R5, text, evidence))
 }
 
+/// A pose was refused for its distance from the reference, or the right one would have been.
 fn outside_prior(subject: &Subject<'_>, _: &TrueMatches) -> Option<Diagnosis> {
-    let failure = subject.outcome.pose.as_ref().err()?;
-    let Failure::OutsideRadius {
+    if let Some(Failure::OutsideRadius {
         distance_m,
         radius_m,
-    } = failure
-    else {
-        return None;
-    };
-    let error = consensus_error(subject)?;
-    Some(Diagnosis::new(
-        Code::R9,
-        format!(
-            "the pose found, {error} from the truth, is {distance_m:.1} m from the reference and was \
-             refused: the prior allows {radius_m:.1} m"
-        ),
-        json!({ "distance_m": distance_m, "radius_m": radius_m, "error": error }),
-    ))
+    }) = subject.outcome.pose.as_ref().err()
+    {
+        let error = consensus_error(subject)?;
+        return Some(Diagnosis::new(
+            Code::R9,
+            format!(
+                "the pose found, {error} from the truth, is {distance_m:.1} m from the reference and \
+                 was refused: the prior allows {radius_m:.1} m"
+            ),
+            json!({ "distance_m": distance_m, "radius_m": radius_m, "error": error }),
+        ));
+    }
+    let distance_m = subject.reference_from_truth()?.translation.vector.norm();
+    let radius_m = subject.problem.believed_within_m();
+    let is_outside = distance_m > radius_m * (1.0 + subject.params.fb.radius_slack);
+    is_outside.then(|| {
+        Diagnosis::new(
+            Code::R9,
+            format!(
+                "the truth is {distance_m:.1} m from the reference: a right pose would have been \
+                 refused, the prior allows {radius_m:.1} m"
+            ),
+            json!({ "distance_m": distance_m, "radius_m": radius_m }),
+        )
+    })
 }
 
 /// Near the truth is a pose that explains enough matches, more than the one that MLESAC ended with.

@@ -54,7 +54,7 @@ pub(super) fn of_units(subject: &Subject<'_>) -> Option<Diagnosis> {
 pub(super) fn of_poses(subject: &Subject<'_>) -> Option<Diagnosis> {
     let pose = subject.outcome.pose.as_ref().ok()?;
     let truth = subject.truth?;
-    const BELIEVED: f64 = 0.8;
+    const BELIEVED: f64 = 0.5;
     let probability = subject.trust.as_ref().and_then(|trust| trust.probability);
     if probability.is_some_and(|probability| probability < BELIEVED) {
         return None;

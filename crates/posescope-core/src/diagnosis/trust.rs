@@ -27,9 +27,9 @@ pub const WITHIN_M: f64 = 1.0;
 /// should be believed.
 pub const LOW_CONFIDENCE: f64 = 0.95;
 
-/// A pose of less probability is more likely wrong than poses of low confidence are as a whole, so
-/// that what speaks against it is said without knowing the truth.
-const DOUBTFUL: f64 = 0.7;
+/// A pose of less probability is more likely wrong than right, so that what speaks against it is said
+/// without knowing the truth.
+const DOUBTFUL: f64 = 0.5;
 
 /// How far a pose is to be believed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,0 +1,206 @@
+//! A picture of the window, or of one view, without a window.
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+use image::RgbImage;
+
+use super::camera::NamedPose;
+use super::command::Command;
+use super::headless::Painter;
+use super::setup::Setup;
+use super::state::Results;
+use super::window::WindowError;
+use super::{App, views};
+use crate::method::Method;
+use crate::session::RunState;
+
+/// What is to be in the picture.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// The view that has all the room; `None` for the whole window.
+    pub view: Option<String>,
+    /// The moment of the run.
+    pub moment: Moment,
+    /// A pose to take the camera to.
+    pub camera: Option<NamedPose>,
+    /// Size of the picture \[px\].
+    pub size_px: [u32; 2],
+    /// Pixels per point: how large words and marks are.
+    pub scale: f32,
+    /// The theme.
+    pub theme: egui::Theme,
+}
+
+/// A moment of a run that has come to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// The end of the run.
+    End,
+    /// The end of a method's part.
+    Method(Method),
+    /// The step of a number.
+    Step(usize),
+}
+
+impl FromStr for Moment {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "end" {
+            return Ok(Self::End);
+        }
+        if let Ok(step) = text.parse() {
+            return Ok(Self::Step(step));
+        }
+        Method::called(text)
+            .map(Self::Method)
+            .map_err(|_| format!("{text}: `end`, a method or the number of a step expected"))
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::End => f.write_str("end"),
+            Self::Method(method) => method.fmt(f),
+            Self::Step(step) => step.fmt(f),
+        }
+    }
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum ShotError {
+    /// There is nothing to draw with.
+    #[error(transparent)]
+    Window(#[from] WindowError),
+    /// The run ended early.
+    #[error("{0}")]
+    Broken(String),
+    /// The run has no such moment, or the view is none.
+    #[error("{0}")]
+    Unknown(String),
+    /// The adapter failed.
+    #[error("{0}")]
+    Paint(String),
+}
+
+/// Runs what is set up to its end and paints the window.
+///
+/// # Errors
+/// [`ShotError`] where there is no such view or moment, nothing to draw with, or bad data.
+pub fn shoot(setup: Setup, results: Results, shot: &Shot) -> Result<RgbImage, ShotError> {
+    let view = match &shot.view {
+        Some(name) => Some(views::find(name).map_err(ShotError::Unknown)?),
+        None => None,
+    };
+    let painter = Painter::new(shot.size_px)?;
+    let ctx = egui::Context::default();
+    ctx.set_pixels_per_point(shot.scale);
+    ctx.set_theme(shot.theme);
+    let mut app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
+    // Nothing moves in a picture.
+    ctx.all_styles_mut(|style| style.animation_time = 0.0);
+    let mut window = Window {
+        app: &mut app,
+        ctx: &ctx,
+        painter: &painter,
+        shot,
+        frames: 0,
+    };
+    window.run_to_end()?;
+    window.go_to(shot.moment)?;
+    if let Some(pose) = shot.camera {
+        window.app.send(Command::JumpCamera(pose));
+    }
+    window.app.send(Command::Maximize(view));
+    let output = window.settled();
+    painter.paint(&ctx, output).map_err(ShotError::Paint)
+}
+
+/// The application with nothing around it.
+struct Window<'a> {
+    app: &'a mut App,
+    ctx: &'a egui::Context,
+    painter: &'a Painter,
+    shot: &'a Shot,
+    frames: usize,
+}
+
+impl Window<'_> {
+    /// Between two looks at what other threads have done.
+    const PAUSE: Duration = Duration::from_millis(5);
+
+    fn run_to_end(&mut self) -> Result<(), ShotError> {
+        self.app.send(Command::RunToEnd);
+        loop {
+            self.app.update(self.ctx);
+            match self.app.app_state().run_state() {
+                RunState::Finished => return Ok(()),
+                RunState::Broken(why) => return Err(ShotError::Broken(why.clone())),
+                RunState::Cancelled => {
+                    return Err(ShotError::Broken("the run was cancelled".to_owned()));
+                }
+                RunState::Loading | RunState::Running | RunState::Paused { .. } => {
+                    std::thread::sleep(Self::PAUSE);
+                }
+            }
+        }
+    }
+
+    fn go_to(&mut self, moment: Moment) -> Result<(), ShotError> {
+        let steps = self.app.app_state().run().len();
+        match moment {
+            Moment::End => self.app.send(Command::Last),
+            Moment::Step(step) if step < steps => self.app.send(Command::MoveCursor(step)),
+            Moment::Step(step) => {
+                return Err(ShotError::Unknown(format!(
+                    "step {step}: the run has the steps 0 to {}",
+                    steps.saturating_sub(1)
+                )));
+            }
+            Moment::Method(method) => {
+                let asked = &self.app.app_state().setup.task.protocol.methods;
+                if !asked.contains(&method) {
+                    return Err(ShotError::Unknown(format!(
+                        "{method} is not among the methods that are run; add it to --method"
+                    )));
+                }
+                self.app.send(Command::SelectMethod(method));
+            }
+        }
+        Ok(())
+    }
+
+    /// A frame in which everything that was asked for is there.
+    fn settled(&mut self) -> egui::FullOutput {
+        /// Sizes are known one frame late, and pictures are asked for in the frame that wants them.
+        const FEWEST: usize = 6;
+        loop {
+            self.app.update(self.ctx);
+            let mut output = self.frame();
+            self.painter.take_textures(&mut output);
+            let state = self.app.app_state();
+            let is_waiting = state.is_probing() || state.queries.is_painting();
+            if !is_waiting && self.frames >= FEWEST {
+                return output;
+            }
+            std::thread::sleep(Self::PAUSE);
+        }
+    }
+
+    fn frame(&mut self) -> egui::FullOutput {
+        let size = self.shot.size_px.map(|side| side as f32 / self.shot.scale);
+        let input = egui::RawInput {
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size.into())),
+            max_texture_side: Some(self.painter.max_side()),
+            time: Some(self.frames as f64 / 60.0),
+            focused: true,
+            ..egui::RawInput::default()
+        };
+        self.frames += 1;
+        self.ctx.run_ui(input, |ui| self.app.content(ui))
+    }
+}

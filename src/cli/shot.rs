@@ -1,0 +1,40 @@
+//! `posescope shot`: a picture of the window, or of one of its views, without a window.
+
+use posescope::app::{self, Shot, ShotError};
+use posescope::session::RunMode;
+
+use super::args::ShotArgs;
+use super::failure::CliError;
+use super::terminal::Terminal;
+use super::{run, view};
+
+/// Runs the query to its end, paints the view and writes the picture.
+pub fn shot(args: &ShotArgs, terminal: &Terminal) -> Result<(), CliError> {
+    run::use_threads(args.view_args.task.protocol.threads)?;
+    let (setup, results) = view::setup(&args.view_args, RunMode::Running)?;
+    let shot = Shot {
+        view: args.view.clone(),
+        moment: args.at,
+        camera: args.camera,
+        size_px: args.size,
+        scale: args.scale,
+        theme: match args.light {
+            true => egui::Theme::Light,
+            false => egui::Theme::Dark,
+        },
+    };
+    let picture = app::shoot(setup, results, &shot).map_err(|error| match error {
+        ShotError::Unknown(why) => CliError::Usage(why),
+        other => CliError::Picture(other.to_string()),
+    })?;
+    if let Some(folder) = args.out.parent() {
+        std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    }
+    picture
+        .save(&args.out)
+        .map_err(|error| CliError::Picture(format!("{}: {error}", args.out.display())))?;
+    if !terminal.is_quiet() {
+        eprintln!("Picture: {}", args.out.display());
+    }
+    Ok(())
+}
