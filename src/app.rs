@@ -9,11 +9,14 @@
 //! can do.
 
 mod adapter;
+mod arrangement;
 mod camera;
+mod card;
 mod command;
 mod dispatch;
 mod headless;
 mod layout;
+mod lecture;
 mod navigation;
 mod prober;
 mod queries;
@@ -32,6 +35,7 @@ mod view_options;
 pub mod views;
 mod window;
 
+pub use arrangement::Arrangement;
 pub use camera::NamedPose;
 pub use command::{Command, Shortcut, shortcuts};
 pub use setup::{ReferencePick, Setup};
@@ -52,6 +56,8 @@ pub struct App {
     commands: command::Queue,
     help: bool,
     pictures: save::Pictures,
+    /// What the window's frame says.
+    title: String,
 }
 
 impl App {
@@ -69,6 +75,7 @@ impl App {
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
+            title: String::new(),
         }
     }
 
@@ -102,6 +109,11 @@ impl App {
         for command in self.commands.take() {
             self.dispatch(command, ctx);
         }
+        let title = self.state.setup.title();
+        if title != self.title {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
     }
 
     /// Draws the window.
@@ -115,10 +127,18 @@ impl App {
             ..
         } = self;
         egui::Panel::top("transport").show(ui, |ui| transport::ui(ui, state, commands));
+        // A view that has all the room has that of the card too.
+        if !layout.is_maximized() {
+            if layout.arrangement() == Arrangement::Teach {
+                egui::Panel::top("lecture").show(ui, |ui| lecture::ui(ui, state));
+            }
+            egui::Panel::top("verdicts").show(ui, |ui| card::ui(ui, state, commands));
+        }
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::ui(ui, state, commands));
         egui::CentralPanel::default()
             .frame(egui::Frame::NONE.fill(ui.visuals().panel_fill))
             .show(ui, |ui| layout.ui(ui, state, commands));
+        transport::notes(ui.ctx(), state, commands);
         if *help {
             command::help_ui(ui.ctx(), help);
         }

@@ -22,6 +22,7 @@ mod story;
 mod synth;
 mod table;
 mod terminal;
+mod triage;
 #[cfg(feature = "app")]
 mod view;
 
@@ -60,6 +61,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Shot(args)) => shot::shot(args, &terminal),
         Some(Command::Eval(args)) => eval::eval(args, &terminal),
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
+        Some(Command::Triage(args)) => triage::triage(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),
         Some(Command::Index(args)) => index::index(args, &terminal),
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),

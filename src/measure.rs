@@ -17,6 +17,7 @@ mod report;
 mod table;
 #[cfg(feature = "cli")]
 mod tables;
+mod triage;
 
 pub use diff::{Change, Difference, RunComparison, Tolerance};
 #[cfg(feature = "cli")]
@@ -28,3 +29,4 @@ pub use paper::{FigureKey, figure as paper_figure};
 pub use report::{Report, SUMMARY_SCHEMA, read_rows, write_report};
 #[cfg(feature = "cli")]
 pub use table::Table;
+pub use triage::{Condition, ConditionError, Field, Order, Value, select};

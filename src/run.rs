@@ -15,5 +15,5 @@ pub use experiment::{
 };
 pub use protocol::Protocol;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
-pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run};
+pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run, result_lines};
 pub use scene_pair::{QueryCamera, ScenePair};

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 
-/// How the window's adapter and device are chosen.
+/// How the window's adapter and device are chosen, of those that these backends have.
 ///
 /// Every limit is the adapter's own: what OpenGL or an old card cannot do is found out by asking it.
-pub(super) fn configuration() -> WgpuConfiguration {
+pub(super) fn configuration(backends: wgpu::Backends) -> WgpuConfiguration {
     let mut setup = WgpuSetupCreateNew::without_display_handle();
+    setup.instance_descriptor.backends &= backends;
     let preference = setup.power_preference;
     setup.native_adapter_selector = Some(Arc::new(move |adapters, surface| {
         let can_show = |adapter: &&wgpu::Adapter| {

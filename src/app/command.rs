@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
+use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
 use super::setup::ReferencePick;
 use super::view_options::CompareMode;
@@ -54,6 +55,8 @@ pub enum Command {
     },
     /// Look for what would have helped the results that are wrong, or look no more.
     Explain,
+    /// Keep this run as A and localise again with the arguments of something that helped.
+    Try(Vec<String>),
     /// Localise all queries, without stepping, to know which fail.
     RunAllQueries,
     /// Choose the references in another way.
@@ -123,8 +126,8 @@ pub enum Command {
     ShowView(&'static str),
     /// Give all the room to a view; for none, for that under the pointer, or back to all views.
     Maximize(Option<&'static str>),
-    /// Go back to the first layout.
-    ResetLayout,
+    /// Arrange the window for something, with every view at its first place.
+    Arrange(Arrangement),
     /// Change from dark to light or back.
     SwitchTheme,
     /// Show or hide the list of keys.
@@ -145,6 +148,82 @@ impl Queue {
 
     pub(super) fn take(&self) -> Vec<Command> {
         self.0.take()
+    }
+}
+
+/// What a key is for: the list of keys is in these groups.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// Running and stepping.
+    Run,
+    /// Another moment or method.
+    Look,
+    /// Another query.
+    Query,
+    /// What is shown.
+    Show,
+    /// Two runs.
+    Compare,
+    /// The camera in hand.
+    Camera,
+    /// What leaves the window, and how it looks.
+    Window,
+}
+
+impl Task {
+    const ALL: [Self; 7] = [
+        Self::Run,
+        Self::Look,
+        Self::Query,
+        Self::Show,
+        Self::Compare,
+        Self::Camera,
+        Self::Window,
+    ];
+
+    fn title(self) -> &'static str {
+        match self {
+            Self::Run => "Run and step",
+            Self::Look => "Look back and ahead",
+            Self::Query => "Queries",
+            Self::Show => "What is shown",
+            Self::Compare => "Compare two runs",
+            Self::Camera => "Try another pose",
+            Self::Window => "Window and files",
+        }
+    }
+
+    fn of(command: &Command) -> Self {
+        match command {
+            Command::RunOrPause
+            | Command::Run
+            | Command::StepInto
+            | Command::StepOver
+            | Command::StepOut
+            | Command::RunToEnd
+            | Command::Restart => Self::Run,
+            Command::Forward(_)
+            | Command::Back(_)
+            | Command::First
+            | Command::Last
+            | Command::MoveCursor(_)
+            | Command::SelectMethod(_) => Self::Look,
+            Command::SelectQuery(_)
+            | Command::NextQuery { .. }
+            | Command::NextFailure { .. }
+            | Command::Explain
+            | Command::RunAllQueries => Self::Query,
+            Command::Pin | Command::Unpin | Command::Compare(_) | Command::Flip => Self::Compare,
+            Command::TakeCamera(_) | Command::JumpCamera(_) | Command::MoveCamera(_) => {
+                Self::Camera
+            }
+            Command::CopyCommandLine
+            | Command::SavePicture(_)
+            | Command::SwitchTheme
+            | Command::Arrange(_)
+            | Command::Help => Self::Window,
+            _ => Self::Show,
+        }
     }
 }
 
@@ -333,6 +412,14 @@ pub fn shortcuts() -> Vec<Shortcut> {
         keys(NONE, Key::Questionmark, Command::Help, "This list"),
         keys(NONE, Key::F1, Command::Help, "This list"),
     ];
+    let helps = [
+        "Layout: inspect one query",
+        "Layout: teach",
+        "Layout: batch of results",
+    ];
+    for ((arrangement, _, key), help) in Arrangement::ALL.into_iter().zip(helps) {
+        all.push(keys(NONE, key, Command::Arrange(arrangement), help));
+    }
     let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4];
     let methods = Method::PAPER
         .into_iter()
@@ -385,13 +472,19 @@ pub(super) fn help_ui(ctx: &egui::Context, open: &mut bool) {
         egui::ScrollArea::vertical()
             .max_height(520.0)
             .show(ui, |ui| {
-                egui::Grid::new("keys").striped(true).show(ui, |ui| {
-                    for shortcut in shortcuts() {
-                        ui.monospace(ui.ctx().format_shortcut(&shortcut.keys));
-                        ui.label(shortcut.help);
-                        ui.end_row();
-                    }
-                });
+                for task in Task::ALL {
+                    ui.strong(task.title());
+                    egui::Grid::new(task.title()).striped(true).show(ui, |ui| {
+                        let all = shortcuts();
+                        let own = all.iter().filter(|one| Task::of(&one.command) == task);
+                        for shortcut in own {
+                            ui.monospace(ui.ctx().format_shortcut(&shortcut.keys));
+                            ui.label(shortcut.help);
+                            ui.end_row();
+                        }
+                    });
+                    ui.add_space(6.0);
+                }
             });
     });
 }

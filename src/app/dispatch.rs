@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::App;
+use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
 use super::saved::SavedSession;
@@ -16,6 +17,9 @@ use crate::localize::References;
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 use crate::sink::rerun::Targets;
+
+/// How much larger everything is where a room of people looks.
+const LECTURE_ZOOM: f32 = 1.2;
 
 impl App {
     /// Does one thing. What cannot be done is said, not ignored.
@@ -54,6 +58,7 @@ impl App {
             Command::NextQuery { back } => state.next_query(back, |_, _| true),
             Command::NextFailure { back } => state.next_failure(back),
             Command::Explain => state.switch_explaining(),
+            Command::Try(args) => state.try_again(&args),
             Command::RunAllQueries => state.queries.run_all(&state.setup),
             Command::PickReferences(pick) => state.pick_references(pick),
             Command::SetReferences(frames) => state.set_references(frames),
@@ -82,10 +87,7 @@ impl App {
             }
             Command::SetBreakpoints(texts) => state.set_breakpoints(texts),
             Command::Pin => {
-                state.kept = Some(KeptRun {
-                    run: state.run().clone(),
-                    cursor: state.cursor(),
-                });
+                state.keep();
                 state.note(
                     "This run is kept as A; change a parameter to compare",
                     false,
@@ -134,7 +136,12 @@ impl App {
                 let pointer = ctx.input(|input| input.pointer.hover_pos());
                 self.layout.maximize(view, pointer);
             }
-            Command::ResetLayout => self.layout.reset(),
+            Command::Arrange(arrangement) => {
+                let is_lecture = arrangement == Arrangement::Teach;
+                state.options.hides_future = is_lecture;
+                ctx.set_zoom_factor(if is_lecture { LECTURE_ZOOM } else { 1.0 });
+                self.layout.arrange(arrangement);
+            }
             Command::SwitchTheme => {
                 let is_dark = ctx.global_style().visuals.dark_mode;
                 ctx.set_theme(if is_dark {
@@ -328,6 +335,30 @@ impl AppState {
         self.setup.task.by_hand = true;
         self.setup.chosen = frames.into();
         self.start_run(RunMode::Running);
+    }
+
+    /// Keeps the present run as A.
+    fn keep(&mut self) {
+        self.kept = Some(KeptRun {
+            run: self.run().clone(),
+            cursor: self.cursor(),
+        });
+    }
+
+    /// Localises with what helped; the run in which it was missing is A.
+    fn try_again(&mut self, args: &[String]) {
+        let mut setup = self.setup.clone();
+        if let Err(why) = setup.change(args) {
+            self.note(why, true);
+            return;
+        }
+        self.keep();
+        self.setup = setup;
+        self.restart_run();
+        self.note(
+            format!("Localised with {}; X shows the run before", args.join(" ")),
+            false,
+        );
     }
 
     fn set_breakpoints(&mut self, texts: Vec<String>) {

@@ -21,7 +21,13 @@ pub(super) struct Painter {
 impl Painter {
     /// Finds an adapter for pictures of a size \[px\].
     pub(super) fn new(size_px: [u32; 2]) -> Result<Self, WindowError> {
-        let configuration = adapter::configuration();
+        // OpenGL looks for a display, and complains where there is none: it is asked last.
+        let found = Self::on(wgpu::Backends::PRIMARY, size_px);
+        found.or_else(|_| Self::on(wgpu::Backends::all(), size_px))
+    }
+
+    fn on(backends: wgpu::Backends, size_px: [u32; 2]) -> Result<Self, WindowError> {
+        let configuration = adapter::configuration(backends);
         let instance = pollster::block_on(configuration.wgpu_setup.new_instance());
         let state =
             RenderState::create(&configuration, &instance, None, RendererOptions::default());

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use eframe::egui_wgpu::RenderState;
 use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
 
+use super::arrangement::Arrangement;
 use super::command::{Command, Queue};
 use super::state::AppState;
 use super::view_context::ViewContext;
@@ -13,6 +14,7 @@ use super::views::{self, View};
 
 /// The tree of views, and the views themselves.
 pub(super) struct Layout {
+    arrangement: Arrangement,
     tree: Tree<String>,
     views: BTreeMap<&'static str, ViewPair>,
     /// The view that has all the room, if one has.
@@ -38,14 +40,26 @@ impl Layout {
             })
             .collect();
         Self {
-            tree: first_tree(),
+            arrangement: Arrangement::default(),
+            tree: inspecting(),
             views,
             alone: None,
         }
     }
 
-    pub(super) fn reset(&mut self) {
-        self.tree = first_tree();
+    /// What the window is arranged for.
+    pub(super) fn arrangement(&self) -> Arrangement {
+        self.arrangement
+    }
+
+    /// Puts every view to its first place in an arrangement.
+    pub(super) fn arrange(&mut self, arrangement: Arrangement) {
+        self.arrangement = arrangement;
+        self.tree = match arrangement {
+            Arrangement::Inspect => inspecting(),
+            Arrangement::Teach => teaching(),
+            Arrangement::Batch => sorting(),
+        };
         self.alone = None;
     }
 
@@ -56,6 +70,11 @@ impl Layout {
             (None, Some(_)) => None,
             (None, None) => self.view_at(pointer),
         };
+    }
+
+    /// Whether one view has all the room.
+    pub(super) fn is_maximized(&self) -> bool {
+        self.alone.is_some()
     }
 
     fn view_at(&self, pointer: Option<egui::Pos2>) -> Option<String> {
@@ -69,7 +88,7 @@ impl Layout {
         Some(pane.clone())
     }
 
-    /// Brings a view to the front; a view that was closed comes back.
+    /// Brings a view to the front; a view that was closed comes back to where it was.
     pub(super) fn show(&mut self, name: &str) {
         if self.alone.is_some() {
             self.alone = Some(name.to_owned());
@@ -90,6 +109,7 @@ impl Layout {
             }
             id
         });
+        self.tree.tiles.set_visible(id, true);
         self.tree.make_active(|tile, _| tile == id);
     }
 
@@ -134,46 +154,76 @@ impl Layout {
     }
 }
 
-fn first_tree() -> Tree<String> {
+/// Views in tabs.
+fn tabs(tiles: &mut Tiles<String>, names: &[&str]) -> TileId {
+    let panes: Vec<_> = names
+        .iter()
+        .filter(|name| views::ALL.iter().any(|entry| entry.name == **name))
+        .map(|name| tiles.insert_pane((*name).to_owned()))
+        .collect();
+    tiles.insert_tab_tile(panes)
+}
+
+/// Gives the parts of a split their shares of its room.
+fn share(tiles: &mut Tiles<String>, container: TileId, shares: &[(TileId, f32)]) {
+    if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
+        tiles.get_mut(container)
+    {
+        for (tile, share) in shares {
+            linear.shares.set_share(*tile, *share);
+        }
+    }
+}
+
+fn tree(root: TileId, tiles: Tiles<String>) -> Tree<String> {
+    Tree::new(egui::Id::unique("views"), root, tiles)
+}
+
+fn inspecting() -> Tree<String> {
     let mut tiles = Tiles::default();
-    let mut tabs = |names: &[&str]| {
-        let panes: Vec<_> = names
-            .iter()
-            .filter(|name| views::ALL.iter().any(|entry| entry.name == **name))
-            .map(|name| tiles.insert_pane((*name).to_owned()))
-            .collect();
-        tiles.insert_tab_tile(panes)
-    };
-    let lists = tabs(&[
+    let lists = [
         views::QUERIES,
         "references",
         views::PARAMETERS,
         "breakpoints",
-    ]);
-    let pictures = tabs(&["images", "retrieval", "synthetic"]);
-    let space = tabs(&["space", "ransac"]);
-    let surface = tabs(&["surface"]);
-    let histogram = tabs(&["histogram", "fusion"]);
-    let words = tabs(&["report", "log"]);
+    ];
+    let lists = tabs(&mut tiles, &lists);
+    let pictures = tabs(&mut tiles, &["images", "retrieval", "synthetic"]);
+    let space = tabs(&mut tiles, &["space", "ransac"]);
+    let surface = tabs(&mut tiles, &["surface"]);
+    let histogram = tabs(&mut tiles, &["histogram", "fusion"]);
+    let words = tabs(&mut tiles, &["report", "batch", "log"]);
     let lower = tiles.insert_horizontal_tile(vec![surface, histogram]);
     let middle = tiles.insert_vertical_tile(vec![pictures, lower]);
     let right = tiles.insert_vertical_tile(vec![space, words]);
     let root = tiles.insert_horizontal_tile(vec![lists, middle, right]);
-    // Three maps beside each other need more room than one histogram.
-    let shares = [
-        (root, vec![(lists, 0.22), (middle, 0.48), (right, 0.30)]),
-        (lower, vec![(surface, 0.62), (histogram, 0.38)]),
-    ];
-    for (container, shares) in shares {
-        if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
-            tiles.get_mut(container)
-        {
-            for (tile, share) in shares {
-                linear.shares.set_share(tile, share);
-            }
-        }
-    }
-    Tree::new(egui::Id::unique("views"), root, tiles)
+    let thirds = [(lists, 0.22), (middle, 0.48), (right, 0.30)];
+    share(&mut tiles, root, &thirds);
+    // Photos of drives are wide; the map with its legend needs more room than the histogram.
+    share(&mut tiles, middle, &[(pictures, 0.44), (lower, 0.56)]);
+    share(&mut tiles, lower, &[(surface, 0.62), (histogram, 0.38)]);
+    tree(root, tiles)
+}
+
+fn teaching() -> Tree<String> {
+    let mut tiles = Tiles::default();
+    let indirect = tabs(&mut tiles, &["images", "synthetic"]);
+    let direct = tabs(&mut tiles, &["surface", "ransac", "histogram"]);
+    let space = tabs(&mut tiles, &["space"]);
+    let lower = tiles.insert_horizontal_tile(vec![direct, space]);
+    let root = tiles.insert_vertical_tile(vec![indirect, lower]);
+    tree(root, tiles)
+}
+
+fn sorting() -> Tree<String> {
+    let mut tiles = Tiles::default();
+    let batch = tabs(&mut tiles, &["batch", views::QUERIES, "references"]);
+    let pictures = tabs(&mut tiles, &["images", "synthetic"]);
+    let words = tabs(&mut tiles, &["surface", "ransac", "report"]);
+    let right = tiles.insert_vertical_tile(vec![pictures, words]);
+    let root = tiles.insert_horizontal_tile(vec![batch, right]);
+    share(&mut tiles, root, &[(batch, 0.55), (right, 0.45)]);
+    tree(root, tiles)
 }
 
 /// What the tree draws its panes with.
@@ -248,11 +298,23 @@ impl Behavior<String> for Panes<'_> {
     fn is_tab_closable(&self, _tiles: &Tiles<String>, _tile: TileId) -> bool {
         true
     }
+
+    /// A closed view is hidden: so it keeps its place until it is wanted again.
+    fn on_tab_close(&mut self, tiles: &mut Tiles<String>, tile: TileId) -> bool {
+        close(tiles, tile);
+        false
+    }
+}
+
+fn close(tiles: &mut Tiles<String>, tile: TileId) {
+    tiles.set_visible(tile, false);
 }
 
 fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, context: &ViewContext<'_>) {
     ui.push_id(run, |ui| {
-        if context.other_run().is_some() {
+        // The present run alone needs no name: nothing moves for a run that is kept beside it.
+        let is_compared = context.options.compare_mode != CompareMode::Present;
+        if is_compared && context.other_run().is_some() {
             ui.weak(match run {
                 "A" => "A, kept",
                 _ => "B, present",
@@ -260,4 +322,29 @@ fn draw(ui: &mut egui::Ui, run: &str, view: &mut Box<dyn View>, context: &ViewCo
         }
         view.ui(ui, context);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pane(layout: &Layout, name: &str) -> TileId {
+        let mut tiles = layout.tree.tiles.iter();
+        let found = tiles.find(|(_, tile)| matches!(tile, egui_tiles::Tile::Pane(p) if p == name));
+        *found.expect("a view of the first layout").0
+    }
+
+    #[test]
+    fn a_view_that_was_closed_comes_back_to_its_old_place() {
+        let mut layout = Layout::new(None);
+        for name in ["surface", "report"] {
+            let id = pane(&layout, name);
+            let home = layout.tree.tiles.parent_of(id);
+            close(&mut layout.tree.tiles, id);
+            assert!(!layout.tree.is_visible(id));
+            layout.show(name);
+            assert!(layout.tree.is_visible(id));
+            assert_eq!(layout.tree.tiles.parent_of(pane(&layout, name)), home);
+        }
+    }
 }

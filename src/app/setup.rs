@@ -6,6 +6,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use crate::estimator;
+use crate::event::Side;
 use crate::localize::{References, Selection, frames_within};
 use crate::method::Method;
 use crate::scene::{FrameStore, Scene};
@@ -120,6 +121,84 @@ impl Setup {
                 .filter(|&frame| references.pose(frame).is_some())
                 .collect(),
         }
+    }
+
+    /// Changes what is asked as these arguments of the command line would: those of remedies.
+    ///
+    /// # Errors
+    /// A line that says which argument cannot be followed.
+    pub(super) fn change(&mut self, args: &[String]) -> Result<(), String> {
+        for pair in args.chunks(2) {
+            let [option, value] = pair else {
+                return Err(format!("{}: a value expected", pair.concat()));
+            };
+            let wrong = |why: &dyn fmt::Display| format!("{option} {value}: {why}");
+            match option.as_str() {
+                "--set" => {
+                    let params = &mut self.task.params;
+                    params.assign(value).map_err(|why| wrong(&why))?;
+                }
+                "--radius" => {
+                    self.task.radius_m = value.parse().map_err(|why| wrong(&why))?;
+                }
+                "--method" => {
+                    let method = Method::called(value).map_err(|why| wrong(&why))?;
+                    let methods = &mut self.task.protocol.methods;
+                    if !methods.contains(&method) {
+                        methods.push(method);
+                    }
+                    // In the order in which they run.
+                    let place = |asked: &Method| estimator::methods().position(|m| m == *asked);
+                    methods.sort_by_key(|asked| place(asked).unwrap_or(usize::MAX));
+                }
+                "--reference" => {
+                    let frame = self.references.find(value).map_err(|why| wrong(&why))?;
+                    self.task.by_hand = true;
+                    self.chosen = vec![frame].into();
+                }
+                _ => return Err(wrong(&"no argument of a remedy")),
+            }
+        }
+        Ok(())
+    }
+
+    /// Query and reference frames as a person tells them apart: with their scene where there are two.
+    pub fn label(&self, side: Side, frame: usize) -> String {
+        let scene = match side {
+            Side::Query => &self.queries,
+            Side::Reference => &self.references,
+        };
+        self.label_of(side, &scene.frames()[frame])
+    }
+
+    /// The same for a frame that is known by its name.
+    pub(super) fn label_of(&self, side: Side, name: &str) -> String {
+        let scene = match side {
+            Side::Query => &self.queries,
+            Side::Reference => &self.references,
+        };
+        match self.queries.name() == self.references.name() {
+            true => name.to_owned(),
+            false => format!("{} {name}", scene.name()),
+        }
+    }
+
+    /// What the window is about, for its title.
+    pub fn title(&self) -> String {
+        let references = self.chosen.frames.iter();
+        let references: Vec<String> = references
+            .map(|&frame| self.label(Side::Reference, frame))
+            .collect();
+        let query = self.label(Side::Query, self.query);
+        let from = match references.is_empty() {
+            true => String::new(),
+            false => format!(" ← {}", references.join(", ")),
+        };
+        let scene = match self.queries.name() == self.references.name() {
+            true => format!("{} ", self.task.scene),
+            false => String::new(),
+        };
+        format!("posescope: {scene}{query}{from}")
     }
 
     /// The name of the query.

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use image::RgbImage;
 
+use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
 use super::headless::Painter;
@@ -21,6 +22,8 @@ use crate::session::RunState;
 pub struct Shot {
     /// The view that has all the room; `None` for the whole window.
     pub view: Option<String>,
+    /// What the window is arranged for.
+    pub arrangement: Arrangement,
     /// The moment of the run.
     pub moment: Moment,
     /// A pose to take the camera to.
@@ -98,7 +101,6 @@ pub fn shoot(setup: Setup, results: Results, shot: &Shot) -> Result<RgbImage, Sh
     };
     let painter = Painter::new(shot.size_px)?;
     let ctx = egui::Context::default();
-    ctx.set_pixels_per_point(shot.scale);
     ctx.set_theme(shot.theme);
     let mut app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
     // Nothing moves in a picture.
@@ -115,7 +117,10 @@ pub fn shoot(setup: Setup, results: Results, shot: &Shot) -> Result<RgbImage, Sh
     if let Some(pose) = shot.camera {
         window.app.send(Command::JumpCamera(pose));
     }
-    window.app.send(Command::Maximize(view));
+    window.app.send(Command::Arrange(shot.arrangement));
+    if view.is_some() {
+        window.app.send(Command::Maximize(view));
+    }
     let output = window.settled();
     painter.paint(&ctx, output).map_err(ShotError::Paint)
 }
@@ -192,14 +197,18 @@ impl Window<'_> {
     }
 
     fn frame(&mut self) -> egui::FullOutput {
-        let size = self.shot.size_px.map(|side| side as f32 / self.shot.scale);
-        let input = egui::RawInput {
+        let size = self.shot.size_px;
+        let size = size.map(|side| side as f32 / self.ctx.pixels_per_point());
+        let mut input = egui::RawInput {
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size.into())),
             max_texture_side: Some(self.painter.max_side()),
             time: Some(self.frames as f64 / 60.0),
             focused: true,
             ..egui::RawInput::default()
         };
+        if let Some(viewport) = input.viewports.get_mut(&egui::ViewportId::ROOT) {
+            viewport.native_pixels_per_point = Some(self.shot.scale);
+        }
         self.frames += 1;
         self.ctx.run_ui(input, |ui| self.app.content(ui))
     }

@@ -4,6 +4,7 @@ use egui::Color32;
 
 use crate::estimator;
 use crate::features::FeatureState;
+use crate::localize::Standing;
 use crate::method::Method;
 use crate::palette::{self, Rgb};
 
@@ -27,6 +28,16 @@ pub const fn rgb([r, g, b]: Rgb) -> Color32 {
 /// The colour of a feature's state, by its position in [`FeatureState::NAMES`].
 pub fn state(index: usize) -> Color32 {
     rgb(palette::STATES[index.min(FeatureState::NAMES.len() - 1)])
+}
+
+/// The colour of what a result is worth.
+pub fn standing(visuals: &egui::Visuals, standing: Standing) -> Color32 {
+    match standing {
+        Standing::Right => TRUTH,
+        Standing::Unmeasured => visuals.text_color(),
+        Standing::LowConfidence => FAR,
+        Standing::Wrong | Standing::NoPose => ESTIMATE,
+    }
 }
 
 /// The colour of a method's lane and curves.

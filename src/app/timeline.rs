@@ -51,7 +51,12 @@ fn lanes(ui: &mut Ui, state: &AppState, commands: &Queue) {
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Stages of the run"));
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
-    for span in run.spans() {
+    // Who hides the future shows no stage that has not begun.
+    let end = match state.options.hides_future {
+        true => state.cursor() + 1,
+        false => usize::MAX,
+    };
+    for span in run.spans().iter().filter(|span| span.records.start < end) {
         let name = name_of(run, span.part);
         let (left, right) = (x_of(span.records.start), x_of(span.records.end));
         let top = pos2(left + 3.0, rect.top() + 1.0);
@@ -66,7 +71,7 @@ fn lanes(ui: &mut Ui, state: &AppState, commands: &Queue) {
             );
         }
     }
-    for bar in run.stages() {
+    for bar in run.stages().iter().filter(|bar| bar.records.start < end) {
         draw(ui, &painter, bar, rect, x_of);
     }
     let x = x_of(state.cursor()) + 0.5 * rect.width() / count;

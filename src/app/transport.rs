@@ -2,11 +2,13 @@
 
 use egui::{Button, RichText, Ui};
 
+use super::arrangement::Arrangement;
 use super::command::{Command, Queue};
 use super::setup::ReferencePick;
 use super::state::AppState;
 use super::theme;
 use super::view_options::CompareMode;
+use crate::event::Side;
 use crate::localize::Selection;
 use crate::method::Method;
 use crate::session::RunState;
@@ -23,7 +25,6 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
         compared(ui, state, commands);
         menus(ui, state, commands);
     });
-    notes(ui, state, commands);
 }
 
 fn button(ui: &mut Ui, commands: &Queue, text: &str, help: &str, command: Command) {
@@ -94,9 +95,6 @@ fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
 
 fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let setup = &state.setup;
-    let frame = |scene: &std::sync::Arc<dyn crate::scene::Scene>, index: usize| {
-        scene.frames()[index].clone()
-    };
     button(
         ui,
         commands,
@@ -104,7 +102,7 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
         "Previous query (K)",
         Command::NextQuery { back: true },
     );
-    ui.label(frame(&setup.queries, setup.query))
+    ui.label(setup.label(Side::Query, setup.query))
         .on_hover_text("The query");
     button(
         ui,
@@ -118,7 +116,7 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
         .chosen
         .frames
         .iter()
-        .map(|&reference| frame(&setup.references, reference))
+        .map(|&reference| setup.label(Side::Reference, reference))
         .collect();
     // A label without text would send what follows it back to the left edge.
     let text = match names.as_slice() {
@@ -213,18 +211,12 @@ fn switches(ui: &mut Ui, state: &AppState, commands: &Queue) {
     switch(ui, state.options.blinking, "Blink", help, Command::Blink);
 }
 
+/// The buttons are there without a run A too, lest the bar jump when one is kept.
 fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.separator();
-    if state.kept.is_none() {
-        button(
-            ui,
-            commands,
-            "Keep as A",
-            "Keep this run to compare with (P)",
-            Command::Pin,
-        );
-        return;
-    }
+    let help = "Keep this run to compare with (P)";
+    button(ui, commands, "Keep A", help, Command::Pin);
+    let has_kept = state.kept.is_some();
     for (compare_mode, text, help) in [
         (CompareMode::Kept, "A", "Show the run that was kept (X)"),
         (CompareMode::Present, "B", "Show the present run (X)"),
@@ -234,18 +226,19 @@ fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
             "Show both beside each other",
         ),
     ] {
-        let response = ui.selectable_label(state.options.compare_mode == compare_mode, text);
+        let is_on = has_kept && state.options.compare_mode == compare_mode;
+        let response = ui.add_enabled(has_kept, Button::selectable(is_on, text));
         if response.on_hover_text(help).clicked() {
             commands.send(Command::Compare(compare_mode));
         }
     }
-    button(
-        ui,
-        commands,
-        "Forget A",
-        "Forget the run that was kept",
-        Command::Unpin,
-    );
+    let forget = ui.add_enabled(has_kept, Button::new("Forget"));
+    if forget
+        .on_hover_text("Forget the run that was kept")
+        .clicked()
+    {
+        commands.send(Command::Unpin);
+    }
 }
 
 fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
@@ -257,8 +250,11 @@ fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
             }
         }
         ui.separator();
-        if ui.button("First layout").clicked() {
-            commands.send(Command::ResetLayout);
+        for (arrangement, title, key) in Arrangement::ALL {
+            let words = format!("Layout: {title} ({})", key.name());
+            if ui.button(words).clicked() {
+                commands.send(Command::Arrange(arrangement));
+            }
         }
     });
     super::save::menu(ui, state, commands);
@@ -272,18 +268,30 @@ fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
     button(ui, commands, "?", "All keys (?)", Command::Help);
 }
 
-fn notes(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    for (index, note) in state.notes.iter().enumerate() {
-        ui.horizontal(|ui| {
-            if ui.small_button("×").on_hover_text("Dismiss").clicked() {
-                commands.send(Command::Dismiss(index));
-            }
-            let text = RichText::new(&note.text);
-            ui.label(if note.is_error {
-                text.color(theme::ESTIMATE).strong()
-            } else {
-                text
-            });
-        });
+/// What there is to say, above what is drawn: nothing moves for it.
+pub(super) fn notes(ctx: &egui::Context, state: &AppState, commands: &Queue) {
+    if state.notes.is_empty() {
+        return;
     }
+    let area = egui::Area::new(egui::Id::unique("notes"))
+        .order(egui::Order::Foreground)
+        .anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -76.0]);
+    area.show(ctx, |ui| {
+        egui::Frame::popup(ui.style()).show(ui, |ui| {
+            ui.set_max_width(520.0);
+            for (index, note) in state.notes.iter().enumerate() {
+                ui.horizontal_wrapped(|ui| {
+                    if ui.small_button("×").on_hover_text("Dismiss").clicked() {
+                        commands.send(Command::Dismiss(index));
+                    }
+                    let text = RichText::new(&note.text);
+                    ui.label(if note.is_error {
+                        text.color(theme::ESTIMATE).strong()
+                    } else {
+                        text
+                    });
+                });
+            }
+        });
+    });
 }

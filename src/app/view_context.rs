@@ -12,7 +12,7 @@ use super::state::{AppState, Results};
 use super::textures::Textures;
 use super::view_options::ViewOptions;
 use crate::estimator::{self, Entry};
-use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
+use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, Side, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::problem::Problem;
@@ -105,6 +105,15 @@ impl<'a> ViewContext<'a> {
         self.state.named_pose(name)
     }
 
+    /// The query or the reference of a problem, with its scene where there are two.
+    pub fn frame_label(&self, side: Side, problem: &Problem) -> String {
+        let name = match side {
+            Side::Query => &problem.query.name,
+            Side::Reference => &problem.reference.name,
+        };
+        self.setup.label_of(side, name)
+    }
+
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
     pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
         self.state.looking_at()
@@ -169,7 +178,9 @@ impl<'a> ViewContext<'a> {
             return Some((span, self.cursor));
         }
         let span = self.run.span_of(part)?;
-        Some((span, span.records.end.checked_sub(1)?))
+        let last = span.records.end.checked_sub(1)?;
+        let is_future = last > self.cursor;
+        (!is_future || !self.options.hides_future).then_some((span, last))
     }
 
     /// The latest event of a type that a method has told: up to the cursor if the cursor is in its

@@ -19,6 +19,8 @@ pub struct ViewOptions {
     pub compare_mode: CompareMode,
     /// Whether the ground truth is shown.
     pub shows_truth: bool,
+    /// Whether nothing is shown of what comes behind the cursor.
+    pub hides_future: bool,
     /// Whether only what differs is shown.
     pub only_differences: bool,
     /// Whether query and synthetic view are shown in turn.
@@ -34,6 +36,7 @@ impl Default for ViewOptions {
         Self {
             compare_mode: CompareMode::default(),
             shows_truth: true,
+            hides_future: false,
             only_differences: false,
             blinking: false,
             wants_filter: false,

@@ -3,6 +3,7 @@
 //! A view draws from the [`ViewContext`] that it is handed and keeps nothing of the run. What it
 //! does keep is how a person looks at it: a zoom, a filter.
 
+mod batch;
 mod breakpoints;
 mod canvas;
 mod fusion;
@@ -75,6 +76,12 @@ pub const ALL: &[Entry] = &[
         title: "Queries",
         about: "all queries with what is known of them",
         new: |_| Box::<queries::QueriesView>::default(),
+    },
+    Entry {
+        name: "batch",
+        title: "Batch",
+        about: "the results of all queries in a table: filter, sort, open",
+        new: |_| Box::<batch::BatchView>::default(),
     },
     Entry {
         name: "references",

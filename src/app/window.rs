@@ -49,7 +49,7 @@ pub fn window_options() -> eframe::NativeOptions {
             .with_inner_size([1500.0, 950.0]),
         // There are no wide gradients, and it costs time for every pixel on a software adapter.
         dithering: false,
-        wgpu_options: adapter::configuration(),
+        wgpu_options: adapter::configuration(wgpu::Backends::all()),
         ..eframe::NativeOptions::default()
     }
 }
@@ -63,8 +63,7 @@ pub fn open(setup: Setup, results: Results) -> Result<(), WindowError> {
         return Err(WindowError::NoDisplay);
     }
     let mut options = window_options();
-    let title = format!("posescope: {}", setup.task.scene);
-    options.viewport = options.viewport.with_title(title);
+    options.viewport = options.viewport.with_title(setup.title());
     eframe::run_native(
         "posescope",
         options,

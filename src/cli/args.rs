@@ -2,6 +2,7 @@
 
 #[cfg(feature = "app")]
 mod shot;
+mod triage;
 
 use std::fmt;
 use std::net::IpAddr;
@@ -25,6 +26,7 @@ use posescope::text::UnknownWord;
 
 #[cfg(feature = "app")]
 pub use shot::ShotArgs;
+pub use triage::TriageArgs;
 
 use super::failure::CliError;
 
@@ -59,6 +61,8 @@ pub enum Command {
     /// List the queries that a run fixed, broke or changed against another; exit code 1 if it broke
     /// any
     Diff(DiffArgs),
+    /// List the results of a run that meet a condition, in an order
+    Triage(TriageArgs),
     /// Write the poses or tables of a run in formats of other programs
     Export(ExportArgs),
     /// Check a scene: what is there, what is missing, and which of the usual mistakes it has; exit code 3

@@ -33,6 +33,11 @@ impl JsonLines {
     pub fn write(&mut self, result: &QueryResult) -> Result<(), CliError> {
         let line = serde_json::to_string(result)
             .map_err(|error| CliError::io(&self.path)(error.into()))?;
+        self.write_line(&line)
+    }
+
+    /// Writes one object that is text already.
+    pub fn write_line(&mut self, line: &str) -> Result<(), CliError> {
         writeln!(self.writer, "{line}")
             .and_then(|()| self.writer.flush())
             .map_err(|error| match error.kind() {

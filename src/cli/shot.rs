@@ -14,6 +14,7 @@ pub fn shot(args: &ShotArgs, terminal: &Terminal) -> Result<(), CliError> {
     let (setup, results) = view::setup(&args.view_args, RunMode::Running)?;
     let shot = Shot {
         view: args.view.clone(),
+        arrangement: args.layout,
         moment: args.at,
         camera: args.camera,
         size_px: args.size,

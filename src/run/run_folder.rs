@@ -402,6 +402,18 @@ pub fn read_results<T: DeserializeOwned>(
     }))
 }
 
+/// The lines of `results.jsonl` as they are, in the order of [`read_results`].
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn result_lines(
+    folder: &Path,
+) -> Result<impl Iterator<Item = Result<String, FolderError>>, FolderError> {
+    let path = folder.join(RESULTS);
+    let lines = lines_of(folder, RESULTS)?;
+    Ok(lines.map(move |line| line.map_err(FolderError::io(&path))))
+}
+
 fn lines_of(
     folder: &Path,
     name: &str,

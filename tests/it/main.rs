@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod binary;
+mod card;
 mod colmap;
 mod command_line;
 mod conformance;
@@ -36,11 +37,13 @@ mod scene_formats;
 mod scene_toml;
 mod search_views;
 mod session;
+mod shot;
 mod small_sequence;
 mod space;
 mod stored;
 mod surf_warp;
 mod synth;
+mod triage;
 mod two_walls;
 mod verdicts;
 mod view;

@@ -91,7 +91,7 @@ pub fn finished(setup: Setup) -> Harness<'static, App> {
     window
 }
 
-fn press(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) {
+pub fn press(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) {
     window.key_press_modifiers(modifiers, key);
     window.step();
     window.step();
@@ -258,7 +258,7 @@ fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
     };
     let helped = explanation(&window).expect("it went wrong").helped;
     let words = helped[0].args.join(" ");
-    assert!(is_said(&window, &words), "{words}");
+    assert!(is_said(&window, &format!("Try {words}")), "{words}");
     assert!(window.state().app_state().run().explaining.is_none());
     let line = window.state().app_state().setup.command_line();
     assert!(line.contains("--explain 12"), "{line}");

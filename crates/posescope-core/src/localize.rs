@@ -7,6 +7,7 @@ mod observer;
 mod result;
 mod select;
 mod single;
+mod standing;
 mod timing;
 mod verdict;
 
@@ -21,5 +22,6 @@ pub use select::{
     ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, tell_ranking,
 };
 pub use single::{localize, localize_by, localize_traced, words_of};
+pub use standing::Standing;
 pub use timing::{StageTimes, StageTimings};
 pub use verdict::Verdict;

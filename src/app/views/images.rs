@@ -22,6 +22,7 @@ use self::visible::VisibleFeatures;
 use super::View;
 use super::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext};
+use crate::event::Side;
 use crate::method::Method;
 use crate::problem::Problem;
 
@@ -107,7 +108,8 @@ impl View for ImagesView {
             draw_truth(&mut mesh, &query.at, &problem.query.intrinsics, truth);
             mesh.paint_on(&query.at.painter(ui.painter()));
         }
-        photos::name(ui, problem, &query.at, &reference.at);
+        let labels = [Side::Query, Side::Reference].map(|side| context.frame_label(side, problem));
+        photos::name(ui, &labels, &query.at, &reference.at);
 
         if let (Some(feature), Some(panel)) = (selected, panel) {
             let params = &context.run.params.fb;

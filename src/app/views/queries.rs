@@ -15,6 +15,8 @@ use crate::method::Method;
 #[derive(Default)]
 pub struct QueriesView {
     only_failures: bool,
+    /// The query that was brought into sight.
+    in_sight: Option<usize>,
 }
 
 impl View for QueriesView {
@@ -45,16 +47,19 @@ impl View for QueriesView {
             .copied()
             .filter(|query| !self.only_failures || context.has_failed(*query))
             .collect();
-        ScrollArea::vertical().auto_shrink(false).show_rows(
-            ui,
-            THUMBNAIL.y,
-            shown.len(),
-            |ui, rows| {
-                for &query in &shown[rows] {
-                    row(ui, context, query);
-                }
-            },
-        );
+        let mut area = ScrollArea::vertical().auto_shrink(false);
+        if self.in_sight != Some(context.setup.query) {
+            self.in_sight = Some(context.setup.query);
+            let place = shown.iter().position(|query| *query == context.setup.query);
+            let above = place.unwrap_or(0) as f32 * (THUMBNAIL.y + ui.spacing().item_spacing.y);
+            let middle = 0.5 * (ui.available_height() - THUMBNAIL.y);
+            area = area.vertical_scroll_offset((above - middle).max(0.0));
+        }
+        area.show_rows(ui, THUMBNAIL.y, shown.len(), |ui, rows| {
+            for &query in &shown[rows] {
+                row(ui, context, query);
+            }
+        });
     }
 }
 

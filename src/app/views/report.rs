@@ -3,7 +3,7 @@
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::code::Code;
 use crate::localize::{QueryResult, Verdict};
 use crate::session::Span;
@@ -135,27 +135,7 @@ fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
     for span in with_result {
         findings(ui, span, shows_truth);
     }
-    if shows_truth {
-        explain_button(ui, context);
-    }
     ui.separator();
-}
-
-/// Offers to look for what would have helped, where something went wrong that is not explained.
-fn explain_button(ui: &mut Ui, context: &ViewContext<'_>) {
-    let is_unexplained = |result: &QueryResult| {
-        let is_wrong = result.diagnosis.iter().any(|one| one.code.is_failure());
-        is_wrong && result.error.or(result.initial_error).is_some() && result.explanation.is_none()
-    };
-    let is_asked_for = context.setup.task.protocol.explain > 0;
-    if is_asked_for || !context.run.results().any(is_unexplained) {
-        return;
-    }
-    let help = "Localise what went wrong again in other ways (E)";
-    let button = ui.button("What would have helped?").on_hover_text(help);
-    if button.clicked() {
-        context.send(Command::Explain);
-    }
 }
 
 /// Why a pose is wrong, missing or hardly to be believed. Verdicts tell the ground truth, which may be

@@ -14,15 +14,18 @@ use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::method::Method;
 
-use maps::{MapContent, Maps, progress};
+use maps::{CostMap, MapContent, progress};
 use marks::{MapMark, legend, moved, place};
 use scale::{NO_SAY, Scale, number, swatch};
 use search::Search;
 
-/// What could be done with the maps.
+/// What could be done with the map.
 const HELP: &str = "Point at a cell; click, drag: camera; wheel: zoom; Shift+drag: pan";
 
-/// Maps of a direct method's search, and slices through its minimum.
+/// Room for the legend beside the map \[points\].
+const LEGEND: f32 = 200.0;
+
+/// The map of a direct method's search, and slices through its minimum.
 #[derive(Default)]
 pub struct SurfaceView {
     /// The method that was asked for; that at the cursor otherwise.
@@ -31,7 +34,7 @@ pub struct SurfaceView {
     asked_at: Option<Method>,
     /// The coverage floor that is tried; the run's own otherwise.
     floor: Option<f64>,
-    maps: Maps,
+    map: CostMap,
     /// Whether this view has said that the pointer is over a pose.
     is_hovering: bool,
 }
@@ -79,6 +82,9 @@ impl SurfaceView {
                 }
             }
             let Some(search) = search else { return };
+            ui.separator();
+            let run_floor = context.run.params.grid.coverage_floor;
+            self.map.switches(ui, self.floor.unwrap_or(run_floor));
             if let Some(around) = search.span.part.method().filter(|around| *around != shown) {
                 ui.weak(format!("inside {}", around.label()));
             }
@@ -107,10 +113,29 @@ impl SurfaceView {
             floor,
         };
         let readout = Readout::reserve(ui);
-        let under_pointer = self.maps.ui(ui, context, &shown);
+        // Beside the map where there is room, below it elsewhere.
+        let mut pointed_at = None;
+        let mut has_legend = false;
+        let under_pointer = ui
+            .horizontal_top(|ui| {
+                let (told, map_width) = ui.vertical(|ui| self.map.ui(ui, context, &shown)).inner;
+                has_legend = width - map_width > LEGEND;
+                if has_legend {
+                    ui.vertical(|ui| {
+                        self.map
+                            .colours(ui, &scale, ui.available_width().min(LEGEND));
+                        pointed_at = legend(ui, context, &marks);
+                    });
+                }
+                told
+            })
+            .inner;
         let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
         readout.say(ui, words, HELP);
-        let pointed_at = legend(ui, context, &marks);
+        if !has_legend {
+            self.map.colours(ui, &scale, width);
+            pointed_at = legend(ui, context, &marks);
+        }
         self.floor_ui(ui, context, search, run_floor);
         ui.separator();
         slices::ui(ui, context, search, floor, width);

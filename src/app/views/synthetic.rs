@@ -12,7 +12,7 @@ use super::View;
 use super::canvas::{self, PanZoom};
 use crate::app::textures::color_image;
 use crate::app::{Command, ShownView, ViewContext};
-use crate::event::{Moment, ViewRendered};
+use crate::event::{Moment, Side, ViewRendered};
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::problem::Problem;
@@ -165,7 +165,7 @@ impl SynthesisView {
             (_, Some(picture)) => at.paint(&painter, picture.id(), Color32::WHITE),
         }
         let words = match (shown, blinks) {
-            (None, _) => format!("query {}", problem.query.name),
+            (None, _) => format!("query {}", context.frame_label(Side::Query, problem)),
             (Some(_), true) => format!("{name} (blinking)"),
             (Some(_), false) => name,
         };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
-use posescope::app::{Moment, NamedPose, views};
+use posescope::app::{Arrangement, Moment, NamedPose, views};
 
 use super::ViewArgs;
 
@@ -19,6 +19,15 @@ pub struct ShotArgs {
         value_parser = PossibleValuesParser::new(views::ALL.iter().map(|entry| entry.name))
     )]
     pub view: Option<String>,
+    /// What the window is arranged for
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "inspect",
+        value_parser = PossibleValuesParser::new(["inspect", "teach", "batch"])
+            .try_map(|name: String| arrangement(&name).ok_or("a layout expected"))
+    )]
+    pub layout: Arrangement,
     /// The moment of the run: its end, the end of a method, or the step of a number
     #[arg(long, value_name = "end|METHOD|STEP", default_value_t = Moment::End)]
     pub at: Moment,
@@ -39,9 +48,15 @@ pub struct ShotArgs {
     /// On a light ground
     #[arg(long)]
     pub light: bool,
-    /// The picture to write
-    #[arg(long, value_name = "FILE.png")]
+    /// The picture to write, PNG or JPEG by its ending
+    #[arg(long, value_name = "FILE.png|FILE.jpg")]
     pub out: PathBuf,
+}
+
+fn arrangement(name: &str) -> Option<Arrangement> {
+    let mut all = Arrangement::ALL.into_iter();
+    all.find(|(_, title, _)| title.eq_ignore_ascii_case(name))
+        .map(|(arrangement, ..)| arrangement)
 }
 
 /// The names of the poses that there are before anybody has moved the camera.

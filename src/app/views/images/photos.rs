@@ -120,10 +120,10 @@ impl PhotoPanZoom {
 }
 
 /// The names of the frames, on the photos.
-pub(super) fn name(ui: &Ui, problem: &Problem, query: &Placement, reference: &Placement) {
-    let text = format!("query {}", problem.query.name);
+pub(super) fn name(ui: &Ui, labels: &[String; 2], query: &Placement, reference: &Placement) {
+    let text = format!("query {}", labels[0]);
     canvas::tag(ui.painter(), query.visible().min, &text, Color32::WHITE);
-    let text = format!("reference {}", problem.reference.name);
+    let text = format!("reference {}", labels[1]);
     /// The colour of the reference, light enough for words on black.
     const COLOR: Color32 = Color32::from_rgb(0x8F, 0xC8, 0xF0);
     canvas::tag(ui.painter(), reference.visible().min, &text, COLOR);

@@ -1,18 +1,17 @@
-//! Three maps of the positions beside each other: cost, coverage, and the cost of those that may
-//! win.
+//! One large map of the positions: their cost, of all or of those that may win, or their coverage.
 
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
 use super::marks::{MapMark, place};
 use super::scale::{NO_SAY, Scale, bar, number};
-use super::search::{Search, Searched};
+use super::search::{Search, Searched, cell_of};
 use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset};
 use crate::render::Score;
 
-/// The maps, in their order.
+/// What the map shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Map {
     Cost,
@@ -21,35 +20,40 @@ enum Map {
 }
 
 impl Map {
-    const ALL: [Self; 3] = [Self::Cost, Self::Coverage, Self::Floored];
-
-    fn title(self, floor: f64) -> String {
-        match self {
-            Self::Cost => "Cost".to_owned(),
-            Self::Coverage => "Coverage".to_owned(),
-            Self::Floored => format!("Cost, floor {floor:.3}"),
-        }
-    }
-
     fn name(self) -> &'static str {
         match self {
             Self::Cost => "Cost map",
             Self::Coverage => "Coverage map",
-            Self::Floored => "Map of costs above the floor",
+            Self::Floored => "Cost map above the floor",
         }
     }
 }
 
-/// The width of the numbers left of the first map \[points\].
+/// The width of the numbers left of the map \[points\].
 const LEFT_AXIS: f32 = 34.0;
-/// The height of the numbers below each map \[points\].
+/// The height of the numbers below the map \[points\].
 const LOWER_AXIS: f32 = 30.0;
 
-/// The pictures of the maps. They change with the cursor and with the floor, so each has a texture
-/// that is painted anew where its pixels differ.
-#[derive(Default)]
-pub(super) struct Maps {
+/// The sides that a map may have \[points\].
+const SIDES: std::ops::RangeInclusive<f32> = 120.0..=480.0;
+
+/// The map with its switches. Its pictures change with the cursor and with the floor, so each lattice
+/// has a texture that is painted anew where its pixels differ.
+pub(super) struct CostMap {
+    shows_coverage: bool,
+    /// Whether cells that may not win have no colour.
+    is_floored: bool,
     painted: Vec<(ColorImage, TextureHandle)>,
+}
+
+impl Default for CostMap {
+    fn default() -> Self {
+        Self {
+            shows_coverage: false,
+            is_floored: true,
+            painted: Vec::new(),
+        }
+    }
 }
 
 /// A cell of a lattice.
@@ -61,7 +65,7 @@ struct Cell {
     offset: Offset,
 }
 
-/// What the maps are drawn from.
+/// What the map is drawn from.
 pub(super) struct MapContent<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) scale: &'a Scale,
@@ -70,78 +74,83 @@ pub(super) struct MapContent<'a> {
     pub(super) floor: f64,
 }
 
-impl Maps {
-    /// Draws the maps; answers the pose under the pointer, with its cost in words.
+impl CostMap {
+    fn map(&self) -> Map {
+        match (self.shows_coverage, self.is_floored) {
+            (true, _) => Map::Coverage,
+            (false, true) => Map::Floored,
+            (false, false) => Map::Cost,
+        }
+    }
+
+    /// What is switched on.
+    pub(super) fn switches(&mut self, ui: &mut Ui, floor: f64) {
+        let help = "Colour by coverage instead of cost";
+        ui.toggle_value(&mut self.shows_coverage, "Coverage")
+            .on_hover_text(help);
+        let words = format!("Floor {floor:.3}");
+        let help = "Leave cells without colour that cover too little to win";
+        ui.add_enabled_ui(!self.shows_coverage, |ui| {
+            ui.toggle_value(&mut self.is_floored, words)
+                .on_hover_text(help);
+        });
+    }
+
+    /// Draws the map; answers the pose under the pointer, with its cost in words, and the map's width.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
         shown: &MapContent<'_>,
-    ) -> Option<(Pose, String)> {
-        let gap = ui.spacing().item_spacing.x;
-        let side = ((ui.available_width() - LEFT_AXIS - 2.0 * gap - 2.0) / 3.0).max(60.0);
+    ) -> (Option<(Pose, String)>, f32) {
+        let map = self.map();
+        // As high as what is seen, less what is above and below the map.
+        let room = (ui.available_width() - LEFT_AXIS - 2.0).min(ui.clip_rect().height() - 84.0);
+        let side = room.clamp(*SIDES.start(), *SIDES.end());
         let group = ui.make_persistent_id("maps");
-        let mut transforms = Vec::new();
-        let mut pointed_at = None;
-        let mut takes_camera = false;
-        let mut texture = 0;
-        ui.horizontal_top(|ui| {
-            for map in Map::ALL {
-                ui.vertical(|ui| {
-                    let left = if map == Map::Cost { LEFT_AXIS } else { 0.0 };
-                    ui.horizontal(|ui| {
-                        ui.add_space(left);
-                        ui.add(egui::Label::new(map.title(shown.floor)).truncate());
-                    });
-                    let images = self.images(ui, shown, map, &mut texture);
-                    let answer = plot(ui, shown, map, group, side, images);
-                    let at = answer.response.interact_pointer_pos();
-                    if let Some(at) = answer.response.hover_pos().or(at) {
-                        let frame = answer.transform.frame();
-                        pointed_at = frame
-                            .contains(at)
-                            .then(|| cell_at(shown.search, &answer.transform, at))
-                            .flatten();
-                    }
-                    let is_panning = ui.input(|input| input.modifiers.shift);
-                    takes_camera |= !is_panning
-                        && (answer.response.clicked()
-                            || answer.response.dragged_by(PointerButton::Primary));
-                    transforms.push(answer.transform);
-                    ui.horizontal(|ui| {
-                        ui.spacing_mut().item_spacing.x = 0.0;
-                        ui.add_space(left);
-                        ui.vertical(|ui| colours(ui, shown.scale, map, side));
-                    });
-                });
+        let images = self.images(ui, shown, map);
+        let answer = plot(ui, shown, map, group, side, images);
+        let at = answer.response.interact_pointer_pos();
+        let at = answer.response.hover_pos().or(at);
+        let pointed_at = at
+            .filter(|at| answer.transform.frame().contains(*at))
+            .and_then(|at| cell_at(shown.search, &answer.transform, at));
+        let is_panning = ui.input(|input| input.modifiers.shift);
+        let takes_camera = !is_panning
+            && (answer.response.clicked() || answer.response.dragged_by(PointerButton::Primary));
+        overlay(ui, shown, &answer.transform, pointed_at);
+        let told = pointed_at.and_then(|cell| {
+            let pose = shown.search.pose(&cell.offset);
+            if takes_camera && context.camera() != Some(pose) {
+                context.send(Command::TakeCamera(Some(pose)));
             }
+            let searched = shown.search.positions().nth(cell.lattice)?;
+            let least_covered = shown.search.least_covered(shown.floor);
+            let words = readout(
+                shown.search,
+                searched,
+                cell.cell,
+                least_covered,
+                &cell.offset,
+            );
+            Some((pose, words))
         });
-        for transform in &transforms {
-            overlay(ui, shown, transform, pointed_at);
-        }
-        let Cell {
-            lattice,
-            cell,
-            offset,
-        } = pointed_at?;
-        let pose = shown.search.pose(&offset);
-        if takes_camera && context.camera() != Some(pose) {
-            context.send(Command::TakeCamera(Some(pose)));
-        }
-        let searched = shown.search.positions().nth(lattice)?;
-        let least_covered = shown.search.least_covered(shown.floor);
-        let words = readout(shown.search, searched, cell, least_covered, &offset);
-        Some((pose, words))
+        (told, side + LEFT_AXIS)
     }
 
-    /// The textures of one map with their places.
-    fn images(
-        &mut self,
-        ui: &Ui,
-        shown: &MapContent<'_>,
-        map: Map,
-        texture: &mut usize,
-    ) -> Vec<PlotImage> {
+    /// What the colours of the map mean.
+    pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32) {
+        match (self.map(), scale.cost_ends()) {
+            (Map::Coverage, _) => bar(ui, width, "coverage", &scale.coverage_ends()),
+            (_, Some(ends)) => bar(ui, width, "cost", &ends),
+            (_, None) => {
+                ui.weak("no cost yet");
+            }
+        }
+    }
+
+    /// The textures of the map with their places.
+    fn images(&mut self, ui: &Ui, shown: &MapContent<'_>, map: Map) -> Vec<PlotImage> {
         let least_covered = shown.search.least_covered(shown.floor);
         let color = |score: &Score| match map {
             Map::Coverage => shown.scale.coverage(shown.search.coverage(score.covered)),
@@ -153,8 +162,7 @@ impl Maps {
         let mut images = Vec::new();
         for (index, searched) in shown.search.positions().enumerate() {
             let image = picture(searched, color);
-            let id = self.paint(ui, *texture, image);
-            *texture += 1;
+            let id = self.paint(ui, index, image);
             let Lattice {
                 columns,
                 rows,
@@ -211,7 +219,6 @@ fn plot(
     side: f32,
     images: Vec<PlotImage>,
 ) -> egui_plot::PlotResponse<()> {
-    let is_first = map == Map::Cost;
     let pan = match ui.input(|input| input.modifiers.shift) {
         true => PointerButton::Primary,
         false => PointerButton::Middle,
@@ -228,15 +235,14 @@ fn plot(
     let bounds = whole(shown.search);
     // Another extent, as the search goes on, is another plot: one that is there keeps its bounds.
     let extent = bounds.width().to_bits();
-    let answer = Plot::new((map.name(), extent))
-        .width(side + if is_first { LEFT_AXIS } else { 0.0 })
+    let answer = Plot::new(("cost map", extent))
+        .width(side + LEFT_AXIS)
         .height(side + LOWER_AXIS)
         .data_aspect(1.0)
         .link_axis(group.with(extent), true)
         .show_x(false)
         .show_y(false)
         .show_grid(false)
-        .show_axes([true, is_first])
         .custom_x_axes(vec![right])
         .custom_y_axes(vec![forward])
         .default_x_bounds(bounds.min()[0], bounds.max()[0])
@@ -321,17 +327,6 @@ fn cell_at(search: &Search<'_>, transform: &PlotTransform, at: Pos2) -> Option<C
         })
 }
 
-/// The cell that a position lies in.
-fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
-    let index = |value: f64, count: usize| {
-        let index = (value / lattice.step).round() + (count / 2) as f64;
-        (0.0 <= index && index < count as f64).then_some(index as usize)
-    };
-    let column = index(right_m - lattice.centre.right_m, lattice.columns)?;
-    let row = index(forward_m - lattice.centre.forward_m, lattice.rows)?;
-    Some(row * lattice.columns + column)
-}
-
 fn readout(
     search: &Search<'_>,
     searched: &Searched,
@@ -353,18 +348,6 @@ fn readout(
         false => "",
     };
     format!("{cost}, coverage {coverage:.2} at {at}{note}")
-}
-
-fn colours(ui: &mut Ui, scale: &Scale, map: Map, width: f32) {
-    match map {
-        Map::Coverage => bar(ui, width, "coverage", &scale.coverage_ends()),
-        Map::Cost | Map::Floored => match scale.cost_ends() {
-            Some(ends) => bar(ui, width, "cost", &ends),
-            None => {
-                ui.weak("no cost yet");
-            }
-        },
-    }
 }
 
 /// Outlines and marks on top of a map.
@@ -403,7 +386,7 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
     }
     for mark in shown.marks {
         // A small map is not to vanish under its marks.
-        let reach = (transform.frame().width() / 35.0).clamp(3.0, 6.0);
+        let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
         mark.paint(&painter, screen(&mark.offset), reach);
     }
     if let Some(cell) = pointed_at
@@ -412,31 +395,5 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
         let step = searched.surface.lattice.step;
         outline(&cell.offset, step, step, Color32::BLACK, 3.0);
         outline(&cell.offset, step, step, Color32::WHITE, 1.5);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::grid::{GridParams, Phase};
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn every_point_of_a_cell_finds_the_cell(
-            right in -0.49..0.49, forward in -0.49..0.49, x in -3.0..3.0, y in -9.0..9.0,
-        ) {
-            let centre = Offset { right_m: x, forward_m: y, yaw_rad: 0.0 };
-            let params = GridParams::default();
-            for phase in [Phase::PositionCoarse, Phase::PositionFine] {
-                let lattice = Lattice::new(phase, centre, 4.0, &params).expect("small");
-                for (cell, offset) in lattice.hypotheses() {
-                    let right_m = offset.right_m + right * lattice.step;
-                    let forward_m = offset.forward_m + forward * lattice.step;
-                    prop_assert_eq!(cell_of(&lattice, right_m, forward_m), Some(cell));
-                }
-                prop_assert_eq!(cell_of(&lattice, x + 4.6, y), None);
-            }
-        }
     }
 }

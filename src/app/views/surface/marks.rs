@@ -49,14 +49,14 @@ impl MapMark {
                 words: format!("{name} {}{note}", place(&offset)),
             });
         };
+        // The cost of the cell that a pose lies in, where it is not known at the pose itself.
+        let at_cell = |offset: &Offset| match search.cost_near(offset) {
+            Some(cost) => format!(", cell {}", number(cost)),
+            None => String::new(),
+        };
         let start = Offset::default();
-        add(
-            MarkKind::Start,
-            start,
-            search.pose(&start),
-            "start",
-            String::new(),
-        );
+        let pose = search.pose(&start);
+        add(MarkKind::Start, start, pose, "start", at_cell(&start));
         let own_floor = search.least_covered(context.run.params.grid.coverage_floor);
         for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
             let note = format!(", +{}", number(margin));
@@ -105,12 +105,19 @@ impl MapMark {
                 context.estimate(Method::FB),
                 "FB's estimate",
             ),
-            (MarkKind::Truth, context.truth().copied(), "truth"),
             (MarkKind::Camera, context.camera(), "camera in hand"),
+            // Last, so that nothing hides it.
+            (MarkKind::Truth, context.truth().copied(), "truth"),
         ];
+        let at_truth = context.cost_bounds(search.method).truth;
         for (kind, pose, name) in cameras {
             if let Some(pose) = pose {
-                add(kind, search.offset(&pose), pose, name, String::new());
+                let offset = search.offset(&pose);
+                let cost = match at_truth.filter(|_| kind == MarkKind::Truth) {
+                    Some(cost) => format!(", {}", number(cost)),
+                    None => at_cell(&offset),
+                };
+                add(kind, offset, pose, name, cost);
             }
         }
         marks
@@ -216,11 +223,13 @@ impl MarkKind {
                 let triangle = [(0.0, -1.0), (1.0, 0.8), (-1.0, 0.8)];
                 painter.add(outlined(&triangle, color, Color32::BLACK));
             }
+            // Its arms are longer than any other mark is wide.
             Self::Truth => {
+                let arm = 1.6 * reach;
                 for (width, color) in [(4.5, Color32::WHITE), (2.5, color)] {
                     let stroke = Stroke::new(width, color);
-                    painter.hline(at.x - reach..=at.x + reach, at.y, stroke);
-                    painter.vline(at.x, at.y - reach..=at.y + reach, stroke);
+                    painter.hline(at.x - arm..=at.x + arm, at.y, stroke);
+                    painter.vline(at.x, at.y - arm..=at.y + arm, stroke);
                 }
             }
             Self::Camera => {
@@ -256,7 +265,12 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
                 .wrap_mode(egui::TextWrapMode::Extend);
             let response = ui.add(button.sense(Sense::click()));
             let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
-            mark.kind.paint(ui.painter(), at, REACH);
+            // The cross has longer arms than its room here.
+            let reach = match mark.kind {
+                MarkKind::Truth => 0.6 * REACH,
+                _ => REACH,
+            };
+            mark.kind.paint(ui.painter(), at, reach);
             if response.hovered() {
                 pointed_at = Some(mark.pose);
             }

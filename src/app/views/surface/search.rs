@@ -129,6 +129,15 @@ impl<'a> Search<'a> {
             .world_from_query(&offset.reference_from_camera())
     }
 
+    /// The cost of the finest cell that an offset lies in; of a cell that was tried.
+    pub(super) fn cost_near(&self, offset: &Offset) -> Option<f64> {
+        self.positions().rev().find_map(|searched| {
+            let surface = &searched.surface;
+            let cell = cell_of(&surface.lattice, offset.right_m, offset.forward_m)?;
+            surface.scores[cell]?.cost
+        })
+    }
+
     /// The offset of a camera `world_from_camera`.
     pub(super) fn offset(&self, pose: &Pose) -> Offset {
         Offset::of(&self.problem.reference_from_query(pose))
@@ -205,6 +214,43 @@ impl Filling {
                 scores: self.scores,
                 least_covered,
             }),
+        }
+    }
+}
+
+/// The cell that a position lies in.
+pub(super) fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
+    let index = |value: f64, count: usize| {
+        let index = (value / lattice.step).round() + (count / 2) as f64;
+        (0.0 <= index && index < count as f64).then_some(index as usize)
+    };
+    let column = index(right_m - lattice.centre.right_m, lattice.columns)?;
+    let row = index(forward_m - lattice.centre.forward_m, lattice.rows)?;
+    Some(row * lattice.columns + column)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::GridParams;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_point_of_a_cell_finds_the_cell(
+            right in -0.49..0.49, forward in -0.49..0.49, x in -3.0..3.0, y in -9.0..9.0,
+        ) {
+            let centre = Offset { right_m: x, forward_m: y, yaw_rad: 0.0 };
+            let params = GridParams::default();
+            for phase in [Phase::PositionCoarse, Phase::PositionFine] {
+                let lattice = Lattice::new(phase, centre, 4.0, &params).expect("small");
+                for (cell, offset) in lattice.hypotheses() {
+                    let right_m = offset.right_m + right * lattice.step;
+                    let forward_m = offset.forward_m + forward * lattice.step;
+                    prop_assert_eq!(cell_of(&lattice, right_m, forward_m), Some(cell));
+                }
+                prop_assert_eq!(cell_of(&lattice, x + 4.6, y), None);
+            }
         }
     }
 }

@@ -1,0 +1,56 @@
+//! Triage: the results of a run that meet a condition, in an order.
+
+mod condition;
+mod field;
+
+pub use condition::{Condition, ConditionError};
+pub use field::{Field, Value};
+
+use crate::diagnosis::Tolerance;
+use crate::localize::QueryResult;
+use crate::text::UnknownWord;
+
+/// What to sort by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Order {
+    /// The field.
+    pub field: &'static Field,
+    /// Whether the greatest comes first.
+    pub descending: bool,
+}
+
+impl std::str::FromStr for Order {
+    type Err = UnknownWord;
+
+    /// `error`, or `-error` for the greatest first.
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let name = text.strip_prefix('-').unwrap_or(text);
+        Ok(Self {
+            field: Field::find(name)?,
+            descending: name != text,
+        })
+    }
+}
+
+/// Positions of the results that meet a condition, in an order; without one in their own. What a result
+/// does not have comes last.
+pub fn select(
+    results: &[&QueryResult],
+    right: Tolerance,
+    condition: Option<&Condition>,
+    order: Option<Order>,
+) -> Vec<usize> {
+    let is_met = |result: &QueryResult| condition.is_none_or(|one| one.is_met(result, right));
+    let mut chosen: Vec<usize> = (0..results.len())
+        .filter(|&index| is_met(results[index]))
+        .collect();
+    if let Some(order) = order {
+        let mut keyed: Vec<(Value, usize)> = chosen
+            .into_iter()
+            .map(|index| (order.field.of(results[index], right), index))
+            .collect();
+        keyed.sort_by(|(a, _), (b, _)| a.compare(b, order.descending));
+        chosen = keyed.into_iter().map(|(_, index)| index).collect();
+    }
+    chosen
+}

@@ -1,0 +1,211 @@
+//! What can be asked of a result.
+
+use std::cmp::Ordering;
+
+use crate::diagnosis::Tolerance;
+use crate::localize::QueryResult;
+use crate::text::UnknownWord;
+
+/// A field of a result.
+pub struct Field {
+    /// The name in conditions and orders.
+    pub name: &'static str,
+    /// What it is, with its unit.
+    pub about: &'static str,
+    /// Digits behind the point; `None` for words.
+    pub decimals: Option<usize>,
+    read: Read,
+}
+
+impl PartialEq for Field {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl std::fmt::Debug for Field {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+/// The value of a field.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Words.
+    Words(String),
+    /// A number.
+    Number(f64),
+    /// The result has no such value.
+    None,
+}
+
+impl Value {
+    /// The order of two values of one field. What is not there comes last either way.
+    pub(super) fn compare(&self, other: &Self, descending: bool) -> Ordering {
+        let forward = match (self, other) {
+            (Self::None, Self::None) => return Ordering::Equal,
+            (Self::None, _) => return Ordering::Greater,
+            (_, Self::None) => return Ordering::Less,
+            (Self::Number(a), Self::Number(b)) => a.total_cmp(b),
+            (Self::Words(a), Self::Words(b)) => a.cmp(b),
+            (Self::Words(_), Self::Number(_)) => Ordering::Greater,
+            (Self::Number(_), Self::Words(_)) => Ordering::Less,
+        };
+        match descending {
+            true => forward.reverse(),
+            false => forward,
+        }
+    }
+}
+
+impl Field {
+    /// Every field.
+    pub const ALL: &[Self] = &[
+        words("query", "the query frame", |r| r.query.clone()),
+        words("scene", "the scene of the references", |r| r.scene.clone()),
+        words("queries", "the scene of the query", |r| {
+            r.query_scene.clone().unwrap_or_else(|| r.scene.clone())
+        }),
+        words("reference", "the reference frames", |r| {
+            r.references.join(" ")
+        }),
+        words("method", "the method", |r| r.method.to_string()),
+        words("fusion", "the fusion", |r| {
+            r.fusion.as_ref().map_or(String::new(), ToString::to_string)
+        }),
+        Self {
+            name: "is",
+            about: "right, wrong, no pose; without the truth low confidence or a pose",
+            decimals: None,
+            read: Read::Judged(|r, right| r.standing(right, true).to_string()),
+        },
+        words("code", "the primary verdict", |r| {
+            r.diagnosis
+                .first()
+                .map_or(String::new(), |d| d.code.to_string())
+        }),
+        words("codes", "all verdicts", |r| {
+            let codes: Vec<&str> = r.diagnosis.iter().map(|d| d.code.name()).collect();
+            codes.join(" ")
+        }),
+        number("error", "distance from the truth [m]", 3, |r| {
+            Some(r.error?.translation_m)
+        }),
+        number("rotation", "rotation from the truth [°]", 2, |r| {
+            Some(r.error?.rotation_deg)
+        }),
+        number(
+            "start",
+            "distance of the reference from the truth [m]",
+            3,
+            |r| Some(r.initial_error?.translation_m),
+        ),
+        number("confidence", "probability of being within 1 m", 3, |r| {
+            r.trust.as_ref()?.probability
+        }),
+        number("keypoints", "keypoints of the query", 0, |r| {
+            Some(r.counts?.query_keypoints as f64)
+        }),
+        number("matches", "matches with a depth", 0, |r| {
+            Some(r.counts?.with_depth as f64)
+        }),
+        number("inliers", "inliers", 0, |r| Some(r.counts?.inliers as f64)),
+        number("cost", "cost at the result", 4, |r| {
+            Some(r.cost.as_ref()?.best)
+        }),
+        number("truth_cost", "cost at the truth", 4, |r| {
+            r.cost.as_ref()?.truth
+        }),
+        number("shuffled", "cost of shuffled pixels", 4, |r| {
+            r.cost.as_ref()?.shuffled
+        }),
+        number(
+            "coverage",
+            "share of the photo that is covered at the result",
+            3,
+            |r| Some(r.cost.as_ref()?.coverage_best),
+        ),
+        number(
+            "basin",
+            "how far from the truth the search ends right [m]",
+            1,
+            |r| r.cost.as_ref()?.basin_m,
+        ),
+        number(
+            "margin",
+            "how much more the cheapest minimum elsewhere costs",
+            4,
+            |r| r.cost.as_ref()?.basin_margin,
+        ),
+        number("radius", "the uncertainty radius [m]", 1, |r| {
+            Some(r.setting?.radius_m)
+        }),
+        number("references", "references asked for", 0, |r| {
+            Some(r.setting?.references as f64)
+        }),
+        number("helped", "remedies that made it right", 0, |r| {
+            Some(r.explanation.as_ref()?.helped.len() as f64)
+        }),
+    ];
+
+    /// The field of a name.
+    ///
+    /// # Errors
+    /// The names that there are.
+    pub fn find(name: &str) -> Result<&'static Self, UnknownWord> {
+        let mut all = Self::ALL.iter();
+        let names = Self::ALL.iter().map(|field| field.name);
+        all.find(|field| field.name == name)
+            .ok_or_else(|| UnknownWord::among(name, "field", names))
+    }
+
+    /// Its value in a result. A pose is right within the tolerance.
+    pub fn of(&self, result: &QueryResult, right: Tolerance) -> Value {
+        match self.read {
+            Read::Words(read) => Value::Words(read(result)),
+            Read::Judged(read) => Value::Words(read(result, right)),
+            Read::Number(read) => read(result).map_or(Value::None, Value::Number),
+        }
+    }
+
+    /// Its value as it is shown; nothing where there is none.
+    pub fn text(&self, result: &QueryResult, right: Tolerance) -> String {
+        match self.of(result, right) {
+            Value::Words(words) => words,
+            Value::Number(number) => format!("{number:.*}", self.decimals.unwrap_or(0)),
+            Value::None => String::new(),
+        }
+    }
+}
+
+/// How a value is read.
+enum Read {
+    Words(fn(&QueryResult) -> String),
+    Number(fn(&QueryResult) -> Option<f64>),
+    /// What depends on when a pose is right.
+    Judged(fn(&QueryResult, Tolerance) -> String),
+}
+
+const fn words(name: &'static str, about: &'static str, read: fn(&QueryResult) -> String) -> Field {
+    Field {
+        name,
+        about,
+        decimals: None,
+        read: Read::Words(read),
+    }
+}
+
+const fn number(
+    name: &'static str,
+    about: &'static str,
+    decimals: usize,
+    read: fn(&QueryResult) -> Option<f64>,
+) -> Field {
+    Field {
+        name,
+        about,
+        decimals: Some(decimals),
+        read: Read::Number(read),
+    }
+}

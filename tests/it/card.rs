@@ -1,0 +1,211 @@
+//! The verdict card, and what stays where it is around it.
+
+use std::sync::Arc;
+
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use posescope::app::{App, Command, CompareMode, Setup};
+use posescope::localize::Standing;
+use posescope::method::Method;
+use posescope::scene::{self, Scene};
+use posescope::session::{RunMode, RunState};
+
+use crate::walls_scene::GREY;
+use crate::window::{
+    finished, is_said, press, results, run_until_idle, setup, wait, window, window_with_results,
+};
+
+/// How often words are said.
+fn count(window: &Harness<'_, App>, words: &str) -> usize {
+    window.query_all_by_label_contains(words).count()
+}
+
+#[test]
+fn the_card_says_what_each_answer_is_worth_and_why() {
+    let window = finished(setup());
+    for result in results(&window) {
+        assert_eq!(
+            result.standing(Default::default(), true),
+            Standing::Right,
+            "{}",
+            result.method
+        );
+    }
+    assert_eq!(count(&window, "● right"), 4);
+
+    let grey = finished(Setup {
+        query: GREY,
+        ..setup()
+    });
+    assert_eq!(count(&grey, "● right"), 0);
+    // The report says which verdict, behind a comma.
+    let failed = results(&grey);
+    let failed = failed.iter().filter(|result| result.pose.is_none()).count();
+    assert!(failed > 1);
+    assert_eq!(grey.query_all_by_label("× no pose").count(), failed);
+    for result in results(&grey) {
+        let primary = result.diagnosis.first().expect("a verdict");
+        assert!(is_said(&grey, &primary.text), "{}", primary.text);
+    }
+}
+
+#[test]
+fn without_the_truth_the_card_tells_no_error() {
+    let mut window = finished(setup());
+    let error = results(&window)[0].error.expect("the truth is known");
+    let words = format!("{}, {}", error.translation(), error.rotation());
+    assert!(is_said(&window, &words), "{words}");
+    press(&mut window, Modifiers::NONE, Key::G);
+    assert!(!is_said(&window, &words), "{words}");
+    assert_eq!(count(&window, "● right"), 0);
+}
+
+#[test]
+fn what_helped_is_tried_by_a_button_and_compared_with_the_run_before() {
+    let mut wrong = setup();
+    wrong.task.protocol.methods = vec![Method::MI];
+    wrong.task.protocol.right = "0.4m,5deg".parse().expect("a tolerance");
+    wrong.task.protocol.explain = 12;
+    for assignment in ["grid.coarse_step=3", "grid.fine_range=0.2"] {
+        wrong.task.params.assign(assignment).expect("a parameter");
+    }
+    let mut window = finished(wrong.clone());
+    assert!(is_said(&window, "▲ wrong"));
+    let explanation = results(&window)[0].explanation.clone();
+    let helped = explanation.expect("it went wrong").helped;
+    window.get_by_label_contains("Try --").click();
+    wait(&mut window, |app| app.app_state().kept.is_some());
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    let again = &results(&window)[0];
+    assert_eq!(again.error, Some(helped[0].error));
+    assert!(is_said(&window, "● right"));
+    let before = &window.state().app_state().kept.as_ref().expect("kept").run;
+    assert_eq!(before.params, wrong.task.params);
+}
+
+#[test]
+fn nothing_moves_for_a_note_or_a_run_that_is_kept() {
+    let mut window = finished(setup());
+    let places = |window: &Harness<'_, App>| {
+        ["Run all", "Theme", "Reset view"].map(|label| window.get_by_label(label).rect())
+    };
+    // Sizes are known a frame late.
+    window.run_steps(3);
+    let before = places(&window);
+    press(&mut window, Modifiers::NONE, Key::P);
+    assert!(is_said(&window, "kept as A"));
+    assert_eq!(places(&window), before);
+    window.get_by_label("A").click();
+    wait(&mut window, |app| {
+        app.app_state().options.compare_mode == CompareMode::Kept
+    });
+    assert_eq!(places(&window)[1], before[1]);
+}
+
+#[test]
+fn the_first_screen_says_which_keys_to_press() {
+    let mut waiting = window(setup());
+    run_until_idle(&mut waiting);
+    press(&mut waiting, Modifiers::SHIFT, Key::F5);
+    run_until_idle(&mut waiting);
+    assert!(is_said(&waiting, "? lists all keys") || is_said(&waiting, "at work"));
+    press(&mut waiting, Modifiers::NONE, Key::F1);
+    for task in ["Run and step", "Queries", "Try another pose"] {
+        assert!(is_said(&waiting, task), "{task}");
+    }
+}
+
+/// Two drives of the built-in street.
+fn night_against_snow() -> Setup {
+    let open = |name: &str| -> Arc<dyn Scene> { scene::open(name, None).expect("built in").into() };
+    let (references, queries) = (open("street:snow"), open("street:night"));
+    Setup {
+        offered: (0..queries.frames().len()).collect(),
+        query: queries.find("450").expect("a frame"),
+        chosen: vec![references.find("450").expect("a frame")].into(),
+        references,
+        queries,
+        mode: RunMode::Paused,
+        ..setup()
+    }
+}
+
+#[test]
+fn frames_of_two_scenes_are_told_apart_and_the_query_is_in_sight() {
+    let mut window = window(night_against_snow());
+    window.run_steps(4);
+    assert!(is_said(&window, "street:night 000450"));
+    assert!(is_said(&window, "street:snow 000450"));
+    let title = window.state().app_state().setup.title();
+    assert_eq!(title, "posescope: street:night 000450 ← street:snow 000450");
+    // The list shows some rows only; that of the query is one of them, and so after a jump.
+    assert!(window.query_by_label("000450").is_some());
+    assert!(window.query_by_label("000002").is_none());
+    window.state_mut().send(Command::SelectQuery(2));
+    window.run_steps(4);
+    assert!(window.query_by_label("000450").is_none());
+    assert!(window.query_by_label("000002").is_some());
+}
+
+#[test]
+fn a_lecture_shows_nothing_of_what_is_still_to_come() {
+    let mut window = finished(setup());
+    press(&mut window, Modifiers::NONE, Key::F3);
+    window.run_steps(3);
+    assert_eq!(count(&window, "● right"), 4, "the cursor is at the end");
+    window.state_mut().send(Command::SelectMethod(Method::PM));
+    window.run_steps(3);
+    assert_eq!(
+        count(&window, "● right"),
+        2,
+        "FB and PM are over, MI and HY are not"
+    );
+    window.state_mut().send(Command::MoveCursor(1));
+    window.run_steps(3);
+    assert_eq!(count(&window, "● right"), 0);
+    assert!(
+        is_said(&window, "Points are found"),
+        "the stage in one sentence"
+    );
+    press(&mut window, Modifiers::NONE, Key::F2);
+    window.run_steps(3);
+    assert_eq!(count(&window, "● right"), 4);
+}
+
+#[test]
+fn a_batch_is_filtered_sorted_and_opened() {
+    let all = finished(setup());
+    let grey = finished(Setup {
+        query: GREY,
+        ..setup()
+    });
+    let known = [(1, results(&all)), (GREY, results(&grey))];
+    let mut window = window_with_results(setup(), known.into());
+    press(&mut window, Modifiers::NONE, Key::F4);
+    window.run_steps(3);
+    assert!(is_said(
+        &window,
+        "8 of 8 results; wrong or without a pose: FB 1, PM 1, MI 1, HY 1"
+    ));
+    let filter = |window: &mut Harness<'_, App>, text: &str| {
+        let field = window.get_by_label("Where");
+        field.focus();
+        window.step();
+        press(window, Modifiers::COMMAND, Key::A);
+        window.get_by_label("Where").type_text(text);
+        window.run_steps(3);
+    };
+    filter(&mut window, "method = mi and code = D5");
+    assert!(is_said(
+        &window,
+        "1 of 8 results; wrong or without a pose: MI 1"
+    ));
+    filter(&mut window, "method == mi");
+    assert!(is_said(&window, "a value expected"));
+    filter(&mut window, "error >= 0");
+    let known = [results(&all), results(&grey)].concat();
+    let measured = known.iter().filter(|result| result.error.is_some()).count();
+    assert!((4..8).contains(&measured));
+    assert!(is_said(&window, &format!("{measured} of 8 results")));
+}

@@ -1,0 +1,112 @@
+//! `posescope triage` as a process.
+
+use std::path::{Path, PathBuf};
+
+use crate::binary::posescope;
+use crate::small_sequence::SmallSequence;
+
+/// A run over the frames of a small sequence.
+fn run() -> (SmallSequence, PathBuf) {
+    let sequence = SmallSequence::write();
+    let folder = sequence.path().join("run");
+    posescope()
+        .arg("eval")
+        .arg(sequence.folder())
+        .args(["--method", "fb,mi", "--radius", "3", "--out"])
+        .arg(&folder)
+        .assert()
+        .code(0);
+    (sequence, folder)
+}
+
+/// What a triage prints and says, and its exit code.
+fn triage(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
+    let output = posescope()
+        .arg("triage")
+        .arg(folder)
+        .args(more)
+        .output()
+        .expect("the binary starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (
+        output.status.code(),
+        text(&output.stdout),
+        text(&output.stderr),
+    )
+}
+
+#[test]
+fn results_are_chosen_sorted_and_counted() {
+    let (_sequence, folder) = run();
+    let lines = std::fs::read_to_string(folder.join("results.jsonl")).expect("results");
+    let results: Vec<serde_json::Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("a result"))
+        .collect();
+    let of_mi = results.iter().filter(|result| result["method"] == "mi");
+    let mut wanted: Vec<f64> = of_mi
+        .filter_map(|result| result["error"]["translation_m"].as_f64())
+        .collect();
+    wanted.sort_by(f64::total_cmp);
+    // An error that some poses stay below and some do not.
+    let limit = wanted[wanted.len() - 1];
+    wanted.retain(|error| *error < limit);
+    assert!(!wanted.is_empty());
+
+    let condition = &format!("method = MI and error < {limit}");
+    let asked = [
+        "--where",
+        condition,
+        "--sort",
+        "-error",
+        "--columns",
+        "error,query",
+    ];
+    let (code, table, said) = triage(&folder, &asked);
+    assert_eq!(code, Some(0), "{said}");
+    let words = format!("{} of {} results", wanted.len(), results.len());
+    assert_eq!(said.trim(), words);
+    let shown: Vec<f64> = table
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let first = line.split_whitespace().next().expect("an error");
+            first.parse().expect("a number")
+        })
+        .collect();
+    let mut sorted = wanted.clone();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    assert_eq!(shown.len(), sorted.len());
+    for (shown, wanted) in shown.iter().zip(&sorted) {
+        assert!((shown - wanted).abs() <= 5e-4, "{shown} {wanted}");
+    }
+
+    // As JSON the lines are those of the run.
+    let asked = ["--where", condition, "--json", "-", "--limit", "1"];
+    let (code, json, said) = triage(&folder, &asked);
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(json.lines().count(), 1);
+    assert!(lines.contains(json.trim()));
+    assert!(
+        said.contains(&format!("1 of {} that meet it", wanted.len())),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_cannot_be_asked_is_said_with_what_can() {
+    let (_sequence, folder) = run();
+    for (more, words) in [
+        (["--where", "eror > 1"], "rotation"),
+        (["--where", "error > far"], "a number expected"),
+        (["--sort", "size"], "coverage"),
+        (["--columns", "query,size"], "coverage"),
+    ] {
+        let (code, table, said) = triage(&folder, &more);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(words) && table.is_empty(), "{said}");
+    }
+    let (code, _, said) = triage(&folder.join("nothing"), &[]);
+    assert_eq!(code, Some(3), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+}
