@@ -58,6 +58,8 @@ pub struct App {
     pictures: save::Pictures,
     /// What the window's frame says.
     title: String,
+    /// Whether a maximised view is drawn without bars around it, for a picture.
+    is_bare: bool,
 }
 
 impl App {
@@ -76,6 +78,7 @@ impl App {
             help: false,
             pictures: save::Pictures::default(),
             title: String::new(),
+            is_bare: false,
         }
     }
 
@@ -124,8 +127,14 @@ impl App {
             layout,
             commands,
             help,
+            is_bare,
             ..
         } = self;
+        if *is_bare && layout.is_maximized() {
+            egui::CentralPanel::default().show(ui, |ui| layout.alone_ui(ui, state, commands));
+            state.textures.end_frame();
+            return;
+        }
         egui::Panel::top("transport").show(ui, |ui| transport::ui(ui, state, commands));
         // A view that has all the room has that of the card too.
         if !layout.is_maximized() {

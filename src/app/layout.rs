@@ -113,6 +113,17 @@ impl Layout {
         self.tree.make_active(|tile, _| tile == id);
     }
 
+    /// Draws the view that has all the room, with nothing around it.
+    pub(super) fn alone_ui(&mut self, ui: &mut egui::Ui, state: &AppState, commands: &Queue) {
+        let Some(name) = &self.alone else { return };
+        let mut panes = Panes {
+            views: &mut self.views,
+            state,
+            commands,
+        };
+        panes.draw_pane(ui, name);
+    }
+
     pub(super) fn ui(&mut self, ui: &mut egui::Ui, state: &AppState, commands: &Queue) {
         let mut panes = Panes {
             views: &mut self.views,

@@ -20,7 +20,7 @@ use crate::session::RunState;
 /// What is to be in the picture.
 #[derive(Clone, Debug)]
 pub struct Shot {
-    /// The view that has all the room; `None` for the whole window.
+    /// The view that is painted alone; `None` for the whole window.
     pub view: Option<String>,
     /// What the window is arranged for.
     pub arrangement: Arrangement,
@@ -103,6 +103,7 @@ pub fn shoot(setup: Setup, results: Results, shot: &Shot) -> Result<RgbImage, Sh
     let ctx = egui::Context::default();
     ctx.set_theme(shot.theme);
     let mut app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
+    app.is_bare = true;
     // Nothing moves in a picture.
     ctx.all_styles_mut(|style| style.animation_time = 0.0);
     let mut window = Window {

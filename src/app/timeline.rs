@@ -72,7 +72,13 @@ fn lanes(ui: &mut Ui, state: &AppState, commands: &Queue) {
         }
     }
     for bar in run.stages().iter().filter(|bar| bar.records.start < end) {
-        draw(ui, &painter, bar, rect, x_of);
+        let is_over = bar.records.end <= end;
+        let shown = StageBar {
+            records: bar.records.start..bar.records.end.min(end),
+            succeeded: bar.succeeded.filter(|_| is_over),
+            ..bar.clone()
+        };
+        draw(ui, &painter, &shown, rect, x_of);
     }
     let x = x_of(state.cursor()) + 0.5 * rect.width() / count;
     let color = ui.visuals().strong_text_color();

@@ -12,7 +12,7 @@ use super::ViewArgs;
 pub struct ShotArgs {
     #[command(flatten)]
     pub view_args: ViewArgs,
-    /// The view that has all the room [default: the whole window]
+    /// The view that is painted, without the bars around it [default: the whole window]
     #[arg(
         long,
         value_name = "NAME",
