@@ -13,6 +13,7 @@ mod index;
 mod interrupt;
 mod match_export;
 mod observer;
+mod opened;
 mod output;
 mod params;
 mod run;

@@ -1,6 +1,7 @@
 //! `posescope eval`: an experiment over many queries, into a run folder.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
@@ -8,7 +9,7 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
     Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
-    ScenePair, Scenes, defaults, merge, read_run,
+    ScenePair, Scenes, defaults, inputs, merge, read_run,
 };
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::command_line;
@@ -66,6 +67,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         queries: open_all(&args.queries, args)?,
     };
     let run = describe(args, &scenes, &params)?;
+    let scenes = scenes.located(&run.protocol)?;
     let indices = indices(args, &run, &scenes, &params)?;
     let mut folder = if args.resume {
         RunFolder::resume(folder, &run)?
@@ -110,9 +112,11 @@ fn resuming() -> String {
     command_line(&words)
 }
 
-fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>, CliError> {
+fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Arc<dyn Scene>>, CliError> {
     let format = args.protocol.format.as_deref();
-    let scenes = arguments.iter().map(|scene| scene::open(scene, format));
+    let scenes = arguments
+        .iter()
+        .map(|scene| scene::open(scene, format).map(Arc::from));
     Ok(scenes.collect::<Result<_, _>>()?)
 }
 
@@ -171,6 +175,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
         seed: protocol.seed,
     };
     let table = params.to_toml().parse();
+    let inputs = inputs(&protocol)?;
     Ok(RunFile {
         schema: RUN_SCHEMA.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -187,6 +192,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
             .unwrap_or_else(|| paper.failure_radius_m()),
         shard: args.shard,
         pairs: pairs(&draw, scenes)?,
+        inputs,
         params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),
     })
 }
