@@ -18,6 +18,7 @@ use super::args::{EvalArgs, check_known};
 use super::diff;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
+use super::figures;
 use super::interrupt::Interrupt;
 use super::output;
 use super::run::use_threads;
@@ -222,7 +223,7 @@ fn finish(
     let gates: Vec<Gate> = args.gate.clone();
     let report = write_report(folder, run, &gates)?;
     if !terminal.is_quiet() {
-        show(&report, run)?;
+        show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
     let mut failures: Vec<String> = report
@@ -234,7 +235,7 @@ fn finish(
     if let Some(baseline) = &args.baseline {
         let comparison = against(baseline, folder, run)?;
         if !terminal.is_quiet() {
-            output::print(&diff::text(&comparison))?;
+            output::print(&diff::shown(&comparison, terminal.width()).trim_end())?;
         }
         diff::record(&comparison, (baseline, folder), None, terminal)?;
         if comparison.is_regression() {
@@ -251,11 +252,11 @@ fn finish(
     Err(CliError::NotGoodEnough(failures.join("; ")))
 }
 
-fn show(report: &Report, run: &RunFile) -> Result<(), CliError> {
+fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
     // The overview of an experiment has a line for every combination.
     let skipped = usize::from(run.experiment.is_some());
     for table in report.tables.iter().skip(skipped) {
-        output::print(&table.markdown())?;
+        output::print(&figures::text(table, width))?;
     }
     for gate_result in &report.gate_results {
         let verdict = if gate_result.passed {

@@ -177,12 +177,14 @@ impl Plan<'_> {
         if terminal.is_quiet() || results.is_empty() {
             return Ok(());
         }
-        let table = table::results(results, self.failure_radius_m());
+        let width = terminal.width();
+        let table = table::results(results, self.failure_radius_m(), width);
+        let text = table + &story(results, width);
         if self.args.json.as_deref().is_some_and(output::is_stdout) {
-            eprintln!("{table}{}", story(results));
+            eprint!("{text}");
             return Ok(());
         }
-        output::print(&format_args!("{table}{}", story(results)))
+        output::print(&text.trim_end())
     }
 
     fn queries(&self, wanted: Vec<usize>) -> Result<Vec<PlannedQuery>, CliError> {
