@@ -165,7 +165,7 @@ fn what_is_no_photo_or_no_camera_of_it_is_told() {
 }
 
 /// A JPEG whose EXIF says these.
-fn jpeg(path: &Path, image: &GrayImage, fields: &[Field]) {
+pub fn jpeg(path: &Path, image: &GrayImage, fields: &[Field]) {
     let mut tiff = std::io::Cursor::new(Vec::new());
     let mut writer = Writer::new();
     for field in fields {
@@ -194,6 +194,14 @@ fn field(tag: Tag, value: Value) -> Field {
         ifd_num: In::PRIMARY,
         value,
     }
+}
+
+/// What EXIF says of a lens, on 35 mm film.
+pub fn focal_length(millimetres: u16) -> Vec<Field> {
+    vec![field(
+        Tag::FocalLengthIn35mmFilm,
+        Value::Short(vec![millimetres]),
+    )]
 }
 
 fn rational(number: u32, through: u32) -> Value {
