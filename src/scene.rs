@@ -18,6 +18,7 @@ pub mod layout;
 mod lens;
 mod lines;
 mod loose;
+mod map_blocks;
 mod pair_matches;
 mod photo_file;
 mod retriever;
