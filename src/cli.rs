@@ -1,6 +1,7 @@
 //! The command line of posescope.
 
 mod args;
+mod columns;
 mod demo;
 mod demo_settings;
 mod diff;
@@ -9,10 +10,12 @@ mod eval;
 mod export;
 mod failure;
 mod failures;
+mod figures;
 mod index;
 mod interrupt;
 mod match_export;
 mod observer;
+mod opened;
 mod output;
 mod params;
 mod run;
@@ -66,6 +69,6 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Index(args)) => index::index(args, &terminal),
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
-        Some(Command::Params(params)) => params::print(params),
+        Some(Command::Params(params)) => params::print(params, &terminal),
     }
 }

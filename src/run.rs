@@ -3,6 +3,7 @@
 mod estimates_file;
 mod execute;
 mod experiment;
+mod inputs;
 mod protocol;
 mod run_file;
 mod run_folder;
@@ -13,6 +14,7 @@ pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
 pub use experiment::{
     Defaults, Draw, DrawError, Experiment, PaperProtocol, default_failure_radius_m, defaults,
 };
+pub use inputs::inputs;
 pub use protocol::Protocol;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run, result_lines};

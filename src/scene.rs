@@ -9,12 +9,16 @@ mod depth_image;
 mod described;
 mod estimates;
 mod file_scene;
+mod frame_names;
+mod gps;
 mod kitti;
 mod kitti_format;
 mod kitti_raw;
 pub mod layout;
 mod lens;
 mod lines;
+mod loose;
+mod map_blocks;
 mod pair_matches;
 mod photo_file;
 mod retriever;
@@ -28,7 +32,9 @@ pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneErro
 pub use posescope_street as street;
 
 pub use estimates::read_estimates;
+pub use gps::located;
 pub use kitti::KittiOdometry;
+pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 

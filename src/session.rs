@@ -24,7 +24,7 @@ pub use job::{Job, JobError};
 pub use loaded::Loaded;
 pub use pausing::RunMode;
 pub use run::{Explaining, Part, Run, Span, StageBar};
-pub use task::{Task, command_line};
+pub use task::{Task, TaskScenes, command_line};
 
 use message::Message;
 use pausing::Control;

@@ -14,7 +14,7 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::run::{Protocol, default_failure_radius_m};
 use crate::scene::{self, Scene};
-use crate::session::{Breakpoint, IndexFile, Task};
+use crate::session::{Breakpoint, IndexFile, Task, TaskScenes};
 
 /// The version of the file's form.
 const SCHEMA: &str = "posescope.session/2";
@@ -136,21 +136,23 @@ impl SavedSession {
     pub(super) fn setup(&self, present: &Setup) -> Result<Setup, String> {
         let words = |error: scene::SceneError| error.to_string();
         let (task, now) = (&self.task, &present.task);
-        let open = |argument: &String| -> Result<Arc<dyn Scene>, String> {
-            let is_same_format = task.format.is_none() || task.format == now.format;
-            if is_same_format && *argument == now.scene {
-                return Ok(Arc::clone(&present.references));
-            }
-            if is_same_format && Some(argument) == now.queries.as_ref() {
-                return Ok(Arc::clone(&present.queries));
-            }
-            let scene = scene::open(argument, task.format.as_deref());
-            Ok(scene.map_err(words)?.into())
+        let is_same_format = task.format.is_none() || task.format == now.format;
+        let is_same_scene = task.scene == now.scene
+            && task.queries == now.queries
+            && task.photos == now.photos
+            && task.protocol.gps == now.protocol.gps;
+        let opened = |argument: &str| -> Option<Arc<dyn Scene>> {
+            (is_same_format && *argument == now.scene).then(|| Arc::clone(&present.references))
         };
-        let references = open(&task.scene)?;
-        let queries = match &task.queries {
-            Some(argument) => open(argument)?,
-            None => Arc::clone(&references),
+        let TaskScenes {
+            references,
+            queries,
+        } = match is_same_format && is_same_scene {
+            true => TaskScenes {
+                references: Arc::clone(&present.references),
+                queries: Arc::clone(&present.queries),
+            },
+            false => task.open(&opened).map_err(words)?,
         };
         let query = queries.find(&self.query).map_err(words)?;
         let reference_frames: Vec<usize> = self
@@ -158,7 +160,6 @@ impl SavedSession {
             .iter()
             .map(|name| references.find(name).map_err(words))
             .collect::<Result<_, _>>()?;
-        let is_same_scene = task.scene == now.scene && task.queries == now.queries;
         let mut task = task.clone();
         if is_same_scene && self.schema == SCHEMA_1 {
             // What was not written down then.

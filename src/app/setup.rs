@@ -114,7 +114,7 @@ impl Setup {
         let (references, queries) = (self.references.as_ref(), self.queries.as_ref());
         let is_same_scene = references.name() == queries.name();
         let is_query = |frame| is_same_scene && frame == query;
-        match queries.pose(query) {
+        match queries.position(query) {
             Some(place) => frames_within(references, &place, self.task.reach_m(), &is_query),
             None => (0..references.frames().len())
                 .filter(|&frame| !is_query(frame) && references.has_cloud(frame))

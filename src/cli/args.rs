@@ -19,6 +19,7 @@ use posescope::measure::{Format, Gate, Tolerance};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{EstimatesFile, Experiment, PaperProtocol, Protocol, Shard};
+use posescope::scene::CameraArgument;
 use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 use posescope::session::{Breakpoint, Task};
@@ -123,11 +124,11 @@ pub struct RunArgs {
     /// --help lists all formats
     #[arg(long_help = scene_formats())]
     pub scene: String,
-    /// The frame to localise; repeatable (3823 finds 003823)
-    #[arg(long, value_name = "FRAME", required_unless_present = "all")]
+    /// The frame to localise, or a photo that is no frame of any scene; repeatable (3823 finds 003823)
+    #[arg(long, value_name = "FRAME|PHOTO", required_unless_present = "all")]
     pub query: Vec<String>,
     /// Localise every frame
-    #[arg(long, conflicts_with = "query")]
+    #[arg(long, conflicts_with_all = ["query", "camera"])]
     pub all: bool,
     #[command(flatten)]
     pub task: TaskArgs,
@@ -146,8 +147,8 @@ pub struct ViewArgs {
     /// Where the frames are, or the folder of a run; see `posescope run --help`
     #[arg(default_value = "street", value_name = "SCENE|RUN")]
     pub scene: String,
-    /// The frame to begin with
-    #[arg(long, value_name = "FRAME")]
+    /// The frame to begin with, or a photo that is no frame of any scene
+    #[arg(long, value_name = "FRAME|PHOTO")]
     pub query: Option<String>,
     #[command(flatten)]
     pub task: TaskArgs,
@@ -171,6 +172,15 @@ pub struct TaskArgs {
     /// Take the queries from another scene in the same world frame
     #[arg(long, value_name = "SCENE")]
     pub queries: Option<String>,
+    /// The camera of photos that are named as --query: focal lengths and centre [px], a camera line of
+    /// COLMAP, or its cameras.txt [default: what EXIF tells]
+    #[arg(
+        long,
+        value_name = "fx,fy,cx,cy",
+        requires = "query",
+        conflicts_with = "queries"
+    )]
+    pub camera: Option<CameraArgument>,
     /// A frame with known pose and cloud to localise against; repeatable
     #[arg(long, value_name = "FRAME", conflicts_with = "references")]
     pub reference: Vec<String>,
@@ -201,6 +211,7 @@ impl TaskArgs {
             protocol: self.protocol.over(Protocol::default())?,
             params: self.protocol.config.resolve()?,
             breakpoints: self.breakpoints.clone(),
+            photos: None,
         })
     }
 }
@@ -210,6 +221,7 @@ impl Default for TaskArgs {
     fn default() -> Self {
         Self {
             queries: None,
+            camera: None,
             reference: Vec::new(),
             index: None,
             radius: Protocol::RADIUS_M,
@@ -227,13 +239,19 @@ pub struct ProtocolArgs {
     pub format: Option<String>,
     /// How references are chosen: random:K, nearest:K, maxf:K (those with the most feature matches)
     /// or retrieve:K (those that the index of `posescope index` ranks first) of the frames around the
-    /// query's known position [default: random:1]
+    /// query's known position, or of all where nobody knows it and they are chosen by looks, by one of
+    /// the latter two [default: random:1; for photos of no scene without --gps: maxf:1]
     #[arg(long, value_name = "HOW")]
     pub references: Option<Selection>,
     /// How far from the query's known position references may be, where that is more than the radius
     /// [m] [default: the radius]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub prior: Option<f64>,
+    /// Rough positions of queries, around which references are sought: a table with the columns `name x
+    /// y z`, in the world of the scene, or `name latitude longitude`, with three frames of known pose
+    /// or more among its lines
+    #[arg(long, value_name = "FILE")]
+    pub gps: Option<PathBuf>,
     /// The methods to run [default: fb,pm,mi,hy]
     #[arg(long, value_name = "fb,pm,mi,hy", value_delimiter = ',', value_parser = method)]
     pub method: Vec<Method>,
@@ -299,6 +317,7 @@ impl ProtocolArgs {
             explain: self.explain.unwrap_or(defaults.explain),
             estimates: self.estimates.clone(),
             matches: self.matches.clone().or(defaults.matches),
+            gps: self.gps.clone().or(defaults.gps),
         })
     }
 }

@@ -8,6 +8,7 @@ use posescope::run::read_run;
 use posescope::sink::rerun::{Targets, record_comparison};
 
 use super::args::DiffArgs;
+use super::columns::{Columns, wrapped};
 use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
@@ -31,7 +32,7 @@ pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
             args.after.display()
         )));
     }
-    output::print(&text(&comparison))?;
+    output::print(&shown(&comparison, terminal.width()).trim_end())?;
     record(
         &comparison,
         (&args.before, &args.after),
@@ -66,8 +67,31 @@ pub fn record(
     Ok(())
 }
 
-/// The comparison in words, as Markdown.
-pub fn text(comparison: &RunComparison) -> String {
+/// The comparison in lines of at most `width` characters; without a width, for a pipe, as Markdown.
+pub fn shown(comparison: &RunComparison, width: Option<usize>) -> String {
+    if width.is_none() {
+        return text(comparison);
+    }
+    let header = ["change", "query", "method", "before", "after"];
+    let mut table = Columns::new(header, "where", 0, &[3, 4]);
+    for one in &comparison.differences {
+        let cells = [
+            one.change.name().to_owned(),
+            one.before.query.clone(),
+            one.before.method.to_string(),
+            one.verdicts[0].words(one.before.error.as_ref()),
+            one.verdicts[1].words(one.after.error.as_ref()),
+        ];
+        table.push(cells, one.before.group().to_string());
+    }
+    let counted = wrapped(&counted(comparison), width.unwrap_or(usize::MAX), "");
+    match comparison.differences.is_empty() {
+        true => counted,
+        false => format!("{counted}\n{}", table.text(width)),
+    }
+}
+
+fn counted(comparison: &RunComparison) -> String {
     let mut text = format!(
         "{} broken, {} fixed, {} worse, {} better, of {} results in both runs",
         comparison.count(Change::Broken),
@@ -84,7 +108,12 @@ pub fn text(comparison: &RunComparison) -> String {
             comparison.only_before, comparison.only_after
         );
     }
-    text += "\n";
+    text
+}
+
+/// The comparison in words, as Markdown.
+fn text(comparison: &RunComparison) -> String {
+    let mut text = counted(comparison) + "\n";
     if !comparison.differences.is_empty() {
         text +=
             "\n| change | query | method | before | after | where |\n|:--|:--|:--|--:|--:|:--|\n";

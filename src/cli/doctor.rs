@@ -1,12 +1,11 @@
 //! `posescope doctor`: whether a scene can work, and which of the usual mistakes is in it.
 
-use std::fmt::Write as _;
-
 use posescope::doctor::{Agreement, Examination, Remark, examine};
 use posescope::scene::{self, Scene};
 use posescope::sink::rerun::{Targets, record_checkup};
 
 use super::args::DoctorArgs;
+use super::columns::beside;
 use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
@@ -28,7 +27,8 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
         record_checkup(&targets, scene.as_ref(), &found.compared)?;
     }
     if !terminal.is_quiet() {
-        output::print(&report(scene.as_ref(), &found).trim_end())?;
+        let text = report(scene.as_ref(), &found, terminal.width());
+        output::print(&text.trim_end())?;
     }
     match found.is_broken() {
         true => Err(CliError::Unhealthy(verdict(scene.as_ref(), &found))),
@@ -49,12 +49,11 @@ fn verdict(scene: &dyn Scene, found: &Examination) -> String {
     format!("{name}: {}", broken.unwrap_or("it cannot work"))
 }
 
-fn report(scene: &dyn Scene, found: &Examination) -> String {
+fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> String {
     let mut text = String::new();
     let there = &found.inventory;
     let mut line = |what: &str, words: &str| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{what:<11}{words}");
+        text += &beside(&format!("{what:<11}"), words, width);
     };
     line("scene", scene.name());
     line(

@@ -1,6 +1,7 @@
 //! `posescope eval`: an experiment over many queries, into a run folder.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
@@ -8,7 +9,7 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
     Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
-    ScenePair, Scenes, defaults, merge, read_run,
+    ScenePair, Scenes, defaults, inputs, merge, read_run,
 };
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::command_line;
@@ -17,6 +18,7 @@ use super::args::{EvalArgs, check_known};
 use super::diff;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
+use super::figures;
 use super::interrupt::Interrupt;
 use super::output;
 use super::run::use_threads;
@@ -66,6 +68,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         queries: open_all(&args.queries, args)?,
     };
     let run = describe(args, &scenes, &params)?;
+    let scenes = scenes.located(&run.protocol)?;
     let indices = indices(args, &run, &scenes, &params)?;
     let mut folder = if args.resume {
         RunFolder::resume(folder, &run)?
@@ -110,9 +113,11 @@ fn resuming() -> String {
     command_line(&words)
 }
 
-fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Box<dyn Scene>>, CliError> {
+fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Arc<dyn Scene>>, CliError> {
     let format = args.protocol.format.as_deref();
-    let scenes = arguments.iter().map(|scene| scene::open(scene, format));
+    let scenes = arguments
+        .iter()
+        .map(|scene| scene::open(scene, format).map(Arc::from));
     Ok(scenes.collect::<Result<_, _>>()?)
 }
 
@@ -171,6 +176,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
         seed: protocol.seed,
     };
     let table = params.to_toml().parse();
+    let inputs = inputs(&protocol)?;
     Ok(RunFile {
         schema: RUN_SCHEMA.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -187,6 +193,7 @@ fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile
             .unwrap_or_else(|| paper.failure_radius_m()),
         shard: args.shard,
         pairs: pairs(&draw, scenes)?,
+        inputs,
         params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),
     })
 }
@@ -216,7 +223,7 @@ fn finish(
     let gates: Vec<Gate> = args.gate.clone();
     let report = write_report(folder, run, &gates)?;
     if !terminal.is_quiet() {
-        show(&report, run)?;
+        show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
     let mut failures: Vec<String> = report
@@ -228,7 +235,7 @@ fn finish(
     if let Some(baseline) = &args.baseline {
         let comparison = against(baseline, folder, run)?;
         if !terminal.is_quiet() {
-            output::print(&diff::text(&comparison))?;
+            output::print(&diff::shown(&comparison, terminal.width()).trim_end())?;
         }
         diff::record(&comparison, (baseline, folder), None, terminal)?;
         if comparison.is_regression() {
@@ -245,11 +252,11 @@ fn finish(
     Err(CliError::NotGoodEnough(failures.join("; ")))
 }
 
-fn show(report: &Report, run: &RunFile) -> Result<(), CliError> {
+fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
     // The overview of an experiment has a line for every combination.
     let skipped = usize::from(run.experiment.is_some());
     for table in report.tables.iter().skip(skipped) {
-        output::print(&table.markdown())?;
+        output::print(&figures::text(table, width))?;
     }
     for gate_result in &report.gate_results {
         let verdict = if gate_result.passed {

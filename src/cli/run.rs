@@ -8,7 +8,7 @@ use posescope::localize::{
 };
 use posescope::method::Method;
 use posescope::run::default_failure_radius_m;
-use posescope::scene::{self, Retriever, Scene};
+use posescope::scene::{Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
@@ -17,6 +17,7 @@ use super::failure::CliError;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 use super::observer::CliObserver;
+use super::opened::{self, OpenedTask};
 use super::output::{self, JsonLines};
 use super::story::story;
 use super::table;
@@ -38,13 +39,14 @@ struct PlannedQuery {
 /// Runs the command.
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     use_threads(args.task.protocol.threads)?;
-    let task = args.task.task(&args.scene)?;
-    let open = |scene: &str| scene::open(scene, task.format.as_deref());
-    let references = open(&task.scene)?;
-    let others = task.queries.as_deref().map(open).transpose()?;
-    let queries = others.as_deref().unwrap_or(references.as_ref());
+    let OpenedTask {
+        task,
+        scenes,
+        queries: wanted,
+    } = opened::open(&args.task, &args.scene, &args.query)?;
+    let queries = scenes.queries.as_ref();
     let localizer = task.protocol.configured(Localizer::new(
-        references.as_ref(),
+        scenes.references.as_ref(),
         queries,
         &task.params,
         task.protocol.seed,
@@ -54,7 +56,11 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         task: &task,
         localizer: localizer.with_foreign(task.protocol.foreign(queries)?),
     };
-    let tasks = plan.queries()?;
+    let wanted = match args.all {
+        true => (0..queries.frames().len()).collect(),
+        false => wanted,
+    };
+    let tasks = plan.queries(wanted)?;
     let mut json = match &args.json {
         Some(path) => Some(JsonLines::create(path)?),
         None => None,
@@ -171,25 +177,19 @@ impl Plan<'_> {
         if terminal.is_quiet() || results.is_empty() {
             return Ok(());
         }
-        let table = table::results(results, self.failure_radius_m());
+        let width = terminal.width();
+        let table = table::results(results, self.failure_radius_m(), width);
+        let text = table + &story(results, width);
         if self.args.json.as_deref().is_some_and(output::is_stdout) {
-            eprintln!("{table}{}", story(results));
+            eprint!("{text}");
             return Ok(());
         }
-        output::print(&format_args!("{table}{}", story(results)))
+        output::print(&text.trim_end())
     }
 
-    fn queries(&self) -> Result<Vec<PlannedQuery>, CliError> {
+    fn queries(&self, wanted: Vec<usize>) -> Result<Vec<PlannedQuery>, CliError> {
         let (args, task, protocol) = (self.args, self.task, &self.task.protocol);
-        let (references, queries) = (self.localizer.references(), self.localizer.queries());
-        let wanted = if args.all {
-            (0..queries.frames().len()).collect()
-        } else {
-            args.query
-                .iter()
-                .map(|name| queries.find(name))
-                .collect::<Result<Vec<_>, _>>()?
-        };
+        let references = self.localizer.references();
         let named = args
             .task
             .reference

@@ -4,9 +4,13 @@ use std::time::Duration;
 
 use posescope::localize::QueryResult;
 
-/// The verdicts of all results in sentences, one paragraph each; nothing where all is well.
-pub fn story(results: &[(QueryResult, Duration)]) -> String {
+use super::columns::wrapped;
+
+/// The verdicts of all results in sentences, one paragraph each, in lines of at most `width` characters, if
+/// they have a limit; nothing where all is well.
+pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> String {
     let mut text = String::new();
+    let lines = |paragraph: String| wrapped(&paragraph, width.unwrap_or(usize::MAX), "    ");
     for (result, _) in results {
         let Some(primary) = result.diagnosis.first() else {
             continue;
@@ -15,24 +19,29 @@ pub fn story(results: &[(QueryResult, Duration)]) -> String {
             Some(fusion) => format!("{} {fusion}", result.method),
             None => result.method.to_string(),
         };
-        text += &format!(
-            "\n{} {name}: {} {}.\n",
+        let sentence = format!(
+            "{} {name}: {} {}.",
             result.query, primary.code, primary.text
         );
+        text += &format!("\n{}", lines(sentence));
         for other in result.diagnosis.iter().skip(1) {
-            text += &format!("  also {}: {}\n", other.code, other.text);
+            text += &lines(format!("  also {}: {}", other.code, other.text));
         }
         let Some(explanation) = &result.explanation else {
             continue;
         };
         for helped in &explanation.helped {
-            text += &format!("  helped: {} ({})\n", helped.args.join(" "), helped.error);
+            text += &lines(format!(
+                "  helped: {} ({})",
+                helped.args.join(" "),
+                helped.error
+            ));
         }
         if explanation.helped.is_empty() {
-            text += &format!("  none of {} remedies helped\n", explanation.runs);
+            text += &lines(format!("  none of {} remedies helped", explanation.runs));
         }
         if !explanation.complete {
-            text += "  stopped before all remedies were tried\n";
+            text += &lines("  stopped before all remedies were tried".to_owned());
         }
     }
     text

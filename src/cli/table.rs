@@ -2,32 +2,29 @@
 
 use std::time::Duration;
 
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use posescope::geometry::PoseError;
 use posescope::localize::{QueryResult, Status, Verdict};
 
-/// One row per query, reference and method.
-pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Table {
-    let mut table = Table::new();
-    table
-        .load_preset(presets::UTF8_HORIZONTAL_ONLY)
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_header([
-            "query",
-            "reference",
-            "start",
-            "method",
-            "error",
-            "rotation",
-            "max Euler",
-            "verdict, or evidence",
-            "time",
-        ]);
-    for index in [2, 4, 5, 6, 8] {
-        if let Some(column) = table.column_mut(index) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
+use super::columns::Columns;
+
+/// One row per query, reference and method, for lines of at most `width` characters, if they have a limit.
+pub fn results(
+    results: &[(QueryResult, Duration)],
+    failure_radius_m: f64,
+    width: Option<usize>,
+) -> String {
+    let header = [
+        "query",
+        "reference",
+        "start",
+        "method",
+        "error",
+        "rotation",
+        "max Euler",
+        "time",
+    ];
+    // Of a query against the same references, only the method differs.
+    let mut table = Columns::new(header, "verdict, or evidence", 3, &[2, 4, 5, 6, 7]);
     for (result, time) in results {
         let part = |part: fn(&PoseError) -> String| result.error.as_ref().map(part);
         let translation = part(PoseError::translation).unwrap_or_default();
@@ -38,7 +35,7 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
             Verdict::Near => translation,
         };
         let start = result.initial_error.as_ref().map(PoseError::translation);
-        table.add_row([
+        let cells = [
             result.query.clone(),
             result.references.join(" "),
             start.unwrap_or_default(),
@@ -49,11 +46,11 @@ pub fn results(results: &[(QueryResult, Duration)], failure_radius_m: f64) -> Ta
             error,
             part(PoseError::rotation).unwrap_or_default(),
             part(PoseError::max_euler).unwrap_or_default(),
-            evidence(result),
             format!("{:.2} s", time.as_secs_f64()),
-        ]);
+        ];
+        table.push(cells, evidence(result));
     }
-    table
+    table.text(width)
 }
 
 /// What the result rests on, in a few words.

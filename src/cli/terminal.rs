@@ -51,6 +51,16 @@ impl Terminal {
         self.quiet
     }
 
+    /// How many characters fit a line of results: as `COLUMNS` says, or the terminal; `None` in a pipe.
+    pub fn width(&self) -> Option<usize> {
+        /// Narrower lines would be of no use.
+        const LEAST: usize = 40;
+        let columns = std::env::var("COLUMNS").ok();
+        let asked = columns.and_then(|columns| columns.parse::<usize>().ok());
+        let width = asked.or_else(|| comfy_table::Table::new().width().map(usize::from));
+        width.map(|width| width.max(LEAST))
+    }
+
     /// A bar over `steps` steps; it hides itself where stderr is no terminal.
     pub fn bar(&self, steps: u64) -> ProgressBar {
         if self.quiet {

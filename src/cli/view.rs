@@ -9,11 +9,12 @@ use posescope::localize::QueryResult;
 use posescope::params::Params;
 use posescope::run::{Protocol, default_failure_radius_m, read_results, read_run};
 use posescope::scene::{self, Scene};
-use posescope::session::{IndexFile, RunMode, Task};
+use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
 use super::args::{Arguments, Command, ViewArgs};
 use super::demo_settings::settings as demo_settings;
 use super::failure::CliError;
+use super::opened::{self, OpenedTask};
 use super::run;
 use super::terminal::Terminal;
 
@@ -65,12 +66,16 @@ pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, Results), CliErro
 }
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
-    let task = args.task.task(&args.scene)?;
-    let references: Arc<dyn Scene> = scene::open(&task.scene, task.format.as_deref())?.into();
-    let queries: Arc<dyn Scene> = match &task.queries {
-        Some(queries) => scene::open(queries, task.format.as_deref())?.into(),
-        None => Arc::clone(&references),
-    };
+    let named: Vec<String> = args.query.iter().cloned().collect();
+    let OpenedTask {
+        task,
+        scenes: TaskScenes {
+            references,
+            queries,
+        },
+        queries: named,
+    } = opened::open(&args.task, &args.scene, &named)?;
+    let query = named.first().copied();
     let named: Vec<usize> = args
         .task
         .reference
@@ -90,24 +95,24 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         mode: RunMode::Paused,
         folder: PathBuf::from(FOLDER),
     };
-    begin_at(args, &mut setup)?;
+    begin_at(args, query, &mut setup)?;
     Ok(setup)
 }
 
 /// The query that was named, the demonstration's, or the first that has a reference.
-fn begin_at(args: &ViewArgs, setup: &mut Setup) -> Result<(), CliError> {
+fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<(), CliError> {
     let has_reference =
         |setup: &Setup, query| setup.task.by_hand || !setup.candidates(query).is_empty();
     let is_demo = args.scene == demo_settings().scene
         && args.query.is_none()
         && setup.task.queries.is_none()
         && setup.pick() == ReferencePick::By(Protocol::default().references);
-    setup.query = match &args.query {
+    setup.query = match named {
         _ if is_demo => {
             setup.chosen = vec![setup.references.find(&demo_settings().reference)?].into();
             setup.queries.find(&demo_settings().query)?
         }
-        Some(name) => setup.queries.find(name)?,
+        Some(query) => query,
         None => {
             let mut offered = setup.offered.iter().copied();
             offered
@@ -153,6 +158,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
         Some(argument) => scene::open(argument, format)?.into(),
         None => Arc::clone(&references),
     };
+    let queries = file.protocol.located(queries, references.as_ref())?;
     let mut params = Params::default();
     params
         .merge_toml(&file.params.to_string())
@@ -201,6 +207,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
         },
         params,
         breakpoints: args.task.breakpoints.clone(),
+        photos: None,
     };
     let setup = Setup {
         offered: results.keys().copied().collect(),

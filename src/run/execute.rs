@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
+use super::protocol::Protocol;
 use super::run_file::{RunFile, RunItem};
 use super::run_folder::{FolderError, RunFolder};
 use super::scene_pair::ScenePair;
@@ -20,12 +22,41 @@ use crate::trace::Cancelled;
 /// The scenes of a run, opened.
 pub struct Scenes {
     /// The scenes of references, in the order of [`RunFile::scenes`].
-    pub references: Vec<Box<dyn Scene>>,
+    pub references: Vec<Arc<dyn Scene>>,
     /// The scenes of queries, in the order of [`RunFile::queries`].
-    pub queries: Vec<Box<dyn Scene>>,
+    pub queries: Vec<Arc<dyn Scene>>,
 }
 
 impl Scenes {
+    /// The same scenes, whose queries are sought where the protocol says, if it does. Latitudes and
+    /// longitudes are tied to the first scene of references.
+    ///
+    /// # Errors
+    /// The errors of [`Protocol::located`].
+    pub fn located(self, protocol: &Protocol) -> Result<Self, SceneError> {
+        let Self {
+            mut references,
+            mut queries,
+        } = self;
+        let Some(first) = references.first().map(Arc::clone) else {
+            return Ok(Self {
+                references,
+                queries,
+            });
+        };
+        let of_queries = match queries.is_empty() {
+            true => &mut references,
+            false => &mut queries,
+        };
+        for scene in of_queries {
+            *scene = protocol.located(Arc::clone(scene), first.as_ref())?;
+        }
+        Ok(Self {
+            references,
+            queries,
+        })
+    }
+
     /// The scene that a pair takes its queries from.
     pub fn of_queries(&self, pair: &ScenePair) -> &dyn Scene {
         self.queries

@@ -11,7 +11,7 @@ use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::localize::{Localizer, Selection};
 use crate::method::Method;
-use crate::scene::{MatchFolder, Scene, SceneError, read_estimates};
+use crate::scene::{MatchFolder, Scene, SceneError, located, read_estimates};
 
 /// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
 /// of everything in it are here.
@@ -46,6 +46,9 @@ pub struct Protocol {
     /// A folder of matches that take the place of those of SURF.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matches: Option<PathBuf>,
+    /// A file of rough positions of queries, around which references are sought.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gps: Option<PathBuf>,
 }
 
 /// For what is written only where somebody asked for it.
@@ -67,6 +70,7 @@ impl Default for Protocol {
             explain: 0,
             estimates: Vec::new(),
             matches: None,
+            gps: None,
         }
     }
 }
@@ -99,6 +103,21 @@ impl Protocol {
             foreign = foreign.with_matches(Arc::new(MatchFolder::open(folder)?));
         }
         Ok(foreign)
+    }
+
+    /// The scene of queries, with the rough positions that were given.
+    ///
+    /// # Errors
+    /// The errors of [`located`].
+    pub fn located(
+        &self,
+        queries: Arc<dyn Scene>,
+        references: &dyn Scene,
+    ) -> Result<Arc<dyn Scene>, SceneError> {
+        match &self.gps {
+            Some(path) => located(queries, references, path),
+            None => Ok(queries),
+        }
     }
 
     /// How far from a query's known position its references may be \[m\], with this uncertainty

@@ -1,5 +1,6 @@
 //! `run.toml`: everything that an evaluation was asked, and over which queries.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -84,6 +85,8 @@ pub struct RunFile {
     pub failure_radius_m: f64,
     /// Which part of the run this is.
     pub shard: Option<Shard>,
+    /// What files and folders hold that the protocol names; see [`inputs`](super::inputs).
+    pub inputs: BTreeMap<String, String>,
     /// Scenes paired, with the queries.
     pub pairs: Vec<ScenePair>,
     /// Every parameter of the estimators, as it was written: another version may have had others.
@@ -122,9 +125,13 @@ struct RunFileForm {
     explain: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     matches: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    gps: Option<PathBuf>,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    inputs: BTreeMap<String, String>,
     #[serde(rename = "pair")]
     pairs: Vec<ScenePair>,
     params: toml::Table,
@@ -150,12 +157,14 @@ impl From<RunFileForm> for RunFile {
                 explain: form.explain,
                 estimates: form.estimates,
                 matches: form.matches,
+                gps: form.gps,
             },
             radii_m: form.radii_m,
             share: form.share,
             limit: form.limit,
             failure_radius_m: form.failure_radius_m,
             shard: form.shard,
+            inputs: form.inputs,
             pairs: form.pairs,
             params: form.params,
         }
@@ -184,8 +193,10 @@ impl From<RunFile> for RunFileForm {
             explain: run.protocol.explain,
             estimates: run.protocol.estimates,
             matches: run.protocol.matches,
+            gps: run.protocol.gps,
             seed: run.protocol.seed,
             shard: run.shard,
+            inputs: run.inputs,
             pairs: run.pairs,
             params: run.params,
         }

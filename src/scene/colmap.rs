@@ -16,8 +16,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use self::camera::ModelCamera;
+pub(super) use self::camera::ModelCamera;
 use self::model::ModelImage;
+pub(super) use self::text::camera as camera_of_line;
 use super::file_scene::{Clouds, FileScene, Frame, folder_name};
 use super::lens::Lens;
 use super::{Entry, Scene, SceneError, photo_file};

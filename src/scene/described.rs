@@ -25,9 +25,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use self::poses::FramePoses;
-use super::cloud_file::{self, MapCloud};
+use super::cloud_file;
 use super::file_scene::{Clouds, FileScene, Frame, folder_name};
 use super::lens::{Distortion, Lens};
+use super::map_blocks::MapBlocks;
 use super::{Entry, Scene, SceneError, lines, photo_file, view_crop};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -316,7 +317,7 @@ enum InCamera {
 /// Where the clouds are.
 enum Place {
     /// In one file for all, which is read when the first is asked for.
-    Map(OnceLock<MapCloud>),
+    Map(OnceLock<MapBlocks>),
     /// In a file each.
     PerFrame(Vec<Option<PathBuf>>, InCamera),
 }
@@ -359,15 +360,12 @@ impl Clouds for DescribedClouds {
                 let map = match map.get() {
                     Some(map) => map,
                     None => {
-                        let read = cloud_file::read(path)?;
+                        let read = MapBlocks::new(cloud_file::read(path)?);
                         map.get_or_init(|| read)
                     }
                 };
-                Ok(view_crop::in_view(
-                    map,
-                    &world_from_camera()?,
-                    &frame.intrinsics,
-                ))
+                let points = map.around_view(&world_from_camera()?, &frame.intrinsics);
+                Ok(view_crop::in_view(points, &frame.intrinsics))
             }
             Place::PerFrame(_, frame_of_cloud) => {
                 let camera_from_cloud = match frame_of_cloud {

@@ -6,11 +6,11 @@
 //! - `images.txt` of a COLMAP model, or the model's folder: world to camera;
 //! - visuallocalization.net: `name qw qx qy qz x y z`, world to camera.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use posescope_core::foreign::Estimates;
 
+use super::frame_names::FrameNames;
 use super::lines::{Line, TextFile, excerpt_of};
 use super::trajectory::{SAME_MOMENT_S, associated};
 use super::{Scene, SceneError};
@@ -51,45 +51,6 @@ pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, Scene
         }
     };
     Ok(estimates)
-}
-
-/// The frames of a scene by what a file may call them.
-struct FrameNames<'a> {
-    scene: &'a dyn Scene,
-    /// Names without folder and ending; `None` where several frames share one.
-    stems: BTreeMap<&'a str, Option<usize>>,
-}
-
-impl<'a> FrameNames<'a> {
-    fn new(scene: &'a dyn Scene) -> Self {
-        let mut stems = BTreeMap::new();
-        for (index, name) in scene.frames().iter().enumerate() {
-            let known = stems.entry(stem(name)).or_insert(Some(index));
-            if *known != Some(index) {
-                *known = None;
-            }
-        }
-        Self { scene, stems }
-    }
-
-    /// The frame of a name: itself, or without the folder and the ending that a file's name has.
-    fn find(&self, name: &str) -> Option<usize> {
-        let frames = self.scene.frames();
-        let whole = frames.iter().position(|frame| frame == name);
-        let by_stem = || self.stems.get(stem(name)).copied().flatten();
-        let by_number = || self.scene.find(stem(name)).ok();
-        whole.or_else(by_stem).or_else(by_number)
-    }
-}
-
-/// A name without its folder and the ending of an image.
-fn stem(name: &str) -> &str {
-    const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
-    let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    match base.rsplit_once('.') {
-        Some((stem, ending)) if ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) => stem,
-        _ => base,
-    }
 }
 
 /// Eight words are a time and a pose, or a name and a pose: the quaternion tells, and where both could
@@ -296,16 +257,4 @@ fn of_frames<'a>(
         )));
     }
     Ok(estimates)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_is_known_without_folder_and_ending() {
-        assert_eq!(stem("rear/1418381798086398.jpg"), "1418381798086398");
-        assert_eq!(stem("1305031102.175304"), "1305031102.175304");
-        assert_eq!(stem("a\\b.c.PNG"), "b.c");
-    }
 }

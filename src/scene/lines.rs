@@ -32,6 +32,14 @@ impl TextFile {
         })
     }
 
+    /// A text that is no file; errors name it as if it were one.
+    pub fn from_text(name: &str, text: &str) -> Self {
+        Self {
+            path: name.into(),
+            text: text.to_owned(),
+        }
+    }
+
     /// The lines that are neither empty nor comments (`#`).
     pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
         let is_said = |line: &Line<'_>| !line.text.is_empty() && !line.text.starts_with('#');

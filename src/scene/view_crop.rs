@@ -1,27 +1,32 @@
-//! What a camera has in view of a cloud that is not its own.
+//! What a camera has in view of a cloud that is not its own: neither what is outside its image nor what
+//! something nearer hides.
 
 use nalgebra::Point3;
 
-use super::cloud_file::MapCloud;
 use super::depth_image;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
-use crate::geometry::Pose;
 
 /// Nothing nearer than this is looked at \[m\]: the camera itself, or whoever carried it.
 const NEAREST_M: f64 = 0.1;
+/// How far around a point something nearer is sought \[squares of the image\]: twice the gaps between
+/// the lines of a scanner with 32 beams.
+const AROUND: isize = 6;
+/// What is nearer by less than this share of the depth is of the same surface, seen at a slant.
+const SAME_SURFACE: f32 = 0.9;
+/// In as many of the eight directions something nearer is beside a point that is hidden: one in view
+/// beside a post has it in three, between two posts in six.
+const HIDDEN_IN: u32 = 7;
 
-/// The points that a camera has in view, in its frame: of those that fall into the same small square of
-/// the image the nearest, which hides the others where the map is dense. The squares are such that a
-/// map of any density gives about as many points as a scan.
-pub(super) fn in_view(map: &MapCloud, world_from_camera: &Pose, camera: &Intrinsics) -> Cloud {
-    let camera_from_world = world_from_camera.inverse();
+/// The points, of those in a camera's frame \[m\], that it has in view: of those that fall into the same
+/// small square of the image the nearest, unless it is seen through the gaps of something nearer. The
+/// squares are such that a map of any density gives about as many points as a scan.
+pub(super) fn in_view(points: impl Iterator<Item = Point3<f64>>, camera: &Intrinsics) -> Cloud {
     let side = depth_image::step((camera.width, camera.height));
     let columns = camera.width.div_ceil(side) as usize;
     let rows = camera.height.div_ceil(side) as usize;
     let mut nearest: Vec<Option<Point3<f32>>> = vec![None; columns * rows];
-    for point in map.positions() {
-        let point = camera_from_world * point;
+    for point in points {
         let Some(pixel) = camera
             .project(&point)
             .filter(|pixel| camera.contains(pixel))
@@ -38,15 +43,49 @@ pub(super) fn in_view(map: &MapCloud, world_from_camera: &Pose, camera: &Intrins
             *place = Some(point);
         }
     }
+    let cells = nearest.iter().enumerate();
+    let visible = cells.filter_map(|(at, point)| {
+        let point = (*point)?;
+        (!is_hidden(&nearest, columns, at, point.z)).then_some(point)
+    });
     Cloud {
-        points: nearest.into_iter().flatten().collect(),
+        points: visible.collect(),
     }
+}
+
+/// Whether something nearer is on nearly all sides of a square.
+fn is_hidden(nearest: &[Option<Point3<f32>>], columns: usize, at: usize, depth: f32) -> bool {
+    let rows = nearest.len() / columns;
+    let (column, row) = ((at % columns) as isize, (at / columns) as isize);
+    let mut directions = 0_u32;
+    for dy in -AROUND..=AROUND {
+        for dx in -AROUND..=AROUND {
+            let (x, y) = (column + dx, row + dy);
+            let is_inside = (0..columns as isize).contains(&x) && (0..rows as isize).contains(&y);
+            let beside = is_inside.then(|| nearest[y as usize * columns + x as usize]);
+            if let Some(Some(other)) = beside
+                && other.z < SAME_SURFACE * depth
+                && let Some(direction) = direction(dx, dy)
+            {
+                directions |= 1 << direction;
+            }
+        }
+    }
+    directions.count_ones() >= HIDDEN_IN
+}
+
+/// Which of eight directions, an eighth of a turn each, an offset is in.
+fn direction(dx: isize, dy: isize) -> Option<u32> {
+    if (dx, dy) == (0, 0) {
+        return None;
+    }
+    let eighths = (dy as f64).atan2(dx as f64) / std::f64::consts::FRAC_PI_4;
+    Some(eighths.round().rem_euclid(8.0) as u32)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     const CAMERA: Intrinsics = Intrinsics {
         fx: 300.0,
@@ -57,24 +96,51 @@ mod tests {
         height: 480,
     };
 
+    fn wall(depth: f64, step_px: f64) -> impl Iterator<Item = Point3<f64>> {
+        let (columns, rows) = ((640.0 / step_px) as usize, (480.0 / step_px) as usize);
+        let pixels = (0..rows).flat_map(move |row| (0..columns).map(move |column| (column, row)));
+        pixels.map(move |(column, row)| {
+            let pixel = nalgebra::Point2::new(column as f64 * step_px, row as f64 * step_px);
+            CAMERA.unproject(&pixel, depth)
+        })
+    }
+
     #[test]
     fn a_near_wall_hides_a_far_one_and_what_is_behind_is_left_out() {
-        let origin = Vector3::new(500_000.0, 5_400_000.0, 100.0);
-        let mut map = MapCloud {
-            origin,
-            points: Vec::new(),
-        };
-        for depth in [-5.0, 0.05, 4.0, 9.0] {
-            for row in -330..330 {
-                for column in -440..440 {
-                    let (x, y) = (column as f32 * 0.01, row as f32 * 0.01);
-                    map.points.push(Point3::new(x, y, depth));
-                }
-            }
-        }
-        let world_from_camera = Pose::translation(origin.x, origin.y, origin.z);
-        let cloud = in_view(&map, &world_from_camera, &CAMERA);
+        let walls = [0.05, 4.0, 9.0].map(|depth| wall(depth, 2.0));
+        let behind = wall(5.0, 2.0).map(|point| Point3::from(-point.coords));
+        let cloud = in_view(walls.into_iter().flatten().chain(behind), &CAMERA);
         assert_eq!(cloud.len(), 160 * 120);
         assert!(cloud.points.iter().all(|point| point.z == 4.0));
+    }
+
+    #[test]
+    fn a_wall_of_few_points_hides_what_is_seen_between_them() {
+        // A point in nine squares of the near one, in each square of the far one.
+        let cloud = in_view(wall(4.0, 12.0).chain(wall(12.0, 4.0)), &CAMERA);
+        let far: Vec<_> = cloud.points.iter().filter(|point| point.z > 5.0).collect();
+        // Along the border nothing is beside a square.
+        assert!(far.len() < 1_500, "{}", far.len());
+    }
+
+    #[test]
+    fn what_is_beside_a_post_or_on_a_road_stays() {
+        // Two posts, with a gap of 9 squares between them, before a wall.
+        let post =
+            |from: f64| wall(4.0, 4.0).filter(move |point| (from..from + 0.2).contains(&point.x));
+        let posts = post(-0.5).chain(post(0.2));
+        let wall_alone = in_view(wall(12.0, 4.0), &CAMERA).len();
+        let cloud = in_view(posts.chain(wall(12.0, 4.0)), &CAMERA);
+        let posts = cloud.points.iter().filter(|point| point.z < 5.0).count();
+        assert_eq!(cloud.len(), wall_alone, "{posts} of posts");
+        // A road, seen at a slant, hides none of itself.
+        let road = |row: usize| {
+            let pixel =
+                move |column: usize| nalgebra::Point2::new(column as f64, 250.0 + row as f64);
+            let depth = 1.7 * 300.0 / (250.0 + row as f64 - 239.5);
+            (0..640).map(move |column| CAMERA.unproject(&pixel(column), depth))
+        };
+        let cloud = in_view((0..230).flat_map(road), &CAMERA);
+        assert_eq!(cloud.len(), 160 * 58, "all squares from row 62 on");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -10,6 +11,7 @@ use crate::diagnosis::Tolerance;
 use crate::method::Method;
 use crate::params::Params;
 use crate::run::Protocol;
+use crate::scene::{self, LoosePhotos, Scene, SceneError};
 
 /// Where references and queries are, and how a query is localised. The command line turns into it,
 /// the window and its sessions keep it, and [`Self::command_line`] writes it down again.
@@ -37,6 +39,18 @@ pub struct Task {
     pub params: Params,
     /// Where the run is to stop.
     pub breakpoints: Vec<Breakpoint>,
+    /// Photos of no scene, which are the queries then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photos: Option<LoosePhotos>,
+}
+
+/// The scenes of a task, opened: that of the references and that of the queries, often the same.
+#[derive(Clone)]
+pub struct TaskScenes {
+    /// Where the references are.
+    pub references: Arc<dyn Scene>,
+    /// Where the queries are.
+    pub queries: Arc<dyn Scene>,
 }
 
 /// Writes the parameters as a configuration file, every one of them.
@@ -57,7 +71,32 @@ impl Task {
             protocol: Protocol::default(),
             params: Params::default(),
             breakpoints: Vec::new(),
+            photos: None,
         }
+    }
+
+    /// Opens the scenes. `opened` may have one by its argument already.
+    ///
+    /// # Errors
+    /// A scene, a photo or a file of positions that cannot be read.
+    pub fn open(
+        &self,
+        opened: &dyn Fn(&str) -> Option<Arc<dyn Scene>>,
+    ) -> Result<TaskScenes, SceneError> {
+        let open = |argument: &str| match opened(argument) {
+            Some(scene) => Ok(scene),
+            None => scene::open(argument, self.format.as_deref()).map(Arc::from),
+        };
+        let references = open(&self.scene)?;
+        let queries = match (&self.photos, &self.queries) {
+            (Some(photos), _) => photos.open()?,
+            (None, Some(argument)) => open(argument)?,
+            (None, None) => Arc::clone(&references),
+        };
+        Ok(TaskScenes {
+            queries: self.protocol.located(queries, references.as_ref())?,
+            references,
+        })
     }
 
     /// How far from a query's known position its references may be \[m\].
@@ -79,7 +118,21 @@ impl Task {
         if let Some(queries) = &self.queries {
             option("queries", queries);
         }
-        option("query", &query);
+        match self
+            .photos
+            .as_ref()
+            .and_then(|photos| photos.path_of(query))
+        {
+            Some(path) => option("query", &path.display()),
+            None => option("query", &query),
+        }
+        if let Some(camera) = self
+            .photos
+            .as_ref()
+            .and_then(|photos| photos.camera.as_ref())
+        {
+            option("camera", camera);
+        }
         for reference in references {
             option("reference", reference);
         }
@@ -123,6 +176,9 @@ impl Task {
         }
         for estimates in &protocol.estimates {
             option("estimates", estimates);
+        }
+        if let Some(path) = &protocol.gps {
+            option("gps", &path.display());
         }
         if let Some(folder) = &protocol.matches {
             option("matches", &folder.display());
@@ -189,9 +245,14 @@ mod tests {
                 explain: 4,
                 estimates: vec!["other=my poses.txt".parse().expect("a file")],
                 matches: Some("hloc".into()),
+                gps: Some("gps.csv".into()),
             },
             params,
             breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
+            photos: Some(LoosePhotos {
+                paths: vec!["my photos/a.jpg".into()],
+                camera: Some("500,500,320,240".parse().expect("a camera")),
+            }),
             ..Task::of("street")
         }
     }
@@ -201,9 +262,14 @@ mod tests {
         assert_eq!(
             task().command_line("000070", &[]),
             "posescope run street --format street --queries street:night --query 000070 \
-             --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
+             --camera 500,500,320,240 --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
              --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 \
-             --estimates 'other=my poses.txt' --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
+             --estimates 'other=my poses.txt' --gps gps.csv --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
+        );
+        assert!(
+            task()
+                .command_line("a", &[])
+                .contains("--query 'my photos/a.jpg' --camera 500,500,320,240 "),
         );
         let by_hand = Task {
             by_hand: true,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
+use std::sync::Arc;
 
 use assert_cmd::Command;
 use posescope::camera::Intrinsics;
@@ -528,7 +529,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     let folder = sequence.folder();
     let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
     let scenes = Scenes {
-        references: vec![Box::new(PanickingScene { scene, frame: 1 })],
+        references: vec![Arc::new(PanickingScene { scene, frame: 1 })],
         queries: Vec::new(),
     };
     let draw = Draw {
@@ -556,6 +557,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         failure_radius_m: 10.0,
         shard: None,
         pairs: vec![draw.pair(0, references, references).expect("queries")],
+        inputs: BTreeMap::new(),
         params: Params::default().to_toml().parse().expect("a table"),
     };
     let out = sequence.path().join("run");

@@ -94,7 +94,11 @@ fn a_circle_is_found_whatever_way_it_goes_round() {
         found(&[
             ("a", "use crate::{b::B, c};"),
             ("b", "fn f() { super::c::g(); }"),
-            ("c", "#[cfg(test)] mod tests { use crate::a::A; }"),
+            (
+                "c",
+                "fn f() -> impl A + use<'a> { g(); super::d::D } #[cfg(test)] mod tests { use crate::a::A; }"
+            ),
+            ("d", ""),
         ]),
         none
     );
@@ -335,7 +339,8 @@ fn imports(tokens: &[String]) -> Vec<Import> {
             tokens.get(at + ahead).is_some_and(|token| token == wanted)
         };
         match token.as_str() {
-            "use" => {
+            // `impl Trait + use<'a>` imports nothing.
+            "use" if !is_next(1, "<") => {
                 let is_public = matches!(before(1), Some("pub" | ")"));
                 at += 1;
                 tree(tokens, &mut at, &[], is_public, &mut imports);

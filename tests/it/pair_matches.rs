@@ -312,11 +312,7 @@ fn no_damage_to_matches_makes_a_reader_panic() {
         }),
         ("hloc", hloc),
     ];
-    // POSESCOPE_MUTATIONS asks for more.
-    let mutations = std::env::var("POSESCOPE_MUTATIONS")
-        .ok()
-        .and_then(|n| n.parse().ok());
-    let mutations: usize = mutations.unwrap_or(2_000);
+    let mutations = crate::mutations::mutations(2_000);
     for (form, write) in forms {
         let folder = TempDir::new().expect("a folder");
         write(folder.path());

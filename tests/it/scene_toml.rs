@@ -88,7 +88,7 @@ fn expect_the_wall(scene: &dyn Scene, tolerance_m: f32) {
     }
 }
 
-fn with(folder: &Path, from: &str, to: &str) {
+pub fn with(folder: &Path, from: &str, to: &str) {
     assert!(SIMPLE.contains(from), "{from}");
     let text = SIMPLE.replacen(from, to, 1);
     fs::write(folder.join("scene.toml"), text).expect("writable");
@@ -247,7 +247,7 @@ fn las(path: &Path) {
 }
 
 /// All clouds that can be read, in a folder.
-fn write_clouds(folder: &Path) -> Vec<String> {
+pub fn write_clouds(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
         let name = format!("{format}.ply");

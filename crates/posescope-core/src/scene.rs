@@ -5,6 +5,7 @@ mod frames;
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
 use xxhash_rust::xxh3::Xxh3;
 
 pub use error::SceneError;
@@ -31,6 +32,13 @@ pub trait Scene: Send + Sync {
 
     /// `world_from_camera`, where it is known.
     fn pose(&self, frame: usize) -> Option<Pose>;
+
+    /// Where references of the frame are sought \[m\], in the world: at its pose, where that is known,
+    /// unless something else says roughly where it was taken.
+    fn position(&self, frame: usize) -> Option<Point3<f64>> {
+        self.pose(frame)
+            .map(|pose| Point3::from(pose.translation.vector))
+    }
 
     /// When the frame was taken \[s\], where it is known.
     fn time_s(&self, frame: usize) -> Option<f64>;

@@ -41,6 +41,7 @@ fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
         limit: None,
         failure_radius_m: 10.0,
         shard: None,
+        inputs: std::collections::BTreeMap::new(),
         pairs: scenes
             .iter()
             .map(|(scene, query_scene)| ScenePair {

@@ -5,7 +5,7 @@ use crate::camera::Intrinsics;
 
 /// A camera of a model: as the photos were taken, pixel centres at integers.
 #[derive(Debug, PartialEq)]
-pub(super) struct ModelCamera {
+pub(in super::super) struct ModelCamera {
     pub intrinsics: Intrinsics,
     pub distortion: Distortion,
 }

@@ -24,7 +24,7 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
 }
 
 /// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`
-fn camera(line: Line<'_>) -> Result<(u32, ModelCamera), SceneError> {
+pub(in super::super) fn camera(line: Line<'_>) -> Result<(u32, ModelCamera), SceneError> {
     let words: Vec<&str> = line.words().collect();
     let [id, model, width, height, parameters @ ..] = words.as_slice() else {
         return Err(line.error("a line `id model width height parameters` expected"));

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::super::SceneError;
-use super::super::cloud_file::MapCloud;
 use super::super::view_crop::in_view;
 use super::poses::Track;
 use super::sdk::Sdk;
@@ -99,10 +98,7 @@ pub(super) fn gathered(
     image_from_vehicle: &Pose,
     camera: &Intrinsics,
 ) -> Result<Cloud, SceneError> {
-    let mut map = MapCloud {
-        origin: Vector3::zeros(),
-        points: Vec::new(),
-    };
+    let mut gathered: Vec<Point3<f64>> = Vec::new();
     let Some(here) = motion.at(time) else {
         return Ok(Cloud::default());
     };
@@ -126,10 +122,9 @@ pub(super) fn gathered(
         };
         let image_from_scanner = image_from_vehicle * now_from_then * vehicle_from_scanner;
         let points = read(file)?.into_iter();
-        map.points
-            .extend(points.map(|point| (image_from_scanner * point).cast::<f32>()));
+        gathered.extend(points.map(|point| image_from_scanner * point));
     }
-    Ok(in_view(&map, &Pose::identity(), camera))
+    Ok(in_view(gathered.into_iter(), camera))
 }
 
 /// The points of a scan in the scanner's frame: triples of numbers of eight bytes.

@@ -38,16 +38,18 @@ impl Chooser<'_> {
     ) -> Result<References, ChoiceError> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
-        let place = queries.pose(query);
+        let place = queries.position(query);
         let is_same_scene = references.name() == queries.name();
         let excluded = |frame| is_same_scene && frame == query || left_out(frame);
         let mut within = match (place, self.selection) {
             (Some(place), _) => frames_within(references, &place, self.radius_m, &excluded),
             // What a place looks like is known even where nobody knows where it is.
-            (None, Selection::Retrieved(_)) => (0..references.frames().len())
-                .filter(|&frame| !excluded(frame) && references.has_cloud(frame))
-                .filter(|&frame| references.pose(frame).is_some())
-                .collect(),
+            (None, Selection::Matched(_) | Selection::Retrieved(_)) => {
+                (0..references.frames().len())
+                    .filter(|&frame| !excluded(frame) && references.has_cloud(frame))
+                    .filter(|&frame| references.pose(frame).is_some())
+                    .collect()
+            }
             (None, _) => {
                 return Err(ChoiceError::UnknownPosition {
                     query: name.clone(),

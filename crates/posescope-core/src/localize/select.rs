@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
+use nalgebra::Point3;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
@@ -11,7 +12,6 @@ use rand_pcg::Pcg64;
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
 use crate::features::remembered;
-use crate::geometry::Pose;
 use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
@@ -162,14 +162,14 @@ pub fn tell_ranking(
 /// first; of equally near ones, the earlier.
 pub fn frames_within(
     scene: &dyn Scene,
-    place: &Pose,
+    place: &Point3<f64>,
     radius_m: f64,
     left_out: &dyn Fn(usize) -> bool,
 ) -> Vec<usize> {
     let mut within: Vec<(f64, usize)> = (0..scene.frames().len())
         .filter(|&frame| !left_out(frame))
         .filter_map(|frame| {
-            let offset = scene.pose(frame)?.translation.vector - place.translation.vector;
+            let offset = scene.pose(frame)?.translation.vector - place.coords;
             let distance = offset.norm();
             (distance <= radius_m && scene.has_cloud(frame)).then_some((distance, frame))
         })
@@ -194,7 +194,10 @@ pub fn draw(mut candidates: Vec<usize>, count: usize, query: &str, seed: u64) ->
 #[non_exhaustive]
 pub enum ChoiceError {
     /// References are sought around the query, whose position nobody knows.
-    #[error("the position of query {query} is not known; name a frame with --reference")]
+    #[error(
+        "the position of query {query} is not known; name a frame with --reference, say where it is \
+         with --gps, or choose by looks with --references maxf:K or retrieve:K"
+    )]
     UnknownPosition {
         /// The query frame's name.
         query: String,

@@ -3,6 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use nalgebra::Point3;
+
 use super::{Scene, SceneError, pose_of, reference_of};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -198,6 +200,10 @@ impl Scene for CachedScene<'_> {
 
     fn pose(&self, frame: usize) -> Option<Pose> {
         self.scene.pose(frame)
+    }
+
+    fn position(&self, frame: usize) -> Option<Point3<f64>> {
+        self.scene.position(frame)
     }
 
     fn time_s(&self, frame: usize) -> Option<f64> {

@@ -1,5 +1,7 @@
 //! What would have helped: a query that went wrong is localised again, differently.
 
+use nalgebra::Point3;
+
 use super::work::Answer;
 use super::{LocalizeError, Localizer, Request};
 use crate::diagnosis::remedies::{Change, Remedy, remedies};
@@ -119,7 +121,7 @@ impl Localizer<'_> {
         };
         let (references, queries) = (self.references(), self.queries());
         let is_same_scene = references.name() == queries.name();
-        let place = references.pose(used)?;
+        let place = Point3::from(references.pose(used)?.translation.vector);
         let left_out = |frame: usize| frame == used || is_same_scene && frame == query;
         let radius_m = asked.radius_m;
         let within = frames_within(references, &place, radius_m, &left_out);

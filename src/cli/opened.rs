@@ -1,0 +1,78 @@
+//! The scenes that a command line names, and those of its queries.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use posescope::localize::Selection;
+use posescope::scene::{LoosePhotos, Scene, SceneError};
+use posescope::session::{Task, TaskScenes};
+
+use super::args::TaskArgs;
+use super::failure::CliError;
+
+/// A task with its scenes and the queries that were named.
+pub struct OpenedTask {
+    pub task: Task,
+    pub scenes: TaskScenes,
+    /// The named queries, as positions in their scene.
+    pub queries: Vec<usize>,
+}
+
+/// Opens what the arguments name. A query that is no frame of its scene but a file is a photo of its own;
+/// either all are frames or all are photos.
+pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTask, CliError> {
+    let mut task = args.task(scene)?;
+    let mut first: Option<Arc<dyn Scene>> = None;
+    if args.camera.is_none() && queries.iter().any(|query| Path::new(query).is_file()) {
+        // What is called as a frame is that frame.
+        let named = task.queries.as_deref().unwrap_or(scene);
+        let opened = posescope::scene::open(named, task.format.as_deref())?;
+        let loose = queries.iter().filter(|query| opened.find(query).is_err());
+        let loose = loose.count();
+        if loose > 0 && loose < queries.len() {
+            return Err(CliError::Usage(
+                "some of the queries are frames and others are photos of their own; localise them one \
+                 after the other"
+                    .to_owned(),
+            ));
+        }
+        if loose > 0 {
+            task.photos = Some(LoosePhotos::default());
+        }
+        first = task.queries.is_none().then(|| Arc::from(opened));
+    }
+    if args.camera.is_some() || task.photos.is_some() {
+        if task.queries.is_some() {
+            return Err(CliError::Usage(
+                "--query names photos of their own, which come from no --queries".to_owned(),
+            ));
+        }
+        for query in queries {
+            std::fs::metadata(query).map_err(CliError::io(query))?;
+        }
+        task.photos = Some(LoosePhotos {
+            paths: queries.iter().map(Into::into).collect(),
+            camera: args.camera.clone(),
+        });
+        if args.protocol.references.is_none() && args.protocol.gps.is_none() {
+            task.protocol.references = Selection::Matched(1);
+        }
+    }
+    let opened = |argument: &str| match argument == scene {
+        true => first.clone(),
+        false => None,
+    };
+    let scenes = task.open(&opened)?;
+    let queries = match &task.photos {
+        Some(photos) => (0..photos.paths.len()).collect(),
+        None => queries
+            .iter()
+            .map(|name| scenes.queries.find(name))
+            .collect::<Result<_, SceneError>>()?,
+    };
+    Ok(OpenedTask {
+        task,
+        scenes,
+        queries,
+    })
+}

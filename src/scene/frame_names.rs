@@ -1,0 +1,56 @@
+//! The frames of a scene, as the files of other programs may call them.
+
+use std::collections::BTreeMap;
+
+use super::Scene;
+
+/// The frames of a scene by what a file may call them.
+pub(super) struct FrameNames<'a> {
+    scene: &'a dyn Scene,
+    /// Names without folder and ending; `None` where several frames share one.
+    stems: BTreeMap<&'a str, Option<usize>>,
+}
+
+impl<'a> FrameNames<'a> {
+    pub fn new(scene: &'a dyn Scene) -> Self {
+        let mut stems = BTreeMap::new();
+        for (index, name) in scene.frames().iter().enumerate() {
+            let known = stems.entry(stem(name)).or_insert(Some(index));
+            if *known != Some(index) {
+                *known = None;
+            }
+        }
+        Self { scene, stems }
+    }
+
+    /// The frame of a name: itself, or without the folder and the ending that a file's name has.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        let frames = self.scene.frames();
+        let whole = frames.iter().position(|frame| frame == name);
+        let by_stem = || self.stems.get(stem(name)).copied().flatten();
+        let by_number = || self.scene.find(stem(name)).ok();
+        whole.or_else(by_stem).or_else(by_number)
+    }
+}
+
+/// A name without its folder and the ending of an image.
+fn stem(name: &str) -> &str {
+    const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
+    let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    match base.rsplit_once('.') {
+        Some((stem, ending)) if ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) => stem,
+        _ => base,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_known_without_folder_and_ending() {
+        assert_eq!(stem("rear/1418381798086398.jpg"), "1418381798086398");
+        assert_eq!(stem("1305031102.175304"), "1305031102.175304");
+        assert_eq!(stem("a\\b.c.PNG"), "b.c");
+    }
+}

@@ -1,0 +1,207 @@
+//! The camera of loose photos, as a command line gives it.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use super::super::SceneError;
+use super::super::colmap::{ModelCamera, camera_of_line};
+use super::super::lens::Distortion;
+use super::super::lines::{TextFile, excerpt, numbers};
+use crate::camera::Intrinsics;
+
+/// Four numbers, a line of COLMAP's `cameras.txt`, or such a file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CameraArgument {
+    /// `fx fy cx cy` \[px\], with pixel centres at integers.
+    Pinhole([f64; 4]),
+    /// `ID MODEL WIDTH HEIGHT PARAMETERS…`, with COLMAP's pixels.
+    Line(String),
+    /// A file of such lines.
+    File(PathBuf),
+}
+
+impl CameraArgument {
+    /// The camera of a photo of a size \[px\], and what is to be taken out of it.
+    pub(super) fn of_photo(
+        &self,
+        photo: &Path,
+        (width, height): (u32, u32),
+    ) -> Result<(Intrinsics, Distortion), SceneError> {
+        let error = |expected: String| SceneError::Content {
+            path: photo.to_owned(),
+            expected,
+        };
+        match self {
+            Self::Pinhole([fx, fy, cx, cy]) => {
+                let taken = Intrinsics {
+                    fx: *fx,
+                    fy: *fy,
+                    cx: *cx,
+                    cy: *cy,
+                    width,
+                    height,
+                };
+                let is_inside =
+                    (0.0..f64::from(width)).contains(cx) && (0.0..f64::from(height)).contains(cy);
+                match is_inside {
+                    true => Ok((taken, Distortion::default())),
+                    false => Err(error(format!(
+                        "{width}x{height} pixels found, but --camera has its centre at {cx},{cy}: \
+                         fx,fy,cx,cy for photos of this size expected"
+                    ))),
+                }
+            }
+            Self::Line(line) => {
+                let camera = line_camera(line).map_err(error)?;
+                of_size(&camera, (width, height)).ok_or_else(|| {
+                    let Intrinsics {
+                        width: w,
+                        height: h,
+                        ..
+                    } = camera.intrinsics;
+                    error(format!(
+                        "{w}x{h} pixels expected, as --camera says, {width}x{height} found"
+                    ))
+                })
+            }
+            Self::File(path) => {
+                let file = TextFile::read(path)?;
+                let cameras = file
+                    .lines()
+                    .map(|line| camera_of_line(line).map(|(_, camera)| camera))
+                    .collect::<Result<Vec<_>, _>>()?;
+                let fitting: Vec<_> = cameras
+                    .iter()
+                    .filter_map(|camera| of_size(camera, (width, height)))
+                    .collect();
+                let is_one = |cameras: &[(Intrinsics, Distortion)]| {
+                    cameras.iter().all(|camera| *camera == cameras[0])
+                };
+                match fitting.as_slice() {
+                    [camera, ..] if is_one(&fitting) => Ok(*camera),
+                    [] => Err(file.error(format!(
+                        "a camera of {width}x{height} pixels expected, as {} has, none of {} found",
+                        photo.display(),
+                        cameras.len()
+                    ))),
+                    several => Err(file.error(format!(
+                        "one camera of {width}x{height} pixels expected, {} found; give one of the lines \
+                         as --camera",
+                        several.len()
+                    ))),
+                }
+            }
+        }
+    }
+}
+
+fn of_size(camera: &ModelCamera, size: (u32, u32)) -> Option<(Intrinsics, Distortion)> {
+    let taken = camera.intrinsics;
+    ((taken.width, taken.height) == size).then_some((taken, camera.distortion))
+}
+
+fn line_camera(line: &str) -> Result<ModelCamera, String> {
+    let text = TextFile::from_text("--camera", line);
+    let mut lines = text.lines();
+    let camera = lines.next().map(camera_of_line);
+    match (camera, lines.next()) {
+        (Some(camera), None) => {
+            let camera = camera.map_err(|error| match error {
+                SceneError::Line { expected, .. } => expected,
+                error => error.to_string(),
+            })?;
+            Ok(camera.1)
+        }
+        _ => Err("one camera line of COLMAP expected".to_owned()),
+    }
+}
+
+impl FromStr for CameraArgument {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let words = text.split_whitespace().collect::<Vec<_>>();
+        let is_line = words.len() > 4
+            && words[0].parse::<u32>().is_ok()
+            && words[1].starts_with(|c: char| c.is_ascii_uppercase());
+        if is_line {
+            line_camera(text)?;
+            return Ok(Self::Line(text.trim().to_owned()));
+        }
+        if Path::new(text).is_file() {
+            return Ok(Self::File(text.into()));
+        }
+        let expected = "fx,fy,cx,cy [px], a camera line of COLMAP (`1 PINHOLE 640 480 500 500 320 240`) or \
+                        its cameras.txt expected";
+        match numbers::<4>(text) {
+            Ok([fx, fy, ..]) if fx <= 0.0 || fy <= 0.0 => Err(format!(
+                "positive focal lengths expected, {fx} and {fy} found"
+            )),
+            Ok(pinhole) => Ok(Self::Pinhole(pinhole)),
+            Err(why) if text.contains(',') => Err(format!("{expected}; {why}")),
+            Err(_) => Err(format!("{expected}; there is no file `{}`", excerpt(text))),
+        }
+    }
+}
+
+impl fmt::Display for CameraArgument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pinhole([fx, fy, cx, cy]) => write!(f, "{fx},{fy},{cx},{cy}"),
+            Self::Line(line) => f.write_str(line),
+            Self::File(path) => path.display().fmt(f),
+        }
+    }
+}
+
+posescope_core::serde_as_text!(CameraArgument);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_is_read_in_each_form_and_written_again() {
+        let numbers: CameraArgument = "500,510,319.5,239.5".parse().expect("four numbers");
+        assert_eq!(
+            numbers,
+            CameraArgument::Pinhole([500.0, 510.0, 319.5, 239.5])
+        );
+        let line = "1 SIMPLE_RADIAL 640 480 500 320 240 0.01";
+        let radial: CameraArgument = line.parse().expect("a line of COLMAP");
+        for camera in [&numbers, &radial] {
+            assert_eq!(camera.to_string().parse().as_ref(), Ok(camera));
+        }
+        // COLMAP's pixels have their centres at halves.
+        let (taken, distortion) = radial
+            .of_photo(Path::new("a.png"), (640, 480))
+            .expect("its size");
+        assert_eq!((taken.fx, taken.cx, taken.cy), (500.0, 319.5, 239.5));
+        assert_eq!(distortion.k1, 0.01);
+        for (wrong, word) in [
+            ("500,500,319.5", "4 numbers expected, 3 found"),
+            ("0,500,319.5,200", "positive focal lengths"),
+            ("1 FOV 640 480 1 2 3 4 5", "`FOV` found"),
+            ("no/cameras.txt", "no file `no/cameras.txt`"),
+        ] {
+            let said = wrong.parse::<CameraArgument>().expect_err("no camera");
+            assert!(said.contains(word), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_camera_for_photos_of_another_size_is_refused() {
+        for camera in [
+            "1500,1500,959.5,539.5",
+            "1 SIMPLE_PINHOLE 1920 1080 1500 960 540",
+        ] {
+            let camera: CameraArgument = camera.parse().expect("a camera");
+            let error = camera
+                .of_photo(Path::new("a.png"), (640, 480))
+                .expect_err("too small");
+            let said = error.to_string();
+            assert!(said.contains("a.png") && said.contains("640x480"), "{said}");
+        }
+    }
+}

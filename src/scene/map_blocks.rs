@@ -1,0 +1,157 @@
+//! A map in blocks: the points of a cube of the world stand together, so that a camera looks at those
+//! cubes only that it may have in view.
+
+use std::ops::Range;
+
+use nalgebra::{Point3, Vector3};
+use rayon::slice::ParallelSliceMut as _;
+
+use super::cloud_file::MapCloud;
+use crate::camera::Intrinsics;
+use crate::geometry::Pose;
+
+/// The side of a block \[m\] where the map is one of metres: some thousand points of a dense map each.
+/// Smaller maps, such as those of an object or without a scale, have blocks of a part of their size.
+const SIDE_M: f32 = 8.0;
+/// At least as many blocks along the longest axis.
+const LEAST_BLOCKS: f32 = 32.0;
+
+/// A map, its points sorted by block. It takes no more memory than the points but for some bytes a block.
+pub(super) struct MapBlocks {
+    origin: Vector3<f64>,
+    points: Vec<Point3<f32>>,
+    blocks: Vec<Block>,
+}
+
+struct Block {
+    points: Range<usize>,
+    /// The middle of the points' bounding box, and how far from there the farthest corner is.
+    middle: Point3<f32>,
+    radius: f32,
+}
+
+impl MapBlocks {
+    /// Sorts the points of a map.
+    pub fn new(map: MapCloud) -> Self {
+        let MapCloud { origin, mut points } = map;
+        let extent = (0..3).map(|axis| {
+            let along = || points.iter().map(|point| point[axis]);
+            along().fold(f32::MIN, f32::max) - along().fold(f32::MAX, f32::min)
+        });
+        let longest = extent.fold(0.0, f32::max);
+        let side = SIDE_M.min(longest / LEAST_BLOCKS).max(f32::MIN_POSITIVE);
+        let key = |point: &Point3<f32>| [0, 1, 2].map(|axis| (point[axis] / side).floor() as i32);
+        // By all coordinates, so that the order follows from the points on any number of threads.
+        points.par_sort_unstable_by(|a, b| {
+            let coordinates = || (0..3).map(|axis| a[axis].total_cmp(&b[axis]));
+            let rest = coordinates().fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then);
+            key(a).cmp(&key(b)).then(rest)
+        });
+        let mut blocks = Vec::new();
+        let mut start = 0;
+        for chunk in points.chunk_by(|a, b| key(a) == key(b)) {
+            let corner = |pick: fn(f32, f32) -> f32| {
+                let first = chunk[0];
+                chunk.iter().fold(first, |corner, point| {
+                    Point3::from([0, 1, 2].map(|axis| pick(corner[axis], point[axis])))
+                })
+            };
+            let (least, most) = (corner(f32::min), corner(f32::max));
+            blocks.push(Block {
+                points: start..start + chunk.len(),
+                middle: nalgebra::center(&least, &most),
+                radius: (most - least).norm() / 2.0,
+            });
+            start += chunk.len();
+        }
+        Self {
+            origin,
+            points,
+            blocks,
+        }
+    }
+
+    /// The points of all blocks that a camera may have in view, in its frame \[m\].
+    pub fn around_view<'a>(
+        &'a self,
+        world_from_camera: &Pose,
+        camera: &Intrinsics,
+    ) -> impl Iterator<Item = Point3<f64>> + use<'a> {
+        let camera_from_origin = world_from_camera.inverse()
+            * Pose::translation(self.origin.x, self.origin.y, self.origin.z);
+        let sides = sides(camera);
+        let is_near = move |block: &&Block| {
+            let middle = camera_from_origin * block.middle.cast::<f64>();
+            // Points are rounded to f32.
+            let radius = 1.001 * f64::from(block.radius) + 0.001;
+            sides.iter().all(|side| side.dot(&middle.coords) >= -radius)
+        };
+        let seen = self.blocks.iter().filter(is_near);
+        seen.flat_map(|block| &self.points[block.points.clone()])
+            .map(move |point| camera_from_origin * point.cast::<f64>())
+    }
+}
+
+/// Normals, towards the inside, of the planes through the camera that bound its view, and of the image.
+fn sides(camera: &Intrinsics) -> [Vector3<f64>; 5] {
+    let (left, right) = (-0.5 - camera.cx, f64::from(camera.width) - 0.5 - camera.cx);
+    let (top, bottom) = (-0.5 - camera.cy, f64::from(camera.height) - 0.5 - camera.cy);
+    [
+        Vector3::new(camera.fx, 0.0, -left),
+        Vector3::new(-camera.fx, 0.0, right),
+        Vector3::new(0.0, camera.fy, -top),
+        Vector3::new(0.0, -camera.fy, bottom),
+        Vector3::z(),
+    ]
+    .map(|side| side.normalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_pcg::Pcg64Mcg;
+
+    #[test]
+    fn nothing_in_view_is_missed_and_what_is_behind_is_hardly_looked_at() {
+        let mut random = Pcg64Mcg::seed_from_u64(3);
+        let origin = Vector3::new(500_000.0, 5_400_000.0, 100.0);
+        let mut point = || {
+            let mut along = |most: f32| random.random_range(-most..most);
+            Point3::new(along(200.0), along(200.0), along(20.0))
+        };
+        let points: Vec<_> = (0..50_000).map(|_| point()).collect();
+        let map = MapCloud {
+            origin,
+            points: points.clone(),
+        };
+        let blocks = MapBlocks::new(map);
+        let camera = Intrinsics {
+            fx: 300.0,
+            fy: 320.0,
+            cx: 300.0,
+            cy: 250.0,
+            width: 640,
+            height: 480,
+        };
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -1.1, 0.2);
+        let at = nalgebra::Translation3::from(origin + Vector3::new(20.0, -30.0, 1.0));
+        let world_from_camera = Pose::from_parts(at, turn);
+        let in_view = |point: &Point3<f64>| {
+            let pixel = camera.project(point);
+            pixel.is_some_and(|pixel| camera.contains(&pixel))
+        };
+        let camera_from_world = world_from_camera.inverse();
+        let all = points
+            .iter()
+            .map(|point| camera_from_world * (point.cast::<f64>() + origin))
+            .filter(in_view);
+        let (mut looked_at, mut seen) = (0, 0);
+        for point in blocks.around_view(&world_from_camera, &camera) {
+            looked_at += 1;
+            seen += usize::from(in_view(&point));
+        }
+        assert_eq!(seen, all.count());
+        assert!(seen > 1_000 && looked_at < points.len() / 3, "{looked_at}");
+    }
+}
