@@ -16,7 +16,7 @@ pub fn shot(args: &ShotArgs, terminal: &Terminal) -> Result<(), CliError> {
         view: args.view.clone(),
         arrangement: args.layout,
         moment: args.at,
-        camera: args.camera,
+        camera: args.pose,
         size_px: args.size,
         scale: args.scale,
         theme: match args.light {

@@ -51,7 +51,7 @@ fn a_view_is_painted_without_a_window() {
     assert!(std::fs::read(&path).expect("readable") == first);
     let (code, said) = shot(
         &sequence,
-        &[&surface[..], &["--camera", "truth", "--out", &file]].concat(),
+        &[&surface[..], &["--pose", "truth", "--out", &file]].concat(),
     );
     assert_eq!(code, Some(0), "{said}");
     assert!(std::fs::read(&path).expect("readable") != first);

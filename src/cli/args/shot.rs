@@ -31,14 +31,14 @@ pub struct ShotArgs {
     /// The moment of the run: its end, the end of a method, or the step of a number
     #[arg(long, value_name = "end|METHOD|STEP", default_value_t = Moment::End)]
     pub at: Moment,
-    /// Take the camera to this pose first, so that costs and synthetic views are those at it
+    /// Look from this pose: costs and synthetic views are those at it
     #[arg(
         long,
         value_name = "POSE",
         value_parser = PossibleValuesParser::new(poses())
             .try_map(|name: String| NamedPose::from_word(&name).ok_or("a pose expected"))
     )]
-    pub camera: Option<NamedPose>,
+    pub pose: Option<NamedPose>,
     /// Size of the picture [px]
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1500x950", value_parser = size)]
     pub size: [u32; 2],

@@ -1,0 +1,82 @@
+//! The arguments of `posescope eval`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use posescope::measure::Gate;
+use posescope::run::{Experiment, PaperProtocol, Protocol, Shard};
+
+use super::{ProtocolArgs, positive, share};
+
+#[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// Where the references are, as in `run`; several scenes are evaluated one after the other
+    #[arg(value_name = "SCENE", required_unless_present = "merge")]
+    pub scenes: Vec<String>,
+    /// Take the queries from this scene in the same world frame; repeatable: every scene of
+    /// references is paired with every one of queries
+    #[arg(long, value_name = "SCENE")]
+    pub queries: Vec<String>,
+    /// One of the paper's experiments, which sets other defaults. single: one random reference within
+    /// 10, 15, 20, 25 m, methods fb,pm,mi; multi: random:5 within 10 m, 1 to 5 of them with all
+    /// fusions, methods fb,pm,mi; large: retrieve:5 within a prior of 200 m, RobotCar 50 m. All: a
+    /// tenth of the frames as queries
+    #[arg(long, value_name = "single|multi|large")]
+    pub experiment: Option<Experiment>,
+    /// The index that retrieve:K asks; repeatable, one per scene of references, in their order
+    /// [default: where `posescope index` puts it]
+    #[arg(long, value_name = "FILE")]
+    pub index: Vec<PathBuf>,
+    #[arg(
+        long,
+        value_name = "METRES",
+        value_delimiter = ',',
+        value_parser = positive,
+        help = format!("Uncertainty radius; several are run one by one [m] [default: {}]", Protocol::RADIUS_M)
+    )]
+    pub radius: Vec<f64>,
+    #[command(flatten)]
+    pub protocol: ProtocolArgs,
+    /// Draw this share of the frames as queries; the others are the references [default: 1, where
+    /// every frame is a query of all others; experiments: 0.1]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub queries_share: Option<f64>,
+    /// At most as many queries, drawn by the seed
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub limit: Option<u32>,
+    /// Only this one of the queries; repeatable
+    #[arg(long, value_name = "FRAME")]
+    pub only: Vec<String>,
+    /// Hold the scenes to what the paper asked of this data set. kitti: a prior of 200 m in the
+    /// experiment `large`, failures from 10 m; robotcar: 50 m and 20 m [default: by the scene]
+    #[arg(long = "protocol", value_name = "kitti|robotcar")]
+    pub paper: Option<PaperProtocol>,
+    /// A pose as far off counts as a failure [m] [default: 10, RobotCar 20]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub failure_radius: Option<f64>,
+    /// The run folder [default: below runs/, named after what is asked]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in the folder
+    #[arg(long, conflicts_with = "merge")]
+    pub resume: bool,
+    /// Run one part of N; every query is in one of them
+    #[arg(long, value_name = "I/N", conflicts_with = "merge")]
+    pub shard: Option<Shard>,
+    /// Instead of running: bring all parts of a run together in one folder
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "scenes", requires = "out")]
+    pub merge: Vec<PathBuf>,
+    /// Exit with code 1 unless this holds, such as \"success@mi >= 0.9\" or
+    /// \"recall@0.5m,5deg@fb >= 0.8\"; repeatable
+    #[arg(long, value_name = "CONDITION")]
+    pub gate: Vec<Gate>,
+    /// Exit with code 1 if a query fails that succeeded in this run
+    #[arg(long, value_name = "RUN")]
+    pub baseline: Option<PathBuf>,
+    /// Keep recordings of at most as many failures
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub max_recordings: usize,
+    /// Keep recordings of failures of at most this size together [MB]
+    #[arg(long, value_name = "MB", default_value_t = 500)]
+    pub max_recording_mb: u64,
+}
