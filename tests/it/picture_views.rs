@@ -344,3 +344,20 @@ fn both_views_draw_at_every_moment_of_a_run() {
         cursor += if cursor < 12 { 1 } else { 1 + len / 97 };
     }
 }
+
+#[test]
+fn the_synthetic_view_is_whole_in_a_narrow_window() {
+    let mut window = finished(Method::MI, "synthetic");
+    order(&mut window, Command::Maximize(Some("synthetic")));
+    let mut heights = Vec::new();
+    for width in [500.0, 700.0, 1100.0] {
+        window.set_size(Vec2::new(width, 600.0));
+        window.run_steps(4);
+        let picture = window.get_by_label_contains("MI picture:").rect();
+        assert!(picture.right() <= width, "{picture:?} of {width}");
+        let legend = window.get_by_label_contains("covered pixels spread").rect();
+        assert!(legend.right() <= width && legend.bottom() <= picture.top() + 1.0);
+        heights.push(legend.height());
+    }
+    assert!(heights[0] > 1.5 * heights[2], "wrapped where it is narrow");
+}

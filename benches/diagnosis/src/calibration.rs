@@ -435,11 +435,11 @@ fn judge(title: &str, samples: &[Sample], methods: &[String]) {
             }
             let near = scored.iter().filter(|s| s.1).count();
             println!(
-                "| {set} | {method} | {} | {:.1} % | {:.3} | {:.3} |",
+                "| {set} | {method} | {} | {:.1} % | {:.3} | {} |",
                 scored.len(),
                 100.0 * near as f64 / scored.len() as f64,
                 calibration_error(&scored),
-                area_under_curve(&scored)
+                area_under_curve(&scored).map_or("–".to_owned(), |area| format!("{area:.3}"))
             );
         }
     }
@@ -465,7 +465,8 @@ fn calibration_error(scored: &[Scored]) -> f64 {
 }
 
 /// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
-fn area_under_curve(scored: &[Scored]) -> f64 {
+/// `None` where there is no such pair.
+fn area_under_curve(scored: &[Scored]) -> Option<f64> {
     let (near, far): (Vec<Scored>, Vec<Scored>) = scored.iter().copied().partition(|s| s.1);
     let wins: f64 = near
         .iter()
@@ -479,5 +480,6 @@ fn area_under_curve(scored: &[Scored]) -> f64 {
                 .sum::<f64>()
         })
         .sum();
-    wins / (near.len() * far.len()).max(1) as f64
+    let pairs = near.len() * far.len();
+    (pairs > 0).then(|| wins / pairs as f64)
 }

@@ -109,8 +109,11 @@ impl SynthesisView {
 
     /// What the picture's colours mean; always of one height, so that the picture stays in its place.
     fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&ShownView>) {
-        let size = Vec2::new(ui.available_width(), 24.0);
-        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        /// Below this the longest legend takes two lines \[points\].
+        const ONE_LINE: f32 = 800.0;
+        let width = ui.available_width();
+        let size = Vec2::new(width, if width < ONE_LINE { 42.0 } else { 24.0 });
+        let layout = egui::Layout::left_to_right(egui::Align::Center).with_main_wrap(true);
         ui.allocate_ui_with_layout(size, layout, |ui| {
             ui.set_min_size(size);
             if self.mode == Mode::Blend {
