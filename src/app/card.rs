@@ -17,10 +17,9 @@ const ERROR: f32 = 128.0;
 
 /// One row for each method that was asked for.
 pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    let is_empty = state.run().spans().is_empty();
-    if is_empty && matches!(state.run_state(), RunState::Paused { .. }) {
-        ui.label("Space runs the query to its end, I steps into the first event, ? lists all keys");
-        return;
+    let is_waiting = matches!(state.run_state(), RunState::Paused { .. });
+    if is_waiting && state.run().results().next().is_none() {
+        ui.label("Space runs the query to its end, I steps into the next event, ? lists all keys");
     }
     for &method in &state.setup.task.protocol.methods {
         row(ui, state, commands, method);
@@ -44,7 +43,9 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
                 state.run().spans().last().is_some_and(|span| {
                     span.part.method() == Some(method) && span.result.is_none()
                 });
-            ui.weak(if is_at_work { "at work" } else { "not run yet" });
+            cell(ui, STANDING, |ui| {
+                ui.weak(if is_at_work { "at work" } else { "not run yet" });
+            });
             return;
         };
         if let Some(result) = &span.result {
