@@ -133,6 +133,44 @@ fn a_truth_beyond_the_disc_is_outside_the_grid() {
 }
 
 #[test]
+fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
+    let mut problem = solvable();
+    problem.uncertainty_radius_m = 3.0;
+    let at = |metres| problem.reference.world_from_camera * Pose::translation(0.0, 0.0, metres);
+    let found = |truth: Pose| verdicts(&problem, Method::FB, &Params::default(), Some(&truth));
+    // A tenth beyond the prior is allowed.
+    let beyond = found(at(3.4));
+    let outside = beyond.iter().find(|finding| finding.code == Code::R9);
+    let outside = outside.expect("R9");
+    assert!(
+        outside.text.contains("3.4 m from the reference"),
+        "{}",
+        outside.text
+    );
+    let within = found(at(3.2));
+    assert!(primary(&within).is_some(), "wrong all the same");
+    assert!(!codes(&within).contains(&Code::R9), "{within:?}");
+}
+
+#[test]
+fn poses_that_are_read_the_wrong_way_round_are_suspect() {
+    let problem = solvable();
+    let reference = problem.reference.world_from_camera;
+    let from_query = Pose::translation(0.0, 0.0, 1.0);
+    // As stated, the query is elsewhere; with both poses inverted it is where it is.
+    let stated = from_query.inverse() * reference;
+    for method in [Method::FB, Method::PM, Method::MI] {
+        let found = verdicts(&problem, method, &Params::default(), Some(&stated));
+        assert_eq!(primary(&found), Some(Code::X1), "{method}: {found:?}");
+        let reading = found[0].evidence["reading"].as_str();
+        assert!(
+            reading.is_some_and(|words| words.contains("inverted")),
+            "{method}"
+        );
+    }
+}
+
+#[test]
 fn a_query_that_shows_nothing_has_too_few_features_and_costs_that_tell_nothing() {
     let grey = image::GrayImage::from_pixel(240, 100, image::Luma([90]));
     let problem = problem(grey, photo(0.0, 5), cloud_of_the_walls());

@@ -12,6 +12,8 @@ use image::imageops::{FilterType, resize};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
+use posescope::image::Photo;
+use posescope::problem::ReferenceTuple;
 use posescope::scene::{self, Scene};
 
 use crate::frames::Frame;
@@ -86,6 +88,11 @@ fn frames(folder: &Path, poses: &Path) -> Result<Vec<(String, Frame)>, String> {
             });
             let at = name.ok_or(told(&format!("no frame {number}")))?;
             let frame = read(scene.as_ref(), at, pose).map_err(|error| told(&error))?;
+            // Who takes a frame from here may count on it: photo, camera and cloud go together.
+            let photo = Photo::from_color(frame.photo.clone());
+            let (camera, cloud) = (frame.intrinsics, frame.cloud.clone());
+            ReferenceTuple::new(&*scene.frames()[at], photo, camera, pose, cloud)
+                .map_err(|error| told(&error))?;
             Ok((scene.frames()[at].clone(), frame))
         })
         .collect()
