@@ -17,6 +17,7 @@ mod dispatch;
 mod headless;
 mod layout;
 mod lecture;
+mod lesson;
 mod navigation;
 mod prober;
 mod queries;
@@ -44,10 +45,13 @@ pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note, Results};
 pub use view_context::ViewContext;
 pub use view_options::{CompareMode, ViewOptions};
-pub use window::{WindowError, has_display, open, window_options};
+pub use window::{WindowError, has_display, open, open_lesson, window_options};
 
 use eframe::egui_wgpu::RenderState;
 use layout::Layout;
+use lesson::OpenLesson;
+
+use crate::lesson::Lesson;
 
 /// The application.
 pub struct App {
@@ -56,6 +60,8 @@ pub struct App {
     commands: command::Queue,
     help: bool,
     pictures: save::Pictures,
+    /// The lesson that somebody goes through.
+    lesson: Option<OpenLesson>,
     /// What the window's frame says.
     title: String,
     /// Whether a maximised view is drawn without bars around it, for a picture.
@@ -77,6 +83,7 @@ impl App {
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
+            lesson: None,
             title: String::new(),
             is_bare: false,
         }
@@ -85,6 +92,13 @@ impl App {
     /// With results of the setup's queries that are known already.
     pub fn with_results(mut self, results: Results) -> Self {
         self.state.set_known_results(results);
+        self
+    }
+
+    /// With a lesson at its first page, of which the setup is what is localised there.
+    pub fn with_lesson(mut self, lesson: Lesson) -> Self {
+        self.lesson = Some(OpenLesson::new(lesson, &self.state.setup));
+        self.commands.send(Command::Arrange(Arrangement::Teach));
         self
     }
 
@@ -121,6 +135,9 @@ impl App {
 
     /// Draws the window.
     fn content(&mut self, ui: &mut egui::Ui) {
+        if let Some(lesson) = &self.lesson {
+            lesson.read_keys(ui.ctx(), &self.commands);
+        }
         command::read_keys(ui.ctx(), &self.commands);
         let Self {
             state,
@@ -128,6 +145,7 @@ impl App {
             commands,
             help,
             is_bare,
+            lesson,
             ..
         } = self;
         if *is_bare && layout.is_maximized() {
@@ -136,6 +154,11 @@ impl App {
             return;
         }
         egui::Panel::top("transport").show(ui, |ui| transport::ui(ui, state, commands));
+        if let Some(lesson) = lesson {
+            egui::Panel::left("lesson")
+                .exact_size(lesson::WIDTH)
+                .show(ui, |ui| lesson.ui(ui, state, commands));
+        }
         // A view that has all the room has that of the card too.
         if !layout.is_maximized() {
             if layout.arrangement() == Arrangement::Teach {

@@ -13,6 +13,7 @@ mod failures;
 mod figures;
 mod index;
 mod interrupt;
+mod lesson;
 mod match_export;
 mod observer;
 mod opened;
@@ -62,6 +63,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         }
         #[cfg(feature = "app")]
         Some(Command::Shot(args)) => shot::shot(args, &terminal),
+        Some(Command::Lesson(args)) => lesson::lesson(args, &terminal),
         Some(Command::Eval(args)) => eval::eval(args, &terminal),
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Triage(args)) => triage::triage(args, &terminal),

@@ -31,6 +31,8 @@ pub use posescope_core::{
 #[cfg(feature = "app")]
 pub mod app;
 pub mod doctor;
+#[cfg(feature = "cli")]
+pub mod lesson;
 pub mod measure;
 #[cfg(feature = "rerun")]
 mod narration;

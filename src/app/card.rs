@@ -36,7 +36,7 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
             }
         });
         let Some(span) = deciding(state, method) else {
-            if state.options.hides_future {
+            if state.options.hides_future || state.options.lockstep.is_some() {
                 return;
             }
             let is_at_work =
@@ -68,9 +68,7 @@ fn cell(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui)) {
 fn deciding(state: &AppState, method: Method) -> Option<&Span> {
     let run = state.run();
     let reference = run.reference_at(state.cursor());
-    // What is still to come is told by nobody who hides it.
-    let has_come =
-        |span: &&Span| !state.options.hides_future || span.records.end <= state.cursor() + 1;
+    let has_come = |span: &&Span| state.has_come(span);
     let own = || {
         let spans = run.spans().iter().filter(has_come);
         spans.filter(|span| span.part.method() == Some(method) && span.result.is_some())

@@ -59,6 +59,21 @@ pub enum Command {
     Try(Vec<String>),
     /// Localise all queries, without stepping, to know which fail.
     RunAllQueries,
+    /// Take all methods to this step of theirs, beside each other; without one, back to the cursor.
+    StepTogether(Option<usize>),
+    /// Take all methods on by so many steps, or back.
+    GoTogether(isize),
+    /// The next page of the lesson, or the one before.
+    TurnPage {
+        /// Whether the one before is meant.
+        back: bool,
+    },
+    /// Answer the lesson's question by a choice, counted from 0.
+    Answer(usize),
+    /// Answer it by where the camera in hand is.
+    Guess,
+    /// Close the lesson.
+    CloseLesson,
     /// Choose the references in another way.
     PickReferences(ReferencePick),
     /// Use other reference frames.
@@ -166,18 +181,21 @@ pub enum Task {
     Compare,
     /// The camera in hand.
     Camera,
+    /// The lesson that is open.
+    Lesson,
     /// What leaves the window, and how it looks.
     Window,
 }
 
 impl Task {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Run,
         Self::Look,
         Self::Query,
         Self::Show,
         Self::Compare,
         Self::Camera,
+        Self::Lesson,
         Self::Window,
     ];
 
@@ -189,6 +207,7 @@ impl Task {
             Self::Show => "What is shown",
             Self::Compare => "Compare two runs",
             Self::Camera => "Try another pose",
+            Self::Lesson => "Lessons",
             Self::Window => "Window and files",
         }
     }
@@ -207,6 +226,8 @@ impl Task {
             | Command::First
             | Command::Last
             | Command::MoveCursor(_)
+            | Command::StepTogether(_)
+            | Command::GoTogether(_)
             | Command::SelectMethod(_) => Self::Look,
             Command::SelectQuery(_)
             | Command::NextQuery { .. }
@@ -217,6 +238,10 @@ impl Task {
             Command::TakeCamera(_) | Command::JumpCamera(_) | Command::MoveCamera(_) => {
                 Self::Camera
             }
+            Command::TurnPage { .. }
+            | Command::Answer(_)
+            | Command::Guess
+            | Command::CloseLesson => Self::Lesson,
             Command::CopyCommandLine
             | Command::SavePicture(_)
             | Command::SwitchTheme
@@ -256,6 +281,42 @@ pub fn shortcuts() -> Vec<Shortcut> {
         keys(SHIFT, Key::ArrowLeft, Command::Back(10), "Ten steps back"),
         keys(NONE, Key::Home, Command::First, "To the first step"),
         keys(NONE, Key::End, Command::Last, "To the last step"),
+        keys(
+            NONE,
+            Key::Period,
+            Command::GoTogether(1),
+            "All methods one step on",
+        ),
+        keys(
+            NONE,
+            Key::Comma,
+            Command::GoTogether(-1),
+            "All methods one step back",
+        ),
+        keys(
+            SHIFT,
+            Key::Period,
+            Command::GoTogether(50),
+            "All methods fifty steps on",
+        ),
+        keys(
+            SHIFT,
+            Key::Comma,
+            Command::GoTogether(-50),
+            "All methods fifty steps back",
+        ),
+        keys(
+            NONE,
+            Key::PageDown,
+            Command::TurnPage { back: false },
+            "Next page",
+        ),
+        keys(
+            NONE,
+            Key::PageUp,
+            Command::TurnPage { back: true },
+            "Previous page",
+        ),
         keys(NONE, Key::F5, Command::Run, "Run to the next breakpoint"),
         keys(SHIFT, Key::F5, Command::Restart, "Restart"),
         keys(NONE, Key::F9, Command::RunToEnd, "Run to the end"),

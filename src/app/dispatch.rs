@@ -6,6 +6,7 @@ use super::App;
 use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
+use super::navigation::Navigation;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use super::state::{AppState, KeptRun};
@@ -59,6 +60,26 @@ impl App {
             Command::NextFailure { back } => state.next_failure(back),
             Command::Explain => state.switch_explaining(),
             Command::Try(args) => state.try_again(&args),
+            Command::StepTogether(step) => state.options.lockstep = step,
+            Command::GoTogether(steps) => state.go_together(steps),
+            Command::TurnPage { back } => self.turn_page(back),
+            Command::Answer(choice) => {
+                let open = self.lesson.as_mut();
+                if open.is_some_and(|open| open.choose(choice)) {
+                    self.show_page();
+                }
+            }
+            Command::Guess => {
+                let open = self.lesson.as_mut();
+                if open.is_some_and(|open| open.guess(state.camera)) {
+                    self.show_page();
+                }
+            }
+            Command::CloseLesson => {
+                self.lesson = None;
+                state.options.lockstep = None;
+                self.send(Command::Arrange(Arrangement::default()));
+            }
             Command::RunAllQueries => state.queries.run_all(&state.setup),
             Command::PickReferences(pick) => state.pick_references(pick),
             Command::SetReferences(frames) => state.set_references(frames),
@@ -141,6 +162,9 @@ impl App {
                 state.options.hides_future = is_lecture;
                 ctx.set_zoom_factor(if is_lecture { LECTURE_ZOOM } else { 1.0 });
                 self.layout.arrange(arrangement);
+                if is_lecture {
+                    self.show_page();
+                }
             }
             Command::SwitchTheme => {
                 let is_dark = ctx.global_style().visuals.dark_mode;
@@ -205,6 +229,33 @@ impl App {
 }
 
 impl App {
+    fn turn_page(&mut self, back: bool) {
+        match self.lesson.as_mut().map(|open| open.turn(back)) {
+            Some(true) => self.show_page(),
+            Some(false) => {}
+            None => {
+                let words = "No lesson is open; `posescope lesson` lists them";
+                self.state.note(words, false);
+            }
+        }
+    }
+
+    /// Shows what the present page of the lesson is about.
+    pub(super) fn show_page(&mut self) {
+        let Some(open) = &mut self.lesson else { return };
+        match open.other_setup(&self.state.setup) {
+            Ok(Some(setup)) => {
+                let navigation = Navigation::towards_moment(open.moment().clone());
+                self.state.change_setup(setup, navigation);
+            }
+            Ok(None) => self.state.seek(open.moment().clone()),
+            Err(error) => self.state.note(error.to_string(), true),
+        }
+        let page = open.page();
+        self.state.options.lockstep = page.lockstep;
+        self.layout.present(&page.show);
+    }
+
     fn save_session(&mut self, path: &Path) {
         let layout = match self.layout.to_json() {
             Ok(layout) => layout,
@@ -253,6 +304,14 @@ impl AppState {
         } else if matches!(self.run_state(), RunState::Paused { .. }) {
             self.resume(RunMode::StepInto);
         }
+    }
+
+    /// All methods on by so many steps of theirs, or back.
+    fn go_together(&mut self, steps: isize) {
+        let longest = self.run().spans().iter().map(|span| span.records.len());
+        let last = longest.max().unwrap_or(0).saturating_sub(1);
+        let here = self.options.lockstep.unwrap_or(0).min(last);
+        self.options.lockstep = Some(here.saturating_add_signed(steps).min(last));
     }
 
     fn move_cursor(&mut self, cursor: usize) {

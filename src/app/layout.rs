@@ -63,6 +63,12 @@ impl Layout {
         self.alone = None;
     }
 
+    /// Shows these views alone, the first one largest.
+    pub(super) fn present(&mut self, names: &[String]) {
+        self.tree = presenting(names);
+        self.alone = None;
+    }
+
     /// Gives a view all the room; without one, that under the pointer, or goes back.
     pub(super) fn maximize(&mut self, view: Option<&str>, pointer: Option<egui::Pos2>) {
         self.alone = match (view, &self.alone) {
@@ -223,6 +229,25 @@ fn teaching() -> Tree<String> {
     let space = tabs(&mut tiles, &["space"]);
     let lower = tiles.insert_horizontal_tile(vec![direct, space]);
     let root = tiles.insert_vertical_tile(vec![indirect, lower]);
+    tree(root, tiles)
+}
+
+/// The first view above the others, which are beside each other; each has its name on a tab.
+fn presenting(names: &[String]) -> Tree<String> {
+    let mut tiles = Tiles::default();
+    let mut panes = names.iter().map(|name| tabs(&mut tiles, &[name.as_str()]));
+    let Some(first) = panes.next() else {
+        return teaching();
+    };
+    let others: Vec<TileId> = panes.collect();
+    let root = match others.as_slice() {
+        [] => first,
+        [other] => tiles.insert_vertical_tile(vec![first, *other]),
+        _ => {
+            let lower = tiles.insert_horizontal_tile(others);
+            tiles.insert_vertical_tile(vec![first, lower])
+        }
+    };
     tree(root, tiles)
 }
 

@@ -8,12 +8,19 @@ use super::theme;
 use crate::event::Stage;
 use crate::grid::Phase;
 use crate::narration;
+use crate::session::{Run, Span};
 
 /// Size of the sentences \[points\].
 const LARGE: f32 = 19.0;
 
 pub(super) fn ui(ui: &mut Ui, state: &AppState) {
     let (run, cursor) = (state.run(), state.cursor());
+    if state.options.lockstep.is_some() {
+        let words = "Every method goes on by one step at a time, beside the others.";
+        ui.label(RichText::new(words).size(LARGE));
+        ui.weak("The . key goes on, the , key back, with Shift by fifty steps");
+        return;
+    }
     let Some(span) = run.span_at(cursor) else {
         ui.label(RichText::new("I takes the first step, Space runs to the end").size(LARGE));
         return;
@@ -26,12 +33,15 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState) {
         }
         ui.label(RichText::new(stage.map_or("", about)).size(LARGE));
     });
-    // The latest of what was told; the future is not known yet.
-    let told = run.records()[span.records.start..=cursor.min(span.records.end.saturating_sub(1))]
-        .iter()
-        .rev()
-        .find_map(|record| narration::sentence(&record.event));
-    ui.label(RichText::new(told.unwrap_or_default()).weak());
+    ui.label(RichText::new(told(run, span, cursor).unwrap_or_default()).weak());
+}
+
+/// The latest of what a part of a run has told; the future is not known yet.
+pub(super) fn told(run: &Run, span: &Span, cursor: usize) -> Option<String> {
+    let last = span.records.end.checked_sub(1)?.min(cursor);
+    let told = run.records().get(span.records.start..=last)?;
+    let mut latest = told.iter().rev();
+    latest.find_map(|record| narration::sentence(&record.event))
 }
 
 /// What a stage does, for somebody who sees it for the first time.

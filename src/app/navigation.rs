@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::lesson::Moment;
 use crate::session::{Part, Run};
 
 /// The cursor in the present run.
@@ -33,6 +34,25 @@ impl Navigation {
             anchor: Some(Anchor::Record(record)),
             ..Self::default()
         }
+    }
+
+    /// In a new run, towards a moment.
+    pub(super) fn towards_moment(moment: Moment) -> Self {
+        Self {
+            follows: false,
+            anchor: Some(Anchor::Moment(moment)),
+            ..Self::default()
+        }
+    }
+
+    /// In this run, to a moment, as soon as the run has come so far.
+    pub(super) fn seeking(&self, moment: Moment, run: &Run, is_alive: bool) -> Self {
+        let mut navigation = Self {
+            cursor: self.cursor,
+            ..Self::towards_moment(moment)
+        };
+        navigation.on_records(run, is_alive);
+        navigation
     }
 
     /// In a new run, towards the place that the cursor has in `run`, in meaning.
@@ -97,6 +117,8 @@ enum Anchor {
     Stage(StagePosition),
     /// The place by the number of its record.
     Record(usize),
+    /// The place by what is told there.
+    Moment(Moment),
 }
 
 impl Anchor {
@@ -104,6 +126,7 @@ impl Anchor {
         match self {
             Self::Stage(position) => position.find(run),
             Self::Record(record) => (*record < run.len()).then_some(*record),
+            Self::Moment(moment) => moment.find(run),
         }
     }
 }

@@ -245,5 +245,5 @@ fn localize(
     let mut setup = setup.clone();
     setup.go_to(query);
     let mut observer = UntilStopped(Arc::clone(stop));
-    setup.job(frames).work(&mut observer, |_| {})
+    setup.job(frames).work(0, &mut observer, |_| {})
 }

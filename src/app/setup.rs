@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use crate::estimator;
 use crate::event::Side;
+use crate::lesson::OpenSetting;
 use crate::localize::{References, Selection, frames_within};
 use crate::method::Method;
+use crate::run::default_failure_radius_m;
 use crate::scene::{FrameStore, Scene};
 use crate::session::{IndexFile, Job, RunMode, Task};
 use crate::text::UnknownWord;
@@ -70,6 +72,28 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// What a lesson localises.
+    pub fn of_lesson(open: OpenSetting, folder: PathBuf) -> Self {
+        let OpenSetting {
+            task,
+            scenes,
+            query,
+            references,
+        } = open;
+        Self {
+            offered: vec![query],
+            failure_radius_m: default_failure_radius_m(scenes.references.name()),
+            references: scenes.references,
+            queries: scenes.queries,
+            query,
+            chosen: references.into(),
+            index: Arc::new(IndexFile::new(&task.scene, None)),
+            task,
+            mode: RunMode::Running,
+            folder,
+        }
+    }
+
     pub(super) fn job(&self, frames: &Arc<FrameStore>) -> Job {
         Job {
             references: Arc::clone(&self.references),

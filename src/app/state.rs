@@ -11,11 +11,12 @@ use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
 use crate::geometry::Pose;
+use crate::lesson::Moment;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Run, RunMode, RunState, Session};
+use crate::session::{Breakpoints, Run, RunMode, RunState, Session, Span};
 
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,6 +112,15 @@ impl AppState {
     /// Position among the records of the present run.
     pub fn cursor(&self) -> usize {
         self.navigation.cursor()
+    }
+
+    /// Whether a part of the run was told to its end at the cursor, or at the step that all methods have
+    /// come to. What is still to come is told by nobody who hides it.
+    pub(super) fn has_come(&self, span: &Span) -> bool {
+        match self.options.lockstep {
+            Some(step) => span.records.len() <= step + 1,
+            None => !self.options.hides_future || span.records.end <= self.cursor() + 1,
+        }
     }
 
     /// What the present run is doing.
@@ -255,6 +265,25 @@ impl AppState {
         self.frames = Arc::default();
         self.start_run(RunMode::Running);
         self.navigation = Navigation::towards_record(cursor);
+    }
+
+    /// Another setup whose scenes are partly those of this one; the cursor goes where `navigation` says.
+    pub(super) fn change_setup(&mut self, setup: Setup, navigation: Navigation) {
+        self.stop_queries();
+        self.results = Results::new();
+        self.setup = setup;
+        self.params = Arc::new(self.setup.task.params.clone());
+        self.kept = None;
+        self.options.compare_mode = CompareMode::default();
+        self.camera = None;
+        self.start_run(RunMode::Running);
+        self.navigation = navigation;
+    }
+
+    /// Takes the cursor to a moment of the present run, as soon as the run has come so far.
+    pub(super) fn seek(&mut self, moment: Moment) {
+        let is_alive = self.session.is_alive();
+        self.navigation = self.navigation.seeking(moment, self.session.run(), is_alive);
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor

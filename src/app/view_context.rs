@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::camera::NamedPose;
 use super::command::{Command, Queue};
+use super::lecture;
 use super::prober::Probe;
 use super::queries::Queries;
 use super::setup::Setup;
@@ -57,6 +58,16 @@ impl<'a> ViewContext<'a> {
     /// The present run at the cursor.
     pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
         Self::new(state.run(), state.cursor(), state, commands)
+    }
+
+    /// The same at another position among the records of the run.
+    pub(super) fn at(&self, cursor: usize) -> Self {
+        Self { cursor, ..*self }
+    }
+
+    /// What the part at the cursor told last, in words.
+    pub(super) fn told(&self) -> Option<String> {
+        lecture::told(self.run, self.span()?, self.cursor)
     }
 
     /// The kept run at the place that corresponds to the cursor.

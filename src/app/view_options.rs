@@ -21,6 +21,8 @@ pub struct ViewOptions {
     pub shows_truth: bool,
     /// Whether nothing is shown of what comes behind the cursor.
     pub hides_future: bool,
+    /// With the methods beside each other, so many steps into each of them.
+    pub lockstep: Option<usize>,
     /// Whether only what differs is shown.
     pub only_differences: bool,
     /// Whether query and synthetic view are shown in turn.
@@ -37,6 +39,7 @@ impl Default for ViewOptions {
             compare_mode: CompareMode::default(),
             shows_truth: true,
             hides_future: false,
+            lockstep: None,
             only_differences: false,
             blinking: false,
             wants_filter: false,

@@ -10,6 +10,7 @@ mod fusion;
 mod histogram;
 mod images;
 mod legend;
+mod lockstep;
 mod log;
 mod mesh_painter;
 mod parameters;
@@ -148,6 +149,12 @@ pub const ALL: &[Entry] = &[
         title: "Fusion",
         about: "what each reference gives alone, its weight, and the fused pose",
         new: |_| Box::<fusion::FusionView>::default(),
+    },
+    Entry {
+        name: "lockstep",
+        title: "Lock-step",
+        about: "all methods beside each other, each as many steps into its work",
+        new: |_| Box::<lockstep::LockstepView>::default(),
     },
     Entry {
         name: "report",

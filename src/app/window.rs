@@ -6,6 +6,7 @@ use super::App;
 use super::adapter;
 use super::setup::Setup;
 use super::state::Results;
+use crate::lesson::Lesson;
 
 /// Why no window could be opened, and what would help.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +60,18 @@ pub fn window_options() -> eframe::NativeOptions {
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
 pub fn open(setup: Setup, results: Results) -> Result<(), WindowError> {
+    open_with(setup, move |app| app.with_results(results))
+}
+
+/// Opens the window with a lesson, of which `setup` is what its first page localises.
+///
+/// # Errors
+/// [`WindowError`] when there is no display, or nothing to draw with.
+pub fn open_lesson(setup: Setup, lesson: Lesson) -> Result<(), WindowError> {
+    open_with(setup, move |app| app.with_lesson(lesson))
+}
+
+fn open_with(setup: Setup, with: impl FnOnce(App) -> App) -> Result<(), WindowError> {
     if !has_display() {
         return Err(WindowError::NoDisplay);
     }
@@ -67,7 +80,7 @@ pub fn open(setup: Setup, results: Results) -> Result<(), WindowError> {
     eframe::run_native(
         "posescope",
         options,
-        Box::new(|creation| Ok(Box::new(App::new(creation, setup).with_results(results)))),
+        Box::new(|creation| Ok(Box::new(with(App::new(creation, setup))))),
     )
     .map_err(|error| match error {
         eframe::Error::Wgpu(why) => WindowError::NoAdapter(one_line(&why.to_string())),

@@ -1,6 +1,7 @@
 //! The arguments.
 
 mod eval;
+mod lesson;
 #[cfg(feature = "app")]
 mod shot;
 mod triage;
@@ -27,6 +28,7 @@ use posescope::session::{Breakpoint, Task};
 use posescope::text::UnknownWord;
 
 pub use eval::EvalArgs;
+pub use lesson::LessonArgs;
 #[cfg(feature = "app")]
 pub use shot::ShotArgs;
 pub use triage::TriageArgs;
@@ -59,6 +61,8 @@ pub enum Command {
     /// Save a picture of the window, or of one of its views, without a window
     #[cfg(feature = "app")]
     Shot(Box<ShotArgs>),
+    /// List the lessons, or go through one: in the window, or with --save as a recording
+    Lesson(LessonArgs),
     /// Run an experiment over many queries into a run folder
     Eval(Box<EvalArgs>),
     /// List the queries that a run fixed, broke or changed against another; exit code 1 if it broke

@@ -1,6 +1,6 @@
 //! What the demonstration shows: `assets/demo.toml`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 /// What the demonstration runs, and where its recording goes.
@@ -19,6 +19,11 @@ pub fn settings() -> &'static Settings {
         settings.unwrap_or_else(|error| unreachable!("a test reads it: {error}"))
     });
     &SETTINGS
+}
+
+/// Where things are saved unless somebody names another place.
+pub fn folder() -> &'static Path {
+    settings().recording.parent().unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use posescope::describe::ParamError;
+use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::ChoiceError;
 use posescope::run::{DrawError, FolderError, RunError};
 use posescope::scene::{NoIndex, SceneError};
+use posescope::session::JobError;
 use posescope::sink::rerun::{CheckupError, ComparisonError, RecordError};
 use posescope::trace::Cancelled;
 
@@ -45,6 +47,12 @@ pub enum CliError {
     Draw(#[from] DrawError),
     #[error(transparent)]
     Record(#[from] RecordError),
+    #[error(transparent)]
+    Job(#[from] JobError),
+    #[error(transparent)]
+    Lesson(#[from] LessonError),
+    #[error(transparent)]
+    LessonSetting(#[from] SettingError),
     /// There is nothing to draw with, or no room for the picture.
     #[cfg(feature = "app")]
     #[error("{0}")]
@@ -86,6 +94,7 @@ impl CliError {
                 | FolderError::OtherRun { .. }
                 | FolderError::InUse { .. },
             )
+            | Self::Lesson(LessonError::Unknown { .. })
             | Self::Scene(SceneError::UnknownFormat { .. }) => USAGE,
             Self::Scene(_)
             | Self::Config { .. }
@@ -96,6 +105,9 @@ impl CliError {
             | Self::Draw(_)
             | Self::Folder(_)
             | Self::Unhealthy(_)
+            | Self::Job(_)
+            | Self::Lesson(_)
+            | Self::LessonSetting(_)
             | Self::Record(_) => BAD_DATA,
             #[cfg(feature = "app")]
             Self::Picture(_) => BAD_DATA,

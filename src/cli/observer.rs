@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use posescope::event::{Event, KindSet};
 use posescope::geometry::Pose;
+use posescope::lesson::PageTurner;
 use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
@@ -22,6 +23,8 @@ pub struct CliObserver {
     pub recorder: Option<Recorder>,
     /// Writes matches, if that is asked for.
     pub export: Option<MatchExport>,
+    /// The pages of a lesson, which are recorded where they belong.
+    pub pages: Option<PageTurner>,
     /// Ends the run at a breakpoint, if there are any.
     pub stop: Option<StopAtBreakpoint>,
     interrupt: Interrupt,
@@ -45,6 +48,7 @@ impl CliObserver {
         Self {
             recorder,
             export: None,
+            pages: None,
             stop: None,
             interrupt,
             bar,
@@ -57,9 +61,20 @@ impl CliObserver {
     }
 }
 
+impl CliObserver {
+    /// Records the pages of a lesson that are about the end of the run.
+    pub fn turn_last_pages(&mut self) {
+        if let (Some(pages), Some(recorder)) = (self.pages.take(), &mut self.recorder) {
+            for page in pages.rest() {
+                recorder.show_page(&page);
+            }
+        }
+    }
+}
+
 impl Sink for CliObserver {
     fn wanted(&self) -> KindSet {
-        if self.stop.is_some() {
+        if self.stop.is_some() || self.pages.is_some() {
             return KindSet::ALL;
         }
         let recorder = self.recorder.as_ref();
@@ -80,6 +95,11 @@ impl Sink for CliObserver {
                 recorder.accept(record)?;
             }
             _ => {}
+        }
+        if let (Some(pages), Some(recorder)) = (&mut self.pages, &mut self.recorder) {
+            for page in pages.turn(record) {
+                recorder.show_page(&page);
+            }
         }
         if let (Some(export), Some(problem)) = (&mut self.export, self.problems.get(self.problem)) {
             export.accept(record, problem);

@@ -1,6 +1,6 @@
 //! `posescope view`: the window; without a display, the same run as a recording.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use clap::Parser as _;
@@ -12,14 +12,11 @@ use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
 use super::args::{Arguments, Command, ViewArgs};
-use super::demo_settings::settings as demo_settings;
+use super::demo_settings::{folder as saving_folder, settings as demo_settings};
 use super::failure::CliError;
 use super::opened::{self, OpenedTask};
 use super::run;
 use super::terminal::Terminal;
-
-/// Where the window saves things unless somebody says otherwise.
-const FOLDER: &str = "recordings";
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
@@ -93,7 +90,7 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         task,
         failure_radius_m,
         mode: RunMode::Paused,
-        folder: PathBuf::from(FOLDER),
+        folder: saving_folder().to_owned(),
     };
     begin_at(args, query, &mut setup)?;
     Ok(setup)
@@ -219,7 +216,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
         task,
         failure_radius_m,
         mode: RunMode::Paused,
-        folder: PathBuf::from(FOLDER),
+        folder: saving_folder().to_owned(),
     };
     Ok((setup, results))
 }

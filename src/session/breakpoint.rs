@@ -231,6 +231,11 @@ impl Breakpoint {
             .map(|quantity| (quantity.name, quantity.about))
     }
 
+    /// The estimator whose stage or number it is; any without.
+    pub fn method(&self) -> Option<Method> {
+        self.method
+    }
+
     /// What it waits for.
     pub fn at(&self) -> &BreakAt {
         &self.at

@@ -96,7 +96,7 @@ pub(super) fn spawn(
                 // The session may be gone; the next event finds out.
                 let _ = choices.send(Message::Chosen(chosen.clone()));
             };
-            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(&mut observer, on_choice)));
+            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(0, &mut observer, on_choice)));
             let last_words = match outcome {
                 Ok(Ok(_)) => Message::Finished,
                 Ok(Err(error)) if error.is_cancelled() => Message::Cancelled,
@@ -119,13 +119,14 @@ pub(super) fn spawn(
 impl Job {
     /// Chooses references where there are none yet, and localises.
     ///
-    /// `on_choice` hears which frames the references are before any of them is used. Hands out what
+    /// `number` is the query's among those that the observer hears of. `on_choice` hears which frames the references are before any of them is used. Hands out what
     /// [`Localizer::localize`] does: with a fusion the fused results only.
     ///
     /// # Errors
     /// [`JobError`].
     pub fn work(
         &self,
+        number: usize,
         observer: &mut dyn LocalizeObserver,
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
@@ -153,7 +154,7 @@ impl Job {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };
-        localizer.localize(0, self.query, &[request], &protocol.methods, observer, keep)?;
+        localizer.localize(number, self.query, &[request], &protocol.methods, observer, keep)?;
         Ok(results)
     }
 

@@ -103,7 +103,12 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
     move_to_end(&mut window, Method::MI);
     let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
-    for switch in ["", "Coverage", "Coverage", "Floor"] {
+    for (switch, map) in [
+        ("", "Cost map above the floor"),
+        ("Coverage", "Coverage map"),
+        ("Coverage", "Cost map above the floor"),
+        ("Floor", "Cost map"),
+    ] {
         if !switch.is_empty() {
             click(&window, switch);
             window.run_steps(2);
@@ -115,7 +120,7 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
             (0.52, 0.34),
             (0.7, 0.6),
         ] {
-            let readout = hover(&mut window, " map", right, down).expect("a cell");
+            let readout = hover(&mut window, map, right, down).expect("a cell");
             let (_, event) = scored
                 .iter()
                 .find(|(_, event)| !event.phase.is_yaw() && readout.starts_with(&words(event)))

@@ -262,7 +262,7 @@ fn references_that_are_ranked_can_be_stopped_too() {
     ranked.task.by_hand = false;
     ranked.task.protocol.references = "maxf:2".parse().expect("a selection");
     let mut stopped = UntilStopped(Arc::new(AtomicBool::new(true)));
-    let error = ranked.work(&mut stopped, |_| panic!("none was chosen"));
+    let error = ranked.work(0, &mut stopped, |_| panic!("none was chosen"));
     assert!(error.expect_err("it was stopped").is_cancelled());
 }
 

@@ -81,6 +81,19 @@ fn results_are_chosen_sorted_and_counted() {
         assert!((shown - wanted).abs() <= 5e-4, "{shown} {wanted}");
     }
 
+    // Of one order the other is the reverse, and what has no error comes last in both.
+    let order = |order: &str| -> Vec<f64> {
+        let (code, table, said) = triage(&folder, &["--sort", order, "--columns", "error,method"]);
+        assert_eq!(code, Some(0), "{said}");
+        let rows = table.lines().skip(1);
+        rows.filter_map(|line| line.split_whitespace().next()?.parse().ok())
+            .collect()
+    };
+    let (up, mut down) = (order("error"), order("-error"));
+    assert!(up.is_sorted() && up[0] < up[up.len() - 1], "{up:?}");
+    down.reverse();
+    assert_eq!(down, up);
+
     // As JSON the lines are those of the run.
     let asked = ["--where", "error >= 0", "--json", "-", "--limit", "1"];
     let (code, json, said) = triage(&folder, &asked);

@@ -29,6 +29,8 @@ pub(super) struct LayoutInput<'a> {
     pub(super) ranked: usize,
     /// What is known at the end.
     pub(super) focus: Focus,
+    /// Whether the pages of a lesson are shown.
+    pub(super) has_pages: bool,
 }
 
 /// What the layout leads the eye to, once the results are known; nothing before.
@@ -87,6 +89,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         references,
         ranked,
         ref focus,
+        has_pages,
     } = *input;
     let viewpoints = &Viewpoints(first);
     let mut words: Vec<BlueprintNode> = vec![
@@ -100,10 +103,15 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     if ranked > 0 {
         words.push(BlueprintView::new("TextDocument", "Ranking", entities::RETRIEVAL_TABLE).into());
     }
-    let left = BlueprintNode::Column(vec![
+    let mut left = vec![
         (3.0, overview(viewpoints, &focus.places).into()),
         (2.0, BlueprintNode::Tabs(words)),
-    ]);
+    ];
+    if has_pages {
+        let page = BlueprintView::new("TextDocument", "Lesson", entities::LESSON);
+        left.insert(0, (4.0, page.into()));
+    }
+    let left = BlueprintNode::Column(left);
     let mut rows = Vec::new();
     if shows_features(methods) {
         rows.push((1.0, feature_row()));

@@ -14,6 +14,11 @@ pub const STEP_TIMELINE: &str = "step";
 /// One number per hypothesis: a trial of MLESAC, or an evaluation of the grid search.
 pub const EVAL_TIMELINE: &str = "eval";
 
+/// One number per event of an estimator, from 0 for each of them: on it all of them advance together.
+pub const LOCKSTEP_TIMELINE: &str = "lockstep";
+
+/// The page of a lesson, as Markdown.
+pub const LESSON: &str = "lesson";
 /// Everything that has a place in the world.
 pub const WORLD: &str = "world";
 /// The roots of all that belongs to one query, whichever methods were asked.

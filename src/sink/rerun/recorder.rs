@@ -39,6 +39,8 @@ pub struct Recorder {
     /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
     origin: Option<Origin>,
     is_laid_out: bool,
+    /// Whether the pages of a lesson are shown.
+    has_pages: bool,
     query: CurrentQuery,
     /// Hypotheses of each method in earlier runs: `eval` goes on where the last run ended.
     evals: BTreeMap<Method, i64>,
@@ -64,6 +66,10 @@ struct CurrentQuery {
     beside_truth: Vec<Method>,
     /// Ranked frames that have a picture.
     ranked: usize,
+    /// Events that the method at work has told.
+    told: i64,
+    /// Events of the estimators that were recorded, by reference.
+    lengths: BTreeMap<(usize, Method), i64>,
 }
 
 /// An estimator whose events come in.
@@ -71,6 +77,8 @@ struct ActiveEstimator {
     method: Method,
     /// Whether all its events were recorded before.
     is_repetition: bool,
+    /// Events of the method at work before its first.
+    began: i64,
     hypotheses: i64,
     feature: FeatureContext,
     direct: DirectContext,
@@ -97,9 +105,23 @@ impl Recorder {
             methods: methods.to_vec(),
             origin: None,
             is_laid_out: false,
+            has_pages: false,
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
+    }
+
+    /// With the pages of a lesson, which the layout leaves room for.
+    pub fn with_pages(mut self) -> Self {
+        self.has_pages = true;
+        self
+    }
+
+    /// Shows a page of a lesson, as Markdown, from here on.
+    pub fn show_page(&mut self, markdown: &str) {
+        self.stream.advance();
+        let page = TextDocument::from_markdown(markdown);
+        self.stream.log(entities::LESSON, &page);
     }
 
     /// Completes the recording. With [`Targets::serve`] it goes on serving and does not return.
@@ -138,6 +160,7 @@ impl Recorder {
             references: self.query.problems.len(),
             ranked,
             focus: Focus::default(),
+            has_pages: self.has_pages,
         };
         blueprint::send(&mut self.stream, &input);
     }
@@ -147,7 +170,8 @@ impl Recorder {
         let Some(first) = self.query.problems.first() else {
             return;
         };
-        if self.query.results.is_empty() || self.stream.is_broken() {
+        // A lesson tells its story itself, from the beginning.
+        if self.query.results.is_empty() || self.stream.is_broken() || self.has_pages {
             return;
         }
         let CurrentQuery {
@@ -163,6 +187,7 @@ impl Recorder {
             references: self.query.problems.len(),
             ranked: *ranked,
             focus: story::focus(first, truth.as_ref(), results, beside_truth),
+            has_pages: self.has_pages,
         };
         blueprint::send(&mut self.stream, &input);
     }
@@ -232,6 +257,8 @@ impl Recorder {
         let CurrentQuery {
             problems, results, ..
         } = &self.query;
+        // It says what all methods found: where they advance together that is told too early.
+        self.stream.set_lockstep(None);
         let text = report::markdown(
             problems,
             results,
@@ -254,6 +281,7 @@ impl Recorder {
             self.query.estimators.push(ActiveEstimator {
                 method,
                 is_repetition: !is_first,
+                began: self.query.told - 1,
                 hypotheses: 0,
                 feature: FeatureContext::default(),
                 direct: DirectContext::default(),
@@ -272,9 +300,18 @@ impl Recorder {
         }
         if matches!(stage, Stage::Estimator(_))
             && let Some(estimator) = self.query.estimators.pop()
-            && !estimator.is_repetition
         {
-            *self.evals.entry(estimator.method).or_default() += estimator.hypotheses;
+            let key = (self.query.reference, estimator.method);
+            let told = self.query.told - estimator.began;
+            if estimator.is_repetition {
+                // Not all of it was told again, but it happened.
+                let length = self.query.lengths.get(&key).copied().unwrap_or(told);
+                self.query.told = estimator.began + length;
+                self.stream.set_lockstep(Some(self.query.told - 1));
+            } else {
+                self.query.lengths.insert(key, told);
+                *self.evals.entry(estimator.method).or_default() += estimator.hypotheses;
+            }
         }
         if !succeeded {
             self.say(&format!("{path} stopped here"), TextLogLevel::WARN);
@@ -412,6 +449,8 @@ impl LocalizeObserver for Recorder {
             return;
         };
         self.stream.set_query(query_index);
+        // Where every estimator begins.
+        self.stream.set_lockstep(Some(0));
         self.stream.advance();
         let origin = match self.origin {
             Some(origin) => {
@@ -443,6 +482,7 @@ impl LocalizeObserver for Recorder {
         self.lay_out(0);
         self.query.reference = reference_index;
         self.query.method = Some(method);
+        self.query.told = 0;
         // Decided once: while a hybrid runs, its own parts are recorded one after the other.
         self.query.is_repetition = self.query.is_repeated_hybrid();
         self.query.stages.clear();
@@ -496,6 +536,8 @@ impl Sink for Recorder {
         if self.stream.is_broken() {
             return Ok(());
         }
+        self.stream.set_lockstep(Some(self.query.told));
+        self.query.told += 1;
         match &record.event {
             Event::StageStarted(started) => self.stage_started(started.stage),
             Event::StageEnded(ended) => self.stage_ended(ended.stage, ended.succeeded),

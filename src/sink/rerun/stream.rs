@@ -6,7 +6,9 @@ use rerun::log::ChunkBatcherConfig;
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, TimeColumn};
 
 use super::encode::Encoded;
-use super::entities::{APPLICATION_ID, EVAL_TIMELINE, QUERY_TIMELINE, STEP_TIMELINE};
+use super::entities::{
+    APPLICATION_ID, EVAL_TIMELINE, LOCKSTEP_TIMELINE, QUERY_TIMELINE, STEP_TIMELINE,
+};
 use super::file::RecordingFile;
 use super::layout::{self, BlueprintNode};
 use super::targets::OpenTargets;
@@ -33,6 +35,7 @@ pub(super) struct Stream {
     query: i64,
     step: i64,
     eval: Option<i64>,
+    lockstep: Option<i64>,
     /// Layouts that were sent.
     layouts: i64,
 }
@@ -60,6 +63,7 @@ impl Stream {
             query: 0,
             step: -1,
             eval: None,
+            lockstep: None,
             layouts: 0,
         })
     }
@@ -86,6 +90,11 @@ impl Stream {
         self.eval = eval;
     }
 
+    /// From here on the rows belong to this event of its estimator, or to none.
+    pub(super) fn set_lockstep(&mut self, event: Option<i64>) {
+        self.lockstep = event;
+    }
+
     /// Goes on to the next decision of the timeline.
     pub(super) fn advance(&mut self) {
         self.step += 1;
@@ -99,9 +108,14 @@ impl Stream {
         // Rerun keeps the time per thread, and a run may move to another one.
         self.recording.set_time_sequence(QUERY_TIMELINE, self.query);
         self.recording.set_time_sequence(STEP_TIMELINE, self.step);
-        match self.eval {
-            Some(eval) => self.recording.set_time_sequence(EVAL_TIMELINE, eval),
-            None => self.recording.disable_timeline(EVAL_TIMELINE),
+        for (timeline, time) in [
+            (EVAL_TIMELINE, self.eval),
+            (LOCKSTEP_TIMELINE, self.lockstep),
+        ] {
+            match time {
+                Some(time) => self.recording.set_time_sequence(timeline, time),
+                None => self.recording.disable_timeline(timeline),
+            }
         }
         let told = self.recording.log(path, what);
         self.keep(told.map_err(|error| unrecordable(path, &error)));

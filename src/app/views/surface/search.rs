@@ -92,6 +92,12 @@ impl<'a> Search<'a> {
                 _ => {}
             }
         }
+        if search.lattices.is_empty() && filling.is_none() && search.assessed.is_none() {
+            // Where it is going to look follows from the parameters: an empty map, to point at.
+            let radius_m = problem.uncertainty_radius_m;
+            let coarse = Lattice::new(Phase::PositionCoarse, centre, radius_m, params);
+            filling = coarse.ok().map(Filling::new);
+        }
         search
             .lattices
             .extend(filling.map(|filling| filling.done(least_covered)));

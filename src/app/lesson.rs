@@ -1,0 +1,303 @@
+//! A lesson that is open: its page, what was answered, and the panel that shows both.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use egui::{Key, Modifiers, ProgressBar, RichText, ScrollArea, Ui};
+use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
+
+use super::command::{Command, Queue};
+use super::setup::Setup;
+use super::state::AppState;
+use super::theme;
+use crate::geometry::Pose;
+use crate::grid::Offset;
+use crate::lesson::{Answer, Lesson, Moment, Page, Question, SettingError};
+use crate::method::Method;
+use crate::scene::Scene;
+use crate::session::{Part, RunState};
+
+/// Width of the panel \[points\].
+pub(super) const WIDTH: f32 = 330.0;
+
+/// A lesson that somebody goes through.
+pub(super) struct OpenLesson {
+    lesson: Lesson,
+    page: usize,
+    /// What was answered, by page.
+    given: BTreeMap<usize, Given>,
+    /// What is localised at present, by its name in the lesson.
+    variant: String,
+    /// Scenes by the names that the lesson calls them.
+    scenes: BTreeMap<String, Arc<dyn Scene>>,
+    words: CommonMarkCache,
+}
+
+/// An answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Given {
+    /// Position of the choice.
+    Choice(usize),
+    /// Where the camera was put (`world_from_camera`).
+    Place(Pose),
+}
+
+impl OpenLesson {
+    /// A lesson at its first page, of which `setup` is what is localised there.
+    pub(super) fn new(lesson: Lesson, setup: &Setup) -> Self {
+        let mut open = Self {
+            variant: lesson.pages[0].variant.clone(),
+            lesson,
+            page: 0,
+            given: BTreeMap::new(),
+            scenes: BTreeMap::new(),
+            words: CommonMarkCache::default(),
+        };
+        open.remember(setup);
+        open
+    }
+
+    fn remember(&mut self, setup: &Setup) {
+        let task = &setup.task;
+        let queries = task.queries.as_ref().unwrap_or(&task.scene);
+        for (name, scene) in [(&task.scene, &setup.references), (queries, &setup.queries)] {
+            self.scenes.insert(name.clone(), Arc::clone(scene));
+        }
+    }
+
+    /// The present page.
+    pub(super) fn page(&self) -> &Page {
+        &self.lesson.pages[self.page]
+    }
+
+    /// Goes on by a page, or back; whether there is one.
+    pub(super) fn turn(&mut self, back: bool) -> bool {
+        let next = match back {
+            true => self.page.checked_sub(1),
+            false => Some(self.page + 1).filter(|page| *page < self.lesson.pages.len()),
+        };
+        if let Some(page) = next {
+            self.page = page;
+        }
+        next.is_some()
+    }
+
+    /// The moment that the run is to be shown at: that of the answer once it is given.
+    pub(super) fn moment(&self) -> &Moment {
+        let page = self.page();
+        match &page.question {
+            Some(question) if self.given.contains_key(&self.page) => &question.reveal,
+            _ => &page.at,
+        }
+    }
+
+    /// What the present page localises, where that is something else than before.
+    pub(super) fn other_setup(&mut self, setup: &Setup) -> Result<Option<Setup>, SettingError> {
+        let wanted = self.page().variant.clone();
+        if wanted == self.variant {
+            return Ok(None);
+        }
+        let opened = |name: &str| self.scenes.get(name).cloned();
+        let open = self.lesson.setting(&wanted).open(&opened)?;
+        self.variant = wanted;
+        let setup = Setup::of_lesson(open, setup.folder.clone());
+        self.remember(&setup);
+        Ok(Some(setup))
+    }
+
+    /// The question that waits for an answer.
+    fn asked(&self) -> Option<&Question> {
+        let question = self.page().question.as_ref()?;
+        (!self.given.contains_key(&self.page)).then_some(question)
+    }
+
+    /// Answers by a choice; whether that was asked for.
+    pub(super) fn choose(&mut self, choice: usize) -> bool {
+        let is_one = self.asked().is_some_and(|question| {
+            matches!(&question.answer, Answer::Choice { choices, .. } if choice < choices.len())
+        });
+        if is_one {
+            self.given.insert(self.page, Given::Choice(choice));
+        }
+        is_one
+    }
+
+    /// Answers by the place of the camera in hand; whether that was asked for.
+    pub(super) fn guess(&mut self, camera: Option<Pose>) -> bool {
+        let is_asked = self
+            .asked()
+            .is_some_and(|question| matches!(question.answer, Answer::Place(_)));
+        match camera {
+            Some(pose) if is_asked => {
+                self.given.insert(self.page, Given::Place(pose));
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Takes the keys that answer what is asked; others keep their meaning.
+    pub(super) fn read_keys(&self, ctx: &egui::Context, commands: &Queue) {
+        const DIGITS: [Key; 6] = [
+            Key::Num1,
+            Key::Num2,
+            Key::Num3,
+            Key::Num4,
+            Key::Num5,
+            Key::Num6,
+        ];
+        if ctx.egui_wants_keyboard_input() {
+            return;
+        }
+        let Some(question) = self.asked() else { return };
+        let taken = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+        match &question.answer {
+            Answer::Choice { choices, .. } => {
+                for (choice, key) in DIGITS.into_iter().take(choices.len()).enumerate() {
+                    if taken(key) {
+                        commands.send(Command::Answer(choice));
+                    }
+                }
+            }
+            Answer::Place(_) => {
+                if taken(Key::Enter) {
+                    commands.send(Command::Guess);
+                }
+            }
+        }
+    }
+
+    /// Draws the page.
+    pub(super) fn ui(&mut self, ui: &mut Ui, state: &AppState, commands: &Queue) {
+        let (number, pages) = (self.page + 1, self.lesson.pages.len());
+        ui.add_space(4.0);
+        ui.horizontal_wrapped(|ui| {
+            ui.weak(format!("Lesson: {}", self.lesson.title));
+            let close = ui.small_button("Close").on_hover_text("Close the lesson");
+            if close.clicked() {
+                commands.send(Command::CloseLesson);
+            }
+        });
+        let progress = ProgressBar::new(number as f32 / pages as f32).desired_height(6.0);
+        ui.add(progress);
+        ui.horizontal(|ui| {
+            let back = ui.add_enabled(number > 1, egui::Button::new("◀ Back"));
+            if back.on_hover_text("The page before (PageUp)").clicked() {
+                commands.send(Command::TurnPage { back: true });
+            }
+            ui.label(format!("page {number} of {pages}"));
+            let next = ui.add_enabled(number < pages, egui::Button::new("Next ▶"));
+            if next.on_hover_text("The next page (PageDown)").clicked() {
+                commands.send(Command::TurnPage { back: false });
+            }
+            if matches!(state.run_state(), RunState::Loading | RunState::Running) {
+                ui.spinner();
+            }
+        });
+        ui.separator();
+        ScrollArea::vertical()
+            .id_salt(("page", self.page))
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                ui.heading(self.lesson.pages[self.page].title.clone());
+                let page = &self.lesson.pages[self.page];
+                CommonMarkViewer::new().show(ui, &mut self.words, &page.text);
+                if let Some(question) = &page.question {
+                    ui.separator();
+                    let given = self.given.get(&self.page).copied();
+                    asked_ui(ui, state, commands, question, given);
+                    if given.is_some() {
+                        CommonMarkViewer::new().show(ui, &mut self.words, &question.because);
+                    }
+                }
+            });
+    }
+}
+
+fn asked_ui(
+    ui: &mut Ui,
+    state: &AppState,
+    commands: &Queue,
+    question: &Question,
+    given: Option<Given>,
+) {
+    ui.label(RichText::new(&question.ask).strong());
+    match (&question.answer, given) {
+        (Answer::Choice { choices, right }, given) => {
+            for (index, choice) in choices.iter().enumerate() {
+                let text = format!("{}  {choice}", index + 1);
+                let is_right = index == *right;
+                let chosen = given == Some(Given::Choice(index));
+                let mark = match (given.is_some(), is_right, chosen) {
+                    (true, true, _) => "  ✔ right",
+                    (true, false, true) => "  × wrong",
+                    _ => "",
+                };
+                let mut text = RichText::new(format!("{text}{mark}"));
+                if given.is_some() && is_right {
+                    text = text.color(theme::TRUTH).strong();
+                } else if chosen {
+                    text = text.color(theme::ESTIMATE).strong();
+                }
+                let button = egui::Button::new(text).wrap().min_size([ui.available_width(), 0.0].into());
+                let button = ui.add_enabled(given.is_none(), button);
+                if button.clicked() {
+                    commands.send(Command::Answer(index));
+                }
+            }
+        }
+        (Answer::Place(_), None) => {
+            ui.weak("Click on the map, or move the camera with Alt and the arrows");
+            let words = state.camera.and_then(|camera| place(state, &camera));
+            let is_placed = words.is_some();
+            ui.label(words.unwrap_or_else(|| "Nothing is chosen yet".to_owned()));
+            let button = ui.add_enabled(is_placed, egui::Button::new("This is my guess (Enter)"));
+            if button.clicked() {
+                commands.send(Command::Guess);
+            }
+        }
+        (Answer::Place(method), Some(Given::Place(guess))) => {
+            for words in outcome(state, *method, &guess) {
+                ui.label(RichText::new(words).strong());
+            }
+        }
+        (Answer::Place(_), Some(Given::Choice(_))) => {}
+    }
+}
+
+/// Where a camera is, seen from the reference.
+fn place(state: &AppState, camera: &Pose) -> Option<String> {
+    let run = state.run();
+    let problem = run.loaded.as_deref()?.problems.first()?;
+    let offset = Offset::of(&problem.reference_from_query(camera));
+    let side = match offset.right_m < 0.0 {
+        true => "left",
+        false => "right",
+    };
+    Some(format!(
+        "Your guess: {:.1} m ahead of the reference, {:.1} m to the {side}",
+        offset.forward_m,
+        offset.right_m.abs()
+    ))
+}
+
+/// How good a guess was, as far as that is told.
+fn outcome(state: &AppState, method: Method, guess: &Pose) -> Vec<String> {
+    let run = state.run();
+    let apart = |pose: &Pose| (guess.translation.vector - pose.translation.vector).norm();
+    let span = run.span_of(Part::Reference(method, 0));
+    let span = span.filter(|span| state.has_come(span));
+    let pose = span.and_then(|span| span.result.as_ref()?.pose.as_ref()?.to_pose());
+    let mut words: Vec<String> = place(state, guess).into_iter().collect();
+    match pose {
+        Some(pose) => words.push(format!(
+            "{} puts it {:.2} m from there",
+            method.label(),
+            apart(&pose)
+        )),
+        None => words.push(format!("{} is at work", method.label())),
+    }
+    let truth = run.loaded.as_deref().and_then(|loaded| loaded.truth);
+    words.extend(truth.map(|truth| format!("The truth is {:.2} m from your guess", apart(&truth))));
+    words
+}

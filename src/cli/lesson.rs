@@ -1,0 +1,172 @@
+//! `posescope lesson`: the lessons, in the window, as recordings and as text.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use comfy_table::{ContentArrangement, Table, presets};
+use posescope::estimator;
+use posescope::lesson::{Lesson, OpenSetting, Page, PageTurner};
+use posescope::method::Method;
+use posescope::run::default_failure_radius_m;
+use posescope::scene::Scene;
+use posescope::sink::rerun::{Identity, Recorder, Targets};
+
+use super::args::LessonArgs;
+use super::demo_settings;
+use super::failure::CliError;
+use super::interrupt::Interrupt;
+use super::observer::CliObserver;
+use super::output;
+use super::terminal::Terminal;
+
+/// Lists the lessons, or goes through one.
+pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
+    let Some(name) = &args.name else {
+        return list();
+    };
+    let lesson = Lesson::open(name)?;
+    if args.text {
+        return output::print(&text(&lesson).trim_end());
+    }
+    match &args.save {
+        Some(path) => save(&lesson, path, terminal),
+        None => window(lesson, terminal),
+    }
+}
+
+fn list() -> Result<(), CliError> {
+    let mut table = Table::new();
+    table
+        .load_preset(presets::NOTHING)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(["lesson", "minutes", "title", "about"]);
+    for lesson in Lesson::all()? {
+        table.add_row([
+            lesson.name,
+            lesson.minutes.to_string(),
+            lesson.title,
+            lesson.about,
+        ]);
+    }
+    output::print(&table.to_string())
+}
+
+/// All pages, with their answers.
+fn text(lesson: &Lesson) -> String {
+    let pages = lesson.pages.len();
+    let page = |(index, page): (usize, &Page)| {
+        let answered = page.answered(index + 1, pages);
+        format!("{}\n{}", page.markdown(index + 1, pages), answered.unwrap_or_default())
+    };
+    lesson.pages.iter().enumerate().map(page).collect()
+}
+
+#[cfg(feature = "app")]
+fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
+    use posescope::app::{self, Setup};
+
+    let first = &lesson.pages[0].variant;
+    let open = lesson.setting(first).open(&|_| None)?;
+    let setup = Setup::of_lesson(open, demo_settings::folder().to_owned());
+    match app::open_lesson(setup, lesson.clone()) {
+        Ok(()) => Ok(()),
+        Err(why) => save_instead(&lesson, &why, terminal),
+    }
+}
+
+/// Without a window in the program there is the recording.
+#[cfg(not(feature = "app"))]
+fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
+    save_instead(&lesson, &"this posescope is built without its window", terminal)
+}
+
+fn save_instead(
+    lesson: &Lesson,
+    why: &dyn std::fmt::Display,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    let folder = demo_settings::folder();
+    std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    let stem = Path::new(&lesson.name).file_stem().unwrap_or_default();
+    let path = folder.join(stem).with_extension("rrd");
+    eprintln!("posescope: {why}; recording {} instead", path.display());
+    save(lesson, &path, terminal)
+}
+
+/// Localises what the pages are about, one setting after the other, and records both.
+fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliError> {
+    let interrupt = Interrupt::listen();
+    let groups = lesson.groups();
+    let mut scenes: BTreeMap<String, Arc<dyn Scene>> = BTreeMap::new();
+    let mut settings: Vec<OpenSetting> = Vec::new();
+    for (variant, _) in &groups {
+        let open = lesson
+            .setting(variant)
+            .open(&|name| scenes.get(name).cloned())?;
+        scenes.extend(open.named_scenes());
+        settings.push(open);
+    }
+    let recorder = recorder(lesson, &settings, path)?;
+    let bar = terminal.bar(settings.iter().map(estimates).sum());
+    let mut observer = CliObserver::new(bar.clone(), Some(recorder), interrupt.clone());
+    let mut outcome = Ok(());
+    for (number, ((_, pages), setting)) in groups.iter().zip(settings).enumerate() {
+        observer.pages = Some(PageTurner::new(lesson, pages.clone()));
+        let frames = Arc::default();
+        let worked = setting.job(&frames).work(number, &mut observer, |_| {});
+        observer.turn_last_pages();
+        if let Err(error) = worked {
+            outcome = Err(CliError::from(error));
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    let is_interrupted = interrupt.is_raised();
+    interrupt.release();
+    observer.recorder.map_or(Ok(()), Recorder::close)?;
+    if is_interrupted {
+        let words = "the recording has what was told until then";
+        return Err(CliError::Interrupted(words.to_owned()));
+    }
+    outcome?;
+    if !terminal.is_quiet() {
+        eprintln!("Recording: {0} (open it with `rerun {0}`)", path.display());
+    }
+    Ok(())
+}
+
+/// How many results there are going to be.
+fn estimates(setting: &OpenSetting) -> u64 {
+    let references = setting.references.len().max(1);
+    (references * setting.task.protocol.methods.len()) as u64
+}
+
+fn recorder(
+    lesson: &Lesson,
+    settings: &[OpenSetting],
+    path: &Path,
+) -> Result<Recorder, CliError> {
+    let first = &settings[0];
+    let scene = first.scenes.references.name();
+    let identity = Identity {
+        scene: scene.to_owned(),
+        queries: vec![format!("lesson {}", lesson.name)],
+        references: lesson.variants[0].1.references.clone().unwrap_or_default(),
+        configuration: first.task.params.to_toml(),
+        seed: first.task.protocol.seed,
+        failure_radius_m: default_failure_radius_m(scene),
+    };
+    let targets = Targets {
+        save: Some(path.to_owned()),
+        ..Targets::default()
+    };
+    let asked = settings
+        .iter()
+        .flat_map(|setting| &setting.task.protocol.methods);
+    // In the order in which they run.
+    let methods: Vec<Method> = estimator::methods()
+        .filter(|method| asked.clone().any(|asked| asked == method))
+        .collect();
+    Ok(Recorder::open(&targets, &identity, &methods)?.with_pages())
+}

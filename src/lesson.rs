@@ -1,0 +1,146 @@
+//! Lessons: guided runs with words, questions and claims.
+//!
+//! A lesson is one Markdown file. Its header, TOML between lines of `+++`, says what is localised; each
+//! heading of the second level begins a page, whose own header, a code block called `page`, says which
+//! moment of the run it is about and what is asked there. `docs/lessons.md` has every field.
+
+mod file;
+mod moment;
+mod page;
+mod setting;
+mod turner;
+
+use std::ops::Range;
+use std::path::Path;
+
+use include_dir::{Dir, include_dir};
+
+pub use file::LessonError;
+pub use moment::{Moment, MomentError, Watch};
+pub use page::{Answer, Page, Question};
+pub use setting::{OpenSetting, Setting, SettingError};
+pub use turner::PageTurner;
+
+use crate::measure::Condition;
+
+/// The lessons that posescope comes with, each `NUMBER-NAME.md`.
+static LESSONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/assets/lessons");
+
+/// A guided run, or several.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lesson {
+    /// The name on the command line.
+    pub name: String,
+    /// The title.
+    pub title: String,
+    /// What it is about, in one line.
+    pub about: String,
+    /// How long it takes \[min\].
+    pub minutes: u32,
+    /// What is localised, by the names that pages call it by; the first is that of the first page.
+    pub variants: Vec<(String, Setting)>,
+    /// What must be true of the results for the words to be.
+    pub claims: Vec<Claim>,
+    /// The pages, at least one.
+    pub pages: Vec<Page>,
+}
+
+/// Something that the words of a lesson rest on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Claim {
+    /// The name of the setting that it is about.
+    pub variant: String,
+    /// What some result of it meets.
+    pub holds: Condition,
+}
+
+impl Lesson {
+    /// Every lesson that posescope comes with, in their order.
+    ///
+    /// # Errors
+    /// One whose file is no lesson; a test reads them all.
+    pub fn all() -> Result<Vec<Self>, LessonError> {
+        let mut files: Vec<_> = LESSONS.files().collect();
+        files.sort_by_key(|file| file.path());
+        let lessons = files.into_iter().map(|file| {
+            let name = name_of(file.path());
+            Self::parse(&name, file.contents_utf8().unwrap_or_default())
+        });
+        lessons.collect()
+    }
+
+    /// A lesson by its name, or from a file.
+    ///
+    /// # Errors
+    /// There is no such lesson, or the file is none.
+    pub fn open(name: &str) -> Result<Self, LessonError> {
+        let path = Path::new(name);
+        if path.is_file() {
+            let text = std::fs::read_to_string(path).map_err(|error| LessonError::Unreadable {
+                path: path.to_owned(),
+                why: error.to_string(),
+            })?;
+            return Self::parse(name, &text);
+        }
+        let all = Self::all()?;
+        let names: Vec<&str> = all.iter().map(|lesson| lesson.name.as_str()).collect();
+        let unknown = LessonError::Unknown {
+            name: name.to_owned(),
+            known: names.join(", "),
+        };
+        let mut all = all.into_iter();
+        all.find(|lesson| lesson.name == name).ok_or(unknown)
+    }
+
+    /// The pages by what they localise, in their order: the name of the setting, and the pages that
+    /// follow each other there.
+    pub fn groups(&self) -> Vec<(&str, Range<usize>)> {
+        let mut groups: Vec<(&str, Range<usize>)> = Vec::new();
+        for (index, page) in self.pages.iter().enumerate() {
+            match groups.last_mut() {
+                Some((variant, pages)) if *variant == page.variant => pages.end = index + 1,
+                _ => groups.push((&page.variant, index..index + 1)),
+            }
+        }
+        groups
+    }
+
+    /// What a page's run localises.
+    pub fn setting(&self, variant: &str) -> &Setting {
+        let found = self.variants.iter().find(|(name, _)| name == variant);
+        found.map_or(&self.variants[0].1, |(_, setting)| setting)
+    }
+}
+
+/// `light` for `04-light.md`.
+fn name_of(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = stem.trim_start_matches(|c: char| c.is_ascii_digit() || c == '-');
+    name.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_lesson_is_read_and_has_a_name_of_its_own() {
+        let lessons = Lesson::all().expect("our own");
+        assert!(!lessons.is_empty());
+        let mut names: Vec<_> = lessons.iter().map(|lesson| &lesson.name).collect();
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), lessons.len());
+        for lesson in &lessons {
+            assert!(!lesson.pages.is_empty(), "{}", lesson.name);
+            assert!(!lesson.claims.is_empty(), "{} claims nothing", lesson.name);
+            assert_eq!(Lesson::open(&lesson.name).as_ref(), Ok(lesson));
+        }
+    }
+
+    #[test]
+    fn an_unknown_lesson_is_answered_by_those_there_are() {
+        let why = Lesson::open("nonsense").expect_err("none").to_string();
+        assert!(why.contains("four-points"), "{why}");
+    }
+}
