@@ -164,7 +164,10 @@ impl App {
             if layout.arrangement() == Arrangement::Teach {
                 egui::Panel::top("lecture").show(ui, |ui| lecture::ui(ui, state));
             }
-            egui::Panel::top("verdicts").show(ui, |ui| card::ui(ui, state, commands));
+            // Beside each other the methods say themselves what became of them.
+            if state.options.lockstep.is_none() {
+                egui::Panel::top("verdicts").show(ui, |ui| card::ui(ui, state, commands));
+            }
         }
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::ui(ui, state, commands));
         egui::CentralPanel::default()

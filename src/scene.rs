@@ -28,7 +28,9 @@ mod trajectory;
 mod tum;
 mod view_crop;
 
-pub use posescope_core::scene::{CachedScene, Entry, FrameStore, Scene, SceneError};
+pub use posescope_core::scene::{
+    CachedScene, DegradedScene, Entry, FrameStore, Scene, SceneError, degraded,
+};
 pub use posescope_street as street;
 
 pub use estimates::read_estimates;

@@ -36,7 +36,7 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
             }
         });
         let Some(span) = deciding(state, method) else {
-            if state.options.hides_future || state.options.lockstep.is_some() {
+            if state.options.hides_future {
                 return;
             }
             let is_at_work =

@@ -10,6 +10,7 @@ use super::setup::ReferencePick;
 use super::view_options::CompareMode;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
+use crate::image::Degradation;
 use crate::method::Method;
 
 /// Something to be done between two frames.
@@ -91,6 +92,8 @@ pub enum Command {
         /// The value as text.
         value: String,
     },
+    /// Degrade the photos of queries this way and run again.
+    Degrade(Degradation),
     /// Set all parameters to their defaults.
     ResetParams,
     /// Replace the breakpoints.

@@ -7,6 +7,7 @@ use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
 use super::navigation::Navigation;
+use super::queries::Queries;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use super::state::{AppState, KeptRun};
@@ -14,6 +15,7 @@ use super::view_options::CompareMode;
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
+use crate::image::Degradation;
 use crate::localize::References;
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
@@ -93,7 +95,7 @@ impl App {
                 state.restart_run();
             }
             Command::SetSeed(seed) => {
-                state.setup.task.protocol.seed = seed;
+                state.setup.set_seed(seed);
                 state.setup.go_to(state.setup.query);
                 state.restart_run();
             }
@@ -102,6 +104,7 @@ impl App {
                 Ok(()) => {}
                 Err(error) => state.note(error.to_string(), true),
             },
+            Command::Degrade(degradation) => state.degrade(degradation),
             Command::ResetParams => {
                 state.setup.task.params = crate::params::Params::default();
                 state.restart_run();
@@ -251,6 +254,8 @@ impl App {
             Ok(None) => self.state.seek(open.moment().clone()),
             Err(error) => self.state.note(error.to_string(), true),
         }
+        // The truth would be an answer.
+        self.state.options.shows_truth = open.asked().is_none();
         let page = open.page();
         self.state.options.lockstep = page.lockstep;
         self.layout.present(&page.show);
@@ -396,6 +401,16 @@ impl AppState {
         self.start_run(RunMode::Running);
     }
 
+    fn degrade(&mut self, degradation: Degradation) {
+        if degradation == self.setup.task.protocol.degrade {
+            return;
+        }
+        self.setup.degrade(degradation);
+        self.restart_run();
+        // Thumbnails show what is localised.
+        self.queries = Queries::new(self.ctx.clone());
+    }
+
     /// Keeps the present run as A.
     fn keep(&mut self) {
         self.kept = Some(KeptRun {
@@ -461,8 +476,11 @@ impl AppState {
             NamedPose::Start => Some(problem.reference.world_from_camera),
             NamedPose::Coarse => minimum(Phase::PositionCoarse),
             NamedPose::Fine => minimum(Phase::PositionFine),
-            NamedPose::Estimate => span?.result.as_ref()?.pose.as_ref()?.to_pose(),
-            NamedPose::Truth => loaded.truth,
+            NamedPose::Estimate => {
+                let span = span.filter(|span| self.has_come(span))?;
+                span.result.as_ref()?.pose.as_ref()?.to_pose()
+            }
+            NamedPose::Truth => loaded.truth.filter(|_| self.options.shows_truth),
             NamedPose::Last => self.camera_before,
         }
     }

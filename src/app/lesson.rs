@@ -12,7 +12,7 @@ use super::state::AppState;
 use super::theme;
 use crate::geometry::Pose;
 use crate::grid::Offset;
-use crate::lesson::{Answer, Lesson, Moment, Page, Question, SettingError};
+use crate::lesson::{Answer, Lesson, Moment, Page, Question, SettingError, named_scenes};
 use crate::method::Method;
 use crate::scene::Scene;
 use crate::session::{Part, RunState};
@@ -58,11 +58,8 @@ impl OpenLesson {
     }
 
     fn remember(&mut self, setup: &Setup) {
-        let task = &setup.task;
-        let queries = task.queries.as_ref().unwrap_or(&task.scene);
-        for (name, scene) in [(&task.scene, &setup.references), (queries, &setup.queries)] {
-            self.scenes.insert(name.clone(), Arc::clone(scene));
-        }
+        let named = named_scenes(&setup.task, &setup.references, &setup.queries);
+        self.scenes.extend(named);
     }
 
     /// The present page.
@@ -106,7 +103,7 @@ impl OpenLesson {
     }
 
     /// The question that waits for an answer.
-    fn asked(&self) -> Option<&Question> {
+    pub(super) fn asked(&self) -> Option<&Question> {
         let question = self.page().question.as_ref()?;
         (!self.given.contains_key(&self.page)).then_some(question)
     }
@@ -195,6 +192,7 @@ impl OpenLesson {
             }
         });
         ui.separator();
+        larger(ui);
         ScrollArea::vertical()
             .id_salt(("page", self.page))
             .auto_shrink(false)
@@ -214,6 +212,17 @@ impl OpenLesson {
     }
 }
 
+/// Words to be read, not to be looked up.
+fn larger(ui: &mut Ui) {
+    const FACTOR: f32 = 1.15;
+    let strong = ui.visuals().strong_text_color();
+    let usual = ui.visuals().text_color();
+    ui.visuals_mut().override_text_color = Some(usual.lerp_to_gamma(strong, 0.5));
+    for font in ui.style_mut().text_styles.values_mut() {
+        font.size *= FACTOR;
+    }
+}
+
 fn asked_ui(
     ui: &mut Ui,
     state: &AppState,
@@ -226,24 +235,23 @@ fn asked_ui(
         (Answer::Choice { choices, right }, given) => {
             for (index, choice) in choices.iter().enumerate() {
                 let text = format!("{}  {choice}", index + 1);
-                let is_right = index == *right;
-                let chosen = given == Some(Given::Choice(index));
-                let mark = match (given.is_some(), is_right, chosen) {
-                    (true, true, _) => "  ✔ right",
-                    (true, false, true) => "  × wrong",
-                    _ => "",
+                let Some(given) = given else {
+                    let size = [ui.available_width(), 0.0];
+                    let button = egui::Button::new(text).wrap().min_size(size.into());
+                    if ui.add(button).clicked() {
+                        commands.send(Command::Answer(index));
+                    }
+                    continue;
                 };
-                let mut text = RichText::new(format!("{text}{mark}"));
-                if given.is_some() && is_right {
-                    text = text.color(theme::TRUTH).strong();
-                } else if chosen {
-                    text = text.color(theme::ESTIMATE).strong();
-                }
-                let button = egui::Button::new(text).wrap().min_size([ui.available_width(), 0.0].into());
-                let button = ui.add_enabled(given.is_none(), button);
-                if button.clicked() {
-                    commands.send(Command::Answer(index));
-                }
+                ui.label(match (index == *right, given == Given::Choice(index)) {
+                    (true, _) => RichText::new(format!("{text}  ● right"))
+                        .color(theme::TRUTH)
+                        .strong(),
+                    (false, true) => RichText::new(format!("{text}  ▲ wrong"))
+                        .color(theme::ESTIMATE)
+                        .strong(),
+                    (false, false) => RichText::new(text).weak(),
+                });
             }
         }
         (Answer::Place(_), None) => {

@@ -73,6 +73,7 @@ impl AppState {
             queries: vec![setup.query_name().to_owned()],
             references: setup.reference_names(),
             configuration: run.params.to_toml(),
+            degraded: setup.task.protocol.degrade,
             seed: setup.task.protocol.seed,
             failure_radius_m: setup.failure_radius_m,
         };

@@ -150,7 +150,7 @@ impl SavedSession {
         } = match is_same_format && is_same_scene {
             true => TaskScenes {
                 references: Arc::clone(&present.references),
-                queries: Arc::clone(&present.queries),
+                queries: task.protocol.degraded(&present.queries),
             },
             false => task.open(&opened).map_err(words)?,
         };

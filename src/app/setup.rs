@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::estimator;
 use crate::event::Side;
+use crate::image::Degradation;
 use crate::lesson::OpenSetting;
 use crate::localize::{References, Selection, frames_within};
 use crate::method::Method;
@@ -186,6 +187,18 @@ impl Setup {
         Ok(())
     }
 
+    /// Degrades the photos of the queries, in the place of any degradation before.
+    pub(super) fn degrade(&mut self, degradation: Degradation) {
+        self.task.protocol.degrade = degradation;
+        self.queries = self.task.protocol.degraded(&self.queries);
+    }
+
+    /// Changes the seed of every random choice, the noise of degraded photos too.
+    pub(super) fn set_seed(&mut self, seed: u64) {
+        self.task.protocol.seed = seed;
+        self.queries = self.task.protocol.degraded(&self.queries);
+    }
+
     /// Query and reference frames as a person tells them apart: with their scene where there are two.
     pub fn label(&self, side: Side, frame: usize) -> String {
         let scene = match side {
@@ -222,7 +235,12 @@ impl Setup {
             true => format!("{} ", self.task.scene),
             false => String::new(),
         };
-        format!("posescope: {scene}{query}{from}")
+        let degradation = self.task.protocol.degrade;
+        let degraded = match degradation.is_none() {
+            true => String::new(),
+            false => format!(" ({degradation})"),
+        };
+        format!("posescope: {scene}{query}{degraded}{from}")
     }
 
     /// The name of the query.

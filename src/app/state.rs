@@ -283,7 +283,9 @@ impl AppState {
     /// Takes the cursor to a moment of the present run, as soon as the run has come so far.
     pub(super) fn seek(&mut self, moment: Moment) {
         let is_alive = self.session.is_alive();
-        self.navigation = self.navigation.seeking(moment, self.session.run(), is_alive);
+        self.navigation = self
+            .navigation
+            .seeking(moment, self.session.run(), is_alive);
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor

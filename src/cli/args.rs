@@ -13,9 +13,11 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand};
+use posescope::describe::Domain;
 use posescope::diagnosis::Tolerance as Right;
 use posescope::estimator;
 use posescope::fusion::Fusion;
+use posescope::image::Degradation;
 use posescope::localize::Selection;
 use posescope::measure::{Format, Tolerance};
 use posescope::method::Method;
@@ -269,6 +271,10 @@ pub struct ProtocolArgs {
     /// features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair
     #[arg(long, value_name = "DIR")]
     pub matches: Option<PathBuf>,
+    /// Degrade the photos of queries before anybody sees them, as in gamma=0.4,noise=8,invert; --help
+    /// lists what there is
+    #[arg(long, value_name = "STEP=STRENGTH,…", long_help = degradations())]
+    pub degrade: Option<Degradation>,
     /// Fuse the poses of several references into one, by each of these [default: none, and each
     /// reference gives its own; eval: r-wavg]
     #[arg(long, value_name = "maxf,avg,wavg,r-wavg", value_delimiter = ',')]
@@ -324,6 +330,7 @@ impl ProtocolArgs {
             estimates: self.estimates.clone(),
             matches: self.matches.clone().or(defaults.matches),
             gps: self.gps.clone().or(defaults.gps),
+            degrade: self.degrade.unwrap_or(defaults.degrade),
         })
     }
 }
@@ -508,6 +515,26 @@ fn scene_formats() -> String {
     )
 }
 
+/// What --degrade does, step by step.
+fn degradations() -> String {
+    let mut text = "Degrade the photos of queries before anybody sees them, as in gamma=0.4,noise=8,invert. \
+                    References stay as they are. Whatever the order in which the steps are named, they are \
+                    taken in this one:"
+        .to_owned();
+    for step in Degradation::default().steps() {
+        let range = match step.domain {
+            Domain::Flag => String::new(),
+            domain => format!("={domain}"),
+        };
+        let unit = match step.about.unit {
+            "" => String::new(),
+            unit => format!(" [{unit}]"),
+        };
+        text += &format!("\n- {}{range}{unit}: {}", step.key, step.about.help());
+    }
+    text
+}
+
 fn share(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
@@ -571,6 +598,8 @@ mod tests {
                 "avg,r-wavg",
                 "--seed",
                 "9",
+                "--degrade",
+                "invert,noise=8,gamma=0.4",
                 "--set",
                 "fb.ratio=0.75",
                 "--break",

@@ -68,7 +68,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         queries: open_all(&args.queries, args)?,
     };
     let run = describe(args, &scenes, &params)?;
-    let scenes = scenes.located(&run.protocol)?;
+    let scenes = scenes.as_asked(&run.protocol)?;
     let indices = indices(args, &run, &scenes, &params)?;
     let mut folder = if args.resume {
         RunFolder::resume(folder, &run)?

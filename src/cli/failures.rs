@@ -6,6 +6,7 @@ use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use posescope::image::Degradation;
 use posescope::localize::{LocalizeError, LocalizeObserver};
 use posescope::method::Method;
 use posescope::params::Params;
@@ -31,6 +32,7 @@ pub struct FailureRecordings<'a> {
     folder: PathBuf,
     budget: RecordingBudget,
     params: &'a Params,
+    degraded: Degradation,
     seed: u64,
     failure_radius_m: f64,
     several_pairs: bool,
@@ -105,6 +107,7 @@ impl<'a> FailureRecordings<'a> {
             folder: path,
             budget,
             params,
+            degraded: run.protocol.degrade,
             seed: run.protocol.seed,
             failure_radius_m: run.failure_radius_m,
             several_pairs,
@@ -132,6 +135,7 @@ impl<'a> FailureRecordings<'a> {
                 .map(|&frame| frames[frame].clone())
                 .collect(),
             configuration: self.params.to_toml(),
+            degraded: self.degraded,
             seed: self.seed,
             failure_radius_m: self.failure_radius_m,
         };

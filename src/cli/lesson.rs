@@ -57,7 +57,11 @@ fn text(lesson: &Lesson) -> String {
     let pages = lesson.pages.len();
     let page = |(index, page): (usize, &Page)| {
         let answered = page.answered(index + 1, pages);
-        format!("{}\n{}", page.markdown(index + 1, pages), answered.unwrap_or_default())
+        format!(
+            "{}\n{}",
+            page.markdown(index + 1, pages),
+            answered.unwrap_or_default()
+        )
     };
     lesson.pages.iter().enumerate().map(page).collect()
 }
@@ -78,7 +82,11 @@ fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
 /// Without a window in the program there is the recording.
 #[cfg(not(feature = "app"))]
 fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
-    save_instead(&lesson, &"this posescope is built without its window", terminal)
+    save_instead(
+        &lesson,
+        &"this posescope is built without its window",
+        terminal,
+    )
 }
 
 fn save_instead(
@@ -142,11 +150,7 @@ fn estimates(setting: &OpenSetting) -> u64 {
     (references * setting.task.protocol.methods.len()) as u64
 }
 
-fn recorder(
-    lesson: &Lesson,
-    settings: &[OpenSetting],
-    path: &Path,
-) -> Result<Recorder, CliError> {
+fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Recorder, CliError> {
     let first = &settings[0];
     let scene = first.scenes.references.name();
     let identity = Identity {
@@ -154,6 +158,7 @@ fn recorder(
         queries: vec![format!("lesson {}", lesson.name)],
         references: lesson.variants[0].1.references.clone().unwrap_or_default(),
         configuration: first.task.params.to_toml(),
+        degraded: first.task.protocol.degrade,
         seed: first.task.protocol.seed,
         failure_radius_m: default_failure_radius_m(scene),
     };

@@ -261,6 +261,7 @@ impl Plan<'_> {
             queries: names(of, &mut tasks.iter().map(|task| task.query)),
             references: names(from, &mut references.copied()),
             configuration: self.task.params.to_toml(),
+            degraded: self.task.protocol.degrade,
             seed: self.task.protocol.seed,
             failure_radius_m: self.failure_radius_m(),
         };

@@ -155,7 +155,12 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
         Some(argument) => scene::open(argument, format)?.into(),
         None => Arc::clone(&references),
     };
-    let queries = file.protocol.located(queries, references.as_ref())?;
+    let protocol = Protocol {
+        prior_m: given.prior.or(file.protocol.prior_m),
+        degrade: given.degrade.unwrap_or(file.protocol.degrade),
+        ..file.protocol
+    };
+    let queries = protocol.as_asked(queries, references.as_ref())?;
     let mut params = Params::default();
     params
         .merge_toml(&file.params.to_string())
@@ -198,10 +203,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
         by_hand: false,
         index: args.task.index.clone(),
         radius_m: radius_m.unwrap_or(args.task.radius),
-        protocol: Protocol {
-            prior_m: given.prior.or(file.protocol.prior_m),
-            ..file.protocol
-        },
+        protocol,
         params,
         breakpoints: args.task.breakpoints.clone(),
         photos: None,

@@ -120,10 +120,11 @@ impl Lesson {
         for (variant, setting) in header.variant {
             variants.push((variant, setting.over(&header.setting)));
         }
-        let known = |variant: &str, at: usize| match variants.iter().any(|(name, _)| name == variant) {
-            true => Ok(variant.to_owned()),
-            false => Err(source.malformed(at, &format!("there is no variant `{variant}`"))),
-        };
+        let known =
+            |variant: &str, at: usize| match variants.iter().any(|(name, _)| name == variant) {
+                true => Ok(variant.to_owned()),
+                false => Err(source.malformed(at, &format!("there is no variant `{variant}`"))),
+            };
         let mut claims = Vec::new();
         for claim in header.claim {
             claims.push(Claim {
@@ -172,7 +173,11 @@ impl Source<'_> {
     }
 
     /// Reads TOML that begins behind a line at `at`.
-    fn toml<T: serde::de::DeserializeOwned>(&self, text: &str, at: usize) -> Result<T, LessonError> {
+    fn toml<T: serde::de::DeserializeOwned>(
+        &self,
+        text: &str,
+        at: usize,
+    ) -> Result<T, LessonError> {
         toml::from_str(text).map_err(|error| {
             let lines = error.span().map_or(0, |span| {
                 let before = text.as_bytes().iter().take(span.start);
@@ -223,7 +228,9 @@ impl Source<'_> {
                             heading,
                             header: None,
                         }),
-                        (Some((Block::Page, placed)), Some(section)) if section.header.is_none() => {
+                        (Some((Block::Page, placed)), Some(section))
+                            if section.header.is_none() =>
+                        {
                             section.header = Some(placed);
                         }
                         (Some((Block::Page, (range, _))), _) => {
@@ -250,7 +257,11 @@ impl Source<'_> {
         let (header, at, text) = match &section.header {
             Some((range, toml)) => {
                 let header: PageHeader = self.toml(toml, range.start)?;
-                let words = format!("{}{}", &self.text[start..range.start], &self.text[range.end..end]);
+                let words = format!(
+                    "{}{}",
+                    &self.text[start..range.start],
+                    &self.text[range.end..end]
+                );
                 (header, range.start, words)
             }
             None => (
@@ -373,18 +384,27 @@ variant = "dark"
         let [first, second, third] = lesson.pages.as_slice() else {
             panic!("three pages: {:?}", lesson.pages);
         };
-        assert_eq!((first.title.as_str(), first.text.as_str()), ("The first", "Some *words*."));
+        assert_eq!(
+            (first.title.as_str(), first.text.as_str()),
+            ("The first", "Some *words*.")
+        );
         let question = first.question.as_ref().expect("a question");
         assert!(matches!(&question.answer, Answer::Choice { right: 1, .. }));
         // A page goes on from where the one before has left the run.
         assert_eq!(second.at, question.reveal);
         assert_eq!(second.show, ["images"]);
-        assert_eq!((third.variant.as_str(), &third.at), ("dark", &Moment::Start));
+        assert_eq!(
+            (third.variant.as_str(), &third.at),
+            ("dark", &Moment::Start)
+        );
         let dark = lesson.setting("dark");
         assert_eq!(dark.queries.as_deref(), Some("street:night"));
         assert_eq!(dark.query, lesson.setting(FIRST).query);
         let shown = first.markdown(1, 3);
-        assert!(shown.contains("2. that") && !shown.contains("So."), "{shown}");
+        assert!(
+            shown.contains("2. that") && !shown.contains("So."),
+            "{shown}"
+        );
         assert!(first.answered(1, 3).expect("an answer").contains("So."));
     }
 
@@ -394,10 +414,20 @@ variant = "dark"
             ("minutes = 1", "minutes = \"one\"", 4, "u32"),
             ("scene = ", "scenery = ", 6, "scenery"),
             ("error < 1\"", "error <\"", 1, "expected"),
-            ("variant = \"dark\"\nholds", "variant = \"rain\"\nholds", 1, "rain"),
+            (
+                "variant = \"dark\"\nholds",
+                "variant = \"rain\"\nholds",
+                1,
+                "rain",
+            ),
             ("after fb.match", "after lunch", 19, "lunch"),
             ("right = 2", "right = 3", 18, "right"),
-            ("```page\nvariant = \"dark\"", "```page\nvariant = \"fog\"", 38, "fog"),
+            (
+                "```page\nvariant = \"dark\"",
+                "```page\nvariant = \"fog\"",
+                38,
+                "fog",
+            ),
             ("+++\ntitle", "title", 1, "header"),
         ] {
             assert!(LESSON.contains(from), "{from}");

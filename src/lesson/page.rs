@@ -53,7 +53,10 @@ pub enum Answer {
 impl Page {
     /// The page as Markdown that stands alone: with its title, and the question without its answer.
     pub fn markdown(&self, number: usize, pages: usize) -> String {
-        let mut text = format!("# {}\n\n*Page {number} of {pages}*\n\n{}\n", self.title, self.text);
+        let mut text = format!(
+            "# {}\n\n*Page {number} of {pages}*\n\n{}\n",
+            self.title, self.text
+        );
         if let Some(question) = &self.question {
             text += &format!("\n**{}**\n\n", question.ask);
             if let Answer::Choice { choices, .. } = &question.answer {

@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use crate::describe::ParamError;
 use crate::fusion::Fusion;
+use crate::image::Degradation;
 use crate::localize::Selection;
 use crate::method::Method;
 use crate::params::Params;
@@ -38,6 +39,8 @@ pub struct Setting {
     pub prior_m: Option<f64>,
     /// The seed.
     pub seed: Option<u64>,
+    /// What is done to the query's photo, as `--degrade` takes it.
+    pub degrade: Option<Degradation>,
     /// Parameters, as `--set` takes them.
     pub set: Option<Vec<String>>,
 }
@@ -71,13 +74,8 @@ pub struct OpenSetting {
 
 impl OpenSetting {
     /// The scenes by the names that the setting calls them.
-    pub fn named_scenes(&self) -> [(String, Arc<dyn Scene>); 2] {
-        let task = &self.task;
-        let queries = task.queries.as_ref().unwrap_or(&task.scene);
-        [
-            (task.scene.clone(), Arc::clone(&self.scenes.references)),
-            (queries.clone(), Arc::clone(&self.scenes.queries)),
-        ]
+    pub fn named_scenes(&self) -> Vec<(String, Arc<dyn Scene>)> {
+        named_scenes(&self.task, &self.scenes.references, &self.scenes.queries)
     }
 
     /// The work of localising it, with these frames at hand.
@@ -92,6 +90,19 @@ impl OpenSetting {
             frames: Arc::clone(frames),
         }
     }
+}
+
+/// The scenes of a task by the names that it calls them. Where queries have no scene of their own, theirs
+/// is that of the references, perhaps with degraded photos, and has no name.
+pub fn named_scenes(
+    task: &Task,
+    references: &Arc<dyn Scene>,
+    queries: &Arc<dyn Scene>,
+) -> Vec<(String, Arc<dyn Scene>)> {
+    let own = task.queries.iter();
+    let own = own.map(|name| (name.clone(), Arc::clone(queries)));
+    own.chain([(task.scene.clone(), Arc::clone(references))])
+        .collect()
 }
 
 impl Setting {
@@ -109,6 +120,7 @@ impl Setting {
             radius_m: own.radius_m.or(base.radius_m),
             prior_m: own.prior_m.or(base.prior_m),
             seed: own.seed.or(base.seed),
+            degrade: own.degrade.or(base.degrade),
             set: own.set.or(base.set),
         }
     }
@@ -134,6 +146,7 @@ impl Setting {
                 fusions: self.fusions.clone().unwrap_or_default(),
                 prior_m: self.prior_m,
                 seed: self.seed.unwrap_or_default(),
+                degrade: self.degrade.unwrap_or_default(),
                 ..default
             },
             params,

@@ -23,17 +23,18 @@ use crate::trace::Cancelled;
 pub struct Scenes {
     /// The scenes of references, in the order of [`RunFile::scenes`].
     pub references: Vec<Arc<dyn Scene>>,
-    /// The scenes of queries, in the order of [`RunFile::queries`].
+    /// The scenes of queries, in the order of [`RunFile::queries`]; none where each scene has its own,
+    /// unless their photos are degraded.
     pub queries: Vec<Arc<dyn Scene>>,
 }
 
 impl Scenes {
-    /// The same scenes, whose queries are sought where the protocol says, if it does. Latitudes and
-    /// longitudes are tied to the first scene of references.
+    /// The same scenes as the protocol asks about their queries: sought where it says, and with their
+    /// photos degraded. Latitudes and longitudes are tied to the first scene of references.
     ///
     /// # Errors
-    /// The errors of [`Protocol::located`].
-    pub fn located(self, protocol: &Protocol) -> Result<Self, SceneError> {
+    /// The errors of [`Protocol::as_asked`].
+    pub fn as_asked(self, protocol: &Protocol) -> Result<Self, SceneError> {
         let Self {
             mut references,
             mut queries,
@@ -44,12 +45,16 @@ impl Scenes {
                 queries,
             });
         };
+        if queries.is_empty() && !protocol.degrade.is_none() {
+            // References keep their photos as they were taken.
+            queries.clone_from(&references);
+        }
         let of_queries = match queries.is_empty() {
             true => &mut references,
             false => &mut queries,
         };
         for scene in of_queries {
-            *scene = protocol.located(Arc::clone(scene), first.as_ref())?;
+            *scene = protocol.as_asked(Arc::clone(scene), first.as_ref())?;
         }
         Ok(Self {
             references,

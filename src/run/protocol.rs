@@ -9,9 +9,10 @@ use super::estimates_file::EstimatesFile;
 use crate::diagnosis::Tolerance;
 use crate::foreign::Foreign;
 use crate::fusion::Fusion;
+use crate::image::Degradation;
 use crate::localize::{Localizer, Selection};
 use crate::method::Method;
-use crate::scene::{MatchFolder, Scene, SceneError, located, read_estimates};
+use crate::scene::{MatchFolder, Scene, SceneError, degraded, located, read_estimates};
 
 /// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
 /// of everything in it are here.
@@ -49,6 +50,9 @@ pub struct Protocol {
     /// A file of rough positions of queries, around which references are sought.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gps: Option<PathBuf>,
+    /// What is done to the photos of queries before anybody sees them.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub degrade: Degradation,
 }
 
 /// For what is written only where somebody asked for it.
@@ -71,6 +75,7 @@ impl Default for Protocol {
             estimates: Vec::new(),
             matches: None,
             gps: None,
+            degrade: Degradation::default(),
         }
     }
 }
@@ -105,19 +110,26 @@ impl Protocol {
         Ok(foreign)
     }
 
-    /// The scene of queries, with the rough positions that were given.
+    /// The scene of queries as it is asked about: with the rough positions that were given, and with
+    /// its photos degraded.
     ///
     /// # Errors
     /// The errors of [`located`].
-    pub fn located(
+    pub fn as_asked(
         &self,
         queries: Arc<dyn Scene>,
         references: &dyn Scene,
     ) -> Result<Arc<dyn Scene>, SceneError> {
-        match &self.gps {
-            Some(path) => located(queries, references, path),
-            None => Ok(queries),
-        }
+        let queries = match &self.gps {
+            Some(path) => located(queries, references, path)?,
+            None => queries,
+        };
+        Ok(self.degraded(&queries))
+    }
+
+    /// The scene of queries with its photos degraded, in the place of any degradation before.
+    pub fn degraded(&self, queries: &Arc<dyn Scene>) -> Arc<dyn Scene> {
+        degraded(queries, self.degrade, self.seed)
     }
 
     /// How far from a query's known position its references may be \[m\], with this uncertainty

@@ -13,6 +13,7 @@ use super::scene_pair::{QueryCamera, ScenePair};
 use crate::diagnosis::Tolerance;
 use crate::estimator::{find, methods};
 use crate::fusion::Fusion;
+use crate::image::Degradation;
 use crate::localize::{References, Request, Selection, Setting};
 use crate::method::Method;
 use crate::text::UnknownWord;
@@ -127,6 +128,8 @@ struct RunFileForm {
     matches: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     gps: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "is_default")]
+    degrade: Degradation,
     seed: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
@@ -158,6 +161,7 @@ impl From<RunFileForm> for RunFile {
                 estimates: form.estimates,
                 matches: form.matches,
                 gps: form.gps,
+                degrade: form.degrade,
             },
             radii_m: form.radii_m,
             share: form.share,
@@ -194,6 +198,7 @@ impl From<RunFile> for RunFileForm {
             estimates: run.protocol.estimates,
             matches: run.protocol.matches,
             gps: run.protocol.gps,
+            degrade: run.protocol.degrade,
             seed: run.protocol.seed,
             shard: run.shard,
             inputs: run.inputs,

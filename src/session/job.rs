@@ -154,7 +154,14 @@ impl Job {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };
-        localizer.localize(number, self.query, &[request], &protocol.methods, observer, keep)?;
+        localizer.localize(
+            number,
+            self.query,
+            &[request],
+            &protocol.methods,
+            observer,
+            keep,
+        )?;
         Ok(results)
     }
 

@@ -94,7 +94,7 @@ impl Task {
             (None, None) => Arc::clone(&references),
         };
         Ok(TaskScenes {
-            queries: self.protocol.located(queries, references.as_ref())?,
+            queries: self.protocol.as_asked(queries, references.as_ref())?,
             references,
         })
     }
@@ -180,6 +180,9 @@ impl Task {
         if let Some(path) = &protocol.gps {
             option("gps", &path.display());
         }
+        if !protocol.degrade.is_none() {
+            option("degrade", &protocol.degrade);
+        }
         if let Some(folder) = &protocol.matches {
             option("matches", &folder.display());
         }
@@ -246,6 +249,7 @@ mod tests {
                 estimates: vec!["other=my poses.txt".parse().expect("a file")],
                 matches: Some("hloc".into()),
                 gps: Some("gps.csv".into()),
+                degrade: "fog=0.25,gamma=0.5,invert".parse().expect("a degradation"),
             },
             params,
             breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
@@ -264,7 +268,7 @@ mod tests {
             "posescope run street --format street --queries street:night --query 000070 \
              --camera 500,500,320,240 --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
              --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 \
-             --estimates 'other=my poses.txt' --gps gps.csv --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
+             --estimates 'other=my poses.txt' --gps gps.csv --degrade fog=0.25,gamma=0.5,invert --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
         );
         assert!(
             task()

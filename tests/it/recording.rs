@@ -27,6 +27,7 @@ use crate::two_walls::solvable;
 
 const STEP: &str = entities::STEP_TIMELINE;
 const EVAL: &str = entities::EVAL_TIMELINE;
+const LOCKSTEP: &str = entities::LOCKSTEP_TIMELINE;
 
 fn identity() -> Identity {
     Identity {
@@ -34,6 +35,7 @@ fn identity() -> Identity {
         queries: vec!["query".to_owned()],
         references: vec!["reference".to_owned()],
         configuration: Params::default().to_toml(),
+        degraded: Default::default(),
         seed: 7,
         failure_radius_m: 10.0,
     }
@@ -144,6 +146,41 @@ fn assert_equal(left: &[Chunk], right: &[Chunk]) {
     assert!(unmatched.is_empty(), "{} chunks too many", unmatched.len());
 }
 
+/// The times of an entity's rows on a timeline, in order.
+pub fn times(chunks: &[Chunk], entity: &str, timeline: &str) -> Vec<i64> {
+    let of_entity = chunks
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string().trim_start_matches('/') == entity);
+    let columns = of_entity.flat_map(|chunk| {
+        let mut columns = chunk.timelines().iter();
+        columns.find_map(|(name, column)| {
+            (name.as_str() == timeline).then(|| column.times_raw().to_vec())
+        })
+    });
+    let mut times: Vec<i64> = columns.flatten().collect();
+    times.sort_unstable();
+    times
+}
+
+#[test]
+fn on_the_timeline_of_lock_step_every_method_begins_at_zero_and_a_hybrid_takes_as_long_as_its_parts()
+ {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = recorded(&folder, "run.rrd", &Method::PAPER, &Params::default());
+    let chunks = chunks(&path);
+    let ends = ["fb", "pm", "mi", "hy"].map(|method| {
+        let times = times(&chunks, &format!("stage/{method}"), LOCKSTEP);
+        assert_eq!(times.first(), Some(&0), "{method}");
+        *times.last().expect("stages")
+    });
+    let [fb, pm, mi, hy] = ends;
+    assert!(fb > 20 && pm > 100 && mi > 100, "{ends:?}");
+    // It takes what the feature-based method found, and says so.
+    assert!(fb < hy && hy < fb + 20, "{ends:?}");
+    // What all methods found is on no timeline on which they are still at work.
+    assert_eq!(times(&chunks, "report", LOCKSTEP), [0; 0]);
+}
+
 #[test]
 fn every_promised_entity_is_on_its_timelines() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -192,7 +229,9 @@ fn every_promised_entity_is_on_its_timelines() {
         promised.push((format!("{method}/synthetic"), STEP));
         promised.push((format!("{method}/synthetic"), EVAL));
         promised.push((format!("{method}/cost"), EVAL));
+        promised.push((format!("{method}/synthetic"), LOCKSTEP));
     }
+    promised.extend(["query/image", "fb/matches/0", "stage/hy"].map(|p| (p.to_owned(), LOCKSTEP)));
     for (path, timeline) in promised {
         let Some(timelines) = found.get(&path) else {
             panic!("{path} is missing");

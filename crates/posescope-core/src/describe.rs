@@ -108,7 +108,7 @@ impl fmt::Display for Domain {
 /// One row of the table of parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Described {
-    /// `group.name`.
+    /// `group.name`; the name alone where a struct is listed by itself.
     pub key: String,
     /// Unit and meaning.
     pub about: About,
@@ -152,6 +152,109 @@ fn hint(nearest: &Option<String>) -> String {
     match nearest {
         Some(key) => format!(" (did you mean `{key}`?)"),
         None => String::new(),
+    }
+}
+
+/// The parameters of a struct with their present values; keys are their bare names.
+pub fn list(params: &mut (impl Describe + ?Sized)) -> Vec<Described> {
+    let mut lister = ListVisitor::default();
+    params.visit(&mut lister);
+    lister.rows
+}
+
+/// Sets a parameter of a struct from text; `None` where there is none of this name.
+///
+/// # Errors
+/// What values the parameter accepts.
+pub fn set(
+    params: &mut (impl Describe + ?Sized),
+    name: &str,
+    text: &str,
+) -> Option<Result<(), Domain>> {
+    let mut setter = SetVisitor {
+        name,
+        text,
+        outcome: None,
+    };
+    params.visit(&mut setter);
+    setter.outcome
+}
+
+#[derive(Default)]
+struct ListVisitor {
+    rows: Vec<Described>,
+}
+
+impl ListVisitor {
+    fn push(&mut self, about: About, value: Value, domain: Domain) {
+        self.rows.push(Described {
+            key: about.name.to_owned(),
+            about,
+            value,
+            domain,
+        });
+    }
+}
+
+impl ParamVisitor for ListVisitor {
+    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
+        self.push(about, Value::Number(*value), Domain::Number(range));
+    }
+    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
+        self.push(about, Value::Count(*value), Domain::Count(range));
+    }
+    fn flag(&mut self, about: About, value: &mut bool) {
+        self.push(about, Value::Flag(*value), Domain::Flag);
+    }
+    fn choice(&mut self, about: About, value: &mut dyn Choice) {
+        let names = value.names();
+        self.push(
+            about,
+            Value::Choice(names[value.index()]),
+            Domain::Choice(names),
+        );
+    }
+}
+
+/// Sets the parameter `name` of the struct it is shown.
+struct SetVisitor<'a> {
+    name: &'a str,
+    text: &'a str,
+    outcome: Option<Result<(), Domain>>,
+}
+
+impl SetVisitor<'_> {
+    fn set<T>(&mut self, about: About, parsed: Option<T>, domain: Domain, place: &mut T) {
+        if about.name == self.name {
+            self.outcome = Some(match parsed {
+                Some(value) => {
+                    *place = value;
+                    Ok(())
+                }
+                None => Err(domain),
+            });
+        }
+    }
+}
+
+impl ParamVisitor for SetVisitor<'_> {
+    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
+        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
+        self.set(about, parsed, Domain::Number(range), value);
+    }
+    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
+        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
+        self.set(about, parsed, Domain::Count(range), value);
+    }
+    fn flag(&mut self, about: About, value: &mut bool) {
+        self.set(about, self.text.parse().ok(), Domain::Flag, value);
+    }
+    fn choice(&mut self, about: About, value: &mut dyn Choice) {
+        let names = value.names();
+        let mut index = value.index();
+        let parsed = names.iter().position(|name| *name == self.text);
+        self.set(about, parsed, Domain::Choice(names), &mut index);
+        value.choose(index);
     }
 }
 

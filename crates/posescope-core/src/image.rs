@@ -1,7 +1,10 @@
 //! Photographs: loading, smoothing, interpolation.
 
+mod degrade;
+
 use std::path::Path;
 
+pub use degrade::{Degradation, DegradationError};
 pub use image::{GrayImage, RgbImage};
 use image::{ImageBuffer, Luma};
 

@@ -3,13 +3,10 @@
 //! The table of `posescope params`, `--set`, the configuration file and the app's sliders all follow
 //! from what the groups say of themselves ([`crate::describe`]).
 
-use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use crate::cost::CostSettings;
-use crate::describe::{
-    About, Choice, Describe, Described, Domain, ParamError, ParamVisitor, Value,
-};
+use crate::describe::{Describe, Described, ParamError, Value, list, set};
 use crate::estimator::{FeatureParams, GuidedParams, RobustParams, SixParams};
 use crate::features::SurfParams;
 use crate::grid::GridParams;
@@ -72,12 +69,14 @@ impl Params {
 
     /// All parameters with their present values.
     pub fn list(&self) -> Vec<Described> {
-        let mut lister = ListVisitor::default();
+        let mut rows = Vec::new();
         self.clone().visit_groups(|group, params| {
-            lister.group = group;
-            params.visit(&mut lister);
+            rows.extend(list(params).into_iter().map(|row| Described {
+                key: format!("{group}.{}", row.key),
+                ..row
+            }));
         });
-        lister.rows
+        rows
     }
 
     /// Sets one parameter from text, as `--set` does: `fb.ratio=0.7`.
@@ -97,17 +96,13 @@ impl Params {
     /// [`ParamError`] with what was expected.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), ParamError> {
         let (wanted_group, name) = key.split_once('.').unwrap_or(("", key));
-        let mut setter = SetVisitor {
-            name,
-            text: value,
-            outcome: None,
-        };
+        let mut outcome = None;
         self.visit_groups(|group, params| {
             if group == wanted_group {
-                params.visit(&mut setter);
+                outcome = set(params, name, value);
             }
         });
-        match setter.outcome {
+        match outcome {
             Some(Ok(())) => Ok(()),
             Some(Err(expected)) => Err(ParamError::BadValue {
                 key: key.to_owned(),
@@ -193,85 +188,6 @@ impl Params {
             .filter(|(similarity, _)| *similarity > 0.8)
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, key)| key)
-    }
-}
-
-#[derive(Default)]
-struct ListVisitor {
-    group: &'static str,
-    rows: Vec<Described>,
-}
-
-impl ListVisitor {
-    fn push(&mut self, about: About, value: Value, domain: Domain) {
-        self.rows.push(Described {
-            key: format!("{}.{}", self.group, about.name),
-            about,
-            value,
-            domain,
-        });
-    }
-}
-
-impl ParamVisitor for ListVisitor {
-    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
-        self.push(about, Value::Number(*value), Domain::Number(range));
-    }
-    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
-        self.push(about, Value::Count(*value), Domain::Count(range));
-    }
-    fn flag(&mut self, about: About, value: &mut bool) {
-        self.push(about, Value::Flag(*value), Domain::Flag);
-    }
-    fn choice(&mut self, about: About, value: &mut dyn Choice) {
-        let names = value.names();
-        self.push(
-            about,
-            Value::Choice(names[value.index()]),
-            Domain::Choice(names),
-        );
-    }
-}
-
-/// Sets the parameter `name` of the group it is shown.
-struct SetVisitor<'a> {
-    name: &'a str,
-    text: &'a str,
-    outcome: Option<Result<(), Domain>>,
-}
-
-impl SetVisitor<'_> {
-    fn set<T>(&mut self, about: About, parsed: Option<T>, domain: Domain, place: &mut T) {
-        if about.name == self.name {
-            self.outcome = Some(match parsed {
-                Some(value) => {
-                    *place = value;
-                    Ok(())
-                }
-                None => Err(domain),
-            });
-        }
-    }
-}
-
-impl ParamVisitor for SetVisitor<'_> {
-    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
-        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
-        self.set(about, parsed, Domain::Number(range), value);
-    }
-    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
-        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
-        self.set(about, parsed, Domain::Count(range), value);
-    }
-    fn flag(&mut self, about: About, value: &mut bool) {
-        self.set(about, self.text.parse().ok(), Domain::Flag, value);
-    }
-    fn choice(&mut self, about: About, value: &mut dyn Choice) {
-        let names = value.names();
-        let mut index = value.index();
-        let parsed = names.iter().position(|name| *name == self.text);
-        self.set(about, parsed, Domain::Choice(names), &mut index);
-        value.choose(index);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Scenes: anything that yields frames (photo, intrinsics, perhaps a pose, perhaps a cloud).
 
+mod degraded;
 mod error;
 mod frames;
 
@@ -8,6 +9,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use xxhash_rust::xxh3::Xxh3;
 
+pub use degraded::{DegradedScene, degraded};
 pub use error::SceneError;
 pub use frames::{CachedScene, FrameStore};
 
@@ -80,6 +82,11 @@ pub trait Scene: Send + Sync {
         let world_from_camera = pose_of(self, frame)?;
         let query = self.query(frame)?;
         reference_of(self, frame, world_from_camera, &query)
+    }
+
+    /// The scene as one whose photos are degraded, if they are.
+    fn as_degraded(&self) -> Option<&DegradedScene> {
+        None
     }
 
     /// A number that changes with the photos, as far as can be told without reading them: what was

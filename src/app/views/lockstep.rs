@@ -78,7 +78,10 @@ fn axis(ui: &mut Ui, context: &ViewContext<'_>, step: usize, last: usize) {
             context.options.lockstep.is_some(),
             egui::Button::new("Leave"),
         );
-        if follow.on_hover_text("Back to the cursor of the run").clicked() {
+        if follow
+            .on_hover_text("Back to the cursor of the run")
+            .clicked()
+        {
             context.send(Command::StepTogether(None));
         }
     });
@@ -107,7 +110,8 @@ impl LockstepView {
                 let right = context.setup.task.protocol.right;
                 let standing = result.standing(right, shows_truth);
                 let error = result.error.filter(|_| shows_truth);
-                let error = error.map_or(String::new(), |error| format!(", {}", error.translation()));
+                let error =
+                    error.map_or(String::new(), |error| format!(", {}", error.translation()));
                 let words = format!("{} {standing}{error}", standing.mark());
                 let color = theme::standing(ui.visuals(), standing);
                 ui.label(RichText::new(words).color(color).strong());

@@ -1,5 +1,7 @@
 //! Every parameter with unit, range, help and a way back to its default.
 
+mod degradation;
+
 use std::ops::RangeInclusive;
 
 use egui::{ComboBox, DragValue, RichText, ScrollArea, TextEdit, Ui};
@@ -41,6 +43,7 @@ impl View for ParametersView {
         let reference = other.clone().unwrap_or_default();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.add_enabled_ui(present, |ui| {
+                degradation::sliders(ui, context, &self.filter);
                 self.list(ui, context, &mut params, &reference, other.is_some());
             });
         });

@@ -17,6 +17,7 @@ use super::{Identity, RecordError, Targets, blueprint, entities, report, retriev
 use crate::estimator;
 use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
+use crate::image::Degradation;
 use crate::localize::{LocalizeObserver, PoseReport, QueryResult, StageTimes};
 use crate::method::Method;
 use crate::narration;
@@ -33,6 +34,7 @@ use crate::trace::{Cancelled, Record, Sink};
 pub struct Recorder {
     stream: Stream,
     configuration: String,
+    degraded: Degradation,
     failure_radius_m: f64,
     params: Params,
     methods: Vec<Method>,
@@ -101,6 +103,7 @@ impl Recorder {
             stream: Stream::open(targets, identity)?,
             params,
             configuration: identity.configuration.clone(),
+            degraded: identity.degraded,
             failure_radius_m: identity.failure_radius_m,
             methods: methods.to_vec(),
             origin: None,
@@ -263,6 +266,7 @@ impl Recorder {
             problems,
             results,
             &self.configuration,
+            self.degraded,
             self.failure_radius_m,
             origin,
         );

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::scene::Origin;
 use crate::geometry::PoseError;
+use crate::image::Degradation;
 use crate::localize::{QueryResult, Verdict};
 use crate::params::Params;
 use crate::problem::Problem;
@@ -13,6 +14,7 @@ pub(super) fn markdown(
     problems: &[Problem],
     results: &[QueryResult],
     configuration: &str,
+    degraded: Degradation,
     failure_radius_m: f64,
     origin: Origin,
 ) -> String {
@@ -32,6 +34,9 @@ pub(super) fn markdown(
     text += &features(results);
     text += &costs(results);
     text += &costs_at_poses(results);
+    if !degraded.is_none() {
+        text += &format!("The photo of the query was degraded before: `{degraded}`.\n\n");
+    }
     text += &changes(configuration);
     let Origin(origin) = origin;
     text += &format!(

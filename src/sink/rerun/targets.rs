@@ -13,6 +13,7 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::error::RecordError;
 use super::file::RecordingFile;
 use super::viewer::Viewer;
+use crate::image::Degradation;
 
 /// Where a recording goes. All of them can be combined; none is a recording that nobody keeps.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +39,8 @@ pub struct Identity {
     pub references: Vec<String>,
     /// The configuration, as TOML.
     pub configuration: String,
+    /// What was done to the photos of the queries before.
+    pub degraded: Degradation,
     /// The seed of every random choice.
     pub seed: u64,
     /// The translation error from which on a pose counts as a failure \[m\].
@@ -153,6 +156,9 @@ mod tests {
         assert_ne!(id, other.recording_id());
         other = identity.clone();
         other.seed = 1;
+        assert_ne!(id, other.recording_id());
+        other = identity.clone();
+        other.degraded = "invert".parse().expect("a degradation");
         assert_ne!(id, other.recording_id());
     }
 

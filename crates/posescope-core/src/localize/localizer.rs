@@ -26,7 +26,7 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::retrieval::ReferenceRanking;
-use crate::scene::{CachedScene, Scene, SceneError};
+use crate::scene::{CachedScene, DegradedScene, Scene, SceneError};
 use crate::trace::Fanout;
 use crate::trace::{Cancelled, Sink, Trace};
 
@@ -343,6 +343,7 @@ impl<'a> Localizer<'a> {
         let (scene, queries) = (self.references.name(), self.queries.name());
         QueryResult {
             query_scene: (queries != scene).then(|| queries.to_owned()),
+            degraded: self.queries.as_degraded().map(DegradedScene::degradation),
             setting,
             ..result
         }

@@ -13,6 +13,7 @@ use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 #[cfg(doc)]
 use crate::grid::GridParams;
 use crate::grid::{Basin, Offset};
+use crate::image::Degradation;
 use crate::method::Method;
 use crate::text::UnknownWord;
 
@@ -39,6 +40,9 @@ pub struct QueryResult {
     pub fusion: Option<Fusion>,
     /// The seed of every random choice.
     pub seed: u64,
+    /// What was done to the query's photo before, if anything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degraded: Option<Degradation>,
     /// What an experiment varies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub setting: Option<Setting>,
@@ -366,6 +370,7 @@ impl QueryResult {
             method,
             fusion: None,
             seed,
+            degraded: None,
             setting: None,
             status: if pose.is_ok() {
                 Status::Ok

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::Point3;
 
-use super::{Scene, SceneError, pose_of, reference_of};
+use super::{DegradedScene, Scene, SceneError, pose_of, reference_of};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -220,6 +220,10 @@ impl Scene for CachedScene<'_> {
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         self.scene.cloud(frame)
+    }
+
+    fn as_degraded(&self) -> Option<&DegradedScene> {
+        self.scene.as_degraded()
     }
 
     fn fingerprint(&self) -> u64 {

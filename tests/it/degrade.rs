@@ -1,0 +1,209 @@
+//! Queries whose photos are made worse: on the command line, in run folders and in the window.
+
+use std::fs;
+use std::path::Path;
+
+use egui_kittest::kittest::Queryable as _;
+use image::imageops;
+use posescope::app::{Command, Setup};
+use posescope::image::Degradation;
+use posescope::scene;
+use posescope::session::RunState;
+
+use crate::binary::posescope;
+use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
+use crate::window::{finished, run_until_idle, setup};
+
+/// The lines of `run --json -` without what says that the photo was degraded.
+fn results(scene: &Path, words: &[&str]) -> (String, usize) {
+    let output = posescope()
+        .arg("run")
+        .arg(scene)
+        .args([
+            "--query",
+            "5",
+            "--reference",
+            "4",
+            "--method",
+            "fb,mi",
+            "--radius",
+            "3",
+        ])
+        .args(words)
+        .args(["--json", "-", "-q"])
+        .output()
+        .expect("the binary starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let mark = "\"degraded\":\"fog=0.25,invert\",";
+    (text.replace(mark, ""), text.matches(mark).count())
+}
+
+/// The sequence with the photo of a frame as it comes out of the degradation.
+fn worse_on_disk(text: &str) -> SmallSequence {
+    let sequence = SmallSequence::write();
+    let degradation: Degradation = text.parse().expect("a degradation");
+    let photo = posescope::Photo::from_gray(wall(WIDTH, HEIGHT));
+    let worse = degradation.of(&photo, 0, "000005").gray;
+    worse.save(sequence.image("000005")).expect("writable");
+    sequence
+}
+
+#[test]
+fn a_degraded_query_is_the_photo_that_was_degraded_before_and_its_references_stay() {
+    let text = "invert,fog=0.25";
+    let (there, _) = results(&worse_on_disk(text).folder(), &[]);
+    let (here, marks) = results(&SmallSequence::write().folder(), &["--degrade", text]);
+    assert_eq!(here, there);
+    assert_eq!(marks, 2);
+    let (as_taken, _) = results(&SmallSequence::write().folder(), &[]);
+    assert_ne!(here, as_taken);
+}
+
+#[test]
+fn a_run_folder_says_what_was_degraded_and_goes_on_with_nothing_else() {
+    let (plain, worse) = (SmallSequence::write(), worse_on_disk("invert"));
+    let eval = |sequence: &SmallSequence, name: &str, words: &[&str]| {
+        let mut command = posescope();
+        command.arg("eval").arg(sequence.folder());
+        command.args(["--method", "fb,mi", "--radius", "3", "-q"]);
+        command.args(["--references", "nearest:1", "--only", "5"]);
+        command.arg("--out").arg(sequence.path().join(name));
+        command.args(words);
+        command
+    };
+    let read = |sequence: &SmallSequence, file: &str| {
+        fs::read_to_string(sequence.path().join(file)).expect("readable")
+    };
+    // Without a scene of queries of their own, the references keep their photos all the same.
+    eval(&plain, "run", &["--degrade", "invert"])
+        .assert()
+        .code(0);
+    eval(&worse, "run", &[]).assert().code(0);
+    let mark = "\"degraded\":\"invert\",";
+    assert_eq!(
+        read(&plain, "run/results.jsonl").replace(mark, ""),
+        read(&worse, "run/results.jsonl")
+    );
+    assert!(read(&plain, "run/run.toml").contains("degrade = \"invert\"\n"));
+    assert!(!read(&worse, "run/run.toml").contains("degrade"));
+    let other = eval(&plain, "run", &["--degrade", "gamma=2", "--resume"]);
+    let other = { other }.output().expect("the binary starts");
+    let said = String::from_utf8_lossy(&other.stderr);
+    assert_eq!(other.status.code(), Some(2), "{said}");
+    let words = "`degrade = \"invert\"` there, `degrade = \"gamma=2\"` here";
+    assert!(said.contains(words), "{said}");
+
+    // Noise is the same on any number of threads, and another for another seed.
+    let noise = ["--degrade", "noise=20", "--threads"];
+    for (name, more) in [
+        ("1", &["1"][..]),
+        ("3", &["3"]),
+        ("seed", &["1", "--seed", "4"]),
+    ] {
+        eval(&plain, name, &[&noise, more].concat())
+            .assert()
+            .code(0);
+    }
+    let one = read(&plain, "1/results.jsonl");
+    assert_eq!(one, read(&plain, "3/results.jsonl"));
+    assert_ne!(
+        one,
+        read(&plain, "seed/results.jsonl").replace("\"seed\":4", "\"seed\":0")
+    );
+}
+
+#[test]
+fn bad_text_is_one_line_that_says_what_was_expected() {
+    for (text, words) in [
+        (
+            "gama=0.4",
+            "fog, blur, exposure, gamma, noise, invert expected",
+        ),
+        ("gamma=0.01", "`gamma` takes 0.05 … 10, not `0.01`"),
+        ("noise=8,noise=9", "`noise` is given twice"),
+        ("", "something such as gamma=0.4,noise=8,invert expected"),
+    ] {
+        let output = posescope()
+            .args(["run", "street", "--query", "70", "--degrade", text])
+            .output()
+            .expect("the binary starts");
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+#[test]
+fn poses_clouds_and_names_of_a_degraded_scene_are_its_own() {
+    let street = scene::open("street", None).expect("is built in").into();
+    let worse = scene::degraded(&street, "invert".parse().expect("a degradation"), 0);
+    let frame = worse.find("70").expect("is there");
+    assert_eq!(worse.name(), street.name());
+    assert_eq!(worse.pose(frame), street.pose(frame));
+    assert_ne!(worse.fingerprint(), street.fingerprint());
+    let (taken, degraded) = (
+        street.photo(frame).expect("is made"),
+        worse.photo(frame).expect("is made"),
+    );
+    let mut negative = taken.gray.clone();
+    imageops::invert(&mut negative);
+    assert_eq!(degraded.gray, negative);
+    // Another degradation takes the place of the first; none brings the scene itself back.
+    let again = scene::degraded(&worse, Degradation::default(), 0);
+    assert_eq!(again.photo(frame).expect("is made").gray, taken.gray);
+}
+
+fn query_photo(setup: &Setup) -> image::GrayImage {
+    setup.queries.photo(setup.query).expect("is there").gray
+}
+
+#[test]
+fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
+    let mut window = finished(setup());
+    let taken = query_photo(&window.state().app_state().setup);
+    window.state_mut().send(Command::ShowView("parameters"));
+    window.step();
+    window.step();
+    window.get_by_label("Photo: invert").click_accesskit();
+    window.step();
+    window.step();
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    let state = window.state().app_state();
+    let degraded = |state: &posescope::app::AppState| state.setup.task.protocol.degrade.to_string();
+    assert_eq!(degraded(state), "invert");
+    let loaded = state.run().loaded.as_deref().expect("it ran");
+    let mut negative = taken.clone();
+    imageops::invert(&mut negative);
+    assert_eq!(loaded.problems[0].query.photo.gray, negative);
+    assert_ne!(loaded.problems[0].reference.photo.gray, negative);
+    assert!(state.setup.command_line().contains(" --degrade invert"));
+    assert!(state.setup.title().contains("(invert)"));
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("session.json");
+    window.state_mut().send(Command::SaveSession(path.clone()));
+    window.step();
+    // The strength of a step is set as assistive technology does it.
+    let gamma = window.get_by_label("Photo: gamma");
+    gamma.set_value_accesskit(0.5);
+    window.step();
+    window.step();
+    run_until_idle(&mut window);
+    let both = degraded(window.state().app_state());
+    assert_eq!(both, "gamma=0.5,invert");
+    window.get_by_label("As taken").click_accesskit();
+    window.step();
+    window.step();
+    run_until_idle(&mut window);
+    let setup = &window.state().app_state().setup;
+    assert_eq!(query_photo(setup), taken);
+    window.state_mut().send(Command::RestoreSession(path));
+    window.step();
+    window.step();
+    run_until_idle(&mut window);
+    let state = window.state().app_state();
+    assert_eq!(degraded(state), "invert");
+    assert_eq!(query_photo(&state.setup), negative);
+}

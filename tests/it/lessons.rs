@@ -1,0 +1,368 @@
+//! Lessons: their claims, and the way through each of them.
+
+use std::sync::Arc;
+
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use posescope::app::{App, Command, Setup, views};
+use posescope::diagnosis::Tolerance;
+use posescope::lesson::{Answer, Lesson, Moment};
+use posescope::localize::{NoObserver, QueryResult};
+use posescope::session::RunState;
+use posescope::sink::rerun::entities;
+use rerun::TextDocument;
+
+use crate::binary::posescope;
+use crate::recording::chunks;
+use crate::window::{is_said, press, run_until_idle};
+
+/// A lesson on the small world, whose frames cost nothing.
+const SMALL: &str = r#"+++
+title = "A small lesson"
+about = "everything that a lesson can do"
+minutes = 1
+[setting]
+scene = "walls"
+query = "1"
+methods = ["fb", "mi"]
++++
+
+## The beginning
+
+```page
+at = "after fb.match"
+show = ["images", "surface"]
+[question]
+ask = "Which is it?"
+choices = ["the one", "the other"]
+right = 2
+because = "It was said in the beginning."
+reveal = "after fb"
+```
+
+These words are read first.
+
+## The map
+
+```page
+at = "mi.position_coarse"
+show = ["surface"]
+[question]
+ask = "Where is it?"
+place = "mi"
+because = "There it is."
+reveal = "after mi"
+```
+
+## The end
+
+```page
+at = "end"
+show = ["lockstep"]
+lockstep = 3
+```
+"#;
+
+fn small(setup: Setup) -> Harness<'static, App> {
+    let lesson = Lesson::parse("small", SMALL).expect("a lesson");
+    let mut window = Harness::builder()
+        .with_size([1500.0, 950.0])
+        .build_eframe(|creation| App::new(creation, setup).with_lesson(lesson));
+    run_until_idle(&mut window);
+    window.run_steps(3);
+    window
+}
+
+fn walls() -> Setup {
+    let mut setup = crate::window::setup();
+    setup.mode = posescope::session::RunMode::Running;
+    setup.task.protocol.methods = ["fb", "mi"]
+        .map(|name| name.parse().expect("a method"))
+        .to_vec();
+    setup
+}
+
+#[test]
+fn a_question_is_answered_before_anything_of_the_answer_is_shown() {
+    let mut window = small(walls());
+    assert!(is_said(&window, "The beginning") && is_said(&window, "These words are read first"));
+    let moment: Moment = "after fb.match".parse().expect("a moment");
+    let at = |window: &Harness<'_, App>| window.state().app_state().cursor();
+    let found = moment.find(window.state().app_state().run());
+    assert_eq!(Some(at(&window)), found);
+    assert!(
+        !is_said(&window, "● right"),
+        "nothing is told before its time"
+    );
+    assert!(!is_said(&window, "It was said in the beginning"));
+    assert!(!window.state().app_state().options.shows_truth);
+
+    press(&mut window, Modifiers::NONE, Key::Num1);
+    window.run_steps(2);
+    assert!(is_said(&window, "the one  ▲ wrong") && is_said(&window, "the other  ● right"));
+    assert!(is_said(&window, "It was said in the beginning"));
+    let moment: Moment = "after fb".parse().expect("a moment");
+    assert_eq!(
+        Some(at(&window)),
+        moment.find(window.state().app_state().run())
+    );
+    assert_eq!(
+        window.query_all_by_label("● right").count(),
+        1,
+        "FB's on the card"
+    );
+
+    // Pages are turned by keys, to the ends and no further.
+    press(&mut window, Modifiers::NONE, Key::PageUp);
+    assert!(is_said(&window, "The beginning"));
+    press(&mut window, Modifiers::NONE, Key::PageDown);
+    assert!(is_said(&window, "The map"));
+}
+
+#[test]
+fn a_place_is_guessed_on_the_empty_map_and_measured_afterwards() {
+    let mut window = small(walls());
+    press(&mut window, Modifiers::NONE, Key::PageDown);
+    window.run_steps(3);
+    assert!(is_said(&window, "Nothing is chosen yet"));
+    // No cell has a cost, and there is a map to click at.
+    assert!(is_said(&window, "position, coarse, 0 of"));
+    let map = window.get_by_label_contains("Cost map").rect();
+    let ahead = map.min + map.size() * egui::vec2(0.5, 0.3);
+    window.hover_at(ahead);
+    window.run_steps(2);
+    window.drag_at(ahead);
+    window.drop_at(ahead);
+    window.run_steps(3);
+    assert!(is_said(&window, "m ahead of the reference"));
+    assert!(!is_said(&window, "MI puts it"));
+    press(&mut window, Modifiers::NONE, Key::Enter);
+    window.run_steps(3);
+    assert!(is_said(&window, "MI puts it") && is_said(&window, "There it is."));
+
+    press(&mut window, Modifiers::NONE, Key::PageDown);
+    window.run_steps(2);
+    let options = &window.state().app_state().options;
+    assert_eq!(options.lockstep, Some(3));
+    press(&mut window, Modifiers::NONE, Key::Period);
+    assert_eq!(window.state().app_state().options.lockstep, Some(4));
+    assert!(
+        !is_said(&window, "● right"),
+        "no method is done at its fourth step"
+    );
+    window
+        .state_mut()
+        .send(Command::StepTogether(Some(usize::MAX - 1)));
+    window.run_steps(2);
+    assert_eq!(
+        window.query_all_by_label_contains("● right").count(),
+        2,
+        "a panel each"
+    );
+
+    window.get_by_label("Close").click();
+    window.run_steps(3);
+    assert!(!is_said(&window, "A small lesson"));
+    press(&mut window, Modifiers::NONE, Key::PageDown);
+    assert!(is_said(&window, "No lesson is open"));
+}
+
+/// Goes through a lesson to its end, answering by keys, and hands out the results of each variant.
+fn go_through(lesson: &Lesson) -> Vec<(String, Vec<QueryResult>)> {
+    let first = lesson.setting(&lesson.pages[0].variant);
+    let open = first.open(&|_| None).expect("a setting");
+    let setup = Setup::of_lesson(open, std::env::temp_dir());
+    let mut window = Harness::builder()
+        .with_size([1500.0, 950.0])
+        .build_eframe(|creation| App::new(creation, setup).with_lesson(lesson.clone()));
+    let mut results: Vec<(String, Vec<QueryResult>)> = Vec::new();
+    for page in &lesson.pages {
+        assert_eq!(
+            run_until_idle(&mut window),
+            RunState::Finished,
+            "{}",
+            page.title
+        );
+        window.run_steps(3);
+        assert!(is_said(&window, &page.title), "{}", page.title);
+        let state = window.state().app_state();
+        let shown = state.run().results().cloned().collect();
+        if results
+            .last()
+            .is_none_or(|(variant, _)| *variant != page.variant)
+        {
+            results.push((page.variant.clone(), shown));
+        }
+        check_moment(&window, &page.at, &page.title);
+        if let Some(question) = &page.question {
+            let reason: String = question.because.chars().take(20).collect();
+            assert!(
+                !is_said(&window, &reason),
+                "{}: told before it is asked",
+                page.title
+            );
+            match &question.answer {
+                Answer::Choice { right, .. } => {
+                    let keys = [Key::Num1, Key::Num2, Key::Num3, Key::Num4];
+                    press(&mut window, Modifiers::NONE, keys[*right]);
+                }
+                Answer::Place(_) => {
+                    press(&mut window, Modifiers::ALT, Key::ArrowUp);
+                    press(&mut window, Modifiers::NONE, Key::Enter);
+                }
+            }
+            window.run_steps(2);
+            assert!(is_said(&window, &reason), "{}: {reason}", page.title);
+            check_moment(&window, &question.reveal, &page.title);
+        }
+        press(&mut window, Modifiers::NONE, Key::PageDown);
+    }
+    results
+}
+
+fn check_moment(window: &Harness<'_, App>, moment: &Moment, title: &str) {
+    let state = window.state().app_state();
+    let place = match moment {
+        Moment::End => state.run().len() - 1,
+        moment => moment
+            .find(state.run())
+            .unwrap_or_else(|| panic!("{title}: no {moment}")),
+    };
+    assert_eq!(state.cursor(), place, "{title}: {moment}");
+}
+
+#[test]
+fn every_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
+    for lesson in Lesson::all().expect("our own") {
+        for page in &lesson.pages {
+            for view in &page.show {
+                assert!(views::find(view).is_ok(), "{}: {view}", lesson.name);
+            }
+        }
+        let mut results = go_through(&lesson);
+        // What no page shows is run for its claims alone.
+        for (variant, setting) in &lesson.variants {
+            if !results.iter().any(|(shown, _)| shown == variant) {
+                let job = setting
+                    .open(&|_| None)
+                    .expect("a setting")
+                    .job(&Arc::default());
+                let told = job.work(0, &mut NoObserver, |_| {}).expect("results");
+                results.push((variant.clone(), told));
+            }
+        }
+        for claim in &lesson.claims {
+            let of_variant = results
+                .iter()
+                .filter(|(variant, _)| *variant == claim.variant);
+            let is_met = of_variant
+                .flat_map(|(_, results)| results)
+                .any(|result| claim.holds.is_met(result, Tolerance::default()));
+            let (name, variant) = (&lesson.name, &claim.variant);
+            assert!(
+                is_met,
+                "{name}, {variant}: no result with {}",
+                claim.holds.text()
+            );
+        }
+    }
+}
+
+#[test]
+fn lessons_are_listed_printed_and_recorded() {
+    let output = posescope()
+        .arg("lesson")
+        .output()
+        .expect("the binary starts");
+    assert_eq!(output.status.code(), Some(0));
+    let listed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let lessons = Lesson::all().expect("our own");
+    for lesson in &lessons {
+        assert!(
+            listed.contains(&lesson.name) && listed.contains(&lesson.title),
+            "{listed}"
+        );
+    }
+    let text = posescope().args(["lesson", "grid", "--text"]).output();
+    let text = String::from_utf8_lossy(&text.expect("the binary starts").stdout).into_owned();
+    let grid = Lesson::open("grid").expect("ours");
+    for page in &grid.pages {
+        assert!(
+            text.contains(&format!("# {}", page.title)),
+            "{}",
+            page.title
+        );
+    }
+
+    for (name, code, words) in [("nonsense", 2, "four-points"), ("broken.md", 3, "line 3")] {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(
+            folder.path().join("broken.md"),
+            "+++\ntitle = \"a\"\nabot = \"b\"\n+++\n",
+        )
+        .expect("writable");
+        let output = posescope()
+            .current_dir(folder.path())
+            .args(["lesson", name])
+            .output()
+            .expect("the binary starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        assert!(
+            said.contains(words) && said.trim().lines().count() == 1,
+            "{said}"
+        );
+    }
+}
+
+/// The pages of a recording with their places on the timeline of decisions.
+fn recorded_pages(path: &std::path::Path) -> Vec<(i64, String)> {
+    let chunks = chunks(path);
+    let mut pages = Vec::new();
+    for chunk in chunks
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string() == "/lesson")
+    {
+        let steps = chunk.timelines().iter().find_map(|(name, column)| {
+            (name.as_str() == entities::STEP_TIMELINE).then(|| column.times_raw().to_vec())
+        });
+        let component = TextDocument::descriptor_text().component;
+        let texts = chunk.iter_slices::<String>(component);
+        for (step, text) in steps.expect("steps").into_iter().zip(texts) {
+            pages.push((step, text[0].to_string()));
+        }
+    }
+    pages.sort();
+    pages
+}
+
+#[test]
+fn a_recorded_lesson_turns_its_pages_in_order_and_answers_after_it_has_asked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for lesson in Lesson::all().expect("our own") {
+        let path = folder.path().join(format!("{}.rrd", lesson.name));
+        posescope()
+            .args(["lesson", &lesson.name, "--save"])
+            .arg(&path)
+            .assert()
+            .code(0);
+        let recorded = recorded_pages(&path);
+        let all = lesson.pages.len();
+        let wanted: Vec<String> = (lesson.pages.iter().enumerate())
+            .flat_map(|(index, page)| {
+                [
+                    Some(page.markdown(index + 1, all)),
+                    page.answered(index + 1, all),
+                ]
+            })
+            .flatten()
+            .collect();
+        let (steps, texts): (Vec<i64>, Vec<String>) = recorded.into_iter().unzip();
+        assert_eq!(texts, wanted, "{}", lesson.name);
+        let mut distinct = steps.clone();
+        distinct.dedup();
+        assert_eq!(distinct, steps, "{}: two pages at one step", lesson.name);
+        std::fs::remove_file(&path).expect("ours");
+    }
+}
