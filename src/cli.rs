@@ -6,6 +6,8 @@ mod demo;
 mod demo_settings;
 mod diff;
 mod doctor;
+#[cfg(test)]
+mod documented;
 mod eval;
 mod export;
 mod failure;
@@ -14,6 +16,7 @@ mod figures;
 mod index;
 mod interrupt;
 mod lesson;
+mod manual;
 mod match_export;
 mod observer;
 mod opened;
@@ -72,5 +75,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params, &terminal),
+        Some(Command::Completions { shell }) => manual::completions(*shell),
+        Some(Command::Man { folder }) => manual::pages(folder, &terminal),
     }
 }

@@ -26,6 +26,8 @@ pub struct Shot {
     pub arrangement: Arrangement,
     /// The moment of the run.
     pub moment: Moment,
+    /// With the methods beside each other, so many steps into each of them.
+    pub lockstep: Option<usize>,
     /// A pose to take the camera to.
     pub camera: Option<NamedPose>,
     /// Size of the picture \[px\].
@@ -115,6 +117,9 @@ pub fn shoot(setup: Setup, results: Results, shot: &Shot) -> Result<RgbImage, Sh
     };
     window.run_to_end()?;
     window.go_to(shot.moment)?;
+    if shot.lockstep.is_some() {
+        window.app.send(Command::StepTogether(shot.lockstep));
+    }
     if let Some(pose) = shot.camera {
         window.app.send(Command::JumpCamera(pose));
     }

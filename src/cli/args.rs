@@ -83,6 +83,16 @@ pub enum Command {
     Index(IndexArgs),
     /// List all parameters with unit, range, default and meaning
     Params(ConfigArgs),
+    /// Print what makes a shell complete posescope's arguments
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages of posescope and its commands into a folder
+    Man {
+        /// The folder, which is made where there is none
+        folder: PathBuf,
+    },
 }
 
 #[derive(Debug, Args)]

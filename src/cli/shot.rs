@@ -16,6 +16,7 @@ pub fn shot(args: &ShotArgs, terminal: &Terminal) -> Result<(), CliError> {
         view: args.view.clone(),
         arrangement: args.layout,
         moment: args.at,
+        lockstep: args.lockstep,
         camera: args.pose,
         size_px: args.size,
         scale: args.scale,

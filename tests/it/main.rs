@@ -11,6 +11,7 @@ mod decisions;
 mod degrade;
 mod diagnosis;
 mod doctor;
+mod documents;
 mod evaluation;
 mod foreign;
 mod frame_cache;

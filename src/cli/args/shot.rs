@@ -31,6 +31,9 @@ pub struct ShotArgs {
     /// The moment of the run: its end, the end of a method, or the step of a number
     #[arg(long, value_name = "end|METHOD|STEP", default_value_t = Moment::End)]
     pub at: Moment,
+    /// Show the methods so many steps into each of them, as in the view lockstep
+    #[arg(long, value_name = "STEP")]
+    pub lockstep: Option<usize>,
     /// Look from this pose: costs and synthetic views are those at it
     #[arg(
         long,
