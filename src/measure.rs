@@ -14,6 +14,8 @@ mod plots;
 #[cfg(feature = "cli")]
 mod report;
 #[cfg(feature = "cli")]
+mod sweep;
+#[cfg(feature = "cli")]
 mod table;
 #[cfg(feature = "cli")]
 mod tables;
@@ -27,6 +29,8 @@ pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
 pub use paper::{FigureKey, figure as paper_figure};
 #[cfg(feature = "cli")]
 pub use report::{Report, SUMMARY_SCHEMA, read_rows, write_report};
+#[cfg(feature = "cli")]
+pub use sweep::{SweptRun, write_sweep};
 #[cfg(feature = "cli")]
 pub use table::Table;
 pub use triage::{Condition, ConditionError, Field, Order, Value, select};

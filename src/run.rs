@@ -8,6 +8,7 @@ mod protocol;
 mod run_file;
 mod run_folder;
 mod scene_pair;
+mod sweep;
 
 pub use estimates_file::EstimatesFile;
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
@@ -19,3 +20,4 @@ pub use protocol::Protocol;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run, result_lines};
 pub use scene_pair::{QueryCamera, ScenePair};
+pub use sweep::{Sweep, SweepError};

@@ -106,7 +106,7 @@ pub struct Verbosity {
 }
 
 /// Which parameters differ from their defaults.
-#[derive(Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct ConfigArgs {
     /// Read parameters from a TOML file with a table per group
     #[arg(long, value_name = "FILE")]
@@ -119,7 +119,11 @@ pub struct ConfigArgs {
 impl ConfigArgs {
     /// The parameters that the arguments describe.
     pub fn resolve(&self) -> Result<Params, CliError> {
-        let mut params = Params::default();
+        self.over(Params::default())
+    }
+
+    /// These parameters with what the arguments change.
+    pub fn over(&self, mut params: Params) -> Result<Params, CliError> {
         if let Some(path) = &self.config {
             let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;
             params
@@ -250,7 +254,7 @@ impl Default for TaskArgs {
 }
 
 /// How queries are localised, one or thousands.
-#[derive(Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct ProtocolArgs {
     /// The format of the scenes, if their content does not tell
     #[arg(long, value_name = "NAME")]
@@ -289,9 +293,9 @@ pub struct ProtocolArgs {
     /// reference gives its own; eval: r-wavg]
     #[arg(long, value_name = "maxf,avg,wavg,r-wavg", value_delimiter = ',')]
     pub fusion: Vec<Fusion>,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
+    /// Seed of every random choice [default: 0]
+    #[arg(long)]
+    pub seed: Option<u64>,
     /// How near the truth a pose is right; one that is not gets a verdict that says why [default:
     /// 1m,5deg]
     #[arg(long, value_name = "METRES,DEGREES")]
@@ -318,7 +322,11 @@ impl ProtocolArgs {
             [] => &defaults.methods,
             wanted => wanted,
         };
-        let others: Vec<Method> = self.estimates.iter().map(|file| file.method).collect();
+        let estimates = match self.estimates.as_slice() {
+            [] => defaults.estimates,
+            given => given.to_vec(),
+        };
+        let others: Vec<Method> = estimates.iter().map(|file| file.method).collect();
         check_known(wanted, &others)?;
         if let Some(twice) = (1..others.len()).find(|&at| others[..at].contains(&others[at])) {
             let message = format!("--estimates {} is given twice", others[twice]);
@@ -333,11 +341,11 @@ impl ProtocolArgs {
                 [] => defaults.fusions,
                 wanted => wanted.to_vec(),
             },
-            seed: self.seed,
+            seed: self.seed.unwrap_or(defaults.seed),
             right: self.right.unwrap_or(defaults.right),
             accept: self.accept.or(defaults.accept),
             explain: self.explain.unwrap_or(defaults.explain),
-            estimates: self.estimates.clone(),
+            estimates,
             matches: self.matches.clone().or(defaults.matches),
             gps: self.gps.clone().or(defaults.gps),
             degrade: self.degrade.unwrap_or(defaults.degrade),

@@ -1,10 +1,16 @@
 //! `posescope eval`: an experiment over many queries, into a run folder.
 
+mod again;
+mod sweep;
+
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::localize::{Ranking, Selection};
-use posescope::measure::{Change, Gate, Report, RunComparison, Tolerance, read_rows, write_report};
+use posescope::measure::{
+    Change, Gate, Report, Row, RunComparison, Tolerance, read_rows, write_report,
+};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
@@ -37,7 +43,16 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
             .collect();
         check_known(&gated, &others)?;
     }
+    if let Some(before) = &args.failed
+        && !again::has_failed(before)?
+    {
+        eprintln!("No query failed in {}", before.display());
+        return Ok(());
+    }
     let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
+    if let Some(sweep) = &args.sweep {
+        return sweep::sweep(args, sweep, &folder, terminal);
+    }
     let run = if args.merge.is_empty() {
         execute(args, &folder, terminal)?
     } else {
@@ -48,12 +63,26 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     finish(args, &folder, &run, terminal)
 }
 
+/// What is asked, and of which scenes.
+struct Asked {
+    run: RunFile,
+    scenes: Scenes,
+    params: Params,
+}
+
 /// Beside each other below `runs`, named after what is asked.
 fn default_folder(args: &EvalArgs) -> PathBuf {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let mut name: String = args.scenes.join("-").chars().map(plain).collect();
     if let Some(experiment) = args.experiment {
         name = format!("{name}-{experiment}").to_lowercase();
+    }
+    if let Some(failed) = &args.failed {
+        let run = failed.file_name().unwrap_or_default().to_string_lossy();
+        name = format!("{run}-failed");
+    }
+    if let Some(sweep) = &args.sweep {
+        name = format!("{name}-{}", sweep.key());
     }
     if let Some(shard) = args.shard {
         name = format!("{name}-{}-of-{}", shard.number, shard.of);
@@ -62,12 +91,15 @@ fn default_folder(args: &EvalArgs) -> PathBuf {
 }
 
 fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFile, CliError> {
-    let params = args.protocol.config.resolve()?;
-    let scenes = Scenes {
-        references: open_all(&args.scenes, args)?,
-        queries: open_all(&args.queries, args)?,
+    let asked = match &args.failed {
+        Some(before) => again::asked(args, before)?,
+        None => asked(args)?,
     };
-    let run = describe(args, &scenes, &params)?;
+    let Asked {
+        run,
+        scenes,
+        params,
+    } = asked;
     let scenes = scenes.as_asked(&run.protocol)?;
     let indices = indices(args, &run, &scenes, &params)?;
     let mut folder = if args.resume {
@@ -102,6 +134,19 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
             Ok(run)
         }
     }
+}
+
+fn asked(args: &EvalArgs) -> Result<Asked, CliError> {
+    let params = args.protocol.config.resolve()?;
+    let scenes = Scenes {
+        references: open_all(&args.scenes, args)?,
+        queries: open_all(&args.queries, args)?,
+    };
+    Ok(Asked {
+        run: describe(args, &scenes, &params)?,
+        scenes,
+        params,
+    })
 }
 
 /// The command line that goes on with this run.
@@ -213,6 +258,26 @@ fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     Ok(pairs)
 }
 
+/// A run with what follows from its results, and why it is not good enough.
+struct Judged {
+    report: Report,
+    failures: Vec<String>,
+}
+
+impl Judged {
+    /// Writes what follows from the results, and holds the gates against them.
+    fn of(args: &EvalArgs, folder: &Path, run: &RunFile) -> Result<Self, CliError> {
+        let report = write_report(folder, run, &args.gate)?;
+        let failures = report
+            .gate_results
+            .iter()
+            .filter(|gate_result| !gate_result.passed)
+            .map(|gate_result| format!("gate `{}` failed: {}", gate_result.gate, gate_result.found))
+            .collect();
+        Ok(Self { report, failures })
+    }
+}
+
 /// Writes what follows from the results, shows it, and says whether it is good enough.
 fn finish(
     args: &EvalArgs,
@@ -220,29 +285,25 @@ fn finish(
     run: &RunFile,
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let gates: Vec<Gate> = args.gate.clone();
-    let report = write_report(folder, run, &gates)?;
+    let Judged {
+        report,
+        mut failures,
+    } = Judged::of(args, folder, run)?;
     if !terminal.is_quiet() {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
-    let mut failures: Vec<String> = report
-        .gate_results
-        .iter()
-        .filter(|gate_result| !gate_result.passed)
-        .map(|gate_result| format!("gate `{}` failed: {}", gate_result.gate, gate_result.found))
-        .collect();
-    if let Some(baseline) = &args.baseline {
-        let comparison = against(baseline, folder, run)?;
+    if let Some(before) = args.baseline.as_ref().or(args.failed.as_ref()) {
+        let comparison = against(before, folder, run, args.failed.is_some())?;
         if !terminal.is_quiet() {
             output::print(&diff::shown(&comparison, terminal.width()).trim_end())?;
         }
-        diff::record(&comparison, (baseline, folder), None, terminal)?;
+        diff::record(&comparison, (before, folder), None, terminal)?;
         if comparison.is_regression() {
             let broken = comparison.count(Change::Broken);
             failures.push(format!(
                 "{broken} queries broken since {}",
-                baseline.display()
+                before.display()
             ));
         }
     }
@@ -272,11 +333,23 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
     Ok(())
 }
 
-fn against(baseline: &Path, folder: &Path, run: &RunFile) -> Result<RunComparison, CliError> {
-    let before = read_run(baseline)?;
+/// What changed since the run before; `only_again` leaves out of it what was not asked again.
+fn against(
+    before: &Path,
+    folder: &Path,
+    run: &RunFile,
+    only_again: bool,
+) -> Result<RunComparison, CliError> {
+    let radius_before_m = read_run(before)?.failure_radius_m;
+    let (mut rows_before, rows) = (read_rows(before)?, read_rows(folder)?);
+    if only_again {
+        let key = |row: &Row| [row.scene.clone(), row.query.clone()];
+        let again: BTreeSet<_> = rows.iter().map(key).collect();
+        rows_before.retain(|row| again.contains(&key(row)));
+    }
     Ok(RunComparison::of(
-        (&read_rows(baseline)?, before.failure_radius_m),
-        (&read_rows(folder)?, run.failure_radius_m),
+        (&rows_before, radius_before_m),
+        (&rows, run.failure_radius_m),
         &Tolerance::default(),
     ))
 }

@@ -52,7 +52,7 @@ struct RecordingBudget {
 impl RecordingBudget {
     fn new(args: &EvalArgs) -> Self {
         Self {
-            recordings: args.max_recordings,
+            recordings: args.recordings(),
             bytes: args.max_recording_mb.saturating_mul(1 << 20),
             is_full: false,
         }

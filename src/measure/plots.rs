@@ -24,11 +24,12 @@ const COLORS: [(Method, RGBColor); 4] = [
 ];
 
 /// One line of a plot.
-struct Line {
+#[derive(Debug)]
+pub(super) struct Line {
     /// Whose line it is, which says its colour.
-    method: Method,
+    pub(super) method: Method,
     /// Its corners.
-    points: Vec<(f64, f64)>,
+    pub(super) points: Vec<(f64, f64)>,
 }
 
 /// The success rate over what the experiment varies, the recall over the translation error, what went
@@ -81,6 +82,11 @@ pub fn plots(run: &RunFile, measures: &[Measures], rows: &[Row]) -> Vec<Plot> {
         }
     }
     all
+}
+
+/// Dotted lines over a setting; what is a share of a hundred has an axis up to there.
+pub(super) fn curves(x_axis: &str, y_axis: &str, lines: &[Line]) -> Result<String, String> {
+    draw(x_axis, y_axis, lines, true)
 }
 
 fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
@@ -165,11 +171,18 @@ fn draw_into(
     };
     let (least, most) = (xs().fold(f64::INFINITY, f64::min), xs().fold(0.0, f64::max));
     let least = if least.is_finite() { least } else { 0.0 };
+    let highest = match y_axis.ends_with("(%)") {
+        true => 100.0,
+        false => {
+            let ys = lines.iter().flat_map(|line| &line.points);
+            1.1 * ys.map(|point| point.1).fold(1e-3, f64::max)
+        }
+    };
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(36)
         .y_label_area_size(44)
-        .build_cartesian_2d(least..most.max(least + 1e-3), 0.0..100.0)?;
+        .build_cartesian_2d(least..most.max(least + 1e-3), 0.0..highest)?;
     chart
         .configure_mesh()
         .x_desc(x_axis)

@@ -2,7 +2,7 @@
 //! `plots/`. All of it follows from `run.toml` and `results.jsonl`, so that it can be written again.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -63,16 +63,7 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
     let text = markdown(run, &tables, &gate_results);
     write(&folder.join("summary.md"), text.as_bytes())?;
     for table in &tables {
-        let path = |extension: &str| {
-            folder
-                .join("tables")
-                .join(format!("{}.{extension}", table.name))
-        };
-        let csv = table.csv();
-        let csv = csv.map_err(|error| FolderError::io(path("csv"))(error.into()))?;
-        write(&path("md"), table.markdown().as_bytes())?;
-        write(&path("csv"), &csv)?;
-        write(&path("tex"), table.latex().as_bytes())?;
+        write_table(folder, table)?;
     }
     for (name, svg) in plots::plots(run, &measures, &rows) {
         let path = folder.join("plots").join(format!("{name}.svg"));
@@ -89,7 +80,21 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
     })
 }
 
-fn write(path: &PathBuf, bytes: &[u8]) -> Result<(), FolderError> {
+/// Writes a table into the run folder's `tables/` in each of its forms.
+pub(super) fn write_table(folder: &Path, table: &Table) -> Result<(), FolderError> {
+    let path = |extension: &str| {
+        folder
+            .join("tables")
+            .join(format!("{}.{extension}", table.name))
+    };
+    let csv = table.csv();
+    let csv = csv.map_err(|error| FolderError::io(path("csv"))(error.into()))?;
+    write(&path("md"), table.markdown().as_bytes())?;
+    write(&path("csv"), &csv)?;
+    write(&path("tex"), table.latex().as_bytes())
+}
+
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     if let Some(parent) = path.parent() {
         fs::create_dir_all(parent).map_err(FolderError::io(parent))?;
     }

@@ -44,6 +44,29 @@ pub struct QueryCamera {
     pub cy: f64,
 }
 
+impl ScenePair {
+    /// The pair with those of its queries that are wanted.
+    #[must_use]
+    pub fn only(&self, is_wanted: impl Fn(&str) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.queries.len())
+            .filter(|&at| is_wanted(&self.queries[at]))
+            .collect();
+        fn those<T: Clone>(kept: &[usize], all: &[T]) -> Vec<T> {
+            kept.iter().filter_map(|&at| all.get(at).cloned()).collect()
+        }
+        Self {
+            camera: match kept.first().and_then(|&at| self.cameras.get(at)) {
+                Some(first) => *first,
+                None => self.camera,
+            },
+            cameras: those(&kept, &self.cameras),
+            queries: those(&kept, &self.queries),
+            times_s: those(&kept, &self.times_s),
+            ..self.clone()
+        }
+    }
+}
+
 /// When the queries of a scene were taken, if that is known of all.
 pub(super) fn times_of(scene: &dyn Scene, queries: &[usize]) -> Vec<f64> {
     let times: Option<Vec<f64>> = queries.iter().map(|&frame| scene.time_s(frame)).collect();

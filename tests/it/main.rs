@@ -49,6 +49,7 @@ mod small_sequence;
 mod space;
 mod stored;
 mod surf_warp;
+mod sweep;
 mod synth;
 mod terminal;
 mod triage;

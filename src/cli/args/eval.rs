@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use posescope::measure::Gate;
-use posescope::run::{Experiment, PaperProtocol, Protocol, Shard};
+use posescope::run::{Experiment, PaperProtocol, Protocol, Shard, Sweep};
 
 use super::{ProtocolArgs, positive, share};
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct EvalArgs {
     /// Where the references are, as in `run`; several scenes are evaluated one after the other
-    #[arg(value_name = "SCENE", required_unless_present = "merge")]
+    #[arg(value_name = "SCENE", required_unless_present_any = ["merge", "failed"])]
     pub scenes: Vec<String>,
     /// Take the queries from this scene in the same world frame; repeatable: every scene of
     /// references is paired with every one of queries
@@ -66,6 +66,25 @@ pub struct EvalArgs {
     /// Instead of running: bring all parts of a run together in one folder
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "scenes", requires = "out")]
     pub merge: Vec<PathBuf>,
+    /// Run the evaluation at each of these values of a parameter or of a step of --degrade, into a folder
+    /// of its own below --out, and draw success and error over them: gamma=0.2:1:0.1,
+    /// fb.ratio=0.5:0.9:0.05
+    #[arg(
+        long,
+        value_name = "KEY=FROM:TO:STEP",
+        conflicts_with_all = ["merge", "shard", "baseline", "failed"]
+    )]
+    pub sweep: Option<Sweep>,
+    /// Run the queries that failed in this run, as it asked but for what is given here, such as --set; ends
+    /// with what changed, and with exit code 1 if anything broke
+    #[arg(
+        long,
+        value_name = "RUN",
+        conflicts_with_all = [
+            "scenes", "merge", "baseline", "queries", "experiment", "queries_share", "limit", "paper"
+        ]
+    )]
+    pub failed: Option<PathBuf>,
     /// Exit with code 1 unless this holds, such as \"success@mi >= 0.9\" or
     /// \"recall@0.5m,5deg@fb >= 0.8\"; repeatable
     #[arg(long, value_name = "CONDITION")]
@@ -73,10 +92,18 @@ pub struct EvalArgs {
     /// Exit with code 1 if a query fails that succeeded in this run
     #[arg(long, value_name = "RUN")]
     pub baseline: Option<PathBuf>,
-    /// Keep recordings of at most as many failures
-    #[arg(long, value_name = "N", default_value_t = 20)]
-    pub max_recordings: usize,
+    /// Keep recordings of at most as many failures [default: 20; with --sweep 0]
+    #[arg(long, value_name = "N")]
+    pub max_recordings: Option<usize>,
     /// Keep recordings of failures of at most this size together [MB]
     #[arg(long, value_name = "MB", default_value_t = 500)]
     pub max_recording_mb: u64,
+}
+
+impl EvalArgs {
+    /// How many recordings of failures are kept.
+    pub fn recordings(&self) -> usize {
+        let default = if self.sweep.is_some() { 0 } else { 20 };
+        self.max_recordings.unwrap_or(default)
+    }
 }

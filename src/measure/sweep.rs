@@ -1,0 +1,172 @@
+//! How results follow a setting: a table and robustness curves over its values.
+
+use std::path::Path;
+
+use super::metrics::{Group, Measures};
+use super::plots;
+use super::report::{write, write_table};
+use super::table::Table;
+use super::tables::slug;
+use crate::run::{FolderError, Sweep};
+
+/// The figures of one value of a sweep.
+#[derive(Clone, Debug)]
+pub struct SweptRun {
+    /// The value as it was set.
+    pub value: String,
+    /// What the methods made of the queries.
+    pub measures: Vec<Measures>,
+}
+
+/// Writes `summary.md`, `tables/sweep.*` and, for each group of results, `plots/success-*.svg` and
+/// `plots/median-*.svg` into the folder that holds the runs of all values.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Table, FolderError> {
+    let table = table(sweep, runs);
+    write_table(folder, &table)?;
+    let mut summary = format!("# {sweep}\n\n{}", table.markdown());
+    let axis = match sweep.unit() {
+        "" => sweep.key().to_owned(),
+        unit => format!("{} ({unit})", sweep.key()),
+    };
+    for group in groups(runs) {
+        for (what, label, figure) in CURVES {
+            let name = match groups(runs).len() {
+                1 => what.to_owned(),
+                _ => format!("{what}-{}", slug(&group.to_string())),
+            };
+            let points = |one: &Measures| figure(one);
+            let curves = curves(runs, group, &points);
+            let path = folder.join("plots").join(format!("{name}.svg"));
+            let svg = plots::curves(&axis, label, &curves);
+            let svg = svg.map_err(|why| FolderError::io(&path)(std::io::Error::other(why)))?;
+            write(&path, svg.as_bytes())?;
+            summary += &format!("\n![{label} over {axis}, {group}](plots/{name}.svg)\n");
+        }
+    }
+    write(&folder.join("summary.md"), summary.as_bytes())?;
+    Ok(table)
+}
+
+/// What is drawn over the values: its name in files, its axis, and how it is read off.
+type Curve = (&'static str, &'static str, fn(&Measures) -> Option<f64>);
+
+const CURVES: [Curve; 2] = [
+    ("success", "success rate (%)", |one| {
+        Some(100.0 * one.success_rate)
+    }),
+    ("median", "median error of successes (m)", |one| {
+        one.of_successes.median_m
+    }),
+];
+
+/// The groups of all runs, in the order in which they first appear.
+fn groups(runs: &[SweptRun]) -> Vec<&Group> {
+    let mut groups: Vec<&Group> = Vec::new();
+    for one in runs.iter().flat_map(|run| &run.measures) {
+        if !groups.contains(&&one.group) {
+            groups.push(&one.group);
+        }
+    }
+    groups
+}
+
+/// A line per method, from the least value to the greatest. Where there is no figure it has no point.
+fn curves(
+    runs: &[SweptRun],
+    group: &Group,
+    figure: &dyn Fn(&Measures) -> Option<f64>,
+) -> Vec<plots::Line> {
+    let mut lines: Vec<plots::Line> = Vec::new();
+    for run in runs {
+        let Ok(x) = run.value.parse::<f64>() else {
+            continue;
+        };
+        for one in run.measures.iter().filter(|one| one.group == *group) {
+            let Some(y) = figure(one) else { continue };
+            match lines.iter_mut().find(|line| line.method == one.method) {
+                Some(line) => line.points.push((x, y)),
+                None => lines.push(plots::Line {
+                    method: one.method,
+                    points: vec![(x, y)],
+                }),
+            }
+        }
+    }
+    lines
+}
+
+fn table(sweep: &Sweep, runs: &[SweptRun]) -> Table {
+    let mut header = vec![sweep.key().to_owned()];
+    let several = groups(runs).len() > 1;
+    header.extend(several.then(|| "where".to_owned()));
+    header.extend(
+        [
+            "method",
+            "queries",
+            "success (%)",
+            "median (m)",
+            "median max Euler (°)",
+            "within 0.5 m, 5° (%)",
+        ]
+        .map(str::to_owned),
+    );
+    let caption = format!("Success and median error of successes over {}", sweep.key());
+    let mut table = Table::new("sweep", caption, header);
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
+    };
+    for run in runs {
+        for one in &run.measures {
+            let mut cells = vec![run.value.clone()];
+            cells.extend(several.then(|| one.group.to_string()));
+            cells.extend([
+                one.method.to_string(),
+                one.queries.to_string(),
+                number(Some(100.0 * one.success_rate), 1),
+                number(one.of_successes.median_m, 3),
+                number(one.of_successes.median_deg, 2),
+                number(one.recall.map(|recall| 100.0 * recall[1]), 1),
+            ]);
+            table.push(cells);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::{measure, tests::row};
+    use super::*;
+
+    fn runs() -> Vec<SweptRun> {
+        let run = |value: &str, error: Option<f64>| SweptRun {
+            value: value.to_owned(),
+            measures: measure(&[row("a", "fb", error), row("a", "mi", Some(0.5))], 10.0),
+        };
+        vec![run("0.5", Some(0.25)), run("1.0", None)]
+    }
+
+    #[test]
+    fn a_line_has_a_point_for_each_value_with_a_figure() {
+        let runs = runs();
+        let group = groups(&runs)[0];
+        let medians = curves(&runs, group, &|one| one.of_successes.median_m);
+        assert_eq!(medians[0].points, [(0.5, 0.25)]);
+        assert_eq!(medians[1].points, [(0.5, 0.5), (1.0, 0.5)]);
+        let successes = curves(&runs, group, &|one| Some(one.success_rate));
+        assert_eq!(successes[0].points, [(0.5, 1.0), (1.0, 0.0)]);
+    }
+
+    #[test]
+    fn the_table_has_a_row_per_value_and_method() {
+        let sweep = "fb.ratio=0.5:1:0.5".parse().expect("a sweep");
+        let table = table(&sweep, &runs());
+        assert_eq!(table.header[..2], ["fb.ratio", "method"]);
+        let row = |at: usize| table.rows[at].join(" ");
+        assert_eq!(row(0), "0.5 fb 1 100.0 0.250 0.25 100.0");
+        assert_eq!(row(2), "1.0 fb 1 0.0 – – 0.0");
+    }
+}
