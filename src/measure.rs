@@ -7,6 +7,7 @@ mod export;
 mod gate;
 #[cfg(feature = "cli")]
 mod junit;
+mod known;
 mod metrics;
 mod paper;
 #[cfg(feature = "cli")]
@@ -19,12 +20,15 @@ mod sweep;
 mod table;
 #[cfg(feature = "cli")]
 mod tables;
+#[cfg(feature = "cli")]
+mod timings;
 mod triage;
 
 pub use diff::{Change, Difference, RunComparison, Tolerance};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
 pub use gate::{Gate, GateResult};
+pub use known::{KnownError, KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
 pub use paper::{FigureKey, figure as paper_figure};
 #[cfg(feature = "cli")]

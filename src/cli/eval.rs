@@ -1,6 +1,7 @@
 //! `posescope eval`: an experiment over many queries, into a run folder.
 
 mod again;
+mod step_summary;
 mod sweep;
 
 use std::collections::BTreeSet;
@@ -9,7 +10,7 @@ use std::sync::Arc;
 
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{
-    Change, Gate, Report, Row, RunComparison, Tolerance, read_rows, write_report,
+    Change, Gate, KnownFailures, Report, Row, RunComparison, Tolerance, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -43,6 +44,8 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
             .collect();
         check_known(&gated, &others)?;
     }
+    // Before anything is run for a list that nobody can read.
+    known_failures(args)?;
     if let Some(before) = &args.failed
         && !again::has_failed(before)?
     {
@@ -258,23 +261,36 @@ fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     Ok(pairs)
 }
 
+fn known_failures(args: &EvalArgs) -> Result<KnownFailures, CliError> {
+    match &args.known_failures {
+        Some(path) => Ok(KnownFailures::read(path)?),
+        None => Ok(KnownFailures::default()),
+    }
+}
+
 /// A run with what follows from its results, and why it is not good enough.
 struct Judged {
     report: Report,
+    known: KnownFailures,
     failures: Vec<String>,
 }
 
 impl Judged {
     /// Writes what follows from the results, and holds the gates against them.
     fn of(args: &EvalArgs, folder: &Path, run: &RunFile) -> Result<Self, CliError> {
-        let report = write_report(folder, run, &args.gate)?;
+        let known = known_failures(args)?;
+        let report = write_report(folder, run, &args.gate, &known)?;
         let failures = report
             .gate_results
             .iter()
             .filter(|gate_result| !gate_result.passed)
             .map(|gate_result| format!("gate `{}` failed: {}", gate_result.gate, gate_result.found))
             .collect();
-        Ok(Self { report, failures })
+        Ok(Self {
+            report,
+            known,
+            failures,
+        })
     }
 }
 
@@ -287,26 +303,36 @@ fn finish(
 ) -> Result<(), CliError> {
     let Judged {
         report,
+        known,
         mut failures,
     } = Judged::of(args, folder, run)?;
     if !terminal.is_quiet() {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
+    let mut compared = None;
     if let Some(before) = args.baseline.as_ref().or(args.failed.as_ref()) {
         let comparison = against(before, folder, run, args.failed.is_some())?;
         if !terminal.is_quiet() {
             output::print(&diff::shown(&comparison, terminal.width()).trim_end())?;
         }
         diff::record(&comparison, (before, folder), None, terminal)?;
-        if comparison.is_regression() {
-            let broken = comparison.count(Change::Broken);
-            failures.push(format!(
-                "{broken} queries broken since {}",
-                before.display()
-            ));
+        let changes = comparison.differences.iter();
+        let broken = changes.filter(|one| one.change == Change::Broken);
+        let news = broken.filter(|one| !known.has(&one.after, run.failure_radius_m));
+        let news = news.count();
+        if news > 0 {
+            failures.push(format!("{news} queries broken since {}", before.display()));
         }
+        compared = Some(comparison);
     }
+    step_summary::append(&step_summary::of_run(
+        run,
+        folder,
+        &report,
+        compared.as_ref(),
+        &failures,
+    ));
     if failures.is_empty() {
         return Ok(());
     }
@@ -329,6 +355,14 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
             "{verdict}: {}: {}",
             gate_result.gate, gate_result.found
         ))?;
+    }
+    let known = &report.known;
+    if known.still > 0 {
+        let count = known.still;
+        output::print(&format!("{count} known failures are left out of gates"))?;
+    }
+    for line in known.fixed.iter().chain(&known.other) {
+        output::print(line)?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::ChoiceError;
+use posescope::measure::KnownError;
 use posescope::run::{DrawError, FolderError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::session::JobError;
@@ -43,6 +44,8 @@ pub enum CliError {
     Choice(#[from] ChoiceError),
     #[error(transparent)]
     Folder(#[from] FolderError),
+    #[error(transparent)]
+    Known(#[from] KnownError),
     #[error(transparent)]
     Draw(#[from] DrawError),
     #[error(transparent)]
@@ -102,6 +105,7 @@ impl CliError {
             | Self::NoReference(_)
             | Self::Index(_)
             | Self::Choice(_)
+            | Self::Known(_)
             | Self::Draw(_)
             | Self::Folder(_)
             | Self::Unhealthy(_)

@@ -3,17 +3,25 @@
 use std::str::FromStr;
 
 use super::metrics::Measures;
+use crate::code::Code;
 use crate::method::Method;
 
 /// What a gate looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Metric {
     Success,
-    Recall { metres: f64, degrees: f64 },
+    Recall {
+        metres: f64,
+        degrees: f64,
+    },
     MedianMetres,
     MedianDegrees,
     RmseMetres,
     RmseDegrees,
+    /// Share of the queries with this primary verdict.
+    Share(Code),
+    MedianConfidence,
+    MedianSeconds,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +32,7 @@ enum Relation {
     Below,
 }
 
-/// A condition such as `success@mi >= 0.9` or `recall@0.5m,5deg@fb >= 0.8`.
+/// A condition such as `success@mi >= 0.9`, `recall@0.5m,5deg@fb >= 0.8` or `share(D3)@mi <= 0.05`.
 ///
 /// It holds where it holds in every group of the run: for each scene, setting and fusion.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,8 +62,8 @@ impl FromStr for Gate {
         let expected = || {
             format!(
                 "`{text}`: METRIC@METHOD >= NUMBER expected, where METRIC is success, \
-                 recall@0.5m,5deg, median_m, median_deg, rmse_m or rmse_deg, and the comparison \
-                 >=, >, <= or <"
+                 recall@0.5m,5deg, median_m, median_deg, rmse_m, rmse_deg, share(CODE) of a verdict, \
+                 median(confidence) or median(time) in seconds, and the comparison >=, >, <= or <"
             )
         };
         let (sign, relation) = [
@@ -91,6 +99,12 @@ fn metric_of(text: &str) -> Option<Metric> {
         "median_deg" => Metric::MedianDegrees,
         "rmse_m" => Metric::RmseMetres,
         "rmse_deg" => Metric::RmseDegrees,
+        "median(confidence)" => Metric::MedianConfidence,
+        "median(time)" => Metric::MedianSeconds,
+        _ if text.starts_with("share(") => {
+            let code = text.strip_prefix("share(")?.strip_suffix(')')?;
+            Metric::Share(code.parse().ok()?)
+        }
         _ => {
             let (metres, degrees) = text.strip_prefix("recall@")?.split_once(',')?;
             Metric::Recall {
@@ -150,13 +164,19 @@ impl Gate {
             Metric::MedianDegrees => errors.median_deg,
             Metric::RmseMetres => errors.rmse_m,
             Metric::RmseDegrees => errors.rmse_deg,
+            Metric::Share(code) => {
+                let count = measures.verdicts.get(&code).copied();
+                Some(measures.share(count.unwrap_or(0)))
+            }
+            Metric::MedianConfidence => measures.median_confidence,
+            Metric::MedianSeconds => measures.median_s,
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::{measure, tests::rows};
+    use super::super::metrics::{Finding, TrustOfRow, measure, tests::rows};
     use super::*;
 
     fn passes(gate: &str) -> bool {
@@ -177,6 +197,35 @@ mod tests {
     }
 
     #[test]
+    fn verdicts_confidence_and_time_have_gates() {
+        let mut rows = rows();
+        for (at, row) in rows
+            .iter_mut()
+            .filter(|row| row.method == Method::MI)
+            .enumerate()
+        {
+            row.seconds = Some(at as f64);
+            row.trust = (at > 0).then_some(TrustOfRow {
+                probability: Some(0.9 + 0.01 * at as f64),
+            });
+            row.diagnosis
+                .extend((at == 3).then_some(Finding { code: Code::D3 }));
+        }
+        let passes = |gate: &str| {
+            let gate: Gate = gate.parse().expect("a gate");
+            gate.check(&measure(&rows, 10.0)).passed
+        };
+        assert!(passes("share(D3)@mi <= 0.25"));
+        assert!(!passes("share(D3)@mi < 0.25"));
+        assert!(passes("share(D2)@mi <= 0"));
+        assert!(passes("median(time)@mi <= 1.5") && !passes("median(time)@mi < 1.5"));
+        assert!(passes("median(confidence)@mi >= 0.92"));
+        assert!(!passes("median(confidence)@mi > 0.92"));
+        // What was not measured passes no gate.
+        assert!(!passes("median(time)@fb < 1000"));
+    }
+
+    #[test]
     fn nonsense_is_refused_with_what_was_expected() {
         for wrong in [
             "success >= 0.9",
@@ -185,6 +234,9 @@ mod tests {
             "recall@0.5,5@fb >= 1",
             "success@fb >= much",
             "success@fb >= nan",
+            "share(D99)@mi <= 1",
+            "share(D3 @mi <= 1",
+            "median(speed)@mi <= 1",
             "",
         ] {
             let error = wrong.parse::<Gate>().expect_err(wrong);

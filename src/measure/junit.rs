@@ -5,7 +5,8 @@ use std::path::Path;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::gate::GateResult;
-use super::metrics::Row;
+use super::known::KnownFailures;
+use super::metrics::{Finding, Row};
 use crate::diagnosis::Diagnosis;
 use crate::fusion::Fusion;
 use crate::localize::{Reason, Setting};
@@ -30,6 +31,7 @@ pub fn junit(
     folder: &Path,
     run: &RunFile,
     gate_results: &[GateResult],
+    known: &KnownFailures,
 ) -> Result<String, FolderError> {
     let mut report = Report::new("posescope");
     // Results come by query; a suite holds those of a method.
@@ -40,6 +42,12 @@ pub fn junit(
             reason,
             diagnosis,
         } = case?;
+        let row = Row {
+            diagnosis: (diagnosis.iter())
+                .map(|one| Finding { code: one.code })
+                .collect(),
+            ..row
+        };
         let mut name = row.scene.clone();
         if let Some(queries) = &row.query_scene {
             name += &format!(" ← {queries}");
@@ -48,6 +56,9 @@ pub fn junit(
         let verdict = row.verdict(run.failure_radius_m);
         let status = match (diagnosis.first(), &reason) {
             _ if verdict.is_success() => TestCaseStatus::success(),
+            _ if known.has(&row, run.failure_radius_m) => {
+                skipped(&verdict.words(row.error.as_ref()))
+            }
             (Some(primary), _) => failure(primary.code.name(), &primary.text),
             (None, Some(reason)) => failure(reason.code.name(), &reason.text),
             (None, None) => failure("far", &verdict.words(row.error.as_ref())),
@@ -82,6 +93,12 @@ pub fn junit(
 fn failure(kind: &str, message: &str) -> TestCaseStatus {
     let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
     status.set_type(kind).set_message(message);
+    status
+}
+
+fn skipped(message: &str) -> TestCaseStatus {
+    let mut status = TestCaseStatus::skipped();
+    status.set_type("known failure").set_message(message);
     status
 }
 

@@ -52,6 +52,20 @@ pub struct Row {
     /// What the cost was like, if a cost was minimised.
     #[serde(default)]
     pub cost: Option<CostOfRow>,
+    /// How far the pose is to be believed.
+    #[serde(default)]
+    pub trust: Option<TrustOfRow>,
+    /// How long the method took \[s\], where that was asked for; no result says it.
+    #[serde(skip)]
+    pub seconds: Option<f64>,
+}
+
+/// What the statistics want to know of a pose's trust.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrustOfRow {
+    /// The probability of being within 1 m.
+    #[serde(default)]
+    pub probability: Option<f64>,
 }
 
 /// What the statistics want to know of a cost.
@@ -219,6 +233,12 @@ pub struct Measures {
     /// What chance alone would reach; nothing where the truth is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chance: Option<Chance>,
+    /// Median probability of being within 1 m, over the poses that have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub median_confidence: Option<f64>,
+    /// Median time of the method \[s\]; a summary holds no clock.
+    #[serde(skip)]
+    pub median_s: Option<f64>,
     /// Every error, failures as infinite, for limits of one's own; nothing without truth.
     #[serde(skip)]
     pub errors: Option<Vec<(f64, f64)>>,
@@ -287,6 +307,14 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
         };
         let success = |row: &Row| row.is_success(failure_radius_m);
         let count = |wanted: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| wanted(row)).count();
+        let median_of = |figure: &dyn Fn(&Row) -> Option<f64>| {
+            median(
+                &rows
+                    .iter()
+                    .filter_map(|row| figure(row))
+                    .collect::<Vec<_>>(),
+            )
+        };
         // A pose without an error is one whose truth is not known.
         let has_truth = rows
             .iter()
@@ -315,6 +343,8 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
                 }),
                 failure_radius_m,
             ),
+            median_confidence: median_of(&|row| row.trust?.probability),
+            median_s: median_of(&|row| row.seconds),
             errors: has_truth.then(|| rows.iter().map(error).collect()),
         };
         for primary in rows.iter().filter_map(|row| row.diagnosis.first()) {
@@ -354,6 +384,8 @@ pub(super) mod tests {
             diagnosis: Vec::new(),
             references: vec!["000000".to_owned()],
             cost: None,
+            trust: None,
+            seconds: None,
         }
     }
 

@@ -7,8 +7,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::gate::{Gate, GateResult};
+use super::known::{KnownFailures, KnownReport};
 use super::metrics::{Measures, Row, measure};
 use super::table::Table;
+use super::timings::add_times;
 use super::{junit, plots, tables};
 use crate::run::RunFile;
 use crate::run::{FolderError, read_results};
@@ -24,6 +26,8 @@ pub struct Report {
     pub measures: Vec<Measures>,
     /// What became of the gates.
     pub gate_results: Vec<GateResult>,
+    /// What became of failures that are known.
+    pub known: KnownReport,
     /// The tables, the overview first.
     pub tables: Vec<Table>,
 }
@@ -47,10 +51,21 @@ pub fn read_rows(folder: &Path) -> Result<Vec<Row>, FolderError> {
 ///
 /// # Errors
 /// When a result cannot be read or a file not be written.
-pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Report, FolderError> {
-    let rows = read_rows(folder)?;
-    let measures = measure(&rows, run.failure_radius_m);
-    let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&measures)).collect();
+pub fn write_report(
+    folder: &Path,
+    run: &RunFile,
+    gates: &[Gate],
+    known: &KnownFailures,
+) -> Result<Report, FolderError> {
+    let mut rows = read_rows(folder)?;
+    add_times(folder, &mut rows)?;
+    let radius_m = run.failure_radius_m;
+    let measures = measure(&rows, radius_m);
+    let mut gated = rows.clone();
+    gated.retain(|row| !known.has(row, radius_m));
+    let gated = measure(&gated, radius_m);
+    let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&gated)).collect();
+    let known_report = known.report(&rows, radius_m);
     let tables = tables::tables(run, &measures);
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
@@ -60,7 +75,7 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
     write(&folder.join("summary.json"), &json)?;
-    let text = markdown(run, &tables, &gate_results);
+    let text = markdown(run, &tables, &gate_results, &known_report);
     write(&folder.join("summary.md"), text.as_bytes())?;
     for table in &tables {
         write_table(folder, table)?;
@@ -71,11 +86,12 @@ pub fn write_report(folder: &Path, run: &RunFile, gates: &[Gate]) -> Result<Repo
         write(&path, svg.as_bytes())?;
     }
     let path = folder.join("junit.xml");
-    let xml = junit::junit(folder, run, &gate_results)?;
+    let xml = junit::junit(folder, run, &gate_results, known)?;
     write(&path, xml.as_bytes())?;
     Ok(Report {
         measures,
         gate_results,
+        known: known_report,
         tables,
     })
 }
@@ -101,7 +117,12 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     write_whole(path, bytes).map_err(FolderError::io(path))
 }
 
-fn markdown(run: &RunFile, tables: &[Table], gate_results: &[GateResult]) -> String {
+fn markdown(
+    run: &RunFile,
+    tables: &[Table],
+    gate_results: &[GateResult],
+    known: &KnownReport,
+) -> String {
     let scenes: Vec<String> = run
         .pairs
         .iter()
@@ -113,8 +134,13 @@ fn markdown(run: &RunFile, tables: &[Table], gate_results: &[GateResult]) -> Str
     let prior = run.protocol.prior_m.map_or(String::new(), |metres| {
         format!(" within {metres} m of the known position")
     });
+    let degradation = run.protocol.degrade;
+    let degraded = match degradation.is_none() {
+        true => String::new(),
+        false => format!(", photos of queries degraded by {degradation}"),
+    };
     let mut text = format!(
-        "# {}\n\n{} queries, references {}{prior}, seed {}; a pose {} m off or more is a failure.\n\n",
+        "# {}\n\n{} queries, references {}{prior}, seed {}{degraded}; a pose {} m off or more is a failure.\n\n",
         scenes.join(", "),
         run.plan().count(),
         run.protocol.references,
@@ -132,7 +158,13 @@ fn markdown(run: &RunFile, tables: &[Table], gate_results: &[GateResult]) -> Str
             gate_result.gate, gate_result.found
         );
     }
-    if !gate_results.is_empty() {
+    let still =
+        (known.still > 0).then(|| format!("{} known failures are left out of gates", known.still));
+    let news = known.fixed.iter().chain(&known.other);
+    for line in still.iter().chain(news) {
+        text += &format!("- {line}\n");
+    }
+    if !gate_results.is_empty() || *known != KnownReport::default() {
         text += "\n";
     }
     for table in tables {

@@ -166,7 +166,7 @@ mod tests {
         let table = table(&sweep, &runs());
         assert_eq!(table.header[..2], ["fb.ratio", "method"]);
         let row = |at: usize| table.rows[at].join(" ");
-        assert_eq!(row(0), "0.5 fb 1 100.0 0.250 0.25 100.0");
+        assert_eq!(row(0), "0.5 fb 1 100.0 0.250 0.12 100.0");
         assert_eq!(row(2), "1.0 fb 1 0.0 – – 0.0");
     }
 }

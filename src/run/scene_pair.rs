@@ -67,6 +67,12 @@ impl ScenePair {
     }
 }
 
+/// Whether a query goes by a name; numbers match whatever their leading zeros.
+pub fn is_called(query: &str, name: &str) -> bool {
+    let number = |text: &str| text.parse::<u64>().ok();
+    query == name || number(query).is_some() && number(query) == number(name)
+}
+
 /// When the queries of a scene were taken, if that is known of all.
 pub(super) fn times_of(scene: &dyn Scene, queries: &[usize]) -> Vec<f64> {
     let times: Option<Vec<f64>> = queries.iter().map(|&frame| scene.time_s(frame)).collect();

@@ -3,6 +3,7 @@
 mod bad_input;
 mod binary;
 mod card;
+mod ci;
 mod colmap;
 mod command_line;
 mod conformance;

@@ -85,10 +85,14 @@ pub struct EvalArgs {
         ]
     )]
     pub failed: Option<PathBuf>,
-    /// Exit with code 1 unless this holds, such as \"success@mi >= 0.9\" or
-    /// \"recall@0.5m,5deg@fb >= 0.8\"; repeatable
+    /// Exit with code 1 unless this holds, such as \"success@mi >= 0.9\", \"recall@0.5m,5deg@fb >= 0.8\",
+    /// \"share(D3)@mi <= 0.05\", \"median(confidence)@fb >= 0.9\" or \"median(time)@mi <= 2\" [s]; repeatable
     #[arg(long, value_name = "CONDITION")]
     pub gate: Vec<Gate>,
+    /// Failures that are known, which gates and --baseline leave out: `QUERY METHOD` or `QUERY METHOD CODE` a
+    /// line, comments behind #; one that is right now is said
+    #[arg(long, value_name = "FILE")]
+    pub known_failures: Option<PathBuf>,
     /// Exit with code 1 if a query fails that succeeded in this run
     #[arg(long, value_name = "RUN")]
     pub baseline: Option<PathBuf>,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use posescope::measure::{Row, read_rows};
 use posescope::params::Params;
-use posescope::run::{RunFile, ScenePair, Scenes, inputs, read_run};
+use posescope::run::{RunFile, ScenePair, Scenes, inputs, is_called, read_run};
 use posescope::scene::{self, Scene};
 
 use super::Asked;
@@ -91,10 +91,4 @@ fn failed(rows: &[Row], failure_radius_m: f64) -> BTreeSet<[String; 3]> {
 
 fn key(scene: &str, query_scene: &str, query: &str) -> [String; 3] {
     [scene, query_scene, query].map(str::to_owned)
-}
-
-/// Whether a query goes by a name; numbers match whatever their leading zeros.
-fn is_called(query: &str, name: &str) -> bool {
-    let number = |text: &str| text.parse::<u64>().ok();
-    query == name || number(query).is_some() && number(query) == number(name)
 }

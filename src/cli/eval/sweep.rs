@@ -6,7 +6,7 @@ use posescope::image::Degradation;
 use posescope::measure::{SweptRun, write_sweep};
 use posescope::run::Sweep;
 
-use super::{Judged, execute};
+use super::{Judged, execute, step_summary};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 use crate::cli::terminal::Terminal;
@@ -28,6 +28,7 @@ pub fn sweep(
         let Judged {
             report,
             failures: of_run,
+            ..
         } = Judged::of(args, &path, &run)?;
         failures.extend(
             of_run
@@ -40,6 +41,7 @@ pub fn sweep(
         });
     }
     let table = write_sweep(folder, sweep, &runs)?;
+    step_summary::append(&format!("{}\n", table.markdown()));
     if !terminal.is_quiet() {
         output::print(&figures::text(&table, terminal.width()))?;
         eprintln!(

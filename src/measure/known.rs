@@ -1,0 +1,234 @@
+//! Failures that are known: a list beside the code, so that a job is red for news only.
+
+use std::path::{Path, PathBuf};
+
+use super::metrics::Row;
+use crate::code::Code;
+use crate::method::Method;
+use crate::run::is_called;
+
+/// A list of queries that are known to fail: `QUERY METHOD` or `QUERY METHOD CODE` a line, with comments
+/// behind `#`.
+#[derive(Clone, Debug, Default)]
+pub struct KnownFailures {
+    path: PathBuf,
+    lines: Vec<KnownFailure>,
+}
+
+/// A line of the list.
+#[derive(Clone, Debug)]
+struct KnownFailure {
+    /// The line, from 1.
+    number: usize,
+    query: String,
+    method: Method,
+    /// With a code, the query may fail for this reason alone.
+    code: Option<Code>,
+}
+
+/// Why the list cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum KnownError {
+    /// The system says no.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        source: std::io::Error,
+    },
+    /// A line that is none.
+    #[error("{}:{line}: {message}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What was expected.
+        message: String,
+    },
+}
+
+/// What became of the known failures in a run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct KnownReport {
+    /// Results that failed as the list says.
+    pub still: usize,
+    /// What is right now and can be taken off the list, a line each.
+    pub fixed: Vec<String>,
+    /// What failed with another code than the list says, a line each.
+    pub other: Vec<String>,
+}
+
+impl KnownFailures {
+    /// Reads the list.
+    ///
+    /// # Errors
+    /// [`KnownError`] with file and line.
+    pub fn read(path: &Path) -> Result<Self, KnownError> {
+        let text = std::fs::read_to_string(path).map_err(|source| KnownError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        let mut lines = Vec::new();
+        for (index, line) in text.lines().enumerate() {
+            let words: Vec<&str> = line
+                .split('#')
+                .next()
+                .unwrap_or_default()
+                .split_whitespace()
+                .collect();
+            let wrong = |message: String| KnownError::Line {
+                path: path.to_owned(),
+                line: index + 1,
+                message,
+            };
+            let (query, method, code) = match words[..] {
+                [] => continue,
+                [query, method] => (query, method, None),
+                [query, method, code] => (query, method, Some(code)),
+                _ => {
+                    let count = words.len();
+                    let message =
+                        format!("QUERY METHOD or QUERY METHOD CODE expected, {count} words found");
+                    return Err(wrong(message));
+                }
+            };
+            lines.push(KnownFailure {
+                number: index + 1,
+                query: query.to_owned(),
+                method: Method::called(method).map_err(|error| wrong(error.to_string()))?,
+                code: match code {
+                    Some(code) => Some(code.parse().map_err(|error| wrong(format!("{error}")))?),
+                    None => None,
+                },
+            });
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            lines,
+        })
+    }
+
+    /// Whether the result is wrong in a way that the list knows.
+    pub fn has(&self, row: &Row, failure_radius_m: f64) -> bool {
+        is_wrong(row, failure_radius_m) && self.of(row).any(|line| line.allows(row))
+    }
+
+    /// What became of the list in a run.
+    pub fn report(&self, rows: &[Row], failure_radius_m: f64) -> KnownReport {
+        let wrong = |row: &&Row| is_wrong(row, failure_radius_m);
+        let known = |row: &&Row| self.has(row, failure_radius_m);
+        let mut report = KnownReport {
+            still: rows.iter().filter(known).count(),
+            ..KnownReport::default()
+        };
+        for line in &self.lines {
+            let of_line: Vec<&Row> = rows.iter().filter(|row| line.is_about(row)).collect();
+            let KnownFailure {
+                number,
+                query,
+                method,
+                code,
+            } = line;
+            let place = format!("{}:{number}", self.path.display());
+            if !of_line.is_empty() && !of_line.iter().any(|row| wrong(row)) {
+                let was = code.map_or(String::new(), |code| format!(" ({code})"));
+                let words = format!("{query} {method}{was} is right now; take it off {place}");
+                report.fixed.push(words);
+            }
+            let other = of_line.iter().copied().filter(wrong);
+            let other = other.filter(|row| !known(row));
+            let other = other.filter_map(|row| row.diagnosis.first());
+            for (found, code) in other.zip(code.iter().cycle()) {
+                let words = format!(
+                    "{query} {method} has {}, not {code} as in {place}",
+                    found.code
+                );
+                report.other.push(words);
+            }
+        }
+        report
+    }
+
+    fn of(&self, row: &Row) -> impl Iterator<Item = &KnownFailure> {
+        self.lines.iter().filter(|line| line.is_about(row))
+    }
+}
+
+impl KnownFailure {
+    fn is_about(&self, row: &Row) -> bool {
+        self.method == row.method && is_called(&row.query, &self.query)
+    }
+
+    fn allows(&self, row: &Row) -> bool {
+        let primary = row.diagnosis.first().map(|finding| finding.code);
+        self.code.is_none_or(|code| primary == Some(code))
+    }
+}
+
+/// Whether a result is a failure of the run or has a verdict that says what is wrong.
+fn is_wrong(row: &Row, failure_radius_m: f64) -> bool {
+    let primary = row.diagnosis.first();
+    !row.is_success(failure_radius_m) || primary.is_some_and(|finding| finding.code.is_failure())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::{Finding, tests::row};
+    use super::*;
+
+    fn read(text: &str) -> Result<KnownFailures, KnownError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("known.txt");
+        std::fs::write(&path, text).expect("writable");
+        KnownFailures::read(&path)
+    }
+
+    fn with_code(row: Row, code: &str) -> Row {
+        Row {
+            diagnosis: vec![Finding {
+                code: code.parse().expect("a code"),
+            }],
+            ..row
+        }
+    }
+
+    #[test]
+    fn a_line_knows_a_failure_by_query_method_and_code() {
+        let known = read("# ours\n70 mi D3 # the search\n\n000071 fb\n").expect("a list");
+        let far = |query, method| row(query, method, Some(50.0));
+        assert!(known.has(&with_code(far("000070", "mi"), "D3"), 10.0));
+        assert!(!known.has(&with_code(far("000070", "mi"), "D2"), 10.0));
+        assert!(!known.has(&far("000070", "fb"), 10.0));
+        assert!(known.has(&with_code(far("71", "fb"), "R3"), 10.0));
+        // Within the failure radius and wrong all the same, then right.
+        let near = row("000070", "mi", Some(2.0));
+        assert!(known.has(&with_code(near.clone(), "D3"), 10.0));
+        assert!(!known.has(&near, 10.0));
+    }
+
+    #[test]
+    fn what_is_right_now_and_what_fails_otherwise_is_said() {
+        let known = read("70 mi D3\n71 fb\n72 fb\n").expect("a list");
+        let rows = [
+            with_code(row("70", "mi", None), "D2"),
+            row("71", "fb", Some(0.1)),
+        ];
+        let report = known.report(&rows, 10.0);
+        assert_eq!(report.still, 0);
+        assert!(report.fixed[0].starts_with("71 fb is right now; take it off "));
+        assert!(report.fixed[0].ends_with("known.txt:2"));
+        assert!(report.other[0].starts_with("70 mi has D2, not D3 as in "));
+        assert_eq!((report.fixed.len(), report.other.len()), (1, 1));
+    }
+
+    #[test]
+    fn a_bad_line_is_told_with_its_number() {
+        let said = |text: &str| read(text).expect_err(text).to_string();
+        assert!(said("70 mi\n71\n").contains("known.txt:2: QUERY METHOD"));
+        assert!(said("70 m!\n").contains("known.txt:1: "));
+        assert!(said("70 mi D99\n").contains("D99"));
+        assert!(said("70 mi D3 because\n").contains("4 words found"));
+    }
+}
