@@ -161,7 +161,7 @@ fn a_place_is_guessed_on_the_empty_map_and_measured_afterwards() {
         "a panel each"
     );
 
-    window.get_by_label("Close").click();
+    window.get_by_label("Close the lesson").click();
     window.run_steps(3);
     assert!(!is_said(&window, "A small lesson"));
     press(&mut window, Modifiers::NONE, Key::PageDown);
