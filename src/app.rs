@@ -13,6 +13,7 @@ mod arrangement;
 mod camera;
 mod card;
 mod command;
+mod deciding;
 mod dispatch;
 mod headless;
 mod layout;

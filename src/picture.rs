@@ -2,9 +2,13 @@
 
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 
+#[cfg(feature = "app")]
+use crate::cost::Explanation;
 use crate::cost::{IntensityPair, JointHistogram, PhotometricWeights};
 use crate::image::Photo;
 use crate::palette;
+#[cfg(feature = "app")]
+use crate::render::Comparison;
 #[cfg(feature = "app")]
 use crate::render::SplattedPixel;
 use crate::render::SyntheticView;
@@ -15,6 +19,9 @@ const RESIDUAL_RANGE: f64 = 64.0;
 /// Contributions to mutual information from −2 to 2 nat have colours of their own.
 #[cfg(feature = "app")]
 const CONTRIBUTION_RANGE: f64 = 2.0;
+/// Side of the tiles that speak for one of two poses \[px\]: single pixels of two views hardly ever meet.
+#[cfg(feature = "app")]
+const TILE: u32 = 24;
 
 /// The grey of a pixel that the photometric cost ignored, and of one that it counted.
 pub(crate) const WEIGHT_GRAYS: [u8; 2] = [90, 255];
@@ -86,6 +93,66 @@ pub(crate) fn contributions(
         .map(|pair| pointwise[histogram.cell(pair)] / CONTRIBUTION_RANGE)
         .map(|share| Rgb(palette::diverging(share)));
     painted(view, Rgb(palette::NOTHING), values)
+}
+
+/// Which parts of the query speak for one of two poses, tile by tile: orange for the first, blue for the
+/// second, the stronger the more of the difference of the costs comes from there. `None` where one of the
+/// poses has no cost.
+#[cfg(feature = "app")]
+pub(crate) fn preference(
+    query: &GrayImage,
+    first: &Comparison,
+    second: &Comparison,
+) -> Option<RgbImage> {
+    let (width, height) = query.dimensions();
+    let columns = width.div_ceil(TILE);
+    let tile = |index: u32| ((index / width) / TILE * columns + (index % width) / TILE) as usize;
+    let mut balance = vec![0.0_f64; (columns * height.div_ceil(TILE)) as usize];
+    for (comparison, sign) in [(first, 1.0), (second, -1.0)] {
+        let evidence = evidence(comparison)?;
+        for (pixel, evidence) in comparison.view.pixels.iter().zip(evidence) {
+            balance[tile(pixel.index)] += sign * evidence;
+        }
+    }
+    // The colour of the strongest tile is full; a few of those that cover most would leave the others pale.
+    let most = balance
+        .iter()
+        .fold(0.0_f64, |most, tile| most.max(tile.abs()));
+    Some(RgbImage::from_fn(width, height, |x, y| {
+        let share = balance[tile(y * width + x)] / most.max(f64::MIN_POSITIVE);
+        let color = palette::diverging(share.signum() * share.abs().sqrt());
+        let ground = query.get_pixel(x, y).0[0];
+        // Where nothing speaks for either, the query is seen as it is.
+        let opacity = 0.75 * share.abs().sqrt();
+        Rgb(color.map(|value| {
+            let mixed = f64::from(value) * opacity + f64::from(ground) * (1.0 - opacity);
+            mixed.round() as u8
+        }))
+    }))
+}
+
+/// What each covered pixel contributes to the fit; over all pixels it adds up to what the cost is made of:
+/// mutual information \[nat\], or less the mean squared difference \[grey values²\].
+#[cfg(feature = "app")]
+fn evidence(comparison: &Comparison) -> Option<Vec<f64>> {
+    let pairs = &comparison.pairs;
+    Some(match comparison.explanation.as_ref()? {
+        Explanation::JointHistogram(histogram) => {
+            let pointwise = histogram.pointwise();
+            let share = 1.0 / pairs.len() as f64;
+            let of_pair = |pair| share * pointwise[histogram.cell(pair)];
+            pairs.iter().map(of_pair).collect()
+        }
+        Explanation::Weights(weights) => {
+            let counted = weights.counted.iter().filter(|counted| **counted).count();
+            let share = 1.0 / counted.max(1) as f64;
+            let of_pair = |(pair, counts): (&IntensityPair, &bool)| match counts {
+                true => -share * f64::from(pair.query - pair.synthetic).powi(2),
+                false => 0.0,
+            };
+            pairs.iter().zip(&weights.counted).map(of_pair).collect()
+        }
+    })
 }
 
 /// The covered pixels in the colours of their depths over the darkened query. Their uncovered

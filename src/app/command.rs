@@ -44,6 +44,17 @@ pub enum Command {
     SelectMethod(Method),
     /// Localise another query.
     SelectQuery(usize),
+    /// Localise a query and go to the step that decided what became of a method's answer.
+    OpenResult {
+        /// The query.
+        query: usize,
+        /// Its position among the query's results that are known.
+        result: usize,
+    },
+    /// Look at results that meet this condition.
+    FilterResults(String),
+    /// Look at two poses beside each other.
+    LookBeside([NamedPose; 2]),
     /// Localise the next query, or the one before.
     NextQuery {
         /// Whether the one before is meant.
@@ -233,6 +244,8 @@ impl Task {
             | Command::GoTogether(_)
             | Command::SelectMethod(_) => Self::Look,
             Command::SelectQuery(_)
+            | Command::OpenResult { .. }
+            | Command::FilterResults(_)
             | Command::NextQuery { .. }
             | Command::NextFailure { .. }
             | Command::Explain

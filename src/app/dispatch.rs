@@ -6,6 +6,7 @@ use super::App;
 use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
+use super::deciding::deciding;
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::saved::SavedSession;
@@ -57,6 +58,9 @@ impl App {
             }
             Command::MoveCursor(cursor) => state.move_cursor(cursor),
             Command::SelectMethod(method) => state.select_method(method),
+            Command::OpenResult { query, result } => state.open_result(query, result),
+            Command::FilterResults(filter) => state.options.results_filter = filter,
+            Command::LookBeside(poses) => state.options.beside = Some(poses),
             Command::SelectQuery(query) => state.select_query(query),
             Command::NextQuery { back } => state.next_query(back, |_, _| true),
             Command::NextFailure { back } => state.next_failure(back),
@@ -347,6 +351,16 @@ impl AppState {
         self.start_run(RunMode::Running);
     }
 
+    /// Localises a query and goes to the step that decided what became of one of its results.
+    fn open_result(&mut self, query: usize, result: usize) {
+        let known = self.results.get(&query).and_then(|known| known.get(result));
+        let moment = known.map(deciding);
+        self.select_query(query);
+        if let Some(moment) = moment {
+            self.navigation = Navigation::towards_moment(moment);
+        }
+    }
+
     /// The next query in the list that is `wanted`, round the end.
     fn next_query(&mut self, back: bool, wanted: impl Fn(&Self, usize) -> bool) {
         let offered = &self.setup.offered;
@@ -375,6 +389,14 @@ impl AppState {
     fn next_failure(&mut self, back: bool) {
         if self.results.keys().any(|query| self.has_failed(*query)) {
             self.next_query(back, Self::has_failed);
+            let known = self.results.get(&self.setup.query);
+            let failed = known.and_then(|known| {
+                let radius_m = self.setup.failure_radius_m;
+                known.iter().position(|result| !result.is_success(radius_m))
+            });
+            if let Some(result) = failed {
+                self.open_result(self.setup.query, result);
+            }
         } else {
             self.note("No query is known to fail; run all of them first", false);
         }

@@ -205,11 +205,17 @@ fn inspecting() -> Tree<String> {
         "breakpoints",
     ];
     let lists = tabs(&mut tiles, &lists);
-    let pictures = tabs(&mut tiles, &["images", "retrieval", "synthetic"]);
+    let pictures = tabs(
+        &mut tiles,
+        &["images", "retrieval", "synthetic", "beside", "lockstep"],
+    );
     let space = tabs(&mut tiles, &["space", "ransac"]);
     let surface = tabs(&mut tiles, &["surface"]);
     let histogram = tabs(&mut tiles, &["histogram", "fusion"]);
-    let words = tabs(&mut tiles, &["report", "batch", "log"]);
+    let words = tabs(
+        &mut tiles,
+        &["report", "differences", "batch", "charts", "log"],
+    );
     let lower = tiles.insert_horizontal_tile(vec![surface, histogram]);
     let middle = tiles.insert_vertical_tile(vec![pictures, lower]);
     let right = tiles.insert_vertical_tile(vec![space, words]);
@@ -253,7 +259,10 @@ fn presenting(names: &[String]) -> Tree<String> {
 
 fn sorting() -> Tree<String> {
     let mut tiles = Tiles::default();
-    let batch = tabs(&mut tiles, &["batch", views::QUERIES, "references"]);
+    let batch = tabs(
+        &mut tiles,
+        &["batch", "charts", views::QUERIES, "references"],
+    );
     let pictures = tabs(&mut tiles, &["images", "synthetic"]);
     let words = tabs(&mut tiles, &["surface", "ransac", "report"]);
     let right = tiles.insert_vertical_tile(vec![pictures, words]);

@@ -170,7 +170,9 @@ impl OpenLesson {
         ui.add_space(4.0);
         ui.horizontal_wrapped(|ui| {
             ui.weak(format!("Lesson: {}", self.lesson.title));
-            let close = ui.small_button("Close").on_hover_text("Back to the window as it is without a lesson");
+            let close = ui
+                .small_button("Close")
+                .on_hover_text("Back to the window as it is without a lesson");
             let close = close.accessible_name("Close the lesson");
             if close.clicked() {
                 commands.send(Command::CloseLesson);

@@ -194,7 +194,9 @@ impl Window<'_> {
             let mut output = self.frame();
             self.painter.take_textures(&mut output);
             let state = self.app.app_state();
-            let is_waiting = state.is_probing() || state.queries.is_painting();
+            let is_waiting = state.is_probing()
+                || [0, 1].into_iter().any(|side| state.is_looking_beside(side))
+                || state.queries.is_painting();
             if !is_waiting && self.frames >= FEWEST {
                 return output;
             }

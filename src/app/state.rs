@@ -60,6 +60,8 @@ pub struct AppState {
     /// Where the camera was before the last jump.
     pub(super) camera_before: Option<Pose>,
     pub(super) prober: Prober,
+    /// For two poses that are looked at beside each other.
+    pub(super) beside: [Prober; 2],
     /// The queries, what is known of them.
     pub queries: Queries,
     /// The latest notes, the newest last.
@@ -80,6 +82,7 @@ impl AppState {
         Self {
             params,
             prober: Prober::new(ctx.clone()),
+            beside: [(); 2].map(|()| Prober::new(ctx.clone())),
             queries: Queries::new(ctx.clone()),
             frames,
             session,
@@ -188,6 +191,32 @@ impl AppState {
             let methods = self.setup.direct_methods();
             self.prober.ask(&problem, &methods, &self.params, pose);
         }
+        self.poll_beside();
+    }
+
+    /// Whether the answer for one of the two poses is still worked out.
+    pub fn is_looking_beside(&self, side: usize) -> bool {
+        self.options.beside.is_some() && self.beside[side].is_busy()
+    }
+
+    fn poll_beside(&mut self) {
+        let Some(named) = self.options.beside else {
+            return;
+        };
+        let problem = self.problem().cloned();
+        let methods = self.setup.direct_methods();
+        for (side, name) in named.into_iter().enumerate() {
+            let pose = self.named_pose(name);
+            if let Err(why) = self.beside[side].poll() {
+                self.note(why, true);
+            }
+            match (&problem, pose) {
+                (Some(problem), Some(pose)) => {
+                    self.beside[side].ask(problem, &methods, &self.params, pose);
+                }
+                _ => self.beside[side].forget(),
+            }
+        }
     }
 
     fn problem(&self) -> Option<&crate::problem::Problem> {
@@ -226,6 +255,7 @@ impl AppState {
         self.hovered = None;
         self.options.selected_feature = None;
         self.prober.forget();
+        self.beside.iter_mut().for_each(Prober::forget);
     }
 
     /// Explains the results that are wrong, or no longer; what was computed is at hand.

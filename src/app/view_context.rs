@@ -36,6 +36,8 @@ pub struct ViewContext<'a> {
     pub queries: &'a Queries,
     /// Results of the queries that were run, by query.
     pub results: &'a Results,
+    /// The pose that is looked at, whatever is looked at elsewhere.
+    pinned: Option<(&'a Probe, NamedPose)>,
     state: &'a AppState,
     commands: &'a Queue,
 }
@@ -50,6 +52,7 @@ impl<'a> ViewContext<'a> {
             textures: &state.textures,
             queries: &state.queries,
             results: &state.results,
+            pinned: None,
             state,
             commands,
         }
@@ -63,6 +66,23 @@ impl<'a> ViewContext<'a> {
     /// The same at another position among the records of the run.
     pub(super) fn at(&self, cursor: usize) -> Self {
         Self { cursor, ..*self }
+    }
+
+    /// The same for one of the two poses that are looked at beside each other, once it is known what the
+    /// costs say of it.
+    pub(super) fn beside(&self, side: usize) -> Option<Self> {
+        let name = self.options.beside?[side];
+        let prober = self.state.beside.get(side)?;
+        let probe = prober.latest().filter(|_| !prober.is_busy())?;
+        Some(Self {
+            pinned: Some((probe, name)),
+            ..*self
+        })
+    }
+
+    /// Whether the answer for one of the two poses is still worked out.
+    pub(super) fn is_looking_beside(&self, side: usize) -> bool {
+        self.state.is_looking_beside(side)
     }
 
     /// What the part at the cursor told last, in words.
@@ -127,17 +147,23 @@ impl<'a> ViewContext<'a> {
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
     pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
-        self.state.looking_at()
+        match self.pinned {
+            Some((probe, name)) => Some((probe.pose, ShownReason::Named(name))),
+            None => self.state.looking_at(),
+        }
     }
 
     /// What is known about the pose that was asked for last.
     pub fn probe(&self) -> Option<&'a Probe> {
-        self.state.probe()
+        match self.pinned {
+            Some((probe, _)) => Some(probe),
+            None => self.state.probe(),
+        }
     }
 
     /// Whether the answer for the pose that is looked at is still worked out.
     pub fn is_probing(&self) -> bool {
-        self.state.is_probing()
+        self.pinned.is_none() && self.state.is_probing()
     }
 
     /// The part of the run that the cursor is in.
@@ -239,6 +265,15 @@ impl<'a> ViewContext<'a> {
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
+        if let Some((probe, name)) = self.pinned {
+            let mut comparisons = probe.comparisons.iter();
+            let (_, comparison) = comparisons.find(|(of, _)| *of == method)?;
+            return Some(ShownView {
+                comparison: Arc::clone(comparison),
+                pose: probe.pose,
+                reason: ShownReason::Named(name),
+            });
+        }
         if let Some((_, reason)) = self.looking_at()
             && let Some(probe) = self.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)

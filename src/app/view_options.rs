@@ -1,5 +1,7 @@
 //! How a person looks at the runs: what is switched on, and what is selected.
 
+use super::camera::NamedPose;
+
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompareMode {
@@ -23,6 +25,10 @@ pub struct ViewOptions {
     pub hides_future: bool,
     /// With the methods beside each other, so many steps into each of them.
     pub lockstep: Option<usize>,
+    /// Two poses that are looked at beside each other.
+    pub beside: Option<[NamedPose; 2]>,
+    /// Which results of queries are looked at, as a condition.
+    pub results_filter: String,
     /// Whether only what differs is shown.
     pub only_differences: bool,
     /// Whether query and synthetic view are shown in turn.
@@ -40,6 +46,8 @@ impl Default for ViewOptions {
             shows_truth: true,
             hides_future: false,
             lockstep: None,
+            beside: None,
+            results_filter: String::new(),
             only_differences: false,
             blinking: false,
             wants_filter: false,

@@ -4,8 +4,11 @@
 //! does keep is how a person looks at it: a zoom, a filter.
 
 mod batch;
+mod beside;
 mod breakpoints;
 mod canvas;
+mod charts;
+mod differences;
 mod fusion;
 mod histogram;
 mod images;
@@ -149,6 +152,24 @@ pub const ALL: &[Entry] = &[
         title: "Fusion",
         about: "what each reference gives alone, its weight, and the fused pose",
         new: |_| Box::<fusion::FusionView>::default(),
+    },
+    Entry {
+        name: "beside",
+        title: "Beside truth",
+        about: "what the cost compares at two poses, and which parts of the query speak for which",
+        new: |_| Box::<beside::BesideView>::default(),
+    },
+    Entry {
+        name: "charts",
+        title: "Charts",
+        about: "the results of all queries: scatter of two measures, errors, verdicts",
+        new: |_| Box::<charts::ChartsView>::default(),
+    },
+    Entry {
+        name: "differences",
+        title: "A | B",
+        about: "two runs as one table: what was changed, and what became different",
+        new: |_| Box::<differences::DifferencesView>::default(),
     },
     Entry {
         name: "lockstep",

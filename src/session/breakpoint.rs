@@ -200,6 +200,11 @@ impl Breakpoint {
     /// Stages around the estimators, not of one of them.
     const OUTSIDE: [&'static str; 2] = ["retrieve", "fusion"];
 
+    /// Whether a stage is around the estimators, not of one of them.
+    pub fn is_outside(stage: &str) -> bool {
+        Self::OUTSIDE.contains(&stage)
+    }
+
     /// Names of the stages a breakpoint can be set at, in the order of a run.
     pub fn stages() -> Vec<&'static str> {
         let stages = [

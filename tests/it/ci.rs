@@ -27,7 +27,9 @@ fn eval(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> Command {
         "--references",
         "nearest:1",
     ]);
-    command.args(["--only", "0", "--only", "1", "--only", "2", "--right", "2m,5deg"]);
+    command.args([
+        "--only", "0", "--only", "1", "--only", "2", "--right", "2m,5deg",
+    ]);
     command.arg("--out").arg(out).args(extra);
     command.env_remove("GITHUB_STEP_SUMMARY");
     command

@@ -6,6 +6,7 @@ mod card;
 mod ci;
 mod colmap;
 mod command_line;
+mod compare_views;
 mod conformance;
 mod data;
 mod decisions;

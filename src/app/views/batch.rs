@@ -8,7 +8,7 @@ use super::View;
 use crate::app::{Command, ViewContext, theme};
 use crate::diagnosis::Tolerance;
 use crate::localize::{QueryResult, Standing};
-use crate::measure::{Condition, Field, Order, select};
+use crate::measure::{Condition, ConditionError, Field, Order, select};
 use crate::method::Method;
 
 /// What the table shows, with the width of its column \[points\].
@@ -27,7 +27,6 @@ const COLUMNS: [(&str, f32); 9] = [
 /// The results of all queries that were run.
 #[derive(Default)]
 pub struct BatchView {
-    typed: String,
     order: Option<Order>,
     /// What was shown last, and what it was made from.
     made: Option<(Made, Vec<Row>)>,
@@ -44,9 +43,9 @@ struct Made {
 
 /// A result by its query and its place among the query's.
 #[derive(Clone, Copy)]
-struct Row {
-    query: usize,
-    place: usize,
+pub(super) struct Row {
+    pub(super) query: usize,
+    pub(super) place: usize,
 }
 
 impl View for BatchView {
@@ -55,15 +54,14 @@ impl View for BatchView {
         ui.horizontal(|ui| {
             let label = ui.label("Where");
             let hint = "method = mi and code = D3";
-            let field = TextEdit::singleline(&mut self.typed).hint_text(hint);
-            ui.add(field.desired_width(ui.available_width() - 8.0))
-                .labelled_by(label.id);
+            let mut typed = context.options.results_filter.clone();
+            let field = TextEdit::singleline(&mut typed).hint_text(hint);
+            let field = ui.add(field.desired_width(ui.available_width() - 8.0));
+            if field.labelled_by(label.id).changed() {
+                context.send(Command::FilterResults(typed));
+            }
         });
-        let condition = match self.typed.trim() {
-            "" => Ok(None),
-            typed => typed.parse::<Condition>().map(Some),
-        };
-        let condition = match condition {
+        let condition = match condition(context) {
             Ok(condition) => condition,
             Err(error) => {
                 ui.label(RichText::new(error.to_string()).color(theme::ESTIMATE));
@@ -86,7 +84,7 @@ impl View for BatchView {
         area.show_rows(ui, height, rows.len(), |ui, range| {
             for row in &rows[range] {
                 if let Some(result) = result(context, *row) {
-                    draw(ui, context, row.query, result, right);
+                    draw(ui, context, *row, result, right);
                 }
             }
         });
@@ -103,7 +101,7 @@ impl BatchView {
         condition: Option<&Condition>,
     ) {
         let wanted = Made {
-            typed: self.typed.clone(),
+            typed: context.options.results_filter.clone(),
             order: self.order,
             results,
             right,
@@ -111,18 +109,44 @@ impl BatchView {
         if self.made.as_ref().is_some_and(|(made, _)| *made == wanted) {
             return;
         }
-        let all: Vec<(Row, &QueryResult)> = context
-            .results
-            .iter()
-            .flat_map(|(&query, results)| {
-                let results = results.iter().enumerate();
-                results.map(move |(place, result)| (Row { query, place }, result))
-            })
-            .collect();
+        let all = known(context);
         let only: Vec<&QueryResult> = all.iter().map(|(_, result)| *result).collect();
         let chosen = select(&only, right, condition, self.order);
         let rows = chosen.into_iter().map(|index| all[index].0).collect();
         self.made = Some((wanted, rows));
+    }
+}
+
+/// All results that are known.
+fn known<'a>(context: &ViewContext<'a>) -> Vec<(Row, &'a QueryResult)> {
+    let all = context.results.iter().flat_map(|(&query, results)| {
+        let results = results.iter().enumerate();
+        results.map(move |(place, result)| (Row { query, place }, result))
+    });
+    all.collect()
+}
+
+/// The results that the condition chooses, in the order of the queries.
+///
+/// # Errors
+/// What is wrong with the condition.
+pub(super) fn chosen<'a>(
+    context: &ViewContext<'a>,
+) -> Result<Vec<(Row, &'a QueryResult)>, ConditionError> {
+    let condition = condition(context)?;
+    let right = context.setup.task.protocol.right;
+    let mut all = known(context);
+    if let Some(condition) = condition {
+        all.retain(|(_, result)| condition.is_met(result, right));
+    }
+    Ok(all)
+}
+
+/// The condition that is asked for, if one is.
+fn condition(context: &ViewContext<'_>) -> Result<Option<Condition>, ConditionError> {
+    match context.options.results_filter.trim() {
+        "" => Ok(None),
+        typed => typed.parse().map(Some),
     }
 }
 
@@ -187,7 +211,7 @@ fn header(ui: &mut Ui, order: &mut Option<Order>) {
 fn draw(
     ui: &mut Ui,
     context: &ViewContext<'_>,
-    query: usize,
+    Row { query, place }: Row,
     result: &QueryResult,
     right: Tolerance,
 ) {
@@ -220,6 +244,9 @@ fn draw(
         None => answer,
     };
     if answer.clicked() {
-        context.send(Command::SelectQuery(query));
+        context.send(Command::OpenResult {
+            query,
+            result: place,
+        });
     }
 }

@@ -1,0 +1,322 @@
+//! The results of all queries as pictures: any two measures against each other, how many are how good, and
+//! which verdicts are frequent.
+
+use std::collections::BTreeMap;
+
+use egui::{ComboBox, DragValue, Ui};
+use egui_plot::{Bar, BarChart, Legend, Line, MarkerShape, Plot, PlotPoint, Points};
+
+use super::View;
+use super::batch::{Row, chosen};
+use crate::app::{Command, ViewContext, theme};
+use crate::code::Code;
+use crate::localize::{QueryResult, Standing};
+use crate::measure::{Field, Value};
+use crate::method::Method;
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Chart {
+    #[default]
+    Scatter,
+    Errors,
+    Verdicts,
+}
+
+impl Chart {
+    const ALL: [(Self, &'static str, &'static str); 3] = [
+        (Self::Scatter, "Scatter", "Any two measures of each result"),
+        (
+            Self::Errors,
+            "Errors",
+            "The share of results within an error",
+        ),
+        (
+            Self::Verdicts,
+            "Verdicts",
+            "How often each verdict is the first, by method",
+        ),
+    ];
+}
+
+/// How near to a point the pointer must be to mean it \[points\].
+const REACH: f32 = 10.0;
+
+/// The results that the batch's condition chooses.
+pub struct ChartsView {
+    chart: Chart,
+    across: &'static str,
+    up: &'static str,
+    /// The greatest error that is drawn \[m\].
+    limit_m: f64,
+}
+
+impl Default for ChartsView {
+    fn default() -> Self {
+        Self {
+            chart: Chart::default(),
+            across: "start",
+            up: "error",
+            limit_m: 2.0,
+        }
+    }
+}
+
+impl View for ChartsView {
+    fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let results = match chosen(context) {
+            Ok(results) => results,
+            Err(error) => {
+                ui.weak(error.to_string());
+                return;
+            }
+        };
+        if results.is_empty() {
+            ui.weak("No result to draw: run all queries, open the folder of a run, or ask for others in Batch");
+            return;
+        }
+        ui.horizontal_wrapped(|ui| {
+            for (chart, name, about) in Chart::ALL {
+                ui.selectable_value(&mut self.chart, chart, name)
+                    .on_hover_text(about);
+            }
+            ui.separator();
+            match self.chart {
+                Chart::Scatter => {
+                    measure(ui, "Across", &mut self.across);
+                    measure(ui, "Up", &mut self.up);
+                }
+                Chart::Errors => {
+                    let label = ui.label("up to");
+                    let drag = DragValue::new(&mut self.limit_m).range(0.05..=100.0);
+                    ui.add(drag.speed(0.05).suffix(" m")).labelled_by(label.id);
+                }
+                Chart::Verdicts => {}
+            }
+        });
+        match self.chart {
+            Chart::Scatter => self.scatter(ui, context, &results),
+            Chart::Errors => self.errors(ui, &results),
+            Chart::Verdicts => verdicts(ui, &results),
+        }
+    }
+}
+
+fn measure(ui: &mut Ui, label: &str, name: &mut &'static str) {
+    let label = ui.label(label);
+    let combo = ComboBox::from_id_salt(label.id).selected_text(*name);
+    let answer = combo.show_ui(ui, |ui| {
+        let numbers = Field::ALL.iter().filter(|field| field.decimals.is_some());
+        for field in numbers {
+            ui.selectable_value(name, field.name, field.name)
+                .on_hover_text(field.about);
+        }
+    });
+    answer.response.labelled_by(label.id);
+}
+
+type Chosen<'a> = (Row, &'a QueryResult);
+
+impl ChartsView {
+    fn scatter(&self, ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>]) {
+        let right = context.setup.task.protocol.right;
+        let number = |name: &str, result: &QueryResult| {
+            let value = Field::find(name).ok()?.of(result, right);
+            match value {
+                Value::Number(number) if number.is_finite() => Some(number),
+                _ => None,
+            }
+        };
+        let mut kinds: BTreeMap<Standing, Vec<[f64; 2]>> = BTreeMap::new();
+        let mut places = Vec::new();
+        for (row, result) in results {
+            let at = number(self.across, result).zip(number(self.up, result));
+            let Some((x, y)) = at else { continue };
+            kinds
+                .entry(result.standing(right, true))
+                .or_default()
+                .push([x, y]);
+            places.push((*row, *result, [x, y]));
+        }
+        let (across, up) = (self.across, self.up);
+        let plot = Plot::new(("scatter", across, up))
+            .x_axis_label(across)
+            .y_axis_label(up)
+            .legend(Legend::default())
+            .show(ui, |plot| {
+                for (standing, points) in kinds {
+                    let shape = match standing {
+                        Standing::Right | Standing::Unmeasured => MarkerShape::Circle,
+                        Standing::LowConfidence => MarkerShape::Diamond,
+                        Standing::Wrong => MarkerShape::Up,
+                        Standing::NoPose => MarkerShape::Cross,
+                    };
+                    let color = theme::standing(&plot.ctx().global_style().visuals, standing);
+                    let points = Points::new(standing.to_string(), points).shape(shape);
+                    plot.points(points.radius(4.0).color(color));
+                }
+            });
+        let answer = &plot.response;
+        answer.widget_info(|| {
+            let words = format!("{} results: {up} over {across}", places.len());
+            egui::WidgetInfo::labeled(egui::Role::Image, true, words)
+        });
+        let Some(pointer) = answer.hover_pos() else {
+            return;
+        };
+        let distance = |at: &[f64; 2]| {
+            let at = plot
+                .transform
+                .position_from_point(&PlotPoint::new(at[0], at[1]));
+            at.distance(pointer)
+        };
+        let nearest = places
+            .iter()
+            .map(|place| (distance(&place.2), place))
+            .filter(|(distance, _)| *distance < REACH)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, (row, result, _))) = nearest else {
+            return;
+        };
+        if answer.clicked() {
+            context.send(Command::OpenResult {
+                query: row.query,
+                result: row.place,
+            });
+        }
+        let code = result.diagnosis.first();
+        let code = code.map_or(String::new(), |finding| {
+            format!("\n{} {}", finding.code, finding.text)
+        });
+        let words = format!("{} {}{code}", result.query, result.method.label());
+        plot.response.clone().on_hover_text_at_pointer(words);
+    }
+
+    fn errors(&self, ui: &mut Ui, results: &[Chosen<'_>]) {
+        let mut errors: BTreeMap<Method, (usize, Vec<f64>)> = BTreeMap::new();
+        for (_, result) in results {
+            let (all, known) = errors.entry(result.method).or_default();
+            *all += 1;
+            known.extend(result.error.map(|error| error.translation_m));
+        }
+        let limit_m = self.limit_m;
+        let plot = Plot::new("errors")
+            .x_axis_label("error [m]")
+            .y_axis_label("share within it [%]")
+            .default_x_bounds(0.0, limit_m)
+            .default_y_bounds(0.0, 100.0)
+            .legend(Legend::default())
+            .show(ui, |plot| {
+                for (method, (all, mut errors)) in errors {
+                    errors.sort_by(f64::total_cmp);
+                    let line = steps(&errors, all, limit_m);
+                    plot.line(
+                        Line::new(method.label(), line)
+                            .color(theme::method(method))
+                            .width(2.0),
+                    );
+                }
+            });
+        plot.response.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::Image, true, "Share of results within an error")
+        });
+    }
+}
+
+/// The share \[%\] of `all` results whose error is at most that, as a line of steps. The errors are sorted;
+/// results without one are within none.
+fn steps(errors: &[f64], all: usize, limit_m: f64) -> Vec<[f64; 2]> {
+    let share = |count: usize| 100.0 * count as f64 / all.max(1) as f64;
+    let mut line = vec![[0.0, 0.0]];
+    let within = errors.iter().take_while(|error| **error <= limit_m);
+    for (index, &error) in within.enumerate() {
+        line.extend([[error, share(index)], [error, share(index + 1)]]);
+    }
+    let last = line.last().map_or(0.0, |point| point[1]);
+    line.push([limit_m, last]);
+    line
+}
+
+/// The most frequent first, one bar for each method on top of the other.
+fn verdicts(ui: &mut Ui, results: &[Chosen<'_>]) {
+    let mut counts: BTreeMap<Code, BTreeMap<Method, usize>> = BTreeMap::new();
+    for (_, result) in results {
+        if let Some(finding) = result.diagnosis.first() {
+            let of_code = counts.entry(finding.code).or_default();
+            *of_code.entry(result.method).or_default() += 1;
+        }
+    }
+    if counts.is_empty() {
+        ui.weak("None of these results has a verdict: all are right and sure");
+        return;
+    }
+    let mut codes: Vec<(Code, BTreeMap<Method, usize>)> = counts.into_iter().collect();
+    codes.sort_by_key(|(code, counts)| (std::cmp::Reverse(counts.values().sum::<usize>()), *code));
+    let names: Vec<&str> = codes.iter().map(|(code, _)| code.name()).collect();
+    let methods: std::collections::BTreeSet<Method> = codes
+        .iter()
+        .flat_map(|(_, counts)| counts.keys().copied())
+        .collect();
+    let labels = names.clone();
+    let plot = Plot::new("verdicts")
+        .y_axis_label("results")
+        .legend(Legend::default())
+        .x_axis_formatter(move |mark, _| {
+            let index = mark.value.round();
+            let is_whole = (mark.value - index).abs() < 1e-6;
+            let name = labels.get(index.max(0.0) as usize);
+            match (is_whole && index >= 0.0, name) {
+                (true, Some(name)) => (*name).to_owned(),
+                _ => String::new(),
+            }
+        })
+        .show(ui, |plot| {
+            let mut below = vec![0.0; codes.len()];
+            for method in methods {
+                let bars = codes
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(index, (code, counts))| {
+                        let count = *counts.get(&method)? as f64;
+                        let bar = Bar::new(index as f64, count)
+                            .base_offset(below[index])
+                            .width(0.7)
+                            .name(format!("{} {code}: {}", method.label(), code.about()));
+                        below[index] += count;
+                        Some(bar)
+                    });
+                let bars: Vec<Bar> = bars.collect();
+                plot.bar_chart(BarChart::new(method.label(), bars).color(theme::method(method)));
+            }
+        });
+    let words: Vec<String> = codes
+        .iter()
+        .map(|(code, counts)| format!("{code} {}", counts.values().sum::<usize>()))
+        .collect();
+    plot.response.widget_info(|| {
+        let words = format!("Verdicts: {}", words.join(", "));
+        egui::WidgetInfo::labeled(egui::Role::Image, true, words)
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::steps;
+
+    #[test]
+    fn what_has_no_error_is_within_none() {
+        let line = steps(&[0.5, 1.0, 3.0], 4, 2.0);
+        assert_eq!(
+            line,
+            [
+                [0.0, 0.0],
+                [0.5, 0.0],
+                [0.5, 25.0],
+                [1.0, 25.0],
+                [1.0, 50.0],
+                [2.0, 50.0]
+            ]
+        );
+        assert_eq!(steps(&[], 0, 1.0), [[0.0, 0.0], [1.0, 0.0]]);
+    }
+}

@@ -1,0 +1,209 @@
+//! The views that hold one thing beside another: two poses, two runs, all results of a run.
+
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use posescope::app::{App, Command, NamedPose, Results};
+use posescope::code::Code;
+use posescope::event::{Event, Stage};
+use posescope::localize::QueryResult;
+use posescope::method::Method;
+
+use crate::walls_scene::GREY;
+use crate::window::{
+    finished, is_said, press, results, run_until_idle, setup, wait, window_with_results,
+};
+
+fn show(window: &mut Harness<'_, App>, view: &'static str) {
+    window.state_mut().send(Command::ShowView(view));
+    window.run_steps(4);
+}
+
+#[test]
+fn two_poses_are_compared_by_the_costs_at_them() {
+    let mut window = finished(setup());
+    press(&mut window, Modifiers::NONE, Key::Num3);
+    show(&mut window, "beside");
+    wait(&mut window, |app| {
+        app.app_state().options.beside.is_some() && app.app_state().run().len() > 0
+    });
+    window.run_steps(60);
+    let result = results(&window)
+        .into_iter()
+        .find(|result| result.method == Method::MI)
+        .expect("a result");
+    let cost = result.cost.expect("a cost");
+    let words = format!(
+        "MI: {:.4} at estimate, {:.4} at truth",
+        cost.best,
+        cost.truth.expect("known")
+    );
+    wait(&mut window, |_| true);
+    assert!(is_said(&window, &words), "{words}");
+    assert!(is_said(
+        &window,
+        "Orange parts of the query speak for estimate"
+    ));
+
+    // The same two the other way round.
+    window.get_by_label("Swap").click();
+    window.run_steps(60);
+    let options = &window.state().app_state().options;
+    assert_eq!(
+        options.beside,
+        Some([NamedPose::Truth, NamedPose::Estimate])
+    );
+    let words = format!(
+        "MI: {:.4} at truth, {:.4} at estimate",
+        cost.truth.expect("known"),
+        cost.best
+    );
+    assert!(is_said(&window, &words), "{words}");
+
+    // A truth that is hidden is no pose to look from.
+    press(&mut window, Modifiers::NONE, Key::G);
+    window.run_steps(20);
+    assert!(is_said(
+        &window,
+        "Truth: there is no such pose at this step"
+    ));
+}
+
+#[test]
+fn two_runs_are_one_table_of_what_became_different() {
+    let mut window = finished(setup());
+    show(&mut window, "differences");
+    assert!(is_said(&window, "There is nothing to compare with"));
+    let before = results(&window);
+    press(&mut window, Modifiers::NONE, Key::P);
+    window.run_steps(3);
+    assert!(is_said(&window, "Both have the same parameters"));
+    assert!(is_said(&window, "no difference"));
+
+    window.state_mut().send(Command::SetParam {
+        key: "fb.ratio".to_owned(),
+        value: "0.6".to_owned(),
+    });
+    window.run_steps(2);
+    run_until_idle(&mut window);
+    window.run_steps(3);
+    let after = results(&window);
+    let matches = |results: &[QueryResult]| results[0].counts.expect("of FB").with_depth;
+    let (a, b) = (matches(&before), matches(&after));
+    assert_ne!(a, b);
+    assert!(is_said(&window, "fb.ratio=0.6"));
+    let difference = format!("{:+}", b as i64 - a as i64);
+    for words in [a.to_string(), b.to_string(), difference] {
+        let mut said = window.query_all_by_label(&words);
+        assert!(said.next().is_some(), "{words}");
+    }
+}
+
+/// A window over a run of three queries, as if its folder was opened.
+fn over_a_run() -> Harness<'static, App> {
+    let mut results = Results::new();
+    for query in [1, 2, GREY] {
+        let mut setup = setup();
+        setup.query = query;
+        let window = finished(setup);
+        results.insert(query, crate::window::results(&window));
+    }
+    let mut window = window_with_results(setup(), results);
+    run_until_idle(&mut window);
+    window
+}
+
+#[test]
+fn results_are_drawn_as_the_condition_chooses_them() {
+    let mut window = over_a_run();
+    show(&mut window, "charts");
+    // What has no error is not drawn.
+    let known: Vec<QueryResult> = {
+        let known = window.state().app_state().results.values().flatten();
+        known.cloned().collect()
+    };
+    let drawn = |wanted: &dyn Fn(&QueryResult) -> bool| {
+        let with_error = known.iter().filter(|result| result.error.is_some());
+        let count = with_error.filter(|result| wanted(result)).count();
+        format!("{count} results: error over start")
+    };
+    assert!(known.iter().any(|result| result.error.is_none()));
+    assert!(is_said(&window, &drawn(&|_| true)));
+    window.get_by_label("Verdicts").click();
+    window.run_steps(3);
+    let codes: Vec<Code> = known
+        .iter()
+        .filter_map(|result| Some(result.diagnosis.first()?.code))
+        .collect();
+    let mut counts: Vec<(usize, Code)> = Vec::new();
+    for code in &codes {
+        let count = codes.iter().filter(|other| *other == code).count();
+        if !counts.contains(&(count, *code)) {
+            counts.push((count, *code));
+        }
+    }
+    counts.sort_by_key(|(count, code)| (std::cmp::Reverse(*count), *code));
+    let words: Vec<String> = counts
+        .iter()
+        .map(|(count, code)| format!("{code} {count}"))
+        .collect();
+    assert!(is_said(&window, &format!("Verdicts: {}", words.join(", "))));
+    window.get_by_label("Errors").click();
+    window.run_steps(3);
+    assert!(is_said(&window, "Share of results within an error"));
+
+    window.get_by_label("Scatter").click();
+    window
+        .state_mut()
+        .send(Command::FilterResults("method = mi".to_owned()));
+    window.run_steps(3);
+    assert!(is_said(
+        &window,
+        &drawn(&|result| result.method == Method::MI)
+    ));
+    window
+        .state_mut()
+        .send(Command::FilterResults("method = ".to_owned()));
+    window.run_steps(3);
+    assert!(is_said(&window, "expected"));
+}
+
+#[test]
+fn a_result_is_opened_at_the_step_that_decided_it() {
+    let mut window = over_a_run();
+    let failed = |window: &Harness<'_, App>, code: Code| {
+        let known = &window.state().app_state().results[&GREY];
+        known.iter().position(|result| {
+            result
+                .diagnosis
+                .first()
+                .is_some_and(|finding| finding.code == code)
+        })
+    };
+    let result = failed(&window, Code::R2).expect("a grey photo has no features");
+    window.state_mut().send(Command::OpenResult {
+        query: GREY,
+        result,
+    });
+    window.run_steps(2);
+    run_until_idle(&mut window);
+    let state = window.state().app_state();
+    assert_eq!(state.setup.query, GREY);
+    let Event::StageEnded(ended) = &state.run().records()[state.cursor()].event else {
+        panic!("not the end of a stage");
+    };
+    assert_eq!(ended.stage, Stage::Detect);
+
+    // The next failure leads there too.
+    let mut window = over_a_run();
+    press(&mut window, Modifiers::NONE, Key::N);
+    run_until_idle(&mut window);
+    let state = window.state().app_state();
+    assert_eq!(state.setup.query, GREY);
+    let first = &state.results[&GREY][0].diagnosis[0];
+    assert_eq!(first.code, Code::R2);
+    let Event::StageEnded(ended) = &state.run().records()[state.cursor()].event else {
+        panic!("not the end of a stage");
+    };
+    assert_eq!(ended.stage, Stage::Detect);
+}
