@@ -40,6 +40,7 @@ mod window;
 pub use arrangement::Arrangement;
 pub use camera::NamedPose;
 pub use command::{Command, Shortcut, shortcuts};
+pub use save::SaveTarget;
 pub use setup::{ReferencePick, Setup};
 pub use shot::{Moment, Shot, ShotError, shoot};
 pub use shown::{ShownReason, ShownView};
@@ -61,6 +62,8 @@ pub struct App {
     commands: command::Queue,
     help: bool,
     pictures: save::Pictures,
+    /// Where something is to be saved, while that is asked.
+    asking: Option<save::Asking>,
     /// The lesson that somebody goes through.
     lesson: Option<OpenLesson>,
     /// What the window's frame says.
@@ -84,6 +87,7 @@ impl App {
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
+            asking: None,
             lesson: None,
             title: String::new(),
             is_bare: false,
@@ -136,10 +140,13 @@ impl App {
 
     /// Draws the window.
     fn content(&mut self, ui: &mut egui::Ui) {
-        if let Some(lesson) = &self.lesson {
-            lesson.read_keys(ui.ctx(), &self.commands);
+        // A question has the keys to itself.
+        if self.asking.is_none() {
+            if let Some(lesson) = &self.lesson {
+                lesson.read_keys(ui.ctx(), &self.commands);
+            }
+            command::read_keys(ui.ctx(), &self.commands);
         }
-        command::read_keys(ui.ctx(), &self.commands);
         let Self {
             state,
             layout,
@@ -147,6 +154,7 @@ impl App {
             help,
             is_bare,
             lesson,
+            asking,
             ..
         } = self;
         if *is_bare && layout.is_maximized() {
@@ -175,6 +183,12 @@ impl App {
             .frame(egui::Frame::NONE.fill(ui.visuals().panel_fill))
             .show(ui, |ui| layout.ui(ui, state, commands));
         transport::notes(ui.ctx(), state, commands);
+        if asking
+            .as_mut()
+            .is_some_and(|asking| asking.ui(ui.ctx(), commands))
+        {
+            *asking = None;
+        }
         if *help {
             command::help_ui(ui.ctx(), help);
         }

@@ -6,6 +6,7 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
+use super::save::SaveTarget;
 use super::setup::ReferencePick;
 use super::view_options::CompareMode;
 use crate::fusion::Fusion;
@@ -145,8 +146,15 @@ pub enum Command {
     SpawnViewer,
     /// Put the command line that repeats this run on the clipboard.
     CopyCommandLine,
+    /// Ask for the file that something is to be saved in.
+    AskWhere(SaveTarget),
     /// Save a view, or the whole window, as a picture.
-    SavePicture(Option<&'static str>),
+    SavePicture {
+        /// The view; the whole window without.
+        view: Option<&'static str>,
+        /// The file, PNG.
+        path: std::path::PathBuf,
+    },
     /// Save scene, query, settings and layout.
     SaveSession(std::path::PathBuf),
     /// Go back to a saved session.
@@ -259,7 +267,8 @@ impl Task {
             | Command::Guess
             | Command::CloseLesson => Self::Lesson,
             Command::CopyCommandLine
-            | Command::SavePicture(_)
+            | Command::AskWhere(_)
+            | Command::SavePicture { .. }
             | Command::SwitchTheme
             | Command::Arrange(_)
             | Command::Help => Self::Window,
@@ -476,7 +485,7 @@ pub fn shortcuts() -> Vec<Shortcut> {
         keys(
             Modifiers::COMMAND,
             Key::P,
-            Command::SavePicture(None),
+            Command::AskWhere(SaveTarget::Picture(None)),
             "Save the window as a picture",
         ),
         keys(

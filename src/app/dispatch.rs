@@ -9,6 +9,7 @@ use super::command::Command;
 use super::deciding::deciding;
 use super::navigation::Navigation;
 use super::queries::Queries;
+use super::save::Asking;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use super::state::{AppState, KeptRun};
@@ -219,14 +220,15 @@ impl App {
                     done,
                 );
             }
-            Command::SavePicture(view) => {
+            Command::AskWhere(target) => {
+                self.asking = Some(Asking::new(target, &state.setup));
+            }
+            Command::SavePicture { view, path } => {
                 let part = view.and_then(|view| self.layout.place_of(view));
-                let name = view.unwrap_or("window");
-                if view.is_some() && part.is_none() {
-                    state.note(format!("The view {name} is not in sight"), true);
+                if let (Some(view), None) = (view, part) {
+                    state.note(format!("The view {view} is not in sight"), true);
                     return;
                 }
-                let path = state.setup.folder.join(format!("{name}.png"));
                 self.pictures.ask(ctx, path, part);
             }
             Command::SaveSession(path) => self.save_session(&path),

@@ -6,29 +6,138 @@ use std::sync::{Arc, Mutex, PoisonError};
 use egui::Ui;
 
 use super::command::{Command, Queue};
+use super::setup::Setup;
 use super::state::AppState;
 use crate::localize::LocalizeObserver as _;
 use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;
 
+/// Something that leaves the window for a file, or comes from one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveTarget {
+    /// All that was told so far, for the Rerun viewer.
+    Recording,
+    /// A view as PNG, or the whole window.
+    Picture(Option<&'static str>),
+    /// Scene, query, settings and layout.
+    Session,
+    /// Back from such a file.
+    Restored,
+}
+
+impl SaveTarget {
+    fn title(self) -> String {
+        match self {
+            Self::Recording => "Save the recording".to_owned(),
+            Self::Picture(None) => "Save the window as a picture".to_owned(),
+            Self::Picture(Some(view)) => format!("Save the view {view} as a picture"),
+            Self::Session => "Save the session".to_owned(),
+            Self::Restored => "Restore a session".to_owned(),
+        }
+    }
+
+    /// The file that is offered: what is looked at gives its name.
+    fn offered(self, setup: &Setup) -> PathBuf {
+        let name = |ending: &str| format!("{}{ending}", name_of(setup));
+        let file = match self {
+            Self::Recording => name(".rrd"),
+            Self::Picture(view) => name(&format!("-{}.png", view.unwrap_or("window"))),
+            Self::Session | Self::Restored => "session.json".to_owned(),
+        };
+        setup.folder.join(file)
+    }
+
+    fn command(self, path: PathBuf) -> Command {
+        match self {
+            Self::Recording => Command::SaveRecording(path),
+            Self::Picture(view) => Command::SavePicture { view, path },
+            Self::Session => Command::SaveSession(path),
+            Self::Restored => Command::RestoreSession(path),
+        }
+    }
+}
+
+/// Scene, query and references, as a file is called.
+fn name_of(setup: &Setup) -> String {
+    let mut words = vec![setup.references.name().to_owned()];
+    if setup.queries.name() != setup.references.name() {
+        words.push(setup.queries.name().to_owned());
+    }
+    words.push(setup.query_name().to_owned());
+    words.extend(setup.reference_names());
+    let plain = |c: char| match c.is_alphanumeric() || "-_.".contains(c) {
+        true => c,
+        false => '-',
+    };
+    words.join("-").chars().map(plain).collect()
+}
+
+/// The question where something is to be saved.
+pub(super) struct Asking {
+    target: SaveTarget,
+    path: String,
+    /// Whether the field has had the keyboard.
+    is_focused: bool,
+}
+
+impl Asking {
+    pub(super) fn new(target: SaveTarget, setup: &Setup) -> Self {
+        Self {
+            target,
+            path: target.offered(setup).display().to_string(),
+            is_focused: false,
+        }
+    }
+
+    /// Draws the question; whether it is answered or taken back.
+    pub(super) fn ui(&mut self, ctx: &egui::Context, commands: &Queue) -> bool {
+        let mut is_over = false;
+        let window = egui::Window::new(self.target.title())
+            .collapsible(false)
+            .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]);
+        window.show(ctx, |ui| {
+            let label = ui.label("File");
+            let field = egui::TextEdit::singleline(&mut self.path).desired_width(520.0);
+            let field = ui.add(field).labelled_by(label.id);
+            if !self.is_focused {
+                field.request_focus();
+                self.is_focused = true;
+            }
+            let (enter, escape) = ui.input(|input| {
+                let is_pressed = |key| input.key_pressed(key);
+                (is_pressed(egui::Key::Enter), is_pressed(egui::Key::Escape))
+            });
+            ui.horizontal(|ui| {
+                let is_named = !self.path.trim().is_empty();
+                let does = match self.target {
+                    SaveTarget::Restored => "Restore",
+                    _ => "Save it",
+                };
+                let button = ui.add_enabled(is_named, egui::Button::new(does));
+                if button.on_hover_text("Enter").clicked() || (enter && is_named) {
+                    commands.send(self.target.command(self.path.trim().into()));
+                    is_over = true;
+                }
+                let cancel = ui.button("Cancel").on_hover_text("Escape");
+                is_over |= cancel.clicked() || escape;
+            });
+        });
+        is_over
+    }
+}
+
 /// The menu of what can be saved or sent.
-pub(super) fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(super) fn menu(ui: &mut Ui, commands: &Queue) {
     ui.menu_button("Save", |ui| {
-        let folder = &state.setup.folder;
-        let name = state.setup.query_name();
         let mut item = |text: &str, help: &str, command: Command| {
             if ui.button(text).on_hover_text(help).clicked() {
                 commands.send(command);
             }
         };
-        let path = folder.join(format!("{name}.rrd"));
-        let text = format!("Recording: {}", path.display());
-        item(
-            &text,
-            "All that was told so far, for the Rerun viewer",
-            Command::SaveRecording(path),
-        );
+        let ask = Command::AskWhere;
+        let help = "All that was told so far, for the Rerun viewer";
+        item("Recording …", help, ask(SaveTarget::Recording));
         let help = "Send the run to a Rerun viewer that is running on this machine";
         item("Stream to a Rerun viewer", help, Command::StreamRecording);
         let help = "Start a Rerun viewer and send the run to it";
@@ -36,27 +145,20 @@ pub(super) fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
         let help = "Put the command line that repeats this run on the clipboard (Ctrl+C)";
         item("Copy the command line", help, Command::CopyCommandLine);
         let help = "The whole window as PNG (Ctrl+P)";
-        item("Picture of the window", help, Command::SavePicture(None));
+        item(
+            "Picture of the window …",
+            help,
+            ask(SaveTarget::Picture(None)),
+        );
         for entry in super::views::ALL {
-            let text = format!("Picture of {}", entry.title);
-            item(
-                &text,
-                "This view as PNG",
-                Command::SavePicture(Some(entry.name)),
-            );
+            let text = format!("Picture of {} …", entry.title);
+            let target = SaveTarget::Picture(Some(entry.name));
+            item(&text, "This view as PNG", ask(target));
         }
-        let path = folder.join("session.json");
-        let text = format!("Session: {}", path.display());
-        item(
-            &text,
-            "Scene, query, settings and layout",
-            Command::SaveSession(path.clone()),
-        );
-        item(
-            "Restore the session",
-            "Go back to the saved session",
-            Command::RestoreSession(path),
-        );
+        let help = "Scene, query, settings and layout";
+        item("Session …", help, ask(SaveTarget::Session));
+        let help = "Go back to a saved session";
+        item("Restore a session …", help, ask(SaveTarget::Restored));
     });
 }
 

@@ -23,7 +23,7 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
         ui.separator();
         switches(ui, state, commands);
         compared(ui, state, commands);
-        menus(ui, state, commands);
+        menus(ui, commands);
     });
 }
 
@@ -241,7 +241,7 @@ fn compared(ui: &mut Ui, state: &AppState, commands: &Queue) {
     }
 }
 
-fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
+fn menus(ui: &mut Ui, commands: &Queue) {
     ui.separator();
     ui.menu_button("Views", |ui| {
         for entry in super::views::ALL {
@@ -257,7 +257,7 @@ fn menus(ui: &mut Ui, state: &AppState, commands: &Queue) {
             }
         }
     });
-    super::save::menu(ui, state, commands);
+    super::save::menu(ui, commands);
     button(
         ui,
         commands,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, CompareMode, Setup};
+use posescope::app::{App, Command, CompareMode, SaveTarget, Setup};
 use posescope::localize::Standing;
 use posescope::method::Method;
 use posescope::scene::{self, Scene};
@@ -207,4 +207,32 @@ fn a_batch_is_filtered_sorted_and_opened() {
     let measured = known.iter().filter(|result| result.error.is_some()).count();
     assert!((4..8).contains(&measured));
     assert!(is_said(&window, &format!("{measured} of 8 results")));
+}
+
+#[test]
+fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = finished(Setup {
+        folder: folder.path().to_owned(),
+        ..setup()
+    });
+    window
+        .state_mut()
+        .send(Command::AskWhere(SaveTarget::Recording));
+    window.run_steps(3);
+    assert!(is_said(&window, "Save the recording"));
+    press(&mut window, Modifiers::NONE, Key::Escape);
+    assert!(!is_said(&window, "Save the recording"));
+    let name = folder.path().join("walls-000001-000000.rrd");
+    assert!(!name.exists(), "nobody said so");
+
+    window
+        .state_mut()
+        .send(Command::AskWhere(SaveTarget::Recording));
+    window.run_steps(3);
+    // Keys belong to the field meanwhile: no view changes for them.
+    press(&mut window, Modifiers::NONE, Key::Enter);
+    window.run_steps(3);
+    assert!(name.exists());
+    assert!(is_said(&window, "Recording: "));
 }
