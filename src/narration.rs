@@ -165,12 +165,17 @@ fn fused(event: &ReferencesFused) -> String {
         .iter()
         .map(|share| {
             let say = match share.outcome {
-                ShareOutcome::Kept => format!("weight {:.3}", share.weight),
-                ShareOutcome::Dropped => "dropped".to_owned(),
-                ShareOutcome::Failed => "failed".to_owned(),
-                ShareOutcome::FallbackUnneeded => "fallback not needed".to_owned(),
+                ShareOutcome::Kept | ShareOutcome::Outvoted => format!("weight {}", share.words()),
+                _ => share.words(),
             };
-            format!("{} {say} ({} matches)", share.reference, share.matches)
+            let support = share
+                .support
+                .map(|support| format!(", {}", support.words()));
+            let support = support.unwrap_or_default();
+            format!(
+                "{} {say} ({} matches{support})",
+                share.reference, share.matches
+            )
         })
         .collect();
     format!("{} of {}", event.fusion, shares.join(", "))

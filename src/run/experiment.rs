@@ -96,7 +96,7 @@ pub fn defaults(experiment: Option<Experiment>) -> Defaults {
             protocol: Protocol {
                 methods: WITHOUT_HYBRID.to_vec(),
                 references: Selection::Random(5),
-                fusions: Fusion::all().collect(),
+                fusions: Fusion::of_the_paper().collect(),
                 ..protocol
             },
             radii_m: &[10.0],

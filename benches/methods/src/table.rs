@@ -13,15 +13,15 @@
 //! prints each query.
 
 mod cases;
+mod truth;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::time::Instant;
 
-use nalgebra::Matrix3x4;
 use posescope::estimator;
 use posescope::event::{Event, Kind, KindSet};
-use posescope::geometry::{Pose, PoseError, pose_from_matrix};
+use posescope::geometry::{Pose, PoseError};
 use posescope::grid::least_covered;
 use posescope::judge::{Freedoms, Judge, Shrinking, Start, shrink};
 use posescope::method::Method;
@@ -33,6 +33,7 @@ use posescope::trace::{Cancelled, Record, Sink, Trace};
 use rayon::prelude::*;
 
 use crate::cases::{Case, Places, pairs, unrelated};
+use crate::truth::poses;
 
 /// A method with its settings, as it was asked for.
 struct Asked {
@@ -192,27 +193,6 @@ fn cells(text: &str) -> Result<Vec<(String, String)>, String> {
             })
             .collect(),
     }
-}
-
-/// Poses by the frames' names, which may have leading zeros.
-fn poses(path: &str) -> Result<HashMap<String, Pose>, String> {
-    let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
-    let mut poses = HashMap::new();
-    for line in text.lines().filter(|line| !line.starts_with('#')) {
-        let mut words = line.split_whitespace();
-        let Some(name) = words.next() else { continue };
-        let numbers: Result<Vec<f64>, _> = words.map(str::parse).collect();
-        let numbers = numbers.map_err(|error| format!("{path}: {error}"))?;
-        if numbers.len() != 12 {
-            return Err(format!("{path}: {line}: a name and 12 numbers expected"));
-        }
-        let pose = pose_from_matrix(&Matrix3x4::from_row_slice(&numbers));
-        let pose = pose.map_err(|error| format!("{path}: {error}"))?;
-        for width in [0, 6, 10] {
-            poses.insert(format!("{name:0>width$}"), pose);
-        }
-    }
-    Ok(poses)
 }
 
 fn measure(cases: &[Case], options: &Options) -> Vec<Measured> {

@@ -70,6 +70,8 @@ codes! {
     D9,
     /// one reference dragged the fusion
     F1,
+    /// the method takes one reference at a time
+    F2,
     /// the hybrid kept a bad pose of its first method
     H1,
     /// the right place was ranked too low

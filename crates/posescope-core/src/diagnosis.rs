@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 pub use crate::code::Code;
-pub use combined::{Member, diagnose_fusion, diagnose_ranking, fused_trust};
+pub use combined::{Member, diagnose_fusion, diagnose_joint, diagnose_ranking, fused_trust};
 pub use evidence::Evidence;
 pub use tolerance::Tolerance;
 pub use trust::Trust;

@@ -12,6 +12,7 @@ mod fb2;
 mod feature;
 mod given;
 mod hybrid;
+mod joint;
 mod mi6;
 mod own;
 mod robust;
@@ -22,6 +23,9 @@ pub use fb2::{Guided, GuidedParams};
 pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches, projected_cloud};
 pub use given::Given;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
+pub use joint::{
+    JointDirect, JointEstimator, JointFeatures, JointHybrid, JointOutcome, JointReference,
+};
 pub use mi6::{SixFreedoms, SixParams};
 pub use own::Own;
 pub use robust::{Robust, RobustParams};

@@ -1,14 +1,16 @@
 //! Fusion: one pose from several references, each of which gave a candidate (paper, section 3.2).
 //!
-//! Every reference is localised against by itself first. A fusion then decides how much each of them
-//! has to say, from nothing but the number of feature matches between the query and the reference:
-//! matches that passed the ratio test and are mutually best, before any depth is looked up. The
-//! direct methods take their weights from the same matches.
+//! Every reference is localised against by itself first. A fusion of the paper then decides how much each
+//! of them has to say, from nothing but the number of feature matches between the query and the
+//! reference: matches that passed the ratio test and are mutually best, before any depth is looked up. The
+//! direct methods take their weights from the same matches. *joint* averages nothing: it asks the
+//! estimator for one pose from all references at once.
 //!
 //! A new fusion is one file, its `mod` line and its entry in [`ALL`].
 
 mod average;
 mod avg;
+mod joint;
 mod maxf;
 mod r_wavg;
 pub mod share;
@@ -20,7 +22,8 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 pub use average::average_pose;
-pub use share::{Share, ShareOutcome};
+pub use joint::fuse_jointly;
+pub use share::{Share, ShareOutcome, Support};
 
 use crate::estimator::Failure;
 use crate::event::{ReferencesFused, Stage};
@@ -35,13 +38,31 @@ pub struct Entry {
     pub name: &'static str,
     /// What the fusion does, in one phrase.
     pub about: &'static str,
-    /// What each reference has to say, given the number of its matches: not negative, 0 leaves it
-    /// out, any common factor does not matter. At least one is positive where there is a reference.
-    pub weigh: fn(&[usize]) -> Vec<f64>,
+    /// How it comes to one pose.
+    pub way: Way,
 }
 
-/// Every fusion, in the paper's order.
-pub const ALL: &[Entry] = &[maxf::ENTRY, avg::ENTRY, wavg::ENTRY, r_wavg::ENTRY];
+/// What each reference has to say, given the number of its matches: not negative, 0 leaves it out, any
+/// common factor does not matter. At least one is positive where there is a reference.
+pub type Weigh = fn(&[usize]) -> Vec<f64>;
+
+/// How several references become one pose.
+#[derive(Clone, Copy, Debug)]
+pub enum Way {
+    /// The poses that they gave each for itself are averaged, by weights.
+    Weighed(Weigh),
+    /// The method takes them all at once.
+    Joint,
+}
+
+/// Every fusion, those of the paper in its order first.
+pub const ALL: &[Entry] = &[
+    maxf::ENTRY,
+    avg::ENTRY,
+    wavg::ENTRY,
+    r_wavg::ENTRY,
+    joint::ENTRY,
+];
 
 /// A fusion of the registry, to be handed around. Two are equal that have the same name.
 #[derive(Clone, Copy)]
@@ -51,6 +72,11 @@ impl Fusion {
     /// Every fusion, in the order of [`ALL`].
     pub fn all() -> impl Iterator<Item = Self> {
         ALL.iter().map(Self)
+    }
+
+    /// The four of the paper, which average poses.
+    pub fn of_the_paper() -> impl Iterator<Item = Self> {
+        Self::all().filter(|fusion| matches!(fusion.way, Way::Weighed(_)))
     }
 }
 
@@ -121,12 +147,13 @@ pub struct Candidate<'a> {
 /// # Errors
 /// Only [`Cancelled`].
 pub fn fuse(
-    fusion: &Entry,
+    name: &'static str,
+    weigh: Weigh,
     candidates: &[Candidate<'_>],
     trace: &mut Trace<'_>,
 ) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
     trace.stage(Stage::Fuse, |trace| {
-        let shares = shares(fusion, candidates);
+        let shares = shares(weigh, candidates);
         let members: Vec<(f64, &Pose)> = shares
             .iter()
             .filter(|share| share.outcome == ShareOutcome::Kept)
@@ -134,7 +161,7 @@ pub fn fuse(
             .collect();
         let pose = average_pose(&members);
         trace.emit(|| ReferencesFused {
-            fusion: fusion.name,
+            fusion: name,
             shares: Arc::from(shares.as_slice()),
             pose,
         })?;
@@ -143,9 +170,9 @@ pub fn fuse(
     })
 }
 
-fn shares(fusion: &Entry, candidates: &[Candidate<'_>]) -> Vec<Share> {
+fn shares(weigh: Weigh, candidates: &[Candidate<'_>]) -> Vec<Share> {
     let matches: Vec<usize> = candidates.iter().map(|c| c.matches).collect();
-    let weights = (fusion.weigh)(&matches);
+    let weights = weigh(&matches);
     let weighed = candidates.iter().zip(&weights);
     let first_method_succeeded = weighed
         .filter(|(_, weight)| **weight > 0.0)
@@ -177,6 +204,7 @@ fn shares(fusion: &Entry, candidates: &[Candidate<'_>]) -> Vec<Share> {
                 },
                 outcome,
                 pose: candidate.pose.ok().copied(),
+                support: None,
             }
         })
         .collect()
@@ -243,8 +271,8 @@ mod tests {
             .collect();
         let mut history = History::default();
         let entry: Fusion = name.parse().expect("a fusion");
-        let (pose, _) =
-            fuse(&entry, &candidates, &mut Trace::to(&mut history)).expect("not cancelled");
+        let trace = &mut Trace::to(&mut history);
+        let (pose, _) = fuse(entry.name, weigh(&entry), &candidates, trace).expect("not cancelled");
         let told = history
             .records()
             .iter()
@@ -254,6 +282,13 @@ mod tests {
             .expect("it is told")
             .clone();
         (pose, told)
+    }
+
+    fn weigh(entry: &Entry) -> Weigh {
+        match entry.way {
+            Way::Weighed(weigh) => weigh,
+            Way::Joint => panic!("{} weighs no poses", entry.name),
+        }
     }
 
     fn x(name: &str, candidates: &[(usize, Result<Pose, Failure>)]) -> f64 {
@@ -271,7 +306,7 @@ mod tests {
         let error = "mean".parse::<Fusion>().expect_err("unknown").to_string();
         assert_eq!(
             error,
-            "`mean` is no fusion; maxf, avg, wavg or r-wavg expected"
+            "`mean` is no fusion; maxf, avg, wavg, r-wavg or joint expected"
         );
     }
 
@@ -315,7 +350,7 @@ mod tests {
                 })
                 .collect();
             let fusion: Fusion = "r-wavg".parse().expect("a fusion");
-            let shares = shares(&fusion, &candidates);
+            let shares = shares(weigh(&fusion), &candidates);
             let total: f64 = shares.iter().map(|share| share.weight).sum();
             assert!((total - 1.0).abs() < 1e-12);
             shares.iter().map(|share| share.outcome).collect()
@@ -361,13 +396,13 @@ mod tests {
 
     #[test]
     fn without_a_reference_there_is_no_pose() {
-        for entry in ALL {
-            assert_eq!(fused_nothing(entry).code(), Code::R1);
+        for entry in Fusion::of_the_paper() {
+            assert_eq!(fused_nothing(&entry).code(), Code::R1);
         }
     }
 
     fn fused_nothing(entry: &Entry) -> Failure {
-        fuse(entry, &[], &mut Trace::off())
+        fuse(entry.name, weigh(entry), &[], &mut Trace::off())
             .expect("not cancelled")
             .0
             .expect_err("no pose")
@@ -378,8 +413,8 @@ mod tests {
         fn every_fusion_gives_weights_that_can_be_shared_out(
             matches in prop::collection::vec(0usize..3000, 1..8),
         ) {
-            for entry in ALL {
-                let weights = (entry.weigh)(&matches);
+            for entry in Fusion::of_the_paper() {
+                let weights = weigh(&entry)(&matches);
                 prop_assert_eq!(weights.len(), matches.len());
                 prop_assert!(weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0));
                 prop_assert!(weights.iter().sum::<f64>() > 0.0, "{}", entry.name);
@@ -397,11 +432,11 @@ mod tests {
         #[test]
         fn a_single_reference_is_taken_as_it_is(x in -1e6..1e6f64, angle in -3.0..3.0f64) {
             let pose = Pose::new([x, 2.0, 3.0].into(), [0.0, angle, 0.0].into());
-            for entry in ALL {
+            for entry in Fusion::of_the_paper() {
                 let candidate =
                     Candidate { reference: "r", matches: 7, pose: Ok(&pose), fell_back: false };
                 let (fused, _) =
-                    fuse(entry, &[candidate], &mut Trace::off()).expect("not cancelled");
+                    fuse(entry.name, weigh(&entry), &[candidate], &mut Trace::off()).expect("not cancelled");
                 prop_assert_eq!(fused, Ok(pose));
             }
         }

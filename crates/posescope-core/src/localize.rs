@@ -21,7 +21,7 @@ pub use result::{
 pub use select::{
     ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, tell_ranking,
 };
-pub use single::{localize, localize_by, localize_traced, words_of};
+pub use single::{localize, localize_by, localize_jointly, localize_traced, words_of};
 pub use standing::Standing;
 pub use timing::{StageTimes, StageTimings};
 pub use verdict::Verdict;

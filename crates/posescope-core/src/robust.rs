@@ -8,6 +8,7 @@
 //! | [`params`] | what decides it? | σ, threshold, confidence, trials |
 //! | [`consensus`] | what came of it? | trials, consensus, errors |
 //! | [`acceptance`] | are the inliers more than chance explains? | an a-contrario test |
+//! | [`places`] | which correspondences are independent? | those at different places of the query |
 
 pub mod acceptance;
 pub mod consensus;
@@ -15,9 +16,13 @@ mod likelihood;
 mod local;
 pub mod mlesac;
 pub mod params;
+pub mod places;
 
-pub use acceptance::{Acceptance, AcceptanceRule, effective_area_px, inliers_beyond_chance};
+pub use acceptance::{
+    Acceptance, AcceptanceRule, effective_area_px, inliers_beyond_chance, places_beyond_chance,
+};
 pub use consensus::{Consensus, Hypothesis, MlesacError, Trial};
 pub use likelihood::LikelihoodScore;
 pub use mlesac::mlesac;
 pub use params::MlesacParams;
+pub use places::Places;

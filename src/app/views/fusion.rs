@@ -122,8 +122,14 @@ fn weight(ui: &mut Ui, share: &Share, color: Color32) {
             ui.label(RichText::new("× failed").color(theme::ESTIMATE))
                 .on_hover_text("It had a weight, but no pose");
         }
-        ShareOutcome::Kept => {
-            ui.horizontal(|ui| {
+        ShareOutcome::Unsupportive => {
+            let response = ui.weak(share.words());
+            if let Some(support) = share.support {
+                response.on_hover_text(support.words());
+            }
+        }
+        ShareOutcome::Kept | ShareOutcome::Outvoted => {
+            let row = ui.horizontal(|ui| {
                 let size = vec2(FULL_BAR, 10.0);
                 let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
                 let filled = vec2(share.weight as f32 * FULL_BAR, size.y);
@@ -131,7 +137,14 @@ fn weight(ui: &mut Ui, share: &Share, color: Color32) {
                 painter.rect_filled(rect, 1.0, ui.visuals().faint_bg_color);
                 painter.rect_filled(Rect::from_min_size(rect.min, filled), 1.0, color);
                 ui.label(format!("{:.0} %", 100.0 * share.weight));
+                if share.outcome == ShareOutcome::Outvoted {
+                    ui.label(RichText::new("outvoted").color(theme::ESTIMATE))
+                        .on_hover_text("Alone it puts the query elsewhere, more than 1 m away");
+                }
             });
+            if let Some(support) = share.support {
+                row.response.on_hover_text(support.words());
+            }
         }
     }
 }
@@ -177,9 +190,11 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
                 let Some(pose) = &share.pose else { continue };
                 let (name, shape) = match share.outcome {
                     ShareOutcome::Kept => ("alone, kept", MarkerShape::Circle),
+                    ShareOutcome::Outvoted => ("alone, outvoted", MarkerShape::Cross),
                     ShareOutcome::Dropped
                     | ShareOutcome::Failed
-                    | ShareOutcome::FallbackUnneeded => ("alone, left out", MarkerShape::Cross),
+                    | ShareOutcome::FallbackUnneeded
+                    | ShareOutcome::Unsupportive => ("alone, left out", MarkerShape::Cross),
                 };
                 let radius = 3.0 + 6.0 * share.weight.sqrt() as f32;
                 mark(

@@ -6,7 +6,7 @@ use super::entities;
 use super::scene::Origin;
 use super::stream::Stream;
 use crate::event::ReferencesFused;
-use crate::fusion::{Share, ShareOutcome};
+use crate::fusion::ShareOutcome;
 use crate::method::Method;
 use crate::palette;
 
@@ -50,13 +50,15 @@ fn candidates(event: &ReferencesFused, origin: Origin) -> Points3D {
         .with_colors(placed().map(|(share, _)| {
             super::color(match share.outcome {
                 ShareOutcome::Kept => palette::ESTIMATE,
-                ShareOutcome::Dropped | ShareOutcome::Failed | ShareOutcome::FallbackUnneeded => {
-                    palette::UNDECIDED
-                }
+                ShareOutcome::Dropped
+                | ShareOutcome::Failed
+                | ShareOutcome::FallbackUnneeded
+                | ShareOutcome::Unsupportive
+                | ShareOutcome::Outvoted => palette::UNDECIDED,
             })
         }))
         .with_radii([rerun::Radius::new_ui_points(4.0)])
-        .with_labels(placed().map(|(share, _)| format!("{} {}", share.reference, say(share))))
+        .with_labels(placed().map(|(share, _)| format!("{} {}", share.reference, share.words())))
         .with_show_labels(false)
 }
 
@@ -75,24 +77,23 @@ fn table(event: &ReferencesFused, method: Method) -> String {
                 format!("{:.2} m from the fused pose", offset.norm())
             }
         };
+        let support = share
+            .support
+            .map(|support| format!("; {}", support.words()));
         text += &format!(
-            "| {} | {} | {} | {alone} |\n",
+            "| {} | {} | {} | {alone}{} |\n",
             share.reference,
             share.matches,
-            say(share)
+            share.words(),
+            support.unwrap_or_default()
         );
     }
+    let is_joint = event.shares.iter().any(|share| share.support.is_some());
     if event.pose.is_none() {
-        text += "\nEvery reference with a weight failed.\n";
+        text += match is_joint {
+            true => "\nTogether the references give no pose.\n",
+            false => "\nEvery reference with a weight failed.\n",
+        };
     }
     text + "\n"
-}
-
-fn say(share: &Share) -> String {
-    match share.outcome {
-        ShareOutcome::Kept => format!("{:.3}", share.weight),
-        ShareOutcome::Dropped => "dropped".to_owned(),
-        ShareOutcome::Failed => "failed".to_owned(),
-        ShareOutcome::FallbackUnneeded => "fallback not needed".to_owned(),
-    }
 }

@@ -55,18 +55,85 @@ pub fn diagnose_fusion(
         if let (Ok(pose), Some(truth)) = (pose, truth) {
             found.extend(dragging(pose, members, truth, &is_right));
         }
-        // Of equal weights the first.
-        let heaviest = members
-            .iter()
-            .rev()
-            .max_by(|a, b| a.share.weight.total_cmp(&b.share.weight));
-        let of_heaviest = heaviest.into_iter().flat_map(|member| member.verdicts);
-        let is_failure = |verdict: &&Diagnosis| verdict.code.is_failure();
-        found.extend(of_heaviest.filter(is_failure).cloned());
+        found.extend(of_heaviest(members));
         if let (Err(failure), true) = (pose, found.is_empty()) {
             found.push(Diagnosis::of_failure(failure));
         }
     }
+    with_doubt(found, pose, members, truth)
+}
+
+/// As [`diagnose_fusion`], of a pose that is no average: of one that is wrong which reference it rests on
+/// most, and the verdicts on that one alone.
+pub fn diagnose_joint(
+    pose: &Result<Pose, Failure>,
+    members: &[Member<'_>],
+    truth: Option<&Pose>,
+    tolerance: Tolerance,
+) -> Vec<Diagnosis> {
+    let mut found = Vec::new();
+    match (pose, truth) {
+        (Err(failure), _) => found.push(Diagnosis::of_failure(failure)),
+        (Ok(pose), Some(truth)) => {
+            let error = PoseError::between(truth, pose);
+            if !tolerance.contains(&error) {
+                found.extend(heaviest(members).and_then(|member| resting(member, truth, &error)));
+                found.extend(of_heaviest(members));
+            }
+        }
+        (Ok(_), None) => {}
+    }
+    with_doubt(found, pose, members, truth)
+}
+
+/// The member of most weight, of equals the first.
+fn heaviest<'m, 'a>(members: &'m [Member<'a>]) -> Option<&'m Member<'a>> {
+    members
+        .iter()
+        .rev()
+        .max_by(|a, b| a.share.weight.total_cmp(&b.share.weight))
+}
+
+/// What is wrong with the member of most weight.
+fn of_heaviest(members: &[Member<'_>]) -> Vec<Diagnosis> {
+    let verdicts = heaviest(members).map_or(&[][..], |member| member.verdicts);
+    let is_failure = |verdict: &&Diagnosis| verdict.code.is_failure();
+    verdicts.iter().filter(is_failure).cloned().collect()
+}
+
+/// On which reference a wrong joint pose rests.
+fn resting(member: &Member<'_>, truth: &Pose, error: &PoseError) -> Option<Diagnosis> {
+    let share = member.share;
+    let support = share.support?;
+    let own = share.pose.map(|own| PoseError::between(truth, &own));
+    let alone = match &own {
+        Some(own) => format!("its own pose is {} off", own.translation()),
+        None => "alone it has no pose".to_owned(),
+    };
+    Some(Diagnosis::new(
+        Code::F1,
+        format!(
+            "the joint pose, {} off, rests on reference {} at a weight of {:.2}: {}; {alone}",
+            error.translation(),
+            share.reference,
+            share.weight,
+            support.words(),
+        ),
+        json!({
+            "reference": share.reference,
+            "weight": share.weight,
+            "own_error": own,
+        }),
+    ))
+}
+
+/// The verdicts, and whether the fused pose is hardly to be believed.
+fn with_doubt(
+    mut found: Vec<Diagnosis>,
+    pose: &Result<Pose, Failure>,
+    members: &[Member<'_>],
+    truth: Option<&Pose>,
+) -> Vec<Diagnosis> {
     if let Ok(pose) = pose {
         let trust = fused_trust(pose, members);
         let doubt = trust.as_ref().and_then(low_confidence);
@@ -80,8 +147,17 @@ pub fn diagnose_fusion(
 /// pose that the fused one is not near speaks against it.
 pub fn fused_trust(pose: &Pose, members: &[Member<'_>]) -> Option<Trust> {
     let believed = |member: &Member<'_>| {
+        // A joint pose may rest on what alone gives none: nothing is known of that.
+        let Some(own) = member
+            .share
+            .pose
+            .as_ref()
+            .filter(|_| member.trust.is_some())
+        else {
+            return member.share.support.map(|_| 0.0);
+        };
         let probability = member.trust?.probability?;
-        let apart = PoseError::between(pose, member.share.pose.as_ref()?).translation_m;
+        let apart = PoseError::between(pose, own).translation_m;
         let supports = apart <= WITHIN_M;
         Some(if supports {
             member.share.weight * probability

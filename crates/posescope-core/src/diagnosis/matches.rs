@@ -187,7 +187,8 @@ impl TrueMatches {
 /// The 3-D point of every reference keypoint that has a depth near by.
 fn lifted_keypoints(subject: &Subject<'_>, reference: &Features) -> Vec<Option<Point3<f64>>> {
     let tuple = &subject.problem.reference;
-    let cloud = projected_cloud(tuple);
+    let params = subject.params;
+    let cloud = projected_cloud(tuple, params.fb.visible.then_some(&params.render));
     let radius_px = subject.params.fb.depth_radius_px;
     reference
         .keypoints

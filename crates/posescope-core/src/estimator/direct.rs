@@ -23,7 +23,7 @@ pub struct Direct {
     method: Method,
     cost: Box<dyn Cost>,
     render: RenderParams,
-    grid: GridParams,
+    pub(super) grid: GridParams,
     /// Which cost, with all its parameters.
     cost_key: Key,
 }

@@ -2,6 +2,7 @@
 
 use crate::code::Code;
 use crate::grid::LatticeTooLarge;
+use crate::method::Method;
 
 /// A typed reason with its evidence. In statistics it counts as an infinite error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -129,6 +130,12 @@ pub enum Failure {
         /// Why that one failed.
         failure: Box<Failure>,
     },
+    /// Several references were to give one pose at once, and the method takes one at a time.
+    #[error("{method} takes one reference at a time, so that it has no joint pose of several")]
+    NotJoint {
+        /// The method.
+        method: Method,
+    },
     /// Another system was asked, and its answers have none here.
     #[error("{answers} has no {missing}")]
     NotAnswered {
@@ -170,6 +177,7 @@ impl Failure {
             Self::ChanceMinimum { .. } => Code::D6,
             Self::LatticeTooLarge(_) => Code::D9,
             Self::NoReferenceSucceeded { failure, .. } => failure.code(),
+            Self::NotJoint { .. } => Code::F2,
             Self::NotAnswered { .. } => Code::E1,
             Self::LowConfidence { .. } => Code::L1,
             Self::Internal { .. } => Code::X9,

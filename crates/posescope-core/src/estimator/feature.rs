@@ -13,6 +13,7 @@ use self::states::FeatureStates;
 use super::consensus::FoundConsensus;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
 use crate::depth::LiftedMatch;
 use crate::depth::{DepthReading, ProjectedCloudIndex};
 use crate::event::{
@@ -28,15 +29,16 @@ use crate::memo::{Exact, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
+use crate::render::{RenderParams, color_cloud_by};
 use crate::robust::{
-    AcceptanceRule, Consensus, MlesacError, MlesacParams, Trial, effective_area_px,
-    inliers_beyond_chance, mlesac,
+    Acceptance, AcceptanceRule, Consensus, MlesacError, MlesacParams, Places, Trial, mlesac,
+    places_beyond_chance,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
 
 /// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
-const MINIMUM: usize = 4;
+pub(super) const MINIMUM: usize = 4;
 
 /// Trials that are remembered at most, 5 MB: all that the parameters ask for by default. Where there
 /// were more, they are drawn again when somebody wants to hear them.
@@ -95,6 +97,7 @@ impl Remembered for Solved {
 pub struct FeatureBased {
     surf: SurfParams,
     params: FeatureParams,
+    render: RenderParams,
 }
 
 impl Estimator for FeatureBased {
@@ -132,6 +135,7 @@ impl FeatureBased {
         Self {
             surf: params.surf,
             params: params.fb.clone(),
+            render: params.render.clone(),
         }
     }
 
@@ -328,7 +332,7 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = projected_cloud(tuple);
+        let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
         trace.emit(|| ProjectedCloud {
             points: tuple.cloud.len(),
             in_view: cloud.len(),
@@ -418,22 +422,10 @@ impl FeatureBased {
             }
             trace.emit(|| HypothesisTried { trial: *trial })
         });
-        let outcome = match found {
+        let outcome = match found.map_err(|error| Self::halt(error, correspondences.len())) {
             Ok(consensus) => Ok(consensus),
-            Err(MlesacError::TooFewCorrespondences { found, .. }) => Err(Failure::NoConsensus {
-                correspondences: found,
-                best_inliers: 0,
-                trials: 0,
-            }),
-            Err(MlesacError::NoModel {
-                trials,
-                best_inliers,
-            }) => Err(Failure::NoConsensus {
-                correspondences: correspondences.len(),
-                best_inliers,
-                trials,
-            }),
-            Err(MlesacError::Cancelled(cancelled)) => return Err(cancelled),
+            Err(Halt::Failed(failure)) => Err(failure),
+            Err(Halt::Cancelled) => return Err(Cancelled),
         };
         Ok(Solved { outcome, trials })
     }
@@ -445,26 +437,127 @@ impl FeatureBased {
         consensus: &Consensus,
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
-        let reference_from_query = consensus.pose.inverse();
-        let inliers = consensus.inliers.len();
-        // False matches gather where the texture is, so chance has less room than the whole image.
-        let pixels: Vec<_> = correspondences.iter().map(|c| c.pixel).collect();
-        let acceptance = inliers_beyond_chance(
-            inliers,
-            correspondences.len(),
-            self.params.mlesac.inlier_threshold_px,
-            effective_area_px(&pixels, problem.query.intrinsics.area()),
-        );
+        let intrinsics = &problem.query.intrinsics;
+        let (acceptance, places) =
+            self.beyond_chance(correspondences, consensus, intrinsics, f64::NEG_INFINITY);
         let found = FoundConsensus {
-            reference_from_query,
+            reference_from_query: consensus.pose.inverse(),
             acceptance,
-            correspondences: correspondences.len(),
-            is_enough: self.params.accept.accepts(&acceptance),
-            // The paper's rule asks for inliers alone.
-            slack: (self.params.accept == AcceptanceRule::Consensus)
-                .then_some(self.params.radius_slack),
+            correspondences: places,
+            is_enough: self.accepts(&acceptance),
+            slack: self.slack(),
         };
         found.judged(problem, trace)
+    }
+}
+
+/// The correspondences with one reference.
+pub(super) struct Gathered {
+    /// Pixels of the query, and points in the frame of the reference camera.
+    pub(super) correspondences: Vec<Correspondence>,
+    /// The matches that they are of, before any depth is looked up.
+    pub(super) unique: usize,
+    /// Keypoints of the query photo.
+    pub(super) query_keypoints: usize,
+}
+
+/// What an estimate from several references has in common with that from one.
+impl FeatureBased {
+    /// The correspondences of a problem, as [`Estimator::estimate`] comes to them. Nothing is told of the
+    /// way: a run on the problem alone has done so.
+    pub(super) fn gather(&self, problem: &Problem) -> Result<Gathered, Failure> {
+        let gathered = || {
+            let trace = &mut Trace::off();
+            let query = self.detect(Side::Query, problem, trace)?.value;
+            let reference = self.detect(Side::Reference, problem, trace)?.value;
+            let mut states = FeatureStates::new(query.keypoints.len());
+            let matches = match query.keypoints.len().min(reference.keypoints.len()) {
+                0..MINIMUM => Vec::new(),
+                _ => {
+                    let decisions = self.best_matches(problem, &query, &reference, trace)?;
+                    states.after_matching(&decisions.value.0)
+                }
+            };
+            let lifted = self.lift(&matches, &reference, &problem.reference, trace)?;
+            let correspondence = |lifted: &LiftedMatch| {
+                let pixel = query.keypoints[lifted.query].pixel();
+                let point = lifted.point?;
+                Some(Correspondence { pixel, point })
+            };
+            Ok::<_, Halt>(Gathered {
+                correspondences: lifted.iter().filter_map(correspondence).collect(),
+                unique: matches.len(),
+                query_keypoints: query.keypoints.len(),
+            })
+        };
+        gathered().map_err(|halt| match halt {
+            Halt::Failed(failure) => failure,
+            Halt::Cancelled => unreachable!("a trace that is off cancels nothing"),
+        })
+    }
+
+    /// What MLESAC is told.
+    pub(super) fn mlesac(&self) -> &MlesacParams {
+        &self.params.mlesac
+    }
+
+    /// Why MLESAC has no consensus of so many correspondences.
+    pub(super) fn halt(error: MlesacError<Cancelled>, correspondences: usize) -> Halt {
+        match error {
+            MlesacError::TooFewCorrespondences { found, .. } => {
+                Halt::Failed(Failure::NoConsensus {
+                    correspondences: found,
+                    best_inliers: 0,
+                    trials: 0,
+                })
+            }
+            MlesacError::NoModel {
+                trials,
+                best_inliers,
+            } => Halt::Failed(Failure::NoConsensus {
+                correspondences,
+                best_inliers,
+                trials,
+            }),
+            MlesacError::Cancelled(Cancelled) => Halt::Cancelled,
+        }
+    }
+
+    /// Whether the inliers of a consensus are more than chance gives, and of how many: pixels of the query
+    /// that are at one place count once where `fb.once` says so, and in any case those that are at most
+    /// `least_reach_px` apart.
+    pub(super) fn beyond_chance(
+        &self,
+        correspondences: &[Correspondence],
+        consensus: &Consensus,
+        intrinsics: &Intrinsics,
+        least_reach_px: f64,
+    ) -> (Acceptance, usize) {
+        let threshold_px = self.params.mlesac.inlier_threshold_px;
+        // The paper's rule counts whatever there is.
+        let is_once = self.params.once && self.params.accept == AcceptanceRule::Consensus;
+        let reach_px = if is_once {
+            threshold_px
+        } else {
+            least_reach_px
+        };
+        let places = Places::of(correspondences.iter().map(|c| c.pixel), reach_px);
+        let area_px = intrinsics.area();
+        // False matches gather where the texture is, so chance has less room than the whole image.
+        let acceptance = places_beyond_chance(&consensus.inliers, &places, threshold_px, area_px);
+        (acceptance, places.count())
+    }
+
+    /// Whether the rule accepts a verdict.
+    pub(super) fn accepts(&self, acceptance: &Acceptance) -> bool {
+        self.params.accept.accepts(acceptance)
+    }
+
+    /// How far outside the prior a pose may be, as a share of that; `None` for anywhere. The paper's rule
+    /// asks for inliers alone.
+    pub(super) fn slack(&self) -> Option<f64> {
+        let is_asked = self.params.accept == AcceptanceRule::Consensus;
+        is_asked.then_some(self.params.radius_slack)
     }
 }
 
@@ -504,10 +597,25 @@ fn best_matches<E>(
     Ok(matches.into())
 }
 
-/// The cloud of a reference tuple projected into its own photo, remembered with the tuple.
-pub fn projected_cloud(tuple: &ReferenceTuple) -> Arc<ProjectedCloudIndex> {
-    let cloud = tuple.memo.recall((), || {
-        ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics)
+/// The cloud of a reference tuple projected into its own photo, remembered with the tuple; where
+/// `visible` says how, without the points that something nearer hides from the camera, which the scanner
+/// beside it may have met all the same.
+pub fn projected_cloud(
+    tuple: &ReferenceTuple,
+    visible: Option<&RenderParams>,
+) -> Arc<ProjectedCloudIndex> {
+    let visible = visible.map(|render| RenderParams {
+        visibility: true,
+        ..render.clone()
+    });
+    let key = visible.as_ref().map(Exact::of);
+    let cloud = tuple.memo.recall(key, || match &visible {
+        None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
+        Some(render) => {
+            let seen = color_cloud_by(&tuple.cloud, &tuple.intrinsics, render, |_, _| 0.0);
+            let points = seen.points.iter().map(|point| point.position).collect();
+            ProjectedCloudIndex::new(&Cloud { points }, &tuple.intrinsics)
+        }
     });
     cloud.value
 }

@@ -1,9 +1,9 @@
 //! *avg*: the simple average.
 
-use super::Entry;
+use super::{Entry, Way};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "avg",
     about: "the average over all references",
-    weigh: |matches| vec![1.0; matches.len()],
+    way: Way::Weighed(|matches| vec![1.0; matches.len()]),
 };

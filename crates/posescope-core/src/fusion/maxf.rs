@@ -1,11 +1,11 @@
 //! *maxf*: the reference with the most matches alone.
 
-use super::Entry;
+use super::{Entry, Way};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "maxf",
     about: "the reference with the most matches alone",
-    weigh,
+    way: Way::Weighed(weigh),
 };
 
 /// The first of equals wins.

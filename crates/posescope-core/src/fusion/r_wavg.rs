@@ -1,11 +1,11 @@
 //! *r-wavg*, the robust weighted average: references with few matches are left out.
 
-use super::{Entry, wavg};
+use super::{Entry, Way, wavg};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "r-wavg",
     about: "as wavg, over references with at least half of the most matches",
-    weigh,
+    way: Way::Weighed(weigh),
 };
 
 /// With K the most matches of any reference, those with at least K/2 stay.

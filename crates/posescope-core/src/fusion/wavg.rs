@@ -1,11 +1,11 @@
 //! *wavg*: the average weighted by matches.
 
-use super::Entry;
+use super::{Entry, Way};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "wavg",
     about: "the average over all references, weighted by their matches",
-    weigh,
+    way: Way::Weighed(weigh),
 };
 
 /// Where no reference has a match, none is better than another.

@@ -1,9 +1,11 @@
-//! One query against one reference.
+//! One query against one reference, or against several at once.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::estimator::{self, Estimator, Failure, Outcome};
+use crate::estimator::{self, Estimator, Failure, JointReference, Outcome};
+use crate::fusion::{Share, fuse_jointly};
+use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -52,6 +54,27 @@ pub fn localize_by(
     estimated.unwrap_or_else(|panic| {
         let message = words_of(panic.as_ref());
         Ok(Outcome::failed(Failure::Internal { message }))
+    })
+}
+
+/// Localises one query against several references at once and says what each of them has to do with the
+/// pose, in their order. A method that takes one at a time, or is in no registry, fails with
+/// [`Failure::NotJoint`]; a panic is a [`Failure::Internal`].
+///
+/// # Errors
+/// [`Cancelled`] when whoever listens asks the run to stop.
+pub fn localize_jointly(
+    references: &[JointReference<'_>],
+    method: Method,
+    params: &Params,
+    trace: &mut Trace<'_>,
+) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
+    let fused = catch_unwind(AssertUnwindSafe(|| {
+        fuse_jointly(method, params, references, trace)
+    }));
+    fused.unwrap_or_else(|panic| {
+        let message = words_of(panic.as_ref());
+        Ok((Err(Failure::Internal { message }), Vec::new()))
     })
 }
 

@@ -9,6 +9,7 @@ use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 use super::params::{NEEDED, SAMPLE};
+use super::places::Places;
 use crate::describe::choice;
 use crate::solver::MAX_SOLUTIONS;
 
@@ -88,11 +89,73 @@ pub fn inliers_beyond_chance(
     area_px: f64,
 ) -> Acceptance {
     let chance = (PI * threshold_px * threshold_px / area_px).min(1.0);
-    let log10_nfa = |inliers| log10_nfa(inliers, correspondences, chance);
-    Acceptance {
-        inliers,
-        log10_nfa: log10_nfa(inliers),
-        needed: (NEEDED..=correspondences).find(|&k| log10_nfa(k) <= LOG10_EPSILON),
+    let independent = Independent {
+        count: correspondences,
+        tested: correspondences,
+        chance,
+    };
+    independent.judge(inliers)
+}
+
+/// As [`inliers_beyond_chance`], of places in the query instead of correspondences, so that none that
+/// repeats another is counted: `inliers` are correspondences, and a place is an inlier where one of its
+/// correspondences is.
+///
+/// - A place with `m` false matches has one within the threshold with probability `1 − (1 − p)^m` at
+///   most. The sum of such unequal trials exceeds a bound above its mean no more often than a binomial
+///   of their mean probability does (Hoeffding, *On the distribution of the number of successes in
+///   independent trials*, Annals of Mathematical Statistics 27, 1956), which stands for it.
+/// - Any three correspondences may be sampled, of the same place or not: `4 C(n, 3)` tests of all `n`.
+/// - The area that chance has is that of the places' pixels.
+pub fn places_beyond_chance(
+    inliers: &[usize],
+    places: &Places,
+    threshold_px: f64,
+    image_area_px: f64,
+) -> Acceptance {
+    let area_px = effective_area_px(places.pixels(), image_area_px);
+    let one = (PI * threshold_px * threshold_px / area_px).min(1.0);
+    let any: f64 = places
+        .sizes()
+        .iter()
+        .map(|&size| match size {
+            1 => one,
+            _ => 1.0 - (1.0 - one).powi(size as i32),
+        })
+        .sum();
+    let independent = Independent {
+        count: places.count(),
+        tested: places.correspondences(),
+        chance: any / places.count().max(1) as f64,
+    };
+    independent.judge(places.of_some(inliers))
+}
+
+/// What may agree with a pose by chance, each by itself.
+struct Independent {
+    /// How many there are.
+    count: usize,
+    /// Correspondences that samples are drawn from.
+    tested: usize,
+    /// The probability that one of them does.
+    chance: f64,
+}
+
+impl Independent {
+    fn judge(&self, inliers: usize) -> Acceptance {
+        Acceptance {
+            inliers,
+            log10_nfa: self.log10_nfa(inliers),
+            needed: (NEEDED..=self.count).find(|&k| self.log10_nfa(k) <= LOG10_EPSILON),
+        }
+    }
+
+    /// `log₁₀ (4 C(tested, 3) · P[B(n − 3, p) ≥ k − 3])`.
+    fn log10_nfa(&self, k: usize) -> f64 {
+        let tests = (MAX_SOLUTIONS as f64).ln() + ln_binomial(self.tested, SAMPLE);
+        let others = self.count.saturating_sub(SAMPLE);
+        let tail = ln_tail(k.saturating_sub(SAMPLE), others, self.chance);
+        (tests + tail) / LN_10
     }
 }
 
@@ -119,13 +182,6 @@ pub fn effective_area_px(pixels: &[Point2<f64>], image_area_px: f64) -> f64 {
     let pairs = pixels.len() * pixels.len().saturating_sub(1) / 2;
     let share = (neighbours + 1) as f64 / pairs.max(1) as f64;
     (PI * squared_radius / share).min(image_area_px)
-}
-
-/// `log₁₀ (4 C(n, 3) · P[B(n − 3, p) ≥ k − 3])`.
-fn log10_nfa(k: usize, n: usize, p: f64) -> f64 {
-    let tests = (MAX_SOLUTIONS as f64).ln() + ln_binomial(n, SAMPLE);
-    let tail = ln_tail(k.saturating_sub(SAMPLE), n.saturating_sub(SAMPLE), p);
-    (tests + tail) / LN_10
 }
 
 /// `ln P[B ≥ k]` for the number of successes `B` in `n` trials of probability `p`.
@@ -179,6 +235,32 @@ mod tests {
                 .expect("enough of them")
         });
         assert_eq!(needed, [5, 6, 7, 10]);
+    }
+
+    /// Pixels 60 px apart, each `copies` times.
+    fn repeated(places: usize, copies: usize) -> Vec<Point2<f64>> {
+        (0..places * copies)
+            .map(|i| Point2::new((i % places % 20) as f64, (i % places / 20) as f64) * 60.0)
+            .collect()
+    }
+
+    #[test]
+    fn what_repeats_another_correspondence_is_no_evidence_of_its_own() {
+        let places = |copies| Places::of(repeated(30, copies), 3.0);
+        // Each by itself: as the test of correspondences has it.
+        let inliers: Vec<usize> = (0..6).collect();
+        let once = places_beyond_chance(&inliers, &places(1), 3.0, KITTI_AREA);
+        assert_eq!(once, inliers_beyond_chance(6, 30, 3.0, KITTI_AREA));
+        assert!(AcceptanceRule::Consensus.accepts(&once));
+        // Three places, each twice, are six inliers of three places: a sample and nothing else.
+        let twice: Vec<usize> = [0, 1, 2, 30, 31, 32].to_vec();
+        let verdict = places_beyond_chance(&twice, &places(2), 3.0, KITTI_AREA);
+        assert_eq!(verdict.inliers, 3);
+        assert!(!AcceptanceRule::Consensus.accepts(&verdict));
+        // Of more matches a place has more room for chance, and the same places say less.
+        let six = places_beyond_chance(&inliers, &places(5), 3.0, KITTI_AREA);
+        assert_eq!(six.inliers, 6);
+        assert!(six.log10_nfa > once.log10_nfa + 1.0);
     }
 
     #[test]

@@ -32,10 +32,18 @@ parameters! {
         pub depth: DepthRule = choice("depth"),
         /// Guarded: greatest spread of the depths within the radius, as a share.
         pub depth_spread: f64 = number("depth_spread", "", 0.0..=10.0),
+        /// Whether only points lend their depth that the reference camera sees.
+        ///
+        /// A scanner beside the camera also meets what something nearer hides from it; `render` says what
+        /// that is.
+        pub visible: bool = flag("visible"),
         /// MLESAC.
         pub mlesac: MlesacParams = group(),
         /// When a consensus becomes a pose: beyond what chance explains, or the paper's four inliers.
         pub accept: AcceptanceRule = choice("accept"),
+        /// Whether matches of one place in the query, which a detector may find at several scales, count
+        /// once in whether a consensus is more than chance.
+        pub once: bool = flag("once"),
         /// How far outside the uncertainty radius a pose is still accepted, as a share of it.
         ///
         /// The reference is taken within the radius of the true position, which is itself uncertain.
@@ -51,8 +59,10 @@ impl Default for FeatureParams {
             depth_radius_px: 3.0,
             depth: DepthRule::Nearest,
             depth_spread: 0.1,
+            visible: false,
             mlesac: MlesacParams::default(),
             accept: AcceptanceRule::Consensus,
+            once: true,
             radius_slack: 0.1,
         }
     }

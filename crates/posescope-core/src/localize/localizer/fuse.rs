@@ -2,17 +2,17 @@
 
 use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
-use crate::diagnosis::{Member, diagnose_fusion, fused_trust};
-use crate::estimator::count_matches;
+use crate::diagnosis::{Member, diagnose_fusion, diagnose_joint, fused_trust};
+use crate::estimator::{Failure, JointReference, count_matches};
 use crate::features::{PairMatches, remembered};
-use crate::fusion::{self, Fusion};
-use crate::geometry::PoseError;
+use crate::fusion::{self, Fusion, Share, Way};
+use crate::geometry::{Pose, PoseError};
 use crate::localize::observer::checkpoint;
-use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
+use crate::localize::{LocalizeObserver, QueryResult, StageTimes, StageTimings, localize_jointly};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::scene::Scene;
-use crate::trace::{Cancelled, Sink, Trace};
+use crate::trace::{Cancelled, Fanout, Sink, Trace};
 
 impl Localizer<'_> {
     /// FB counts them anyway; for the direct methods the same features are matched.
@@ -80,8 +80,14 @@ impl Localizer<'_> {
             })
             .collect();
         observer.begin_fusion(method);
-        let sink: &mut dyn Sink = observer;
-        let (pose, shares) = fusion::fuse(&fusion, &candidates, &mut Trace::to(sink))?;
+        let mut own = StageTimings::default();
+        let (pose, shares) = match fusion.way {
+            Way::Weighed(weigh) => {
+                let sink: &mut dyn Sink = observer;
+                fusion::fuse(fusion.name, weigh, &candidates, &mut Trace::to(sink))?
+            }
+            Way::Joint => self.estimate_jointly(&solved, method, &mut own, observer)?,
+        };
         let fused_members: Vec<Member<'_>> = shares
             .iter()
             .zip(&solved)
@@ -103,7 +109,10 @@ impl Localizer<'_> {
             initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
                 PoseError::between(truth, &problem.reference.world_from_camera)
             }),
-            diagnosis: diagnose_fusion(&pose, &fused_members, truth, self.tolerance),
+            diagnosis: match fusion.way {
+                Way::Weighed(_) => diagnose_fusion(&pose, &fused_members, truth, self.tolerance),
+                Way::Joint => diagnose_joint(&pose, &fused_members, truth, self.tolerance),
+            },
             trust: pose
                 .as_ref()
                 .ok()
@@ -125,7 +134,35 @@ impl Localizer<'_> {
         };
         let result = self.with_ranking_judged(result, request, truth);
         observer.end_fusion(&result);
-        let times = StageTimes::sum(solved.iter().map(|(.., candidate)| &candidate.times));
+        let own = own.into_times();
+        let runs = solved.iter().map(|(.., candidate)| &candidate.times);
+        let times = StageTimes::sum(runs.chain(std::iter::once(&own)));
         Ok((result, times))
+    }
+
+    /// One pose from all references, each of which was asked alone before: what they answered is shown
+    /// beside it, and has no part in it.
+    fn estimate_jointly(
+        &self,
+        solved: &[(&Problem, usize, &MethodOutcome)],
+        method: Method,
+        own: &mut StageTimings,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
+        let references: Vec<_> = solved
+            .iter()
+            .map(|(problem, matches, candidate)| JointReference {
+                problem,
+                matches: *matches,
+                alone: candidate.outcome.pose.as_ref().ok(),
+            })
+            .collect();
+        let attention = observer.attention();
+        let mut fanout = Fanout::new(vec![own, observer]);
+        let mut trace = match &attention {
+            Some(flag) => Trace::watched(&mut fanout, flag),
+            None => Trace::to(&mut fanout),
+        };
+        localize_jointly(&references, method, self.params, &mut trace)
     }
 }

@@ -1,0 +1,212 @@
+//! A direct method of several references: their costs added up over one grid.
+
+use super::{JointEstimator, JointOutcome, JointReference, between, lead};
+use crate::cost;
+use crate::estimator::direct::Direct;
+use crate::estimator::{Failure, Halt, separate_failure};
+use crate::event::Stage;
+use crate::fusion::share::Support;
+use crate::geometry::Pose;
+use crate::grid::{Lattice, Offset, Phase, ScoredLattice, least_covered};
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::render::{ColoredCloud, Score, Scorer};
+use crate::trace::{Cancelled, Trace};
+
+/// The estimator that searches the least cost over several references.
+///
+/// The grid is that of the reference with the most matches: its disc, its axes, its height, pitch and
+/// roll. (On the street the grids of others that look another way found a cheaper wrong place more often
+/// than the right one, and a grid at the average of the references was less exact.) At each hypothesis every reference draws its own view of the query and has its own cost; the
+/// joint cost is their mean, each weighed by the pixels that it covers. One that covers too little there,
+/// as [`coverage_floor`](crate::grid::GridParams::coverage_floor) says, abstains, and where fewer than
+/// half have a say there is no cost: a place that few can see would be cheap for that reason alone.
+pub struct JointDirect {
+    direct: Direct,
+}
+
+impl JointEstimator for JointDirect {
+    fn estimate(
+        &self,
+        references: &[JointReference<'_>],
+        trace: &mut Trace<'_>,
+    ) -> Result<JointOutcome, Cancelled> {
+        let found = self.search(references, trace);
+        Ok(match separate_failure(found)? {
+            Ok((pose, supports)) => JointOutcome {
+                pose: Ok(pose),
+                supports,
+            },
+            Err(failure) => JointOutcome::failed(failure, references.len()),
+        })
+    }
+}
+
+/// A reference that shows something.
+struct Member<'a> {
+    index: usize,
+    scorer: Scorer<'a>,
+    /// Its camera's frame seen from that of the lead.
+    member_from_lead: Pose,
+    least_covered: u32,
+}
+
+impl JointDirect {
+    /// The estimator of a registered cost.
+    pub fn new(entry: &cost::Entry, params: &Params) -> Self {
+        Self {
+            direct: Direct::new(entry, params),
+        }
+    }
+
+    fn search(
+        &self,
+        references: &[JointReference<'_>],
+        trace: &mut Trace<'_>,
+    ) -> Result<(Pose, Vec<Option<Support>>), Halt> {
+        let lead = references[lead(references)].problem;
+        let (grid, radius_m) = (&self.direct.grid, lead.uncertainty_radius_m);
+        for phase in Phase::ALL {
+            Lattice::new(phase, Offset::default(), radius_m, grid).map_err(Failure::from)?;
+        }
+        let mut clouds = Vec::new();
+        for reference in references {
+            trace.checkpoint()?;
+            clouds.push(self.direct.colored(reference.problem).value);
+        }
+        let mut members = Vec::new();
+        for (index, (reference, cloud)) in references.iter().zip(&clouds).enumerate() {
+            if cloud.points.is_empty() {
+                continue;
+            }
+            trace.checkpoint()?;
+            members.push(self.member(index, reference.problem, lead, cloud));
+        }
+        if members.is_empty() {
+            let clouds = references.iter().map(|r| r.problem.reference.cloud.len());
+            let points = clouds.sum();
+            return Err(Halt::from(Failure::NothingInView { points }));
+        }
+
+        let joint = Joint { members };
+        let (mut best, mut found) = (Offset::default(), None);
+        let mut hypotheses = 0;
+        for _ in 0..grid.rounds {
+            for phase in Phase::ALL {
+                let lattice = Lattice::new(phase, best, radius_m, grid).map_err(Failure::from)?;
+                let surface = trace.stage(Stage::Search(phase), |trace| {
+                    joint.scored(lattice, &mut hypotheses, trace)
+                })?;
+                if phase == Phase::PositionCoarse
+                    && let Some((cost, hypotheses)) = surface.flat_cost()
+                {
+                    return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
+                }
+                if let Some(cell) = surface.minimum()
+                    && let Some(offset) = surface.lattice.offset(cell)
+                {
+                    (best, found) = (offset, Some(offset));
+                }
+            }
+        }
+        let best = found.ok_or(Failure::NothingComparable { hypotheses })?;
+        let lead_from_query = best.reference_from_camera();
+        let area = lead.query.intrinsics.area();
+        let mut supports = vec![None; references.len()];
+        for member in &joint.members {
+            let score = member.scores(&[lead_from_query])[0];
+            supports[member.index] = Some(Support::Cost {
+                cost: score.eligible_cost(member.least_covered),
+                coverage: f64::from(score.covered) / area,
+            });
+        }
+        Ok((lead.world_from_query(&lead_from_query), supports))
+    }
+
+    fn member<'a>(
+        &'a self,
+        index: usize,
+        problem: &Problem,
+        lead: &Problem,
+        cloud: &'a ColoredCloud,
+    ) -> Member<'a> {
+        let scorer = self.direct.scorer(problem, cloud);
+        let at_reference = scorer.score(&[Pose::identity()])[0];
+        Member {
+            index,
+            scorer,
+            member_from_lead: between(problem, lead),
+            least_covered: least_covered(self.direct.grid.coverage_floor, at_reference.covered),
+        }
+    }
+}
+
+impl Member<'_> {
+    /// The member's own scores of cameras in the frame of the lead.
+    fn scores(&self, lead_from_camera: &[Pose]) -> Vec<Score> {
+        let own = lead_from_camera.iter();
+        let own: Vec<Pose> = own.map(|pose| self.member_from_lead * pose).collect();
+        self.scorer.score(&own)
+    }
+}
+
+/// The members at work.
+struct Joint<'a> {
+    members: Vec<Member<'a>>,
+}
+
+impl Joint<'_> {
+    fn scored(
+        &self,
+        lattice: Lattice,
+        count: &mut usize,
+        trace: &mut Trace<'_>,
+    ) -> Result<ScoredLattice, Cancelled> {
+        let mut scores = vec![None; lattice.cells()];
+        let at_a_time = self.members[0].scorer.at_a_time();
+        let mut hypotheses = lattice.hypotheses();
+        loop {
+            let some: Vec<_> = hypotheses.by_ref().take(at_a_time).collect();
+            if some.is_empty() {
+                break;
+            }
+            *count += some.len();
+            let poses: Vec<Pose> = some
+                .iter()
+                .map(|(_, offset)| offset.reference_from_camera())
+                .collect();
+            let mut own = Vec::new();
+            for member in &self.members {
+                trace.checkpoint()?;
+                own.push(member.scores(&poses));
+            }
+            for (place, (cell, _)) in some.into_iter().enumerate() {
+                let own = own.iter().map(|scores| scores[place]);
+                scores[cell] = Some(self.together(own));
+            }
+        }
+        drop(hypotheses);
+        Ok(ScoredLattice {
+            lattice,
+            scores,
+            least_covered: 0,
+        })
+    }
+
+    /// The mean of the costs of those that cover enough, and the pixels that they cover.
+    fn together(&self, own: impl Iterator<Item = Score>) -> Score {
+        let counted: Vec<(f64, u32)> = own
+            .zip(&self.members)
+            .filter_map(|(score, member)| {
+                Some((score.eligible_cost(member.least_covered)?, score.covered))
+            })
+            .collect();
+        let covered: u32 = counted.iter().map(|(_, covered)| covered).sum();
+        let mean = |(cost, own): &(f64, u32)| cost * (f64::from(*own) / f64::from(covered));
+        let is_heard = !counted.is_empty() && 2 * counted.len() >= self.members.len();
+        Score {
+            cost: is_heard.then(|| counted.iter().map(mean).sum()),
+            covered,
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Which correspondences are evidence of their own, and which repeat another's.
+
+use nalgebra::Point2;
+
+/// The places in the query photo that correspondences are of.
+///
+/// A detector finds one corner at several scales, and several references may match one keypoint. Such
+/// correspondences stand and fall together: a pose that explains one explains, as good as always, the
+/// others, so that an accident is counted several times. A test that takes correspondences to be
+/// independent counts places instead.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Places {
+    /// The place of each correspondence.
+    of: Vec<usize>,
+    /// The pixel of the first correspondence of each place.
+    pixels: Vec<Point2<f64>>,
+    /// Correspondences of each place.
+    sizes: Vec<usize>,
+}
+
+impl Places {
+    /// A pixel belongs to the first place before it that is within `reach_px`, and else is a place of its
+    /// own. Time is quadratic in their number: a millisecond for a thousand.
+    pub fn of(pixels: impl IntoIterator<Item = Point2<f64>>, reach_px: f64) -> Self {
+        let mut places = Self {
+            of: Vec::new(),
+            pixels: Vec::new(),
+            sizes: Vec::new(),
+        };
+        for pixel in pixels {
+            let is_here = |known: &Point2<f64>| (known - pixel).norm() <= reach_px;
+            let place = places.pixels.iter().position(is_here).unwrap_or_else(|| {
+                places.pixels.push(pixel);
+                places.sizes.push(0);
+                places.sizes.len() - 1
+            });
+            places.sizes[place] += 1;
+            places.of.push(place);
+        }
+        places
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// How many correspondences they are of.
+    pub fn correspondences(&self) -> usize {
+        self.of.len()
+    }
+
+    /// One pixel of each.
+    pub fn pixels(&self) -> &[Point2<f64>] {
+        &self.pixels
+    }
+
+    /// Correspondences of each.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
+    /// The places that some of the correspondences are of.
+    pub fn of_some(&self, correspondences: &[usize]) -> usize {
+        let mut is_met = vec![false; self.count()];
+        for &correspondence in correspondences {
+            is_met[self.of[correspondence]] = true;
+        }
+        is_met.into_iter().filter(|met| *met).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_pixels_are_one_place_and_a_chain_of_them_is_not() {
+        let pixels = [0.0, 2.0, 4.0, 90.0, 0.5].map(|x| Point2::new(x, 7.0));
+        let places = Places::of(pixels, 3.0);
+        assert_eq!(places.count(), 3);
+        assert_eq!(places.correspondences(), 5);
+        assert_eq!(places.sizes(), [3, 1, 1]);
+        assert_eq!(places.of_some(&[0, 1, 4]), 1);
+        assert_eq!(places.of_some(&[4, 2, 3]), 3);
+        assert_eq!(places.of_some(&[]), 0);
+    }
+}
