@@ -289,9 +289,10 @@ pub struct ProtocolArgs {
     /// lists what there is
     #[arg(long, value_name = "STEP=STRENGTH,…", long_help = degradations())]
     pub degrade: Option<Degradation>,
-    /// Fuse the poses of several references into one, by each of these [default: none, and each
-    /// reference gives its own; eval: r-wavg]
-    #[arg(long, value_name = "maxf,avg,wavg,r-wavg", value_delimiter = ',')]
+    /// One pose of several references, by each of these: the poses of each averaged, or, joint, all
+    /// references at once (fb, pm, mi, nid, hy) [default: none, and each reference gives its own; eval:
+    /// r-wavg]
+    #[arg(long, value_name = "maxf,avg,wavg,r-wavg,joint", value_delimiter = ',')]
     pub fusion: Vec<Fusion>,
     /// Seed of every random choice [default: 0]
     #[arg(long)]
@@ -507,6 +508,10 @@ pub struct IndexArgs {
     /// Index every Nth frame only
     #[arg(long, value_name = "N", default_value = "1")]
     pub every: NonZeroUsize,
+    /// Leave out a frame, or the queries of a run folder; repeatable. Where queries are of the same drive,
+    /// an index with their own photos knows more of them than another drive would
+    #[arg(long, value_name = "FRAME|RUN")]
+    pub without: Vec<String>,
     /// The file to write [default: in the user's cache directory, where `run` finds it]
     #[arg(long, value_name = "FILE")]
     pub output: Option<PathBuf>,

@@ -1,7 +1,11 @@
 //! `posescope index`: the retrieval index of a scene.
 
+use std::collections::BTreeSet;
+use std::path::Path;
+
 use posescope::retrieval::{BuildError, BuildProgress, Index, IndexError};
-use posescope::scene::{self, IndexOptions, NoIndex, Retriever};
+use posescope::run::read_run;
+use posescope::scene::{self, IndexOptions, NoIndex, Retriever, Scene};
 
 use super::args::IndexArgs;
 use super::failure::CliError;
@@ -22,7 +26,8 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         every: args.every.get(),
         seed: args.seed,
     };
-    let request = Retriever::request(scene.as_ref(), &options, &params);
+    let without = left_out(scene.as_ref(), &args.without)?;
+    let request = Retriever::request_without(scene.as_ref(), &options, &without, &params);
     if !args.force {
         let there = Index::open(&path, params.retrieval.checks);
         match there.and_then(|index| index.check_request(&request)) {
@@ -59,8 +64,12 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     })?;
     say(terminal, || {
         format!(
-            "{} frames, {} features, {} words, {:.1} MB: {}",
+            "{} frames{}, {} features, {} words, {:.1} MB: {}",
             summary.frames,
+            match without.len() {
+                0 => String::new(),
+                left_out => format!(" without {left_out}"),
+            },
             summary.features,
             summary.words,
             summary.bytes as f64 / 1e6,
@@ -68,6 +77,26 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         )
     });
     Ok(())
+}
+
+/// The frames that are not to be indexed: those that are named, and the queries of runs.
+fn left_out(scene: &dyn Scene, named: &[String]) -> Result<BTreeSet<usize>, CliError> {
+    let mut frames = BTreeSet::new();
+    for name in named {
+        let folder = Path::new(name);
+        if !folder.is_dir() {
+            frames.insert(scene.find(name)?);
+            continue;
+        }
+        let run = read_run(folder)?;
+        let pairs = run.pairs.iter();
+        for pair in pairs.filter(|pair| pair.query_scene == scene.name()) {
+            for query in pair.drawn.iter().chain(&pair.queries) {
+                frames.insert(scene.find(query)?);
+            }
+        }
+    }
+    Ok(frames)
 }
 
 fn say(terminal: &Terminal, message: impl FnOnce() -> String) {

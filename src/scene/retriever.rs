@@ -1,6 +1,6 @@
 //! Retrieval in a scene: from photos to an index, and from a photo to the frames that resemble it.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 use xxhash_rust::xxh3::xxh3_64;
@@ -80,15 +80,39 @@ impl Retriever {
 
     /// What the index of a scene is to hold.
     pub fn request(scene: &dyn Scene, options: &IndexOptions, params: &Params) -> BuildRequest {
+        Self::request_without(scene, options, &BTreeSet::new(), params)
+    }
+
+    /// As [`Self::request`], without some frames: neither are they found, nor have their features a part
+    /// in the words or in how much a word says. Where queries are of the scene itself, an index with
+    /// their own photos knows more of them than one of another drive could.
+    pub fn request_without(
+        scene: &dyn Scene,
+        options: &IndexOptions,
+        without: &BTreeSet<usize>,
+        params: &Params,
+    ) -> BuildRequest {
         let IndexOptions { words, every, seed } = *options;
         let mut recipe = recipe(params, &RetrievalParams::BUILDING);
         let numbers = [("words", words), ("every", every)];
         recipe.extend(numbers.map(|(key, value)| (key.to_owned(), value.to_string())));
         recipe.insert("seed".to_owned(), seed.to_string());
+        if !without.is_empty() {
+            let names = without.iter().map(|&frame| scene.frames()[frame].as_str());
+            let names = names.collect::<Vec<_>>().join("\n");
+            let hash = xxh3_64(names.as_bytes());
+            recipe.insert(
+                "without".to_owned(),
+                format!("{} {hash:016x}", without.len()),
+            );
+        }
         BuildRequest {
             scene: scene.name().to_owned(),
             fingerprint: scene.fingerprint(),
-            frames: (0..scene.frames().len()).step_by(every.max(1)).collect(),
+            frames: (0..scene.frames().len())
+                .step_by(every.max(1))
+                .filter(|frame| !without.contains(frame))
+                .collect(),
             words,
             seed,
             sample: params.retrieval.sample,

@@ -99,6 +99,35 @@ fn an_index_is_built_once_and_finds_the_reference() {
 }
 
 #[test]
+fn frames_that_are_left_out_of_an_index_are_not_found_and_make_it_another() {
+    let (folder, file) = file();
+    let (code, message) = said(index(&file).args(["--without", "200"]));
+    assert_eq!(code, Some(0), "{message}");
+    assert!(message.contains("8 frames without 1"), "{message}");
+    let output = run(&file).output().expect("the binary starts");
+    let results = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(results.contains("\"references\":") && !results.contains("\"000200\""));
+    // With that frame it is another index, which is built anew.
+    let (code, message) = said(&mut index(&file));
+    assert_eq!(code, Some(0), "{message}");
+    assert!(message.contains("9 frames,"), "{message}");
+    let (code, message) = said(index(&file).args(["--without", "no such frame"]));
+    assert_eq!(code, Some(3), "{message}");
+
+    // The queries of a run, which its folder names.
+    let runs = folder.path().join("run");
+    let eval = posescope()
+        .args(["eval", "street", "--only", "200", "--method", "fb", "-q"])
+        .args(["--references", "nearest:1", "--out"])
+        .arg(&runs)
+        .output();
+    assert!(eval.expect("the binary starts").status.success());
+    let (code, message) = said(index(&file).arg("--without").arg(&runs));
+    assert_eq!(code, Some(0), "{message}");
+    assert!(message.contains("8 frames without 1"), "{message}");
+}
+
+#[test]
 fn an_experiment_asks_the_index_that_is_named_for_each_scene() {
     let (folder, file) = file();
     assert!(index(&file).output().expect("starts").status.success());
