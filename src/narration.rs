@@ -91,6 +91,14 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::BranchTaken(event) => {
             format!("takes the pose of {}: {}", event.method.name(), event.why)
         }
+        Event::DescentStepped(event) => format!(
+            "level {}, step {}: smooth cost {:.4}, cost {}, {}",
+            event.level,
+            event.step,
+            event.smooth_cost,
+            cost(event.score.cost),
+            at(&Offset::of(&event.reference_from_camera))
+        ),
         Event::StartsRefined(event) => refined(event)?,
         Event::CandidatesJudged(event) => judged(event),
         Event::ReferencesFused(event) => fused(event),

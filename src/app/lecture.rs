@@ -80,6 +80,9 @@ fn about(stage: Stage) -> &'static str {
             "At the cheapest position the camera is turned left and right."
         }
         Stage::Search(Phase::YawFine) => "Around the cheapest direction the steps become finer.",
+        Stage::Descend => {
+            "From the reference it walks downhill, first over blurred photos, then over sharper ones."
+        }
         Stage::SearchCoarse => {
             "Smaller copies of the photos have wider basins: they are searched first."
         }

@@ -136,7 +136,7 @@ fn color_of(bar: &StageBar) -> Color32 {
         (_, Some(false)) => theme::ESTIMATE,
         (Stage::Estimator(method), _) => theme::method(method),
         (Stage::Detect | Stage::Color, _) => Color32::from_rgb(0x6A, 0x8C, 0xAF),
-        (Stage::SearchCoarse | Stage::RefinePlane | Stage::RefineSix, _)
+        (Stage::Descend | Stage::SearchCoarse | Stage::RefinePlane | Stage::RefineSix, _)
         | (Stage::Retrieve | Stage::Match | Stage::MatchGuided | Stage::Search(_), _) => {
             Color32::from_rgb(0x8F, 0xA8, 0x6E)
         }

@@ -222,7 +222,7 @@ impl Breakpoint {
             .chain(&names)
             .chain(&stages)
             .chain(&phases)
-            .chain(&[Stage::MatchGuided, Stage::SearchCoarse])
+            .chain(&[Stage::Descend, Stage::MatchGuided, Stage::SearchCoarse])
             .chain(&[Stage::RefinePlane, Stage::RefineSix])
             .chain(&[Stage::Judge, Stage::Assess, Stage::Fuse])
             .map(|stage| stage.name())

@@ -2,7 +2,9 @@
 
 use image::{GrayImage, Luma};
 use posescope::estimator::{self, Outcome};
-use posescope::event::{CandidatesJudged, PhaseSearched, StartsRefined};
+use posescope::event::{
+    CandidatesJudged, DescentStepped, Moment, PhaseSearched, StartsRefined, ViewRendered,
+};
 use posescope::geometry::{Pose, PoseError};
 use posescope::history::History;
 use posescope::judge::{Channels, Judge, JudgeParams};
@@ -107,6 +109,47 @@ fn six_freedoms_are_searched_at_several_yaws_and_end_below_every_lattice() {
         for one in refined.refinements.iter() {
             assert!(one.cost <= one.start.cost);
         }
+    }
+}
+
+#[test]
+fn a_descent_tells_each_step_over_the_surface_and_listening_changes_nothing() {
+    let problem = problem(photo(0.15, 5), photo(0.0, 5), cloud_of_the_walls());
+    let truth = problem.world_from_query(&Pose::translation(0.0, 0.0, 0.15));
+    for (method, setting) in [("pm", "pm.search=descent"), ("mi", "mi.search=descent")] {
+        let params = params(&[setting]);
+        let (outcome, history) = told(method, &problem, &params);
+        let silent = estimator::entry(method.parse().expect("a method"))
+            .make(&params)
+            .estimate(&problem, &mut Trace::off());
+        assert_eq!(silent.as_ref(), Ok(&outcome), "{method}");
+        let off = PoseError::between(&truth, outcome.pose.as_ref().expect("a pose"));
+        assert!(off.translation_m < 0.1, "{method}: {off}");
+
+        let steps: Vec<_> = history
+            .all::<DescentStepped>()
+            .map(|(_, step)| *step)
+            .collect();
+        assert_eq!(steps[0].level, params.descent.levels - 1, "{method}");
+        assert_eq!(steps[steps.len() - 1].level, 0, "{method}");
+        for pair in steps.windows(2) {
+            let goes_on = pair[0].level == pair[1].level && pair[0].step + 1 == pair[1].step;
+            let begins = pair[0].level > pair[1].level && pair[1].step == 1;
+            assert!(goes_on || begins, "{method}: {pair:?}");
+        }
+        // The way over the surface that views and recordings draw.
+        let way = history
+            .all::<ViewRendered>()
+            .filter(|(_, view)| view.moment == Moment::NewBest);
+        assert!(way.count() >= steps.len(), "{method}");
+        assert_eq!(history.all::<PhaseSearched>().count(), 1, "{method}");
+        let cost = outcome.cost.expect("a cost was descended");
+        assert_eq!(cost.evaluations, 1 + steps.len() as u64, "{method}");
+        assert_eq!(
+            Some(cost.best),
+            steps[steps.len() - 1].score.cost,
+            "{method}"
+        );
     }
 }
 

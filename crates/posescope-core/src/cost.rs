@@ -27,7 +27,7 @@ pub use mutual_information::{MutualInformation, MutualInformationParams};
 pub use orientation::{Orientation, OrientationParams};
 pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
 
-use crate::describe::Describe;
+use crate::describe::{Describe, choice};
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
 use crate::memo::{Bits, Exact, Key};
 
@@ -90,6 +90,12 @@ pub trait Cost: Send + Sync {
         Evaluator::Pairs(Box::new(|pairs| self.evaluate(pairs)))
     }
 
+    /// The smooth cost that is descended instead of searching a grid for the least of this one; `None` for
+    /// the grid.
+    fn descended(&self) -> Option<SmoothCost> {
+        None
+    }
+
     /// Why the cost of these pairs is what it is; `None` where there is no cost, and for a cost that
     /// has nothing of the kind to show.
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
@@ -114,6 +120,31 @@ pub enum ExplanationKind {
     Weights,
     /// [`Explanation::JointHistogram`].
     JointHistogram,
+}
+
+/// How a direct method finds the pose of least cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SearchRule {
+    /// It scans a coarse-to-fine grid, as the paper does.
+    #[default]
+    Grid,
+    /// It goes down from the reference pose by derivatives, as the methods do that the paper takes its
+    /// costs from.
+    Descent,
+}
+
+choice!(SearchRule: Grid = "grid", Descent = "descent");
+
+/// What a cost is like that has derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SmoothCost {
+    /// Squared differences of values, robustly.
+    Differences,
+    /// The information distance of a histogram with so many bins per axis.
+    Information {
+        /// Bins per axis.
+        bins: usize,
+    },
 }
 
 /// Parameters that make a cost.

@@ -48,6 +48,8 @@ pub enum Stage {
     Color,
     /// PM, MI: one phase of the grid search.
     Search(Phase),
+    /// PM, MI: downhill from the reference pose.
+    Descend,
     /// `mi6`: smaller copies of the photos are searched.
     SearchCoarse,
     /// `mi6`: the best coarse minima are refined in right, forward and yaw.
@@ -79,6 +81,7 @@ impl Stage {
             Self::Search(Phase::PositionFine) => "position_fine",
             Self::Search(Phase::YawCoarse) => "yaw_coarse",
             Self::Search(Phase::YawFine) => "yaw_fine",
+            Self::Descend => "descend",
             Self::SearchCoarse => "search_coarse",
             Self::RefinePlane => "refine_plane",
             Self::RefineSix => "refine_six",
@@ -187,6 +190,7 @@ events! {
     ReferencesRanked,
     StartsRefined,
     CandidatesJudged,
+    DescentStepped,
 }
 
 /// A stage begins.
@@ -393,6 +397,21 @@ pub struct ReferencesRanked {
     /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
     /// read.
     pub photos: Arc<[Option<Arc<Photo>>]>,
+}
+
+/// A step downhill by the derivatives of a smooth cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DescentStepped {
+    /// The copy of the photos, 0 the finest; each is twice as coarse as the one below.
+    pub level: usize,
+    /// Number of the step on this level, from 1.
+    pub step: usize,
+    /// The query camera in the reference camera's frame, after the step.
+    pub reference_from_camera: Pose,
+    /// The smooth cost there.
+    pub smooth_cost: f64,
+    /// The method's own cost there, and the pixels that it is of.
+    pub score: Score,
 }
 
 /// Several starts were refined side by side.

@@ -39,6 +39,7 @@ pub mod cloud;
 pub mod code;
 pub mod cost;
 pub mod depth;
+pub mod descent;
 pub mod describe;
 pub mod diagnosis;
 pub mod estimator;

@@ -6,6 +6,7 @@
 use std::str::FromStr;
 
 use crate::cost::CostSettings;
+use crate::descent::DescentParams;
 use crate::describe::{Describe, Described, ParamError, Value, list, set};
 use crate::estimator::{FeatureParams, GuidedParams, RobustParams, SixParams};
 use crate::features::SurfParams;
@@ -27,6 +28,8 @@ pub struct Params {
     pub grid: GridParams,
     /// `pm`, `mi` and so on: a group for each registered cost.
     pub costs: CostSettings,
+    /// `descent`: going down by derivatives, where `search` of a cost says so.
+    pub descent: DescentParams,
     /// `fb2`: matching twice.
     pub fb2: GuidedParams,
     /// `judge`: the cost by which poses of several methods are compared.
@@ -60,6 +63,7 @@ impl Params {
         for (group, params) in self.costs.groups() {
             visit(group, params);
         }
+        visit("descent", &mut self.descent);
         visit("fb2", &mut self.fb2);
         visit("judge", &mut self.judge);
         visit("mi6", &mut self.mi6);

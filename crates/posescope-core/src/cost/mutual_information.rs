@@ -2,7 +2,7 @@
 
 use super::{
     Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    MakesCost, Similarity,
+    MakesCost, SearchRule, Similarity, SmoothCost,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -31,6 +31,8 @@ parameters! {
         ///
         /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
         pub bins: usize = count("bins", "", 2..=256),
+        /// How the pose of least cost is found: over the grid, or from the reference pose downhill.
+        pub search: SearchRule = choice("search"),
     }
 }
 
@@ -39,6 +41,7 @@ impl Default for MutualInformationParams {
         Self {
             sigma_px: 1.5,
             bins: 16,
+            search: SearchRule::Grid,
         }
     }
 }
@@ -79,6 +82,11 @@ impl Cost for MutualInformation {
 
     fn evaluator(&self) -> Evaluator<'_> {
         Evaluator::of_entropies(self.params.bins, distance)
+    }
+
+    fn descended(&self) -> Option<SmoothCost> {
+        let bins = self.params.bins;
+        (self.params.search == SearchRule::Descent).then_some(SmoothCost::Information { bins })
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {

@@ -1,7 +1,10 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
 use super::median::MedianFinder;
-use super::{Cost, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, MakesCost};
+use super::{
+    Cost, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, MakesCost, SearchRule,
+    SmoothCost,
+};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Exact, Key};
@@ -25,6 +28,8 @@ parameters! {
         /// The power of the squared difference E in the weighted mean: 1 averages it; 2 is the
         /// paper's literal formula, which squares E once more.
         pub power: usize = count("power", "", 1..=2),
+        /// How the pose of least cost is found: over the grid, or from the reference pose downhill.
+        pub search: SearchRule = choice("search"),
     }
 }
 
@@ -33,6 +38,7 @@ impl Default for PhotometricParams {
         Self {
             sigma_px: 1.5,
             power: 1,
+            search: SearchRule::Grid,
         }
     }
 }
@@ -129,6 +135,10 @@ impl Cost for Photometric {
             let threshold = medians.lower_median(&errors)?;
             Some(self.mean_up_to(threshold, &errors))
         }))
+    }
+
+    fn descended(&self) -> Option<SmoothCost> {
+        (self.params.search == SearchRule::Descent).then_some(SmoothCost::Differences)
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {

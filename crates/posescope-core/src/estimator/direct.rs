@@ -1,11 +1,14 @@
 //! What PM and MI share: colour the cloud, then search the grid for the pose of least cost
 //! (paper, appendix B).
 
+mod descend;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost, shuffled};
+use crate::descent::DescentParams;
 use crate::event::{
     CloudColored, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
 };
@@ -24,6 +27,7 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     render: RenderParams,
     pub(super) grid: GridParams,
+    descent: DescentParams,
     /// Which cost, with all its parameters.
     cost_key: Key,
 }
@@ -38,6 +42,7 @@ impl Direct {
             cost: cost.cost(),
             render: params.render.clone(),
             grid: params.grid.clone(),
+            descent: params.descent.clone(),
             cost_key: Key::new((entry.name, cost.key())),
         }
     }
@@ -54,6 +59,7 @@ impl Direct {
             cost,
             render: params.render.clone(),
             grid: params.grid.clone(),
+            descent: params.descent.clone(),
             cost_key: Key::new(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
@@ -62,7 +68,10 @@ impl Direct {
 impl Estimator for Direct {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         let found = trace.stage(Stage::Estimator(self.method), |trace| {
-            self.search(problem, trace)
+            match self.cost.descended() {
+                None => self.search(problem, trace),
+                Some(smooth) => self.descend(smooth, problem, trace),
+            }
         });
         Ok(match separate_failure(found)? {
             Ok((pose, cost)) => Outcome {
@@ -99,21 +108,7 @@ impl Direct {
         for phase in Phase::ALL {
             Lattice::new(phase, Offset::default(), radius, &self.grid).map_err(Failure::from)?;
         }
-        let cloud = trace.stage(Stage::Color, |trace| {
-            let Recalled {
-                value: cloud,
-                reused,
-            } = self.colored(problem);
-            trace.note_reuse(reused);
-            trace.emit(|| CloudColored {
-                cloud: Arc::clone(&cloud),
-            })?;
-            if cloud.points.is_empty() {
-                let points = problem.reference.cloud.len();
-                return Err(Halt::from(Failure::NothingInView { points }));
-            }
-            Ok(cloud)
-        })?;
+        let cloud = self.colored_and_told(problem, trace)?;
         trace.checkpoint()?;
         let scorer = self.scorer(problem, &cloud);
         trace.checkpoint()?;
@@ -186,6 +181,28 @@ impl Direct {
                 problem.world_from_query(&best.reference_from_camera()),
                 summary,
             ))
+        })
+    }
+
+    fn colored_and_told(
+        &self,
+        problem: &Problem,
+        trace: &mut Trace<'_>,
+    ) -> Result<Arc<ColoredCloud>, Halt> {
+        trace.stage(Stage::Color, |trace| {
+            let Recalled {
+                value: cloud,
+                reused,
+            } = self.colored(problem);
+            trace.note_reuse(reused);
+            trace.emit(|| CloudColored {
+                cloud: Arc::clone(&cloud),
+            })?;
+            if cloud.points.is_empty() {
+                let points = problem.reference.cloud.len();
+                return Err(Halt::from(Failure::NothingInView { points }));
+            }
+            Ok(cloud)
         })
     }
 
