@@ -22,6 +22,7 @@ mod observer;
 mod opened;
 mod output;
 mod params;
+mod report;
 mod run;
 #[cfg(feature = "app")]
 mod shot;
@@ -70,6 +71,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Eval(args)) => eval::eval(args, &terminal),
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Triage(args)) => triage::triage(args, &terminal),
+        Some(Command::Report(args)) => report::report(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),
         Some(Command::Index(args)) => index::index(args, &terminal),
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),

@@ -40,6 +40,8 @@ mod narration;
 mod palette;
 #[cfg(feature = "rerun")]
 mod picture;
+#[cfg(feature = "rerun")]
+pub mod report;
 pub mod run;
 pub mod scene;
 pub mod session;

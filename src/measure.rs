@@ -32,9 +32,13 @@ pub use known::{KnownError, KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
 pub use paper::{FigureKey, figure as paper_figure};
 #[cfg(feature = "cli")]
-pub use report::{Report, SUMMARY_SCHEMA, read_rows, write_report};
+pub use plots::{Plot, method_color, plots, verdict_color};
+#[cfg(feature = "cli")]
+pub use report::{Report, SUMMARY_SCHEMA, read_gate_results, read_rows, write_report};
 #[cfg(feature = "cli")]
 pub use sweep::{SweptRun, write_sweep};
 #[cfg(feature = "cli")]
 pub use table::Table;
+#[cfg(feature = "cli")]
+pub use tables::tables;
 pub use triage::{Condition, ConditionError, Field, Order, Value, select};

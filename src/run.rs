@@ -18,6 +18,8 @@ pub use experiment::{
 pub use inputs::inputs;
 pub use protocol::Protocol;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
-pub use run_folder::{FolderError, RunFolder, merge, read_results, read_run, result_lines};
+pub use run_folder::{
+    FAILURES, FolderError, RunFolder, merge, read_results, read_run, recording_name, result_lines,
+};
 pub use scene_pair::{QueryCamera, ScenePair, is_called};
 pub use sweep::{Sweep, SweepError};

@@ -22,6 +22,7 @@ use posescope::localize::Selection;
 use posescope::measure::{Format, Tolerance};
 use posescope::method::Method;
 use posescope::params::Params;
+use posescope::report::PICTURES;
 use posescope::run::{EstimatesFile, Protocol};
 use posescope::scene::CameraArgument;
 use posescope::scene::layout::LAYOUTS;
@@ -72,6 +73,8 @@ pub enum Command {
     Diff(DiffArgs),
     /// List the results of a run that meet a condition, in an order
     Triage(TriageArgs),
+    /// Write report.html: a run, or a run against another, in one file for a browser
+    Report(ReportArgs),
     /// Write the poses or tables of a run in formats of other programs
     Export(ExportArgs),
     /// Check a scene: what is there, what is missing, and which of the usual mistakes it has; exit code 3
@@ -413,6 +416,22 @@ pub struct DiffArgs {
     /// Where to save the recording with both runs on the same timelines [default: RUN_B/diff.rrd]
     #[arg(long, value_name = "FILE.rrd")]
     pub save: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The run folder; of two, the first is the baseline that the second is held against
+    #[arg(value_name = "RUN", num_args = 1..=2, required = true)]
+    pub runs: Vec<PathBuf>,
+    /// The file to write [default: report.html in the folder of the run]
+    #[arg(long, value_name = "FILE.html")]
+    pub out: Option<PathBuf>,
+    /// Draw matches and costs of at most as many failures
+    #[arg(long, value_name = "N", default_value_t = PICTURES)]
+    pub pictures: usize,
+    /// Number of threads [default: one per core]; the report does not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
 }
 
 #[derive(Debug, Args)]

@@ -14,6 +14,7 @@ use posescope::measure::{
 };
 use posescope::method::Method;
 use posescope::params::Params;
+use posescope::report::write_html;
 use posescope::run::{
     Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
     ScenePair, Scenes, defaults, inputs, merge, read_run,
@@ -280,6 +281,8 @@ impl Judged {
     fn of(args: &EvalArgs, folder: &Path, run: &RunFile) -> Result<Self, CliError> {
         let known = known_failures(args)?;
         let report = write_report(folder, run, &args.gate, &known)?;
+        let before = args.baseline.as_deref().or(args.failed.as_deref());
+        write_html(folder, before, args.pictures(), None)?;
         let failures = report
             .gate_results
             .iter()

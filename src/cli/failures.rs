@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 
 use posescope::image::Degradation;
 use posescope::localize::{LocalizeError, LocalizeObserver};
-use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    FailedQuery, FolderError, RunError, RunFile, RunFolder, RunItem, RunObserver,
+    FAILURES, FailedQuery, FolderError, RunError, RunFile, RunFolder, RunItem, RunObserver,
+    recording_name,
 };
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
@@ -20,7 +20,6 @@ use super::failure::CliError;
 use super::interrupt::Interrupt;
 use super::observer::CliObserver;
 
-const FOLDER: &str = "failures";
 /// Names of failed queries without a recording, one per line.
 const DROPPED: &str = "dropped.txt";
 
@@ -80,7 +79,7 @@ impl<'a> FailureRecordings<'a> {
         bar: indicatif::ProgressBar,
         interrupt: Interrupt,
     ) -> Result<Self, CliError> {
-        let path = folder.path().join(FOLDER);
+        let path = folder.path().join(FAILURES);
         fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
         let several_pairs = run.pairs.len() > 1;
         let mut budget = RecordingBudget::new(args);
@@ -88,7 +87,7 @@ impl<'a> FailureRecordings<'a> {
         let mut still_dropped = String::new();
         for item in run.items().take(folder.done()) {
             for method in &run.protocol.methods {
-                let name = name_of(&item, *method, several_pairs);
+                let name = recording_name(item.pair, item.query, *method, several_pairs);
                 if dropped.contains(&name) {
                     budget.is_full = true;
                     still_dropped += &format!("{name}\n");
@@ -169,19 +168,19 @@ impl<'a> FailureRecordings<'a> {
         args: &EvalArgs,
         run: &RunFile,
     ) -> Result<(), FolderError> {
-        let folder = target.join(FOLDER);
+        let folder = target.join(FAILURES);
         fs::create_dir_all(&folder).map_err(FolderError::io(&folder))?;
         let mut budget = RecordingBudget::new(args);
         let mut dropped_in_parts = BTreeSet::new();
         for part in parts {
-            dropped_in_parts.extend(read_dropped(&part.join(FOLDER))?);
+            dropped_in_parts.extend(read_dropped(&part.join(FAILURES))?);
         }
         let mut dropped = 0;
         for item in run.plan() {
             for method in &run.protocol.methods {
-                let name = name_of(&item, *method, run.pairs.len() > 1);
+                let name = recording_name(item.pair, item.query, *method, run.pairs.len() > 1);
                 let file = format!("{name}.rrd");
-                let sources = parts.iter().map(|part| part.join(FOLDER).join(&file));
+                let sources = parts.iter().map(|part| part.join(FAILURES).join(&file));
                 let source = sources.into_iter().find(|path| path.exists());
                 let size = match &source {
                     Some(source) => fs::metadata(source).map_err(FolderError::io(source))?.len(),
@@ -212,7 +211,12 @@ impl RunObserver for FailureRecordings<'_> {
     }
 
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let name = name_of(&query.item, query.method, self.several_pairs);
+        let name = recording_name(
+            query.item.pair,
+            query.item.query,
+            query.method,
+            self.several_pairs,
+        );
         let path = self.folder.join(format!("{name}.rrd"));
         remove_if_there(&path)?;
         if query.request.references.frames.is_empty() {
@@ -238,27 +242,6 @@ impl RunObserver for FailureRecordings<'_> {
         self.bar.set_message(item.query.to_owned());
         self.bar.inc(1);
     }
-}
-
-/// `QUERY-METHOD`, with the scenes before it where there are several pairs of them.
-fn name_of(item: &RunItem<'_>, method: Method, several_pairs: bool) -> String {
-    let pair = item.pair;
-    let name = if several_pairs {
-        format!(
-            "{}-{}-{}-{method}",
-            pair.scene, pair.query_scene, item.query
-        )
-    } else {
-        format!("{}-{method}", item.query)
-    };
-    let plain = |c: char| {
-        if c.is_alphanumeric() || "-_.".contains(c) {
-            c
-        } else {
-            '-'
-        }
-    };
-    name.chars().map(plain).collect()
 }
 
 fn read_dropped(folder: &Path) -> Result<BTreeSet<String>, FolderError> {

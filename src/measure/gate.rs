@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use super::metrics::Measures;
 use crate::code::Code;
 use crate::method::Method;
@@ -45,7 +47,7 @@ pub struct Gate {
 }
 
 /// Whether a gate holds, and what decided it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GateResult {
     /// The gate as it was given.
     pub gate: String,

@@ -23,6 +23,17 @@ const COLORS: [(Method, RGBColor); 4] = [
     (Method::HY, RGBColor(0xD5, 0x5E, 0x00)),
 ];
 
+/// The colour of a method in plots; black for one beyond the paper.
+pub fn method_color(method: Method) -> (u8, u8, u8) {
+    let known = COLORS.iter().find(|(known, _)| *known == method);
+    known.map_or((0, 0, 0), |(_, color)| color.rgb())
+}
+
+/// The colour of the bars of the nth verdict.
+pub fn verdict_color(number: usize) -> (u8, u8, u8) {
+    causes::COLORS[number % causes::COLORS.len()].rgb()
+}
+
 /// One line of a plot.
 #[derive(Debug)]
 pub(super) struct Line {
@@ -191,8 +202,8 @@ fn draw_into(
         .light_line_style(WHITE)
         .draw()?;
     for line in lines {
-        let known = COLORS.iter().find(|(method, _)| *method == line.method);
-        let color = known.map_or(BLACK, |(_, color)| *color);
+        let (r, g, b) = method_color(line.method);
+        let color = RGBColor(r, g, b);
         chart
             .draw_series(LineSeries::new(
                 line.points.iter().copied(),

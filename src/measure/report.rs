@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::gate::{Gate, GateResult};
 use super::known::{KnownFailures, KnownReport};
@@ -15,9 +15,12 @@ use super::{junit, plots, tables};
 use crate::run::RunFile;
 use crate::run::{FolderError, read_results};
 use posescope_core::files::write_whole;
+use posescope_core::text::json_message;
 
 /// The version of `summary.json`.
 pub const SUMMARY_SCHEMA: &str = "posescope.summary/1";
+
+const SUMMARY: &str = "summary.json";
 
 /// The figures of a run.
 #[derive(Clone, Debug)]
@@ -37,6 +40,37 @@ struct Summary<'a> {
     schema: &'a str,
     failure_radius_m: f64,
     groups: &'a [Measures],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    gates: &'a [GateResult],
+}
+
+/// What is read of a summary again.
+#[derive(Deserialize)]
+struct GatesOfSummary {
+    #[serde(default)]
+    gates: Vec<GateResult>,
+}
+
+/// What became of the gates of a run, as its summary says; none where it has no summary.
+///
+/// # Errors
+/// A summary that cannot be read.
+pub fn read_gate_results(folder: &Path) -> Result<Vec<GateResult>, FolderError> {
+    let path = folder.join(SUMMARY);
+    let text = match fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(FolderError::io(path)(error)),
+    };
+    let summary: Result<GatesOfSummary, _> = serde_json::from_str(&text);
+    match summary {
+        Ok(summary) => Ok(summary.gates),
+        Err(error) => Err(FolderError::Damaged {
+            path,
+            line: error.line(),
+            message: json_message(&error),
+        }),
+    }
 }
 
 /// Reads the results of a folder, without what nobody measures.
@@ -71,10 +105,11 @@ pub fn write_report(
         schema: SUMMARY_SCHEMA,
         failure_radius_m: run.failure_radius_m,
         groups: &measures,
+        gates: &gate_results,
     };
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
-    write(&folder.join("summary.json"), &json)?;
+    write(&folder.join(SUMMARY), &json)?;
     let text = markdown(run, &tables, &gate_results, &known_report);
     write(&folder.join("summary.md"), text.as_bytes())?;
     for table in &tables {

@@ -11,6 +11,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::run_file::{RunFile, RunFileError};
+use super::scene_pair::ScenePair;
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
@@ -20,6 +21,31 @@ use posescope_core::text::json_message;
 const RUN: &str = "run.toml";
 const RESULTS: &str = "results.jsonl";
 const TIMINGS: &str = "timings.jsonl";
+
+/// Where a run folder has recordings of failures.
+pub const FAILURES: &str = "failures";
+
+/// The name of the recording of a failure: `QUERY-METHOD`, with the scenes before it where there are several pairs of them.
+pub fn recording_name(
+    pair: &ScenePair,
+    query: &str,
+    method: Method,
+    several_pairs: bool,
+) -> String {
+    let name = if several_pairs {
+        format!("{}-{}-{}-{method}", pair.scene, pair.query_scene, query)
+    } else {
+        format!("{}-{method}", query)
+    };
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
+    name.chars().map(plain).collect()
+}
 
 /// Why a run folder cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -37,6 +37,7 @@ mod planted;
 mod real_pair;
 mod recording;
 mod reference_views;
+mod report;
 mod retrieval;
 mod rgbd;
 mod robotcar;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use posescope::measure::Gate;
+use posescope::report::PICTURES;
 use posescope::run::{Experiment, PaperProtocol, Protocol, Shard, Sweep};
 
 use super::{ProtocolArgs, positive, share};
@@ -99,6 +100,9 @@ pub struct EvalArgs {
     /// Keep recordings of at most as many failures [default: 20; with --sweep 0]
     #[arg(long, value_name = "N")]
     pub max_recordings: Option<usize>,
+    /// Draw matches and costs of at most as many failures in report.html [default: 24; with --sweep 0]
+    #[arg(long, value_name = "N")]
+    pub pictures: Option<usize>,
     /// Keep recordings of failures of at most this size together [MB]
     #[arg(long, value_name = "MB", default_value_t = 500)]
     pub max_recording_mb: u64,
@@ -109,5 +113,11 @@ impl EvalArgs {
     pub fn recordings(&self) -> usize {
         let default = if self.sweep.is_some() { 0 } else { 20 };
         self.max_recordings.unwrap_or(default)
+    }
+
+    /// How many failures have pictures in the report.
+    pub fn pictures(&self) -> usize {
+        let default = if self.sweep.is_some() { 0 } else { PICTURES };
+        self.pictures.unwrap_or(default)
     }
 }

@@ -17,7 +17,7 @@ const LABELLED_FROM: f64 = 5.0;
 
 /// Pale enough for black letters; neighbours differ in lightness, so that they can be told apart
 /// without their hue, and every bar says its code.
-const COLORS: [RGBColor; 6] = [
+pub(super) const COLORS: [RGBColor; 6] = [
     RGBColor(0x8C, 0xC5, 0xE3),
     RGBColor(0xF0, 0xC5, 0x71),
     RGBColor(0x59, 0xA8, 0x9C),

@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# Opens a report.html in headless Chromium and works its table: sorts, filters, follows a link.
+#
+#     examples/ci/check-report.sh run/report.html
+#
+# Prints how long opening and sorting took. Exit code 0 if all is well, 1 if not, 77 where there is no
+# Chromium.
+set -euo pipefail
+
+report=${1:?a report.html expected}
+browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
+if [ -z "$browser" ]; then
+    echo "skipped: no Chromium"
+    exit 77
+fi
+
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+
+# Before the report's own script: what goes wrong. Behind it: the work of somebody at the table.
+cat >"$folder/before" <<'HTML'
+<script>
+window.wrong = [];
+addEventListener("error", (event) => wrong.push(event.message));
+addEventListener("securitypolicyviolation", (event) => wrong.push(event.violatedDirective));
+for (const name of ["error", "warn"]) console[name] = (...words) => wrong.push(words.join(" "));
+</script>
+HTML
+cat >"$folder/behind" <<'HTML'
+<script>
+addEventListener("load", () => setTimeout(() => {
+  const expect = (is, words) => { if (!is) wrong.push(words); };
+  const table = document.getElementById("results");
+  const count = () => document.getElementById("count").textContent;
+  const all = Number(/(\d+) in all/.exec(count())?.[1]);
+  const column = (name) => Array.from(table.tHead.rows[0].cells).findIndex((cell) => cell.textContent === name);
+  const values = (at) => Array.from(table.tBodies[0].rows, (row) => row.cells[at].dataset.v).filter((v) => v !== "").map(Number);
+  const timed = (work) => {
+    const begun = performance.now();
+    work();
+    table.getBoundingClientRect();
+    return performance.now() - begun;
+  };
+  const navigation = performance.getEntriesByType("navigation")[0];
+  let slowest = 0;
+  // The page stands before anybody sorts.
+  timed(() => {});
+  const sort = (name) => {
+    const header = table.tHead.rows[0].cells[column(name)];
+    slowest = Math.max(slowest, timed(() => header.querySelector("button").click()));
+    return header.getAttribute("aria-sort");
+  };
+  const isSorted = (numbers, sign) => numbers.every((n, at) => at === 0 || sign * (n - numbers[at - 1]) >= 0);
+  const error = column("error (m)");
+  expect(all > 0 && error > 0, "there is no table of results");
+  expect(sort("error (m)") === "ascending" && isSorted(values(error), 1), "errors do not ascend");
+  expect(sort("error (m)") === "descending" && isSorted(values(error), -1), "errors do not descend");
+  expect(sort("query") === "ascending", "queries do not ascend");
+  expect(document.querySelectorAll("[aria-sort]").length === 1, "several columns say that they are sorted");
+  const filters = document.getElementById("filters");
+  const method = filters.elements.method;
+  method.value = method.options[1].value;
+  const filtering = timed(() => filters.dispatchEvent(new Event("input", { bubbles: true })));
+  const rows = () => Array.from(table.tBodies[0].rows);
+  expect(rows().length > 0 && rows().every((row) => row.dataset.method === method.value), "other methods are shown");
+  filters.elements.words.value = "no such words";
+  filters.dispatchEvent(new Event("input", { bubbles: true }));
+  expect(rows().length === 0 && count().startsWith("0 of 0"), "something meets a filter that nothing meets");
+  filters.reset();
+  setTimeout(() => {
+    expect(rows().length === Math.min(100, all), "without a filter not all are shown");
+    const more = document.getElementById("more");
+    if (!more.hidden) more.click();
+    expect(rows().length === all, "not all are shown to whoever asks");
+    // The keyboard reaches what the pointer does.
+    const button = table.tHead.querySelector("button");
+    button.focus();
+    expect(document.activeElement === button, "a header takes no focus");
+    const link = table.querySelector('a[href^="#f"]');
+    if (link) { link.click(); }
+    setTimeout(() => {
+      if (link) expect(document.querySelector(link.getAttribute("href")).open, "a failure stays closed");
+      const loaded = performance.getEntriesByType("resource").map((one) => one.name).filter((name) => !name.startsWith("data:"));
+      expect(loaded.length === 0, `it loads ${loaded}`);
+      const told = document.createElement("pre");
+      told.id = "checked";
+      told.textContent = JSON.stringify({ results: all, open_ms: Math.round(navigation.loadEventStart),
+        sort_ms: Math.round(slowest), filter_ms: Math.round(filtering), wrong });
+      document.body.append(told);
+    }, 50);
+  }, 50);
+}, 0));
+</script>
+HTML
+awk -v before="$folder/before" -v behind="$folder/behind" '
+    function put(file,   line) { while ((getline line < file) > 0) print line; close(file) }
+    !begun && (at = index($0, "<head>")) {
+        print substr($0, 1, at + 5); put(before); $0 = substr($0, at + 6); begun = 1
+    }
+    (at = index($0, "</body>")) { print substr($0, 1, at - 1); put(behind); $0 = substr($0, at) }
+    { print }
+' "$report" >"$folder/checked.html"
+
+"$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$folder/profile" \
+    --run-all-compositor-stages-before-draw --virtual-time-budget=20000 --dump-dom \
+    "file://$folder/checked.html" >"$folder/dom.html" 2>"$folder/said" || true
+
+told=$(grep -o '<pre id="checked">[^<]*' "$folder/dom.html" | sed 's/<pre id="checked">//; s/&quot;/"/g')
+if [ -z "$told" ]; then
+    echo "the page did not come to its end:" >&2
+    tail -5 "$folder/said" >&2
+    exit 1
+fi
+echo "$told"
+[[ $told == *'"wrong":[]'* ]]

@@ -1,0 +1,508 @@
+//! The page itself. Whatever comes from elsewhere (names, paths, reasons) is escaped where it is put in.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::{Baseline, ReportedResult, RunReport};
+use crate::code::Code;
+use crate::localize::Standing;
+use crate::measure::{Change, Table};
+use crate::method::Method;
+use crate::run::RunFile;
+use crate::session::Task;
+
+const STYLE: &str = include_str!("../../assets/report/report.css");
+const SCRIPT: &str = include_str!("../../assets/report/report.js");
+
+/// The whole file.
+pub(super) fn page(report: &RunReport) -> String {
+    let title = title(&report.run);
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "posescope: " (title) }
+                style { (PreEscaped(STYLE)) (PreEscaped(thumbnails(report))) }
+            }
+            body {
+                header {
+                    h1 { (title) }
+                    nav aria-label="Parts of the report" {
+                        a href="#asked" { "What was run" }
+                        @if !report.gates.is_empty() { a href="#gates" { "Gates" } }
+                        @if report.baseline.is_some() { a href="#changes" { "Changes" } }
+                        a href="#figures" { "Figures" }
+                        a href="#plots" { "Plots" }
+                        a href="#queries" { "All results" }
+                        a href="#failures" { "Failures" }
+                    }
+                }
+                main {
+                    (asked(report))
+                    (gates(report))
+                    @if let Some(baseline) = &report.baseline { (changes(report, baseline)) }
+                    section aria-labelledby="figures" {
+                        h2 id="figures" { "Figures" }
+                        @for one in &report.tables { (table(one)) }
+                    }
+                    (plots(report))
+                    (results(report))
+                    (failures(report))
+                }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    }
+    .into_string()
+}
+
+fn title(run: &RunFile) -> String {
+    let names = run
+        .pairs
+        .iter()
+        .map(|pair| match pair.scene == pair.query_scene {
+            true => pair.scene.clone(),
+            false => format!("{} ← {}", pair.scene, pair.query_scene),
+        });
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// A class for each query's photo, which all of its results share. Our own data URIs hold no markup.
+fn thumbnails(report: &RunReport) -> String {
+    let photos = report.thumbnails.iter();
+    photos
+        .map(|(query, uri)| format!(".q{query}{{background-image:url({uri})}}\n"))
+        .collect()
+}
+
+fn asked(report: &RunReport) -> Markup {
+    let (run, protocol) = (&report.run, &report.run.protocol);
+    let joined = |words: Vec<String>| words.join(", ");
+    let methods = joined(protocol.methods.iter().map(Method::to_string).collect());
+    let fusions = joined(protocol.fusions.iter().map(ToString::to_string).collect());
+    let radii = joined(
+        run.radii_m
+            .iter()
+            .map(|radius| format!("{radius} m"))
+            .collect(),
+    );
+    html! {
+        section aria-labelledby="asked" {
+            h2 id="asked" { "What was run" }
+            dl {
+                dt { "Scenes" } dd { (run.scenes.join(", ")) }
+                @if !run.queries.is_empty() { dt { "Queries from" } dd { (run.queries.join(", ")) } }
+                @if let Some(experiment) = run.experiment { dt { "Experiment" } dd { (experiment) } }
+                dt { "Queries" } dd { (run.items().count()) }
+                @if let Some(shard) = run.shard { dt { "Part" } dd { (shard) } }
+                dt { "Methods" } dd { (methods) }
+                dt { "References" } dd { (protocol.references) " within " (radii) }
+                @if let Some(prior) = protocol.prior_m { dt { "Prior" } dd { (prior) " m" } }
+                @if !fusions.is_empty() { dt { "Fusions" } dd { (fusions) } }
+                @if !protocol.degrade.is_none() { dt { "Photos degraded" } dd { (protocol.degrade) } }
+                dt { "A failure" } dd { "a pose " (run.failure_radius_m) " m off or more, or none" }
+                dt { "Right" } dd { "within " (protocol.right) }
+                @if let Some(accept) = protocol.accept { dt { "Accepted" } dd { "from a probability of " (accept) " on" } }
+                dt { "Seed" } dd { (protocol.seed) }
+                dt { "Parameters" }
+                dd {
+                    @if report.changes.is_empty() { "all at their defaults" }
+                    @for change in &report.changes { code { (change) } " " }
+                }
+                dt { "Version" } dd { "posescope " (run.version) }
+            }
+            @for note in &report.notes { p { (note) } }
+        }
+    }
+}
+
+fn gates(report: &RunReport) -> Markup {
+    html! {
+        @if !report.gates.is_empty() {
+            section aria-labelledby="gates" {
+                h2 id="gates" { "Gates" }
+                div.scroll tabindex="0" role="region" aria-label="Gates" {
+                    table {
+                        caption { "What the figures of the run had to meet" }
+                        thead { tr { th scope="col" { "gate" } th scope="col" { "" } th scope="col" { "found" } } }
+                        tbody {
+                            @for one in &report.gates {
+                                tr {
+                                    td { code { (one.gate) } }
+                                    @if one.passed { td.right { "● passed" } } @else { td.wrong { "▲ failed" } }
+                                    td.words { (one.found) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A table of figures: the first column in words, the others numbers.
+fn table(table: &Table) -> Markup {
+    let class = |at: usize| if at > 1 { Some("number") } else { None };
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(table.name) style="margin-bottom:1rem" {
+            table {
+                caption { span { (table.caption) } }
+                thead {
+                    tr { @for (at, cell) in table.header.iter().enumerate() { th scope="col" class=[class(at)] { (cell) } } }
+                }
+                tbody {
+                    @for row in &table.rows {
+                        tr { @for (at, cell) in row.iter().enumerate() { td class=[class(at)] { (cell) } } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn changes(report: &RunReport, baseline: &Baseline) -> Markup {
+    let comparison = &baseline.comparison;
+    html! {
+        section aria-labelledby="changes" {
+            h2 id="changes" { "Changes since " code { (baseline.name) } }
+            p {
+                @for change in [Change::Broken, Change::Fixed, Change::Worse, Change::Better] {
+                    (comparison.count(change)) " " (change.name()) ", "
+                }
+                "of " (comparison.common) " results in both runs"
+                @if comparison.only_before + comparison.only_after > 0 {
+                    "; " (comparison.only_before) " only there, " (comparison.only_after) " only here"
+                }
+                "."
+            }
+            @if !comparison.differences.is_empty() {
+                div.scroll tabindex="0" role="region" aria-label="Changed results" {
+                    table {
+                        caption { "Results that changed" }
+                        thead {
+                            tr { @for name in ["change", "query", "method", "before", "after", "where"] { th scope="col" { (name) } } }
+                        }
+                        tbody {
+                            @for one in &comparison.differences {
+                                tr {
+                                    td class=(if matches!(one.change, Change::Broken | Change::Worse) { "wrong" } else { "right" }) { (one.change.name()) }
+                                    td { (one.before.query) }
+                                    td { (one.before.method) }
+                                    td { (one.verdicts[0].words(one.before.error.as_ref())) }
+                                    td { (one.verdicts[1].words(one.after.error.as_ref())) }
+                                    td { (one.before.group()) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            @if let (Some(there), Some(here)) = (baseline.tables.first(), report.tables.first()) {
+                h3 { "Before" } (table(there))
+                h3 { "Now" } (table(here))
+            }
+        }
+    }
+}
+
+fn plots(report: &RunReport) -> Markup {
+    html! {
+        section aria-labelledby="plots" {
+            h2 id="plots" { "Plots" }
+            @if report.plots.is_empty() { p { "Without a known truth there is nothing to draw." } }
+            div.plots {
+                @for (caption, svg) in &report.plots {
+                    // Drawn by us, with all words escaped.
+                    figure.plot { (PreEscaped(svg)) figcaption { (caption) } }
+                }
+            }
+        }
+    }
+}
+
+/// The columns of the table of results; what is wide is left out on a phone.
+const COLUMNS: [(&str, &str); 12] = [
+    ("photo", ""),
+    ("query", ""),
+    ("method", ""),
+    ("where", "wide"),
+    ("reference", "wide"),
+    ("is", ""),
+    ("error (m)", "number"),
+    ("rotation (°)", "number"),
+    ("start (m)", "number wide"),
+    ("probability", "number wide"),
+    ("code", ""),
+    ("change", "wide"),
+];
+
+fn results(report: &RunReport) -> Markup {
+    let (several, compared) = (
+        report
+            .measures
+            .iter()
+            .any(|one| one.group != report.measures[0].group),
+        report.baseline.is_some(),
+    );
+    let is_shown = |name: &str| match name {
+        "where" => several,
+        "change" => compared,
+        "photo" => !report.thumbnails.is_empty(),
+        _ => true,
+    };
+    let columns: Vec<_> = COLUMNS.iter().filter(|(name, _)| is_shown(name)).collect();
+    html! {
+        section aria-labelledby="queries" {
+            h2 id="queries" { "All results" }
+            form.filters id="filters" hidden {
+                label { "Words" input type="search" name="words" autocomplete="off"; }
+                (choice("method", "Method", methods(report)))
+                (choice("is", "Is", standings(report)))
+                (choice("code", "Verdict", codes(report)))
+                button type="reset" { "No filter" }
+            }
+            p id="count" role="status" { (report.results.len()) " results" }
+            div.scroll tabindex="0" role="region" aria-label="All results" {
+                table id="results" {
+                    caption { "A line for each result; a verdict leads to what is known of the failure" }
+                    thead {
+                        tr {
+                            @for (name, class) in &columns {
+                                th scope="col" class=[Some(*class).filter(|class| !class.is_empty())] {
+                                    @if *name == "photo" { (name) } @else { button type="button" { (name) } }
+                                }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for one in &report.results {
+                            (row(report, one, &columns))
+                        }
+                    }
+                }
+            }
+            p { button type="button" id="more" hidden { "Show all" } }
+        }
+    }
+}
+
+fn choice(name: &str, label: &str, values: Vec<(String, String)>) -> Markup {
+    html! {
+        label {
+            (label)
+            select name=(name) {
+                option value="" { "all" }
+                @for (value, words) in values { option value=(value) { (words) } }
+            }
+        }
+    }
+}
+
+fn methods(report: &RunReport) -> Vec<(String, String)> {
+    let methods = report.run.protocol.methods.iter();
+    methods
+        .map(|method| (method.to_string(), method.to_string()))
+        .collect()
+}
+
+fn standings(report: &RunReport) -> Vec<(String, String)> {
+    Standing::ALL
+        .into_iter()
+        .filter(|standing| report.results.iter().any(|one| one.standing == *standing))
+        .map(|standing| (standing.to_string(), standing.to_string()))
+        .collect()
+}
+
+fn codes(report: &RunReport) -> Vec<(String, String)> {
+    let found = |code: &&Code| {
+        report
+            .results
+            .iter()
+            .any(|one| primary(one) == Some(**code))
+    };
+    Code::ALL
+        .iter()
+        .filter(found)
+        .map(|code| (code.to_string(), format!("{code} {}", code.about())))
+        .collect()
+}
+
+fn primary(one: &ReportedResult) -> Option<Code> {
+    one.result.diagnosis.first().map(|primary| primary.code)
+}
+
+fn row(report: &RunReport, one: &ReportedResult, columns: &[&(&str, &str)]) -> Markup {
+    let code = primary(one).map_or(String::new(), |code| code.to_string());
+    html! {
+        tr id={ "r" (one.number) } data-method=(one.result.method) data-is=(one.standing) data-code=(code) {
+            @for (name, class) in columns { (cell(report, one, name, class)) }
+        }
+    }
+}
+
+fn cell(report: &RunReport, one: &ReportedResult, name: &str, class: &str) -> Markup {
+    let result = &one.result;
+    let class = Some(class).filter(|class| !class.is_empty());
+    let number = |value: Option<f64>, digits: usize| {
+        html! {
+            td class=[class] data-v=(value.map_or(String::new(), |value| value.to_string())) {
+                @if let Some(value) = value { (format!("{value:.digits$}")) }
+            }
+        }
+    };
+    match name {
+        "photo" => html! {
+            td {
+                @if report.thumbnails.contains_key(&one.query) {
+                    span class={ "photo q" (one.query) } role="img" aria-label={ "photo of query " (result.query) } {}
+                }
+            }
+        },
+        "query" => html! { td { (result.query) } },
+        "method" => {
+            let fusion = result.fusion.as_ref().map(ToString::to_string);
+            html! { td { (result.method) @if let Some(fusion) = fusion { " " (fusion) } } }
+        }
+        "where" => {
+            let place = match (&result.query_scene, &result.setting) {
+                (queries, Some(setting)) => format!(
+                    "{}, {} m, {} ref.",
+                    queries
+                        .as_ref()
+                        .map_or(result.scene.clone(), |queries| format!(
+                            "{} ← {queries}",
+                            result.scene
+                        )),
+                    setting.radius_m,
+                    setting.references
+                ),
+                (Some(queries), None) => format!("{} ← {queries}", result.scene),
+                (None, None) => result.scene.clone(),
+            };
+            html! { td class=[class] { (place) } }
+        }
+        "reference" => html! { td class=[class] { (result.references.join(" ")) } },
+        "is" => {
+            let class = match one.standing {
+                Standing::Right => "right",
+                Standing::Wrong => "wrong",
+                Standing::NoPose => "none",
+                Standing::Unmeasured | Standing::LowConfidence => "",
+            };
+            html! { td class=(class) { (one.standing.mark()) " " (one.standing) } }
+        }
+        "error (m)" => number(result.error.map(|error| error.translation_m), 3),
+        "rotation (°)" => number(result.error.map(|error| error.rotation_deg), 2),
+        "start (m)" => number(result.initial_error.map(|error| error.translation_m), 3),
+        "probability" => number(result.trust.as_ref().and_then(|trust| trust.probability), 3),
+        "code" => html! {
+            td {
+                @if let Some(primary) = result.diagnosis.first() {
+                    @if one.is_failure {
+                        a href={ "#f" (one.number) } title=(primary.text) { (primary.code) }
+                    } @else {
+                        span title=(primary.text) { (primary.code) }
+                    }
+                }
+            }
+        },
+        _ => html! { td class=[class] { @if let Some(change) = one.change { (change.name()) } } },
+    }
+}
+
+fn failures(report: &RunReport) -> Markup {
+    let failures: Vec<&ReportedResult> =
+        report.results.iter().filter(|one| one.is_failure).collect();
+    html! {
+        section aria-labelledby="failures" {
+            h2 id="failures" { "Failures (" (failures.len()) ")" }
+            p {
+                "The magenta cross is the truth, the orange square the result, the white circle the reference. \
+                 Recordings lie beside this file; what opens them is typed in its folder."
+            }
+            @for one in failures { (failure(report, one)) }
+        }
+    }
+}
+
+fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
+    let result = &one.result;
+    html! {
+        details id={ "f" (one.number) } {
+            summary { (one.headline()) }
+            @for diagnosis in result.diagnosis.iter().skip(1) {
+                p { "Also " (diagnosis.code) ": " (diagnosis.text) }
+            }
+            @if let Some(explanation) = &result.explanation {
+                @if explanation.helped.is_empty() { p { "None of " (explanation.runs) " remedies helped." } }
+                @for helped in &explanation.helped {
+                    p { "Helped: " code { (helped.args.join(" ")) } ", " (helped.error.translation()) }
+                }
+            }
+            dl {
+                dt { "References" } dd { (result.references.join(", ")) }
+                @if let Some(error) = &result.error { dt { "Error" } dd { (error) } }
+                @if let Some(error) = &result.initial_error { dt { "Reference, from the truth" } dd { (error) } }
+                @if let Some(counts) = &result.counts {
+                    dt { "Features" }
+                    dd {
+                        (counts.query_keypoints) " and " (counts.reference_keypoints) " keypoints, "
+                        (counts.ratio_passed) " passed the ratio test, " (counts.unique) " unique, "
+                        (counts.with_depth) " with a depth, " (counts.inliers) " inliers"
+                    }
+                }
+                @if let Some(cost) = &result.cost {
+                    dt { "Cost" }
+                    dd {
+                        (format!("{:.4}", cost.best)) " at the result"
+                        @if let Some(truth) = cost.truth { (format!(", {truth:.4} at the truth")) }
+                        @if let Some(initial) = cost.initial { (format!(", {initial:.4} at the reference")) }
+                        (format!(", covering {:.1} % of the photo", 100.0 * cost.coverage_best))
+                    }
+                }
+                dt { "Again" } dd { code { (again(&report.run, one)) } }
+                @if let Some(recording) = &one.recording { dt { "Recording" } dd { code { "rerun " (recording) } } }
+            }
+            div.pictures {
+                @if let Some(svg) = &one.pictures.matches {
+                    figure { (PreEscaped(svg)) figcaption { "Matches with a depth: inliers whole, outliers dashed" } }
+                }
+                @if let Some(svg) = &one.pictures.surface {
+                    figure { (PreEscaped(svg)) figcaption { "Costs around the reference, its front up: the least bright" } }
+                }
+            }
+        }
+    }
+}
+
+/// The command line that localises the query again, as the run did.
+fn again(run: &RunFile, one: &ReportedResult) -> String {
+    let result = &one.result;
+    let place = run.pairs.iter().find(|pair| pair.scene == result.scene);
+    let scene = place.and_then(|pair| run.scenes.get(pair.scene_index));
+    let mut params = crate::params::Params::default();
+    // A run of another version is repeated with what this one knows.
+    let _ = params.merge_toml(&run.params.to_string());
+    let mut protocol = run.protocol.clone();
+    protocol.methods = vec![result.method];
+    protocol.fusions = result.fusion.into_iter().collect();
+    protocol.explain = 0;
+    let task = Task {
+        queries: match &result.query_scene {
+            Some(_) => run.queries.first().cloned(),
+            None => None,
+        },
+        format: run.format.clone(),
+        by_hand: true,
+        radius_m: result.setting.map_or_else(
+            || run.radii_m.first().copied().unwrap_or_default(),
+            |setting| setting.radius_m,
+        ),
+        protocol,
+        params,
+        ..Task::of(scene.cloned().unwrap_or_else(|| result.scene.clone()))
+    };
+    task.command_line(&result.query, &result.references)
+}
