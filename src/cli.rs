@@ -9,6 +9,7 @@ mod doctor;
 #[cfg(test)]
 mod documented;
 mod eval;
+mod event_export;
 mod export;
 mod failure;
 mod failures;

@@ -6,25 +6,36 @@
   const more = document.getElementById("more");
   const filters = document.getElementById("filters");
   if (!table || !filters) return;
-  const FIRST = 100;
+  const FIRST = 50;
   const body = table.tBodies[0];
-  const rows = Array.from(body.rows, (row) => ({ row, text: row.textContent.toLowerCase() }));
+  const rows = Array.from(body.rows, (row) => ({
+    row,
+    cells: Array.from(row.cells),
+    text: row.textContent.toLowerCase(),
+  }));
   const headers = Array.from(table.tHead.rows[0].cells);
   let order = null;
   let limit = FIRST;
 
-  const value = (row, column) => {
-    const cell = row.cells[column];
+  const value = (cell) => {
     const text = cell.dataset.v ?? cell.textContent;
     if (text === "") return null;
     const number = Number(text);
     return Number.isNaN(number) ? text : number;
   };
 
-  const compare = (a, b) => {
-    if (a === b) return 0;
-    return typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b));
+  // Read once for each column that somebody sorts by.
+  const keys = new Map();
+  const keyed = (column) => {
+    if (!keys.has(column)) {
+      keys.set(column, new Map(rows.map((one) => [one, value(one.cells[column])])));
+    }
+    return keys.get(column);
   };
+
+  const { compare: inWords } = new Intl.Collator("en");
+  const compare = (a, b) =>
+    typeof a === "number" && typeof b === "number" ? a - b : inWords(String(a), String(b));
 
   const show = () => {
     const words = filters.elements.words.value.toLowerCase().split(/\s+/).filter(Boolean);
@@ -33,12 +44,13 @@
       words.every((word) => text.includes(word)) &&
       wanted.every(([name, value]) => value === "" || row.dataset[name] === value));
     if (order) {
-      const keyed = met.map((one) => [value(one.row, order.column), one]);
+      const key = keyed(order.column);
+      const pairs = met.map((one) => [key.get(one), one]);
       // What a result does not have comes last either way.
-      keyed.sort(([a], [b]) => a === null || b === null
+      pairs.sort(([a], [b]) => a === null || b === null
         ? (a === null) - (b === null)
         : order.sign * compare(a, b));
-      met = keyed.map(([, one]) => one);
+      met = pairs.map(([, one]) => one);
     }
     body.replaceChildren(...met.slice(0, limit).map(({ row }) => row));
     const shown = Math.min(met.length, limit);

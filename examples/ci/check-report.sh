@@ -3,7 +3,8 @@
 #
 #     examples/ci/check-report.sh run/report.html
 #
-# Prints how long opening and sorting took. Exit code 0 if all is well, 1 if not, 77 where there is no
+# Prints what it did and how long opening and sorting took, roughly: the browser runs on virtual time, so that it
+# waits for nothing. Exit code 0 if all is well, 1 if not, 77 where there is no
 # Chromium.
 set -euo pipefail
 
@@ -42,6 +43,7 @@ addEventListener("load", () => setTimeout(() => {
     return performance.now() - begun;
   };
   const navigation = performance.getEntriesByType("navigation")[0];
+  const first = table.tBodies[0].rows.length;
   let slowest = 0;
   // The page stands before anybody sorts.
   timed(() => {});
@@ -68,7 +70,7 @@ addEventListener("load", () => setTimeout(() => {
   expect(rows().length === 0 && count().startsWith("0 of 0"), "something meets a filter that nothing meets");
   filters.reset();
   setTimeout(() => {
-    expect(rows().length === Math.min(100, all), "without a filter not all are shown");
+    expect(rows().length === first, "without a filter others are shown than at first");
     const more = document.getElementById("more");
     if (!more.hidden) more.click();
     expect(rows().length === all, "not all are shown to whoever asks");
@@ -102,10 +104,10 @@ awk -v before="$folder/before" -v behind="$folder/behind" '
 ' "$report" >"$folder/checked.html"
 
 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$folder/profile" \
-    --run-all-compositor-stages-before-draw --virtual-time-budget=20000 --dump-dom \
+    --virtual-time-budget=20000 --dump-dom \
     "file://$folder/checked.html" >"$folder/dom.html" 2>"$folder/said" || true
 
-told=$(grep -o '<pre id="checked">[^<]*' "$folder/dom.html" | sed 's/<pre id="checked">//; s/&quot;/"/g')
+told=$(grep -o '<pre id="checked">[^<]*' "$folder/dom.html" | sed 's/<pre id="checked">//; s/&quot;/"/g' || true)
 if [ -z "$told" ]; then
     echo "the page did not come to its end:" >&2
     tail -5 "$folder/said" >&2

@@ -165,6 +165,9 @@ pub struct RunArgs {
     /// Write the results as JSON, one object per line; - for stdout
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+    /// Write every event as JSON, one object per line: all that was decided, for a notebook
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub events: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

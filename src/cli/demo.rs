@@ -33,6 +33,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
                 ..RecordingArgs::default()
             },
             export_matches: None,
+            events: None,
             json: None,
         },
         terminal,

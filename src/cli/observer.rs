@@ -15,6 +15,7 @@ use posescope::sink::Progress;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
 
+use super::event_export::EventExport;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 
@@ -25,6 +26,8 @@ pub struct CliObserver {
     pub export: Option<MatchExport>,
     /// The pages of a lesson, which are recorded where they belong.
     pub pages: Option<PageTurner>,
+    /// Writes events, if that is asked for.
+    pub events: Option<EventExport>,
     /// Ends the run at a breakpoint, if there are any.
     pub stop: Option<StopAtBreakpoint>,
     interrupt: Interrupt,
@@ -37,6 +40,8 @@ pub struct CliObserver {
     problems: Vec<Problem>,
     /// The problem at work.
     problem: usize,
+    /// The method at work.
+    method: Option<Method>,
 }
 
 impl CliObserver {
@@ -49,6 +54,7 @@ impl CliObserver {
             recorder,
             export: None,
             pages: None,
+            events: None,
             stop: None,
             interrupt,
             bar,
@@ -57,6 +63,7 @@ impl CliObserver {
             explaining_since: Instant::now(),
             problems: Vec::new(),
             problem: 0,
+            method: None,
         }
     }
 }
@@ -74,7 +81,7 @@ impl CliObserver {
 
 impl Sink for CliObserver {
     fn wanted(&self) -> KindSet {
-        if self.stop.is_some() || self.pages.is_some() {
+        if self.stop.is_some() || self.pages.is_some() || self.events.is_some() {
             return KindSet::ALL;
         }
         let recorder = self.recorder.as_ref();
@@ -104,6 +111,13 @@ impl Sink for CliObserver {
         if let (Some(export), Some(problem)) = (&mut self.export, self.problems.get(self.problem)) {
             export.accept(record, problem);
         }
+        if let (Some(events), Some(problem), Some(method)) = (
+            &mut self.events,
+            self.problems.get(self.problem),
+            self.method,
+        ) {
+            events.accept(record, problem, method);
+        }
         if let Some(stop) = &mut self.stop {
             stop.accept(record)?;
         }
@@ -120,7 +134,7 @@ impl LocalizeObserver for CliObserver {
         let name =
             |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);
         self.tasks = problems.iter().map(name).collect();
-        if self.export.is_some() {
+        if self.export.is_some() || self.events.is_some() {
             self.problems = problems.to_vec();
         }
         self.progress = None;
@@ -133,6 +147,7 @@ impl LocalizeObserver for CliObserver {
         let task = self.tasks.get(problem).cloned().unwrap_or_default();
         self.progress = Some(Progress::new(self.bar.clone(), task));
         self.problem = problem;
+        self.method = Some(method);
         if let Some(recorder) = &mut self.recorder {
             recorder.begin_method(problem, method);
         }
@@ -166,6 +181,8 @@ impl LocalizeObserver for CliObserver {
     }
 
     fn begin_fusion(&mut self, method: Method) {
+        self.problem = 0;
+        self.method = Some(method);
         if let Some(recorder) = &mut self.recorder {
             recorder.begin_fusion(method);
         }

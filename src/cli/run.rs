@@ -13,6 +13,7 @@ use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
+use super::event_export::EventExport;
 use super::failure::CliError;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
@@ -76,6 +77,9 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         plan.check_features()?;
         observer.export = Some(MatchExport::to(folder)?);
     }
+    if let Some(path) = &args.events {
+        observer.events = Some(EventExport::to(path)?);
+    }
     if !task.breakpoints.is_empty() {
         let breakpoints = Breakpoints::new(task.breakpoints.iter().cloned());
         observer.stop = Some(StopAtBreakpoint::new(breakpoints));
@@ -112,6 +116,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     // A recording that is served stays until somebody ends that.
     interrupt.release();
     let closed = observer.recorder.map_or(Ok(()), Recorder::close);
+    let told = observer.events.map_or(Ok(()), EventExport::close);
     match outcome {
         Err(CliError::Stopped(_)) if is_interrupted => {
             closed?;
@@ -125,6 +130,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         Err(error) => return Err(error),
     }
     closed?;
+    told?;
     if let (Some(export), Some(folder)) = (observer.export, &args.export_matches) {
         let written = export.close()?;
         if !terminal.is_quiet() {

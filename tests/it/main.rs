@@ -15,6 +15,7 @@ mod diagnosis;
 mod doctor;
 mod documents;
 mod evaluation;
+mod events;
 mod foreign;
 mod frame_cache;
 mod gps;

@@ -1,0 +1,104 @@
+//! `run --events`: every event as data.
+
+use std::fs;
+
+use serde_json::Value as Json;
+
+use crate::binary::posescope;
+use crate::small_sequence::SmallSequence;
+
+#[test]
+fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
+    let sequence = SmallSequence::write();
+    let told = |name: &str, threads: &str| {
+        let path = sequence.path().join(name);
+        let output = posescope()
+            .arg("run")
+            .arg(sequence.folder())
+            .args(["--query", "5", "--reference", "4", "--reference", "7"])
+            .args(["--method", "fb,mi", "--radius", "3", "--fusion", "r-wavg"])
+            .args(["--json", "-", "-q", "--threads", threads])
+            .arg("--events")
+            .arg(&path)
+            .output()
+            .expect("the binary starts");
+        assert_eq!(output.status.code(), Some(0));
+        let results = String::from_utf8_lossy(&output.stdout).into_owned();
+        (fs::read_to_string(path).expect("text"), results)
+    };
+    let (text, results) = told("events.jsonl", "1");
+    assert_eq!(told("again.jsonl", "3"), (text.clone(), results.clone()));
+    let events: Vec<Json> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("an object"))
+        .collect();
+    let results: Vec<Json> = results
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("an object"))
+        .collect();
+    let of = |kind: &str, method: &str, reference: &str| -> Vec<&Json> {
+        let is_it = |event: &&Json| {
+            event["kind"] == kind && event["method"] == method && event["reference"] == reference
+        };
+        events.iter().filter(is_it).collect()
+    };
+    let fb = &results[0]["per_reference"][0];
+    assert_eq!(fb["references"][0], "000004");
+    let detected = of("FeaturesDetected", "fb", "000004");
+    assert_eq!(detected.len(), 2);
+    assert_eq!(
+        detected[0]["x_px"].as_array().map(Vec::len),
+        fb["counts"]["query_keypoints"]
+            .as_u64()
+            .map(|count| count as usize)
+    );
+    let classified = of("FeaturesClassified", "fb", "000004");
+    let states = classified[0]["state"].as_array().expect("states");
+    let inliers = states.iter().filter(|state| **state == "inlier").count();
+    assert_eq!(Some(inliers as u64), fb["counts"]["inliers"].as_u64());
+
+    let mi = &results[1]["per_reference"][1];
+    assert_eq!(mi["references"][0], "000007");
+    let phases = of("PhaseSearched", "mi", "000007");
+    let coarse = phases[0];
+    let cells = coarse["cost"].as_array().expect("costs").len() as u64;
+    let side = |name: &str| coarse[name].as_u64().expect("a count");
+    assert_eq!(cells, side("columns") * side("rows"));
+    let scored = of("PoseScored", "mi", "000007");
+    let tried = |phase: &Json| {
+        let covered = phase["covered"].as_array().expect("a list");
+        covered.iter().filter(|covered| !covered.is_null()).count()
+    };
+    let tried: usize = phases.iter().map(|phase| tried(phase)).sum();
+    assert_eq!(scored.len(), tried);
+    let assessed = of("MinimumAssessed", "mi", "000007");
+    assert_eq!(assessed[0]["best"], mi["cost"]["best"]);
+    assert!(
+        events
+            .iter()
+            .any(|event| event["kind"] == "ReferencesFused")
+    );
+    // Nothing is as large as a picture.
+    assert!(text.lines().all(|line| line.len() < 200_000));
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_told_before_anything_is_run() {
+    let sequence = SmallSequence::write();
+    let output = posescope()
+        .arg("run")
+        .arg(sequence.folder())
+        .args([
+            "--query",
+            "5",
+            "--reference",
+            "4",
+            "--events",
+            "/no/such/folder/e.jsonl",
+        ])
+        .output()
+        .expect("the binary starts");
+    assert_eq!(output.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("/no/such/folder/e.jsonl: "));
+    assert!(output.stdout.is_empty());
+}
