@@ -132,7 +132,7 @@ impl KnownFailures {
                 code,
             } = line;
             let place = format!("{}:{number}", self.path.display());
-            if !of_line.is_empty() && !of_line.iter().any(|row| wrong(row)) {
+            if !of_line.is_empty() && !of_line.iter().any(&wrong) {
                 let was = code.map_or(String::new(), |code| format!(" ({code})"));
                 let words = format!("{query} {method}{was} is right now; take it off {place}");
                 report.fixed.push(words);

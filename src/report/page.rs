@@ -419,10 +419,12 @@ fn failures(report: &RunReport) -> Markup {
         section aria-labelledby="failures" {
             h2 id="failures" { "Failures (" (failures.len()) ")" }
             p {
-                "The magenta cross is the truth, the orange square the result, the white circle the reference. \
-                 Recordings lie beside this file; what opens them is typed in its folder."
+                "The magenta cross is the truth, the orange square the result, the white circle the reference."
+                @if failures.iter().any(|one| one.recording.is_some()) {
+                    " Recordings lie in the folder of the run, where the lines that open them are typed."
+                }
             }
-            @for one in failures { (failure(report, one)) }
+            @for one in &failures { (failure(report, one)) }
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use posescope::image::Degradation;
 use posescope::measure::{SweptRun, write_sweep};
 use posescope::run::Sweep;
 
@@ -62,7 +61,7 @@ fn with(args: &EvalArgs, sweep: &Sweep, value: &str) -> EvalArgs {
     let protocol = &mut args.protocol;
     match sweep.is_degradation() {
         true => {
-            let mut degradation = protocol.degrade.unwrap_or_else(Degradation::default);
+            let mut degradation = protocol.degrade.unwrap_or_default();
             if let Err(error) = degradation.set(sweep.key(), value) {
                 unreachable!("the sweep was checked: {error}");
             }
