@@ -176,6 +176,13 @@ fn data(event: &Event) -> Value {
             "score": score(&event.comparison.score),
             "pixels": event.comparison.view.pixels.len(),
         }),
+        Event::DescentStepped(event) => json!({
+            "level": event.level,
+            "step": event.step,
+            "reference_from_camera": rows(&event.reference_from_camera),
+            "smooth_cost": event.smooth_cost,
+            "score": score(&event.score),
+        }),
         Event::MinimumAssessed(event) => json!({
             "offset": offset(&event.offset),
             "initial": event.initial,
