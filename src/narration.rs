@@ -84,6 +84,9 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             let phase = event.surface.lattice.phase.name();
             match &event.best {
                 Some(best) => format!("{phase}: the least cost is at {}", at(best)),
+                None if event.surface.minimum().is_some() => {
+                    format!("{phase}: shown, and not searched")
+                }
                 None => format!("{phase}: no hypothesis has a cost"),
             }
         }

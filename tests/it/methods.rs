@@ -141,7 +141,7 @@ fn a_descent_tells_each_step_over_the_surface_and_listening_changes_nothing() {
         let way = history
             .all::<ViewRendered>()
             .filter(|(_, view)| view.moment == Moment::NewBest);
-        assert!(way.count() >= steps.len(), "{method}");
+        assert_eq!(way.count(), steps.len(), "{method}");
         assert_eq!(history.all::<PhaseSearched>().count(), 1, "{method}");
         let cost = outcome.cost.expect("a cost was descended");
         assert_eq!(cost.evaluations, 1 + steps.len() as u64, "{method}");

@@ -130,7 +130,18 @@ impl Index {
     /// # Errors
     /// [`IndexError::Stale`] names what differs.
     pub fn check_request(&self, request: &BuildRequest) -> Result<(), IndexError> {
-        self.check(&request.scene, request.fingerprint, &request.recipe)
+        self.check(&request.scene, request.fingerprint, &request.recipe)?;
+        let made = &self.description().recipe;
+        match made
+            .iter()
+            .find(|(key, _)| !request.recipe.contains_key(*key))
+        {
+            Some((key, made)) => Err(IndexError::Stale {
+                path: self.path.clone(),
+                why: format!("it was made with {key} = {made}, not nothing"),
+            }),
+            None => Ok(()),
+        }
     }
 
     /// The frames that resemble the query most, of those that are allowed.

@@ -384,6 +384,17 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
         let step = searched.surface.lattice.step;
         outline(&hypothesis.offset, step, step, strong, 1.5);
     }
+    let start = shown.search.steps.first().map(|_| Offset::default());
+    let steps = shown.search.steps.iter();
+    let way: Vec<_> = start
+        .into_iter()
+        .chain(steps.map(|step| Offset::of(&step.reference_from_camera)))
+        .map(|offset| screen(&offset))
+        .collect();
+    for &at in way.iter().skip(1) {
+        painter.circle_filled(at, 2.0, strong);
+    }
+    painter.line(way, Stroke::new(1.0, strong));
     for mark in shown.marks {
         // A small map is not to vanish under its marks.
         let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);

@@ -88,6 +88,13 @@ impl MapMark {
                 );
             }
         }
+        if let Some(step) = search.steps.last() {
+            let offset = Offset::of(&step.reference_from_camera);
+            let pose = search.problem.world_from_query(&step.reference_from_camera);
+            let cost = step.score.cost.map_or(String::new(), number);
+            let note = format!(", {cost}, after {} steps", search.steps.len());
+            add(MarkKind::Fine, offset, pose, "descent", note);
+        }
         if let Some(moved) = moved(search, own_floor, search.least_covered(floor)) {
             let note = format!(", {}", number(moved.cost));
             let pose = search.pose(&moved.offset);

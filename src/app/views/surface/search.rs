@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::app::ViewContext;
-use crate::event::{Event, MinimumAssessed, Moment, PoseScored};
+use crate::event::{DescentStepped, Event, MinimumAssessed, Moment, PoseScored};
 use crate::geometry::Pose;
 use crate::grid::{self, Lattice, Offset, Phase, ScoredLattice};
 use crate::method::Method;
@@ -23,6 +23,8 @@ pub(super) struct Search<'a> {
     /// The hypothesis of the cursor, while a lattice is being searched.
     pub(super) hypothesis: Option<&'a PoseScored>,
     pub(super) assessed: Option<&'a MinimumAssessed>,
+    /// The steps of a descent, where the method goes downhill instead of searching.
+    pub(super) steps: Vec<&'a DescentStepped>,
 }
 
 /// A lattice with the scores that were told.
@@ -57,6 +59,7 @@ impl<'a> Search<'a> {
             lattices: Vec::new(),
             hypothesis: None,
             assessed: None,
+            steps: Vec::new(),
         };
         let params = &context.run.params.grid;
         let least_covered = grid::least_covered(params.coverage_floor, covered_at_reference);
@@ -89,6 +92,7 @@ impl<'a> Search<'a> {
                     });
                 }
                 Event::MinimumAssessed(assessed) => search.assessed = Some(assessed),
+                Event::DescentStepped(step) => search.steps.push(step),
                 _ => {}
             }
         }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use image::GrayImage;
 use nalgebra::Point3;
 
-use super::{Direct, Memory, Search};
+use super::{Direct, Memory};
 use crate::cost::{SmoothCost, shuffled};
 use crate::descent::{Step, View, information, photometric};
 use crate::estimator::{CostSummary, Failure, Halt};
 use crate::event::{DescentStepped, MinimumAssessed, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset, Phase, least_covered};
+use crate::grid::{Lattice, Offset, Phase, ScoredLattice, least_covered};
 use crate::image::{FloatImage, gaussian_smoothed};
 use crate::problem::Problem;
 use crate::render::{ColoredCloud, Score, Scorer};
@@ -38,10 +38,6 @@ impl Direct {
         let scorer = self.scorer(problem, &cloud);
         trace.checkpoint()?;
         let initial = scorer.score(&[Pose::identity()])[0];
-        // The way is shown over the surface of the method's own cost, which it knows nothing of.
-        if trace.wants::<PhaseSearched>() {
-            self.show_surface(problem, &scorer, initial, trace)?;
-        }
         let mut standing = Standing {
             reference_from_camera: Pose::identity(),
             score: initial,
@@ -54,6 +50,10 @@ impl Direct {
             comparison: Arc::new(scorer.compare(&standing.reference_from_camera)),
         };
         trace.emit(|| rendered(&standing, Moment::Start))?;
+        // The way is shown over the surface of the method's own cost, which it knows nothing of.
+        if trace.wants::<PhaseSearched>() {
+            self.show_surface(problem, &scorer, initial, trace)?;
+        }
         trace.stage(Stage::Descend, |trace| {
             for level in (0..self.descent.levels).rev() {
                 trace.checkpoint()?;
@@ -144,24 +144,41 @@ impl Direct {
         initial: Score,
         trace: &mut Trace<'_>,
     ) -> Result<(), Halt> {
-        let start = Offset::default();
-        let phase = Phase::PositionCoarse;
+        let (start, phase) = (Offset::default(), Phase::PositionCoarse);
         let lattice = Lattice::new(phase, start, problem.uncertainty_radius_m, &self.grid);
         let lattice = lattice.map_err(Failure::from)?;
-        let mut search = Search {
-            scorer,
-            memory: Memory {
+        trace.stage(Stage::Search(phase), |trace| {
+            let memory = Memory {
                 direct: self,
                 problem,
-            },
-            covered_at_reference: initial.covered,
-            least_covered: least_covered(self.grid.coverage_floor, initial.covered),
-            evaluations: 1,
-            best: start,
-            best_score: initial,
-        };
-        trace.stage(Stage::Search(phase), |trace| search.phase(lattice, trace))?;
-        Ok(())
+            };
+            let (cells, offsets): (Vec<usize>, Vec<Offset>) = lattice.hypotheses().unzip();
+            let found = memory.scores(&lattice, || {
+                let mut found = Vec::new();
+                for some in offsets.chunks(scorer.at_a_time()) {
+                    trace.checkpoint()?;
+                    let poses: Vec<Pose> = some.iter().map(Offset::reference_from_camera).collect();
+                    found.extend(scorer.score(&poses));
+                }
+                Ok(found)
+            })?;
+            trace.note_reuse(found.reused);
+            let mut scores = vec![None; lattice.cells()];
+            for (cell, &score) in cells.into_iter().zip(&found.value.0) {
+                scores[cell] = Some(score);
+            }
+            let least_covered = least_covered(self.grid.coverage_floor, initial.covered);
+            trace.emit(|| PhaseSearched {
+                surface: Arc::new(ScoredLattice {
+                    lattice,
+                    scores,
+                    least_covered,
+                }),
+                // It leads nowhere: the descent begins at the reference.
+                best: None,
+            })?;
+            Ok(())
+        })
     }
 }
 

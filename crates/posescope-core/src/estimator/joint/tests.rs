@@ -201,6 +201,20 @@ fn the_same_reference_many_times_is_no_more_evidence_than_once() {
 }
 
 #[test]
+fn a_joint_pose_does_not_depend_on_the_number_of_threads() {
+    let references = places().map(|pose| reference(pose, TEXTURE, 0.0..WIDTH));
+    let problems = problems(references.into());
+    for method in [Method::FB, Method::MI] {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let run = || jointly(method, &problems, &[9, 8, 7]);
+            pool.expect("a pool").install(run)
+        };
+        assert_eq!(on(1), on(3), "{method}");
+    }
+}
+
+#[test]
 fn a_method_that_takes_one_reference_at_a_time_says_so() {
     let problems = problems(vec![reference(places()[0], TEXTURE, 0.0..WIDTH)]);
     let references = [JointReference {
