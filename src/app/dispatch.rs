@@ -18,7 +18,7 @@ use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::image::Degradation;
-use crate::localize::References;
+use crate::localize::{References, Standing};
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 use crate::sink::rerun::Targets;
@@ -380,22 +380,23 @@ impl AppState {
         }
     }
 
-    /// Whether a method is known to fail on a query.
+    /// Whether the answer of a method is known to be wrong or missing on a query.
     pub(super) fn has_failed(&self, query: usize) -> bool {
-        let results = self.results.get(&query).map_or(&[][..], Vec::as_slice);
-        let failure_radius_m = self.setup.failure_radius_m;
-        let mut results = results.iter();
-        results.any(|result| !result.is_success(failure_radius_m))
+        self.first_failure(query).is_some()
+    }
+
+    /// The first wrong or missing answer of a query, by its position among the query's results.
+    fn first_failure(&self, query: usize) -> Option<usize> {
+        let right = self.setup.task.protocol.right;
+        let known = self.results.get(&query)?;
+        let mut known = known.iter();
+        known.position(|result| result.standing(right, true) >= Standing::Wrong)
     }
 
     fn next_failure(&mut self, back: bool) {
         if self.results.keys().any(|query| self.has_failed(*query)) {
             self.next_query(back, Self::has_failed);
-            let known = self.results.get(&self.setup.query);
-            let failed = known.and_then(|known| {
-                let radius_m = self.setup.failure_radius_m;
-                known.iter().position(|result| !result.is_success(radius_m))
-            });
+            let failed = self.first_failure(self.setup.query);
             if let Some(result) = failed {
                 self.open_result(self.setup.query, result);
             }

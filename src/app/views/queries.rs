@@ -8,7 +8,7 @@ use super::View;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ViewContext, theme};
 use crate::event::Side;
-use crate::localize::{QueryResult, Verdict};
+use crate::localize::QueryResult;
 use crate::method::Method;
 
 /// The list of queries.
@@ -38,7 +38,9 @@ impl View for QueriesView {
                 .keys()
                 .filter(|query| context.has_failed(**query));
             let failed = failed.count();
-            ui.weak(format!("{failed} of {} failed", context.results.len()));
+            let words = format!("{failed} of {} failed", context.results.len());
+            let help = "A query counts whose answer is wrong or missing by one method at least";
+            ui.weak(words).on_hover_text(help);
         });
         let shown: Vec<usize> = context
             .setup
@@ -81,23 +83,21 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize) {
 
 /// One mark per method: what it is tells the shape too.
 pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
-    let failure_radius_m = context.setup.failure_radius_m;
+    let (right, shows_truth) = (
+        context.setup.task.protocol.right,
+        context.options.shows_truth,
+    );
     ui.spacing_mut().item_spacing.x = 2.0;
     let methods: BTreeSet<Method> = results.iter().map(|result| result.method).collect();
     for method in methods {
         for result in results.iter().filter(|r| r.method == method) {
-            let (mark, color) = match result.verdict(failure_radius_m) {
-                Verdict::NoPose => ("×", theme::ESTIMATE),
-                Verdict::Far => ("▲", theme::FAR),
-                Verdict::Near => ("●", theme::TRUTH),
-                Verdict::Unmeasured => ("●", theme::REFERENCE),
-            };
-            let words = match context.options.shows_truth {
-                true => format!("{}: {}", method.name(), result.words(failure_radius_m)),
-                false => method.name().to_owned(),
-            };
-            ui.label(RichText::new(mark).color(color))
-                .on_hover_text(words);
+            // As the card says it.
+            let standing = result.standing(right, shows_truth);
+            let color = theme::standing(ui.visuals(), standing);
+            let error = result.error.filter(|_| shows_truth);
+            let error = error.map_or(String::new(), |error| format!(", {error}"));
+            ui.label(RichText::new(standing.mark()).color(color))
+                .on_hover_text(format!("{}: {standing}{error}", method.label()));
         }
     }
 }
