@@ -24,7 +24,7 @@ mod tables;
 mod timings;
 mod triage;
 
-pub use diff::{Change, Difference, RunComparison, Tolerance};
+pub use diff::{Change, Difference, Migration, RunComparison, Tolerance};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
 pub use gate::{Gate, GateResult};

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::measure::{Change, RunComparison, Tolerance, read_rows};
+use posescope::measure::{Change, Migration, RunComparison, Tolerance, read_rows};
 use posescope::run::read_run;
 use posescope::sink::rerun::{Targets, record_comparison};
 
@@ -108,7 +108,22 @@ fn counted(comparison: &RunComparison) -> String {
             comparison.only_before, comparison.only_after
         );
     }
+    let moved: Vec<String> = comparison.migrations.iter().map(moved).collect();
+    if !moved.is_empty() {
+        let _ = write!(text, ". Verdicts: {}", moved.join(", "));
+    }
     text
+}
+
+/// Such as `mi D3 → ok 3`.
+fn moved(migration: &Migration) -> String {
+    let Migration {
+        method,
+        before,
+        after,
+        count,
+    } = migration;
+    format!("{method} {before} → {after} {count}")
 }
 
 /// The comparison in words, as Markdown.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::metrics::Row;
 use crate::localize::Verdict;
+use crate::method::Method;
 
 /// Changes of a pose's error that are not worth mentioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,11 +62,26 @@ pub struct Difference {
     pub verdicts: [Verdict; 2],
 }
 
+/// So many results of a method had one primary verdict and have another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Migration {
+    /// The method.
+    pub method: Method,
+    /// The code in the first run, `ok` where nothing was found.
+    pub before: String,
+    /// The code in the second run.
+    pub after: String,
+    /// How many results.
+    pub count: usize,
+}
+
 /// All differences of two runs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunComparison {
     /// By change, then in the order of the first run.
     pub differences: Vec<Difference>,
+    /// What the primary verdicts became, the most frequent first.
+    pub migrations: Vec<Migration>,
     /// Results that both have.
     pub common: usize,
     /// Results that only the first run has.
@@ -81,12 +97,17 @@ impl RunComparison {
         let mut others: BTreeMap<String, &Row> =
             after.0.iter().map(|row| (key(row), row)).collect();
         let mut comparison = Self::default();
+        let mut migrations: BTreeMap<(Method, String, String), usize> = BTreeMap::new();
         for row in before.0 {
             let Some(other) = others.remove(&key(row)) else {
                 comparison.only_before += 1;
                 continue;
             };
             comparison.common += 1;
+            let [was, is] = [row, other].map(code);
+            if was != is {
+                *migrations.entry((row.method, was, is)).or_default() += 1;
+            }
             let verdicts = [row.verdict(before.1), other.verdict(after.1)];
             let [was, is] = verdicts.map(Verdict::is_success);
             if let Some(change) = change(was, is, row, other, tolerance) {
@@ -99,6 +120,16 @@ impl RunComparison {
             }
         }
         comparison.only_after = others.len();
+        let migrations = migrations.into_iter();
+        comparison.migrations = migrations
+            .map(|((method, before, after), count)| Migration {
+                method,
+                before,
+                after,
+                count,
+            })
+            .collect();
+        (comparison.migrations).sort_by_key(|migration| std::cmp::Reverse(migration.count));
         comparison.differences.sort_by_key(|one| one.change);
         comparison
     }
@@ -113,6 +144,12 @@ impl RunComparison {
     pub fn is_regression(&self) -> bool {
         self.count(Change::Broken) > 0
     }
+}
+
+/// The primary verdict of a result.
+fn code(row: &Row) -> String {
+    let primary = row.diagnosis.first();
+    primary.map_or("ok".to_owned(), |finding| finding.code.to_string())
 }
 
 fn change(was: bool, is: bool, before: &Row, after: &Row, tolerance: &Tolerance) -> Option<Change> {
@@ -150,6 +187,37 @@ mod tests {
         assert_eq!(comparison.differences, []);
         assert_eq!(comparison.common, 8);
         assert!(!comparison.is_regression());
+    }
+
+    #[test]
+    fn verdicts_that_became_others_are_counted_by_method() {
+        let with = |query: &str, method: &str, code: Option<&str>| {
+            let mut row = row(query, method, Some(0.1));
+            row.diagnosis = code
+                .map(|code| serde_json::from_value(serde_json::json!({ "code": code })))
+                .into_iter()
+                .collect::<Result<_, _>>()
+                .expect("a finding");
+            row
+        };
+        let before = [
+            with("a", "mi", Some("D3")),
+            with("b", "mi", Some("D3")),
+            with("c", "mi", None),
+            with("d", "fb", Some("R3")),
+        ];
+        let after = [
+            with("a", "mi", None),
+            with("b", "mi", None),
+            with("c", "mi", Some("D2")),
+            with("d", "fb", Some("R3")),
+        ];
+        let told: Vec<String> = compare(&before, &after)
+            .migrations
+            .iter()
+            .map(|one| format!("{} {} {} {}", one.method, one.before, one.after, one.count))
+            .collect();
+        assert_eq!(told, ["mi D3 ok 2", "mi ok D2 1"]);
     }
 
     #[test]
