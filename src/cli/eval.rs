@@ -359,13 +359,8 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
             gate_result.gate, gate_result.found
         ))?;
     }
-    let known = &report.known;
-    if known.still > 0 {
-        let count = known.still;
-        output::print(&format!("{count} known failures are left out of gates"))?;
-    }
-    for line in known.fixed.iter().chain(&known.other) {
-        output::print(line)?;
+    for line in report.known.lines() {
+        output::print(&line)?;
     }
     Ok(())
 }

@@ -60,6 +60,19 @@ pub struct KnownReport {
     pub other: Vec<String>,
 }
 
+impl KnownReport {
+    /// How many failures of the run are known, and what is new about the list, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let still = match self.still {
+            0 => None,
+            1 => Some("1 known failure is left out of gates".to_owned()),
+            still => Some(format!("{still} known failures are left out of gates")),
+        };
+        let news = self.fixed.iter().chain(&self.other).cloned();
+        still.into_iter().chain(news).collect()
+    }
+}
+
 impl KnownFailures {
     /// Reads the list.
     ///

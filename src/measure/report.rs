@@ -193,10 +193,7 @@ fn markdown(
             gate_result.gate, gate_result.found
         );
     }
-    let still =
-        (known.still > 0).then(|| format!("{} known failures are left out of gates", known.still));
-    let news = known.fixed.iter().chain(&known.other);
-    for line in still.iter().chain(news) {
+    for line in known.lines() {
         text += &format!("- {line}\n");
     }
     if !gate_results.is_empty() || *known != KnownReport::default() {

@@ -56,7 +56,7 @@ fn a_known_failure_turns_no_job_red_and_one_that_is_fixed_is_said() {
     let shown = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{shown}");
     assert!(
-        shown.contains("1 known failures are left out of gates"),
+        shown.contains("1 known failure is left out of gates"),
         "{shown}"
     );
     assert!(shown.contains("1 fb is right now; take it off"), "{shown}");

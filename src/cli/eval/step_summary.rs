@@ -55,17 +55,7 @@ pub fn of_run(
     }
     text += figures(report).markdown().trim_start();
     text += "\n";
-    let known = &report.known;
-    if known.still > 0 {
-        text += &format!("{} known failures are left out of gates.\n\n", known.still);
-    }
-    text += &list(
-        known
-            .fixed
-            .iter()
-            .chain(&known.other)
-            .map(|line| plain(line)),
-    );
+    text += &list(report.known.lines().iter().map(|line| plain(line)));
     if let Some(comparison) = comparison {
         let broken = comparison.differences.iter();
         let broken = broken.filter(|one| one.change == Change::Broken);
