@@ -6,7 +6,7 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
-use super::save::SaveTarget;
+use super::save_target::SaveTarget;
 use super::setup::ReferencePick;
 use super::view_options::CompareMode;
 use crate::fusion::Fusion;

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use egui::Ui;
 
 use super::command::{Command, Queue};
+use super::save_target::SaveTarget;
 use super::setup::Setup;
 use super::state::AppState;
 use crate::localize::LocalizeObserver as _;
@@ -13,48 +14,23 @@ use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;
 
-/// Something that leaves the window for a file, or comes from one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SaveTarget {
-    /// All that was told so far, for the Rerun viewer.
-    Recording,
-    /// A view as PNG, or the whole window.
-    Picture(Option<&'static str>),
-    /// Scene, query, settings and layout.
-    Session,
-    /// Back from such a file.
-    Restored,
+/// The file that is offered: what is looked at gives its name.
+fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
+    let name = |ending: &str| format!("{}{ending}", name_of(setup));
+    let file = match target {
+        SaveTarget::Recording => name(".rrd"),
+        SaveTarget::Picture(view) => name(&format!("-{}.png", view.unwrap_or("window"))),
+        SaveTarget::Session | SaveTarget::Restored => "session.json".to_owned(),
+    };
+    setup.folder.join(file)
 }
 
-impl SaveTarget {
-    fn title(self) -> String {
-        match self {
-            Self::Recording => "Save the recording".to_owned(),
-            Self::Picture(None) => "Save the window as a picture".to_owned(),
-            Self::Picture(Some(view)) => format!("Save the view {view} as a picture"),
-            Self::Session => "Save the session".to_owned(),
-            Self::Restored => "Restore a session".to_owned(),
-        }
-    }
-
-    /// The file that is offered: what is looked at gives its name.
-    fn offered(self, setup: &Setup) -> PathBuf {
-        let name = |ending: &str| format!("{}{ending}", name_of(setup));
-        let file = match self {
-            Self::Recording => name(".rrd"),
-            Self::Picture(view) => name(&format!("-{}.png", view.unwrap_or("window"))),
-            Self::Session | Self::Restored => "session.json".to_owned(),
-        };
-        setup.folder.join(file)
-    }
-
-    fn command(self, path: PathBuf) -> Command {
-        match self {
-            Self::Recording => Command::SaveRecording(path),
-            Self::Picture(view) => Command::SavePicture { view, path },
-            Self::Session => Command::SaveSession(path),
-            Self::Restored => Command::RestoreSession(path),
-        }
+fn command(target: SaveTarget, path: PathBuf) -> Command {
+    match target {
+        SaveTarget::Recording => Command::SaveRecording(path),
+        SaveTarget::Picture(view) => Command::SavePicture { view, path },
+        SaveTarget::Session => Command::SaveSession(path),
+        SaveTarget::Restored => Command::RestoreSession(path),
     }
 }
 
@@ -85,7 +61,7 @@ impl Asking {
     pub(super) fn new(target: SaveTarget, setup: &Setup) -> Self {
         Self {
             target,
-            path: target.offered(setup).display().to_string(),
+            path: offered(target, setup).display().to_string(),
             is_focused: false,
         }
     }
@@ -116,7 +92,7 @@ impl Asking {
                 };
                 let button = ui.add_enabled(is_named, egui::Button::new(does));
                 if button.on_hover_text("Enter").clicked() || (enter && is_named) {
-                    commands.send(self.target.command(self.path.trim().into()));
+                    commands.send(command(self.target, self.path.trim().into()));
                     is_over = true;
                 }
                 let cancel = ui.button("Cancel").on_hover_text("Escape");

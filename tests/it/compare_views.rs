@@ -25,7 +25,7 @@ fn two_poses_are_compared_by_the_costs_at_them() {
     press(&mut window, Modifiers::NONE, Key::Num3);
     show(&mut window, "beside");
     wait(&mut window, |app| {
-        app.app_state().options.beside.is_some() && app.app_state().run().len() > 0
+        app.app_state().options.beside.is_some() && !app.app_state().run().is_empty()
     });
     window.run_steps(60);
     let result = results(&window)
