@@ -5,6 +5,7 @@ use egui::{Color32, Mesh, Rect, Sense, Ui, Vec2, pos2, vec2};
 use super::search::Search;
 use crate::app::theme;
 use crate::event::Event;
+use crate::render::Score;
 use crate::session::Run;
 
 /// What has no colour of the scale: a cell that may not win.
@@ -31,17 +32,28 @@ impl Scale {
         };
         let records = run.records().get(search.span.records.clone());
         for record in records.unwrap_or_default() {
-            if let Event::PoseScored(scored) = &record.event
-                && !scored.phase.is_yaw()
-            {
-                scale.coverage = scale.coverage.max(scored.coverage);
-                if let Some(cost) = scored.score.eligible_cost(least_covered) {
-                    let (least, greatest) = scale.costs.unwrap_or((cost, cost));
-                    scale.costs = Some((least.min(cost), greatest.max(cost)));
+            match &record.event {
+                Event::PoseScored(scored) if !scored.phase.is_yaw() => {
+                    scale.take(&scored.score, scored.coverage, least_covered);
                 }
+                // A surface that is shown under a descent is told at once.
+                Event::PhaseSearched(searched) if scale.costs.is_none() => {
+                    for score in searched.surface.scores.iter().flatten() {
+                        scale.take(score, search.coverage(score.covered), least_covered);
+                    }
+                }
+                _ => {}
             }
         }
         scale
+    }
+
+    fn take(&mut self, score: &Score, coverage: f64, least_covered: u32) {
+        self.coverage = self.coverage.max(coverage);
+        if let Some(cost) = score.eligible_cost(least_covered) {
+            let (least, greatest) = self.costs.unwrap_or((cost, cost));
+            self.costs = Some((least.min(cost), greatest.max(cost)));
+        }
     }
 
     /// The colour of a cost; grey where it is no number.
