@@ -59,7 +59,7 @@ fn photo(pose: &Pose, texture: u32) -> Photo {
 fn reference(pose: Pose, texture: u32, columns: std::ops::Range<f64>) -> Arc<ReferenceTuple> {
     let scanned = pixels().filter(|pixel| columns.contains(&pixel.x));
     let cloud: Cloud = scanned
-        .map(|pixel| (pose.inverse() * seen(&pose, pixel)).cast::<f32>().into())
+        .map(|pixel| (pose.inverse() * seen(&pose, pixel)).cast::<f32>())
         .map(|point: Point3<f32>| [point.x, point.y, point.z])
         .collect();
     let name = format!("{:.1}", pose.translation.x + 100.0 * pose.translation.z);
