@@ -30,6 +30,10 @@ use pictures::{FailurePictures, Witness, thumbnail};
 /// Pictures of so many failures, where nobody says how many.
 pub const PICTURES: usize = 24;
 
+/// Queries that have a photo in the report, at most: more would make it too large to be sent around, and take
+/// longer than the run itself.
+const MOST_PHOTOS: usize = 500;
+
 /// The name of the file in a run folder.
 pub const REPORT: &str = "report.html";
 
@@ -139,6 +143,12 @@ impl RunReport {
         match open(&run) {
             Ok(scenes) => {
                 thumbnails = self::thumbnails(&run, &scenes, &results);
+                let queries = results.iter().map(|one| one.query + 1).max();
+                if let Some(queries) = queries.filter(|queries| *queries > MOST_PHOTOS) {
+                    notes.push(format!(
+                        "The first {MOST_PHOTOS} of {queries} queries have photos"
+                    ));
+                }
                 draw_failures(&run, &scenes, &params, &mut results, pictures);
                 let failures = results.iter().filter(|one| one.is_failure).count();
                 if failures > pictures {
@@ -257,6 +267,7 @@ fn thumbnails(
     let firsts: Vec<&ReportedResult> = results
         .iter()
         .filter(|one| seen.insert(one.query))
+        .take(MOST_PHOTOS)
         .collect();
     let painted = firsts.par_iter().filter_map(|one| {
         let scene = scenes.of_queries(pair_of(run, &one.result)?);
