@@ -425,7 +425,7 @@ variant = "dark"
             (
                 "```page\nvariant = \"dark\"",
                 "```page\nvariant = \"fog\"",
-                38,
+                37,
                 "fog",
             ),
             ("+++\ntitle", "title", 1, "header"),

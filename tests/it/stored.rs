@@ -122,7 +122,7 @@ fn what_is_wrong_in_a_run_file_is_told_with_its_line() {
             "r-wavg",
             "mean",
             "fusions",
-            "`mean` is no fusion; maxf, avg, wavg or r-wavg expected",
+            "`mean` is no fusion; maxf, avg, wavg, r-wavg or joint expected",
         ),
         ("[2.0]", "[-2.0]", "radii_m", "positive radius"),
         (
