@@ -23,7 +23,7 @@ use super::terminal::Terminal;
 /// Lists the lessons, or goes through one.
 pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
     let Some(name) = &args.name else {
-        return list();
+        return list(terminal);
     };
     let lesson = Lesson::open(name)?;
     if args.text {
@@ -35,11 +35,16 @@ pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
 }
 
-fn list() -> Result<(), CliError> {
+fn list(terminal: &Terminal) -> Result<(), CliError> {
     let mut table = Table::new();
+    // Words wrap where there is a terminal, and stay in one line in a pipe.
+    if let Some(width) = terminal.width() {
+        table
+            .set_content_arrangement(ContentArrangement::Dynamic)
+            .set_width(width.try_into().unwrap_or(u16::MAX));
+    }
     table
         .load_preset(presets::NOTHING)
-        .set_content_arrangement(ContentArrangement::Disabled)
         .set_header(["lesson", "minutes", "title", "about"]);
     for lesson in Lesson::all()? {
         table.add_row([
@@ -49,7 +54,7 @@ fn list() -> Result<(), CliError> {
             lesson.about,
         ]);
     }
-    output::print(&table.to_string())
+    output::print(&table.trim_fmt())
 }
 
 /// All pages, with their answers.

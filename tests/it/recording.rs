@@ -19,6 +19,7 @@ use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, Referen
 use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
 use posescope::trace::{Cancelled, Fanout, Sink as _, Trace};
 use rerun::external::re_log_encoding::DecoderApp;
+use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use rerun::log::{Chunk, LogMsg};
 
 use crate::binary::posescope;
@@ -179,6 +180,68 @@ fn on_the_timeline_of_lock_step_every_method_begins_at_zero_and_a_hybrid_takes_a
     assert!(fb < hy && hy < fb + 20, "{ends:?}");
     // What all methods found is on no timeline on which they are still at work.
     assert_eq!(times(&chunks, "report", LOCKSTEP), [0; 0]);
+}
+
+/// The views of a layout: the class of each by its id.
+fn view_classes(path: &Path) -> BTreeMap<String, String> {
+    let file = BufReader::new(File::open(path).expect("the recording"));
+    let mut classes = BTreeMap::new();
+    for message in DecoderApp::decode_lazy(file) {
+        let LogMsg::ArrowMsg(store, message) = message.expect("a readable message") else {
+            continue;
+        };
+        if store.is_recording() {
+            continue;
+        }
+        let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
+        let component = ViewBlueprint::descriptor_class_identifier().component;
+        for class in chunk.iter_slices::<String>(component) {
+            let id = chunk.entity_path().to_string();
+            let known = classes.insert(id.clone(), class[0].to_string());
+            assert!(
+                known.is_none_or(|known| known == class[0].to_string()),
+                "{id}"
+            );
+        }
+    }
+    classes
+}
+
+#[test]
+fn a_view_of_one_id_is_of_one_class_in_every_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let params = Params::default();
+    let all: Vec<BTreeMap<String, String>> = [
+        ("fb.rrd", &[Method::FB][..], false),
+        ("pm.rrd", &[Method::PM][..], false),
+        ("all.rrd", &Method::PAPER[..], false),
+        ("pages.rrd", &Method::PAPER[..], true),
+    ]
+    .into_iter()
+    .map(|(name, methods, has_pages)| {
+        let path = folder.path().join(name);
+        let mut recorder = open(&path, methods);
+        if has_pages {
+            recorder = recorder.with_pages();
+        }
+        run(&mut recorder, methods, &params);
+        recorder.close().expect("a whole recording");
+        let classes = view_classes(&path);
+        assert!(classes.len() > 5, "{name}: {classes:?}");
+        classes
+    })
+    .collect();
+    // A viewer keeps the layout of the recording before until it has read the next one.
+    for one in &all {
+        for other in &all {
+            for (id, class) in one {
+                assert!(
+                    other.get(id).is_none_or(|known| known == class),
+                    "{id}: {class}"
+                );
+            }
+        }
+    }
 }
 
 #[test]

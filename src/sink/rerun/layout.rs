@@ -183,7 +183,7 @@ fn log_view(
         contents,
         properties,
     } = view;
-    let path = view_path(place);
+    let path = view_path(place, class);
     let expressions = contents
         .iter()
         .map(|line| QueryExpression(line.as_str().into()));
@@ -203,13 +203,15 @@ fn log_view(
 
 fn path_of(node: &BlueprintNode, place: &str) -> String {
     match node {
-        BlueprintNode::View(_) => view_path(place),
+        BlueprintNode::View(view) => view_path(place, view.class),
         _ => format!("container/{}", uuid(place)),
     }
 }
 
-fn view_path(place: &str) -> String {
-    format!("view/{}", uuid(place))
+/// A viewer keeps what it knows of a view under its id, and goes on with the layout of the recording before
+/// until it has read the next one: what has an id must be of one class in all recordings.
+fn view_path(place: &str, class: &str) -> String {
+    format!("view/{}", uuid(&format!("{place} {class}")))
 }
 
 /// The same layout has the same ids in every recording.
