@@ -1,7 +1,10 @@
-//! How long a frame of the window takes on the software adapter, with one query of the street.
+//! How long a frame of the window takes on the software adapter, with one query of the street, and how
+//! long it takes to look through 10,000 results.
 //!
 //! A frame here is all that happens between two pictures: the pass over the widgets, and their
-//! painting into a texture of the size of the window, to the end.
+//! painting into a texture of the size of the window, to the end. Those named `own_…` are the part that is
+//! ours on any adapter: the pass over the widgets and the triangles made of them, on the processor, without
+//! painting.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -13,11 +16,11 @@ use eframe::egui_wgpu::{
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use nalgebra::Point3;
-use posescope::app::{self, App, Command, Setup};
-use posescope::camera::Intrinsics;
+use posescope::app::{self, App, Arrangement, Command, KnownResults, Results, Setup};
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
-use posescope::image::Photo;
+use posescope::localize::QueryResult;
+use posescope::run::{QueryCamera, ScenePair};
 use posescope::scene::{self, Scene, SceneError};
 use posescope::session::{RunMode, RunState, Task};
 
@@ -36,27 +39,8 @@ fn main() {
 struct DenseStreet(Box<dyn Scene>);
 
 impl Scene for DenseStreet {
-    fn name(&self) -> &str {
-        self.0.name()
-    }
-    fn frames(&self) -> &[String] {
-        self.0.frames()
-    }
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.0.intrinsics(frame)
-    }
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.0.pose(frame)
-    }
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.0.time_s(frame)
-    }
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.0.has_cloud(frame)
-    }
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        self.0.photo(frame)
-    }
+    posescope::inner_scene!(0: name, frames, intrinsics, pose, time_s, has_cloud, photo);
+
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         let sparse = self.0.cloud(frame)?.points;
         // Once more around, a hair farther away each time.
@@ -244,6 +228,192 @@ fn open() -> Option<Window> {
 fn draw(window: &mut Window) {
     window.step();
     window.render().expect("a picture");
+}
+
+/// What a frame costs on the processor, whoever paints it.
+fn draw_own(window: &mut Window) {
+    window.step();
+    let (shapes, scale) = {
+        let output = window.output();
+        (output.shapes.clone(), output.pixels_per_point)
+    };
+    divan::black_box(window.ctx.tessellate(shapes, scale));
+}
+
+/// The cursor goes over the run: our own part of a frame.
+#[divan::bench(sample_count = 120, sample_size = 1)]
+fn own_scrubbing(bencher: Bencher) {
+    with_window(|window| {
+        let records = window.state().app_state().run().len();
+        let mut cursor = 0;
+        bencher.bench_local(|| {
+            cursor = (cursor + records / 120) % records;
+            window.state_mut().send(Command::MoveCursor(cursor));
+            draw_own(window);
+        });
+        window.state_mut().send(Command::Last);
+    });
+}
+
+/// A part of the window has all the room while the cursor goes over the run: our own part of a frame.
+#[divan::bench(args = ["images", "synthetic", "space", "surface", "histogram", "ransac", "report", "log"], sample_count = 60, sample_size = 1)]
+fn own_scrubbing_of(bencher: Bencher, view: &str) {
+    with_window(|window| {
+        let name = app::views::find(view).expect("a view");
+        window.state_mut().send(Command::Maximize(Some(name)));
+        window.step();
+        let records = window.state().app_state().run().len();
+        let mut cursor = 0;
+        bencher.bench_local(|| {
+            cursor = (cursor + records / 60) % records;
+            window.state_mut().send(Command::MoveCursor(cursor));
+            draw_own(window);
+        });
+        window.state_mut().send(Command::Maximize(None));
+        window.state_mut().send(Command::Last);
+        window.step();
+    });
+}
+
+/// Results that are looked through.
+const RESULTS: usize = 10_000;
+
+/// The results of the window's query, repeated over the frames of its scene: a run folder of so many.
+struct ManyResults {
+    folder: tempfile::TempDir,
+    pair: ScenePair,
+    scene: Arc<dyn Scene>,
+}
+
+impl ManyResults {
+    fn write(window: &Window) -> Self {
+        let state = window.state().app_state();
+        let scene = Arc::clone(&state.setup.queries);
+        let own: Vec<QueryResult> = state.run().results().cloned().collect();
+        let folder = tempfile::tempdir().expect("a folder");
+        let lines: String = (0..RESULTS)
+            .map(|at| {
+                let mut result = own[at % own.len()].clone();
+                let frames = scene.frames();
+                result
+                    .query
+                    .clone_from(&frames[at / own.len() % frames.len()]);
+                let line = serde_json::to_string(&result).expect("written");
+                line + "\n"
+            })
+            .collect();
+        std::fs::write(folder.path().join("results.jsonl"), lines).expect("written");
+        let camera = scene.intrinsics(0);
+        let pair = ScenePair {
+            scene_index: 0,
+            scene: scene.name().to_owned(),
+            query_scene: scene.name().to_owned(),
+            camera: QueryCamera {
+                width: camera.width,
+                height: camera.height,
+                fx: camera.fx,
+                fy: camera.fy,
+                cx: camera.cx,
+                cy: camera.cy,
+            },
+            cameras: Vec::new(),
+            drawn: Vec::new(),
+            queries: Vec::new(),
+            times_s: Vec::new(),
+        };
+        Self {
+            folder,
+            pair,
+            scene,
+        }
+    }
+
+    fn read(&self) -> Results {
+        let read = app::results_of_run(self.folder.path(), &self.pair, self.scene.as_ref());
+        let (results, elsewhere) = read.expect("readable");
+        assert_eq!(elsewhere, 0);
+        results
+    }
+
+    /// A window with them, arranged for a batch.
+    fn open(&self, like: &Window) -> Window {
+        let setup = Setup {
+            mode: RunMode::Paused,
+            ..like.state().app_state().setup.clone()
+        };
+        let results = self.read();
+        let before = results.clone();
+        let known = KnownResults {
+            now: results,
+            before: Some(before),
+        };
+        let mut window = Harness::builder()
+            .with_size(SIZE)
+            .build_eframe(|creation| App::new(creation, setup).with_results(known));
+        window
+            .state_mut()
+            .send(Command::Arrange(Arrangement::Batch));
+        window.run_steps(4);
+        window
+    }
+}
+
+/// A run folder of 10,000 results: until they are there and the first frame shows them.
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn open_10000_results(bencher: Bencher) {
+    with_window(|window| {
+        let many = ManyResults::write(window);
+        bencher.bench_local(|| drop(many.open(window)));
+    });
+}
+
+/// Another condition on 10,000 results: until the frame that shows what meets it.
+#[divan::bench(sample_count = 20, sample_size = 1)]
+fn filter_10000_results(bencher: Bencher) {
+    with_window(|window| {
+        let mut batch = ManyResults::write(window).open(window);
+        let mut asked = 0;
+        bencher.bench_local(|| {
+            asked += 1;
+            let condition = format!("method = mi and coverage < 5 and error < {asked}");
+            batch.state_mut().send(Command::FilterResults(condition));
+            draw_own(&mut batch);
+        });
+    });
+}
+
+/// What a view of 10,000 results costs in a frame in which nothing changes.
+#[divan::bench(args = ["batch", "charts", "migrations", "queries"], sample_count = 30, sample_size = 1)]
+fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
+    with_window(|window| {
+        let mut batch = ManyResults::write(window).open(window);
+        let name = app::views::find(view).expect("a view");
+        batch.state_mut().send(Command::Maximize(Some(name)));
+        batch.run_steps(3);
+        bencher.bench_local(|| draw_own(&mut batch));
+    });
+}
+
+/// The table of 10,000 results is scrolled by a page.
+#[divan::bench(sample_count = 60, sample_size = 1)]
+fn own_scrolling_of_10000_results(bencher: Bencher) {
+    with_window(|window| {
+        let mut batch = ManyResults::write(window).open(window);
+        batch.state_mut().send(Command::Maximize(Some("batch")));
+        batch.run_steps(3);
+        batch.hover_at(egui::pos2(600.0, 600.0));
+        batch.step();
+        bencher.bench_local(|| {
+            batch.event(egui::Event::MouseWheel {
+                unit: egui::MouseWheelUnit::Page,
+                delta: egui::vec2(0.0, -1.0),
+                phase: egui::TouchPhase::Move,
+                source: egui::MouseWheelSource::Wheel,
+                modifiers: egui::Modifiers::NONE,
+            });
+            draw_own(&mut batch);
+        });
+    });
 }
 
 /// Nothing has changed. A window on a screen would not draw such a frame at all.

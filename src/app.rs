@@ -13,6 +13,7 @@ mod arrangement;
 mod camera;
 mod card;
 mod command;
+mod cost_line;
 mod deciding;
 mod dispatch;
 mod headless;
@@ -22,9 +23,11 @@ mod lesson;
 mod navigation;
 mod prober;
 mod queries;
+mod run_results;
 mod save;
 mod save_target;
 mod saved;
+mod selection;
 mod setup;
 mod shot;
 mod shown;
@@ -33,6 +36,7 @@ mod textures;
 mod theme;
 mod timeline;
 mod transport;
+mod vector;
 mod view_context;
 mod view_options;
 pub mod views;
@@ -41,11 +45,14 @@ mod window;
 pub use arrangement::Arrangement;
 pub use camera::NamedPose;
 pub use command::{Command, Shortcut, shortcuts};
+pub use cost_line::{CostAlong, CostLine};
+pub use run_results::results_of_run;
 pub use save_target::SaveTarget;
+pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
 pub use setup::{ReferencePick, Setup};
-pub use shot::{Moment, Shot, ShotError, shoot};
+pub use shot::{Moment, Shot, ShotError, draw, shoot};
 pub use shown::{ShownReason, ShownView};
-pub use state::{AppState, Note, Results};
+pub use state::{AppState, Note};
 pub use view_context::ViewContext;
 pub use view_options::{CompareMode, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson, window_options};
@@ -60,9 +67,11 @@ use crate::lesson::Lesson;
 pub struct App {
     state: AppState,
     layout: Layout,
+    timeline: timeline::Timeline,
     commands: command::Queue,
     help: bool,
     pictures: save::Pictures,
+    drawings: vector::Drawings,
     /// Where something is to be saved, while that is asked.
     asking: Option<save::Asking>,
     /// The lesson that somebody goes through.
@@ -82,12 +91,16 @@ impl App {
 
     fn of(ctx: &egui::Context, render_state: Option<&RenderState>, setup: Setup) -> Self {
         theme::install(ctx);
+        let drawings = vector::Drawings::default();
+        ctx.add_plugin(drawings.clone());
         Self {
             state: AppState::new(setup, ctx.clone()),
             layout: Layout::new(render_state),
+            timeline: timeline::Timeline::default(),
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
+            drawings,
             asking: None,
             lesson: None,
             title: String::new(),
@@ -96,8 +109,8 @@ impl App {
     }
 
     /// With results of the setup's queries that are known already.
-    pub fn with_results(mut self, results: Results) -> Self {
-        self.state.set_known_results(results);
+    pub fn with_results(mut self, results: impl Into<KnownResults>) -> Self {
+        self.state.set_known_results(results.into());
         self
     }
 
@@ -123,7 +136,8 @@ impl App {
     /// Takes in what other threads have done, and does what was asked for.
     fn update(&mut self, ctx: &egui::Context) {
         self.state.poll();
-        for said in self.pictures.write() {
+        let said = self.pictures.write();
+        for said in said.into_iter().chain(self.drawings.take_said()) {
             match said {
                 Ok(words) => self.state.note(words, false),
                 Err(why) => self.state.note(why, true),
@@ -151,6 +165,7 @@ impl App {
         let Self {
             state,
             layout,
+            timeline,
             commands,
             help,
             is_bare,
@@ -179,7 +194,7 @@ impl App {
                 egui::Panel::top("verdicts").show(ui, |ui| card::ui(ui, state, commands));
             }
         }
-        egui::Panel::bottom("timeline").show(ui, |ui| timeline::ui(ui, state, commands));
+        egui::Panel::bottom("timeline").show(ui, |ui| timeline.ui(ui, state, commands));
         egui::CentralPanel::default()
             .frame(egui::Frame::NONE.fill(ui.visuals().panel_fill))
             .show(ui, |ui| layout.ui(ui, state, commands));

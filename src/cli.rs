@@ -1,7 +1,9 @@
 //! The command line of posescope.
 
 mod args;
+mod choice;
 mod columns;
+mod compute;
 mod demo;
 mod demo_settings;
 mod diff;
@@ -22,12 +24,14 @@ mod match_export;
 mod observer;
 mod opened;
 mod output;
+mod overview;
 mod params;
 mod report;
 mod run;
 #[cfg(feature = "app")]
 mod shot;
 mod story;
+mod surface;
 mod synth;
 mod table;
 mod terminal;
@@ -61,21 +65,31 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
     let terminal = terminal::Terminal::new(&arguments.verbosity);
     match &arguments.command {
         None => demo::demo(&terminal),
-        Some(Command::Run(run)) => run::run(run, &terminal),
-        #[cfg(feature = "app")]
-        Some(Command::View(args)) => {
-            view::view(args, posescope::session::RunMode::Paused, &terminal)
+        Some(Command::Run(args)) => {
+            compute::with(args.task.protocol.compute, || run::run(args, &terminal))
         }
         #[cfg(feature = "app")]
-        Some(Command::Shot(args)) => shot::shot(args, &terminal),
+        Some(Command::View(args)) => compute::with(args.task.protocol.compute, || {
+            view::view(args, posescope::session::RunMode::Paused, &terminal)
+        }),
+        #[cfg(feature = "app")]
+        Some(Command::Shot(args)) => compute::with(args.view_args.task.protocol.compute, || {
+            shot::shot(args, &terminal)
+        }),
         Some(Command::Lesson(args)) => lesson::lesson(args, &terminal),
-        Some(Command::Eval(args)) => eval::eval(args, &terminal),
+        Some(Command::Eval(args)) => {
+            compute::with(args.protocol.compute, || eval::eval(args, &terminal))
+        }
         Some(Command::Diff(args)) => diff::diff(args, &terminal),
         Some(Command::Triage(args)) => triage::triage(args, &terminal),
         Some(Command::Report(args)) => report::report(args, &terminal),
         Some(Command::Export(args)) => export::run(args, &terminal),
         Some(Command::Index(args)) => index::index(args, &terminal),
+        Some(Command::Overview(args)) => overview::overview(args, &terminal),
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),
+        Some(Command::Surface(args)) => compute::with(args.task.protocol.compute, || {
+            surface::surface(args, &terminal)
+        }),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params, &terminal),
         Some(Command::Completions { shell }) => manual::completions(*shell),

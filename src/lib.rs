@@ -19,8 +19,8 @@ struct Readme;
 
 pub use posescope_core::{
     Cloud, Cost, Direct, Estimator, Failure, History, InputError, IntensityPair, Intrinsics,
-    Method, Outcome, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, localize_by,
-    localize_traced,
+    Method, Outcome, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, inner_scene,
+    localize_by, localize_traced,
 };
 pub use posescope_core::{
     camera, cloud, code, cost, depth, describe, diagnosis, estimator, event, features, foreign,

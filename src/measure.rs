@@ -9,6 +9,9 @@ mod gate;
 mod junit;
 mod known;
 mod metrics;
+mod migration;
+#[cfg(feature = "cli")]
+mod overview;
 mod paper;
 #[cfg(feature = "cli")]
 mod plots;
@@ -24,12 +27,15 @@ mod tables;
 mod timings;
 mod triage;
 
-pub use diff::{Change, Difference, Migration, RunComparison, Tolerance};
+pub use diff::{Change, Difference, RunComparison, Tolerance};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownError, KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
+pub use migration::{Migration, migrations, verdict_name};
+#[cfg(feature = "cli")]
+pub use overview::{Route, overview, write_overview};
 pub use paper::{FigureKey, figure as paper_figure};
 #[cfg(feature = "cli")]
 pub use plots::{Plot, method_color, plots, verdict_color};

@@ -52,13 +52,14 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             event.inliers, event.correspondences, event.trials
         ),
         Event::ConsensusJudged(event) => format!(
-            "{}: {} inliers, {} needed, log10 of false alarms {:.1}, {:.2} m from the reference",
+            "{}: {} {} agree, {} needed, log10 of false alarms {:.1}, {:.2} m from the reference",
             if event.accepted {
                 "accepted"
             } else {
                 "refused"
             },
             event.acceptance.inliers,
+            event.counted.name(),
             event
                 .acceptance
                 .needed

@@ -60,10 +60,40 @@ pub(crate) fn synthetic(view: &SyntheticView) -> GrayImage {
 }
 
 /// Query minus synthetic view: blue where the query is darker, orange where it is brighter.
+/// Recordings have the same colours for the same differences at each step.
 pub(crate) fn residual(view: &SyntheticView, pairs: &[IntensityPair]) -> RgbImage {
+    residual_within(view, pairs, RESIDUAL_RANGE)
+}
+
+/// How far grey values differ: at most one pixel in fifty differs more. A power of two, so that views that
+/// are alike have the same.
+#[cfg(feature = "app")]
+pub(crate) fn residual_range(pairs: &[IntensityPair]) -> f64 {
+    const BEYOND: f64 = 0.02;
+    let differences = pairs.iter().map(|pair| (pair.query - pair.synthetic).abs());
+    let mut differences: Vec<f32> = differences.collect();
+    let within = (differences.len() as f64 * (1.0 - BEYOND)) as usize;
+    let Some(within) = within.checked_sub(1) else {
+        return RESIDUAL_RANGE;
+    };
+    let (_, most, _) = differences.select_nth_unstable_by(within, f32::total_cmp);
+    let most = f64::from(*most);
+    let ranges = [16.0, 32.0, 64.0, 128.0];
+    ranges
+        .into_iter()
+        .find(|range| *range >= most)
+        .unwrap_or(256.0)
+}
+
+/// Query minus synthetic view in colours that end at a difference of this many grey values.
+pub(crate) fn residual_within(
+    view: &SyntheticView,
+    pairs: &[IntensityPair],
+    range: f64,
+) -> RgbImage {
     let values = pairs.iter().map(|pair| {
         Rgb(palette::diverging(
-            f64::from(pair.query - pair.synthetic) / RESIDUAL_RANGE,
+            f64::from(pair.query - pair.synthetic) / range,
         ))
     });
     let background = Rgb(palette::NOTHING);
@@ -249,6 +279,26 @@ mod tests {
         let values = view.pixels.iter().map(|p| Luma([gray(p.intensity)]));
         let picture = painted(&view, Luma([0]), values);
         assert_eq!(picture.as_raw(), &[50, 50, 50, 70, 70]);
+    }
+
+    #[cfg(feature = "app")]
+    #[test]
+    fn residuals_have_colours_up_to_the_range_that_they_have() {
+        let pairs = |most: f32| -> Vec<IntensityPair> {
+            (0..=100)
+                .map(|at| IntensityPair {
+                    query: most * at as f32 / 100.0,
+                    synthetic: 0.0,
+                })
+                .collect()
+        };
+        let ranges = [10.0, 30.0, 100.0, 250.0].map(|most| residual_range(&pairs(most)));
+        assert_eq!(ranges, [16.0, 32.0, 128.0, 256.0]);
+        // One odd pixel of a hundred changes nothing.
+        let mut odd = pairs(30.0);
+        odd[7].query = 255.0;
+        assert_eq!(residual_range(&odd), 32.0);
+        assert_eq!(residual_range(&[]), RESIDUAL_RANGE);
     }
 
     #[cfg(feature = "app")]

@@ -378,7 +378,7 @@ fn drawn(
             "margin" => "What the cheapest minimum elsewhere costs more",
             other => other,
         };
-        let svg = svg.map(|svg| charts::with_lines_named(&svg, &run.protocol.methods));
+        let svg = svg.map(|svg| charts::with_methods_named(&svg, &run.protocol.methods));
         add(format!("{what} ({name})"), svg);
     }
     all

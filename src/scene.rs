@@ -1,5 +1,7 @@
 //! Scene formats. What a scene is says [`Scene`].
 //!
+//! A scene that changes another in some respects takes the rest from it by [`inner_scene!`](crate::inner_scene).
+//!
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
 mod argument;

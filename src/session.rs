@@ -89,14 +89,21 @@ impl Session {
         while let Ok(message) = self.inbox.try_recv() {
             is_new = true;
             match message {
-                Message::Chosen(chosen) => self.chosen = Some(chosen),
+                Message::Chosen(chosen) => {
+                    self.run.ranking = None;
+                    self.chosen = Some(chosen);
+                }
+                Message::Ranking {
+                    looked_at,
+                    candidates,
+                } => self.run.ranking = Some([looked_at, candidates]),
                 Message::Loaded(loaded) => {
                     self.run.loaded = Some(loaded);
                     self.state = RunState::Running;
                 }
                 Message::Began(part) => self.run.begin(part),
-                Message::Told(record) => {
-                    self.run.push(*record);
+                Message::Told(record, worked) => {
+                    self.run.push(*record, worked);
                     // It was told to go on, or is about to say that it waits.
                     self.state = RunState::Running;
                 }

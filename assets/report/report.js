@@ -93,3 +93,12 @@
   show();
   follow();
 })();
+
+// Rerun's web viewer reads recordings from a server; a page that was opened as a file has none to give.
+if (location.protocol.startsWith("http")) {
+  for (const link of document.querySelectorAll("a[data-viewer]")) {
+    const recording = new URL(link.dataset.recording, location.href);
+    link.href = link.dataset.viewer + encodeURIComponent(recording.href);
+    link.hidden = false;
+  }
+}

@@ -6,7 +6,9 @@
 //! street, or with `POSESCOPE_SCENE=PATH` and `POSESCOPE_PAIR=QUERY,REFERENCE`, the indices of two of its
 //! frames, one of any scene.
 
-use std::error::Error;
+mod pair;
+mod problems;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::thread;
@@ -14,27 +16,25 @@ use std::time::Instant;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use nalgebra::{Point2, Point3, Unit, Vector3};
 use posescope::camera::Intrinsics;
-use posescope::cost::{self, Cost, Evaluator, Pair};
+use posescope::cost::{self, Evaluator, Pair};
 use posescope::estimator;
 use posescope::event::KindSet;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
-use posescope::geometry::Pose;
-use posescope::grid::{GridParams, Lattice, Offset, Phase};
-use posescope::image::FloatImage;
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::problem::Problem;
-use posescope::render::{Canvas, ColoredCloud, PointArrays, Scorer, Values, color_cloud_by};
+use posescope::render::{Canvas, PointArrays, Scorer, Values};
 use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, IndexOptions, Retriever};
-use posescope::solver::{Correspondence, p3p};
+use posescope::solver::p3p;
 use posescope::trace::{Cancelled, Record, Sink, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+
+use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
+use self::problems::{Outliers, p3p_problems};
 
 fn main() {
     if let Some(threads) = std::env::var("POSESCOPE_THREADS")
@@ -47,44 +47,6 @@ fn main() {
             .expect("set once");
     }
     divan::main();
-}
-
-/// Two frames of the street, 8 m apart, or those that the environment names.
-static PAIR: LazyLock<Problem> = LazyLock::new(|| {
-    let variable = |name: &str, default: &str| std::env::var(name).unwrap_or(default.to_owned());
-    let scene = variable("POSESCOPE_SCENE", "street");
-    let indices = variable("POSESCOPE_PAIR", "70,62");
-    named_pair(&scene, &indices).unwrap_or_else(|error| {
-        eprintln!("error: {error}");
-        std::process::exit(2);
-    })
-});
-
-fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
-    let expected = || {
-        format!(
-            "POSESCOPE_PAIR={indices}: the indices of a query and a reference expected, as 70,62"
-        )
-    };
-    let (query, reference) = indices.split_once(',').ok_or_else(expected)?;
-    let index = |text: &str| text.trim().parse::<usize>().map_err(|_| expected());
-    let scene = scene::open(scene, None)?;
-    let known = |index: usize| match scene.frames().len() {
-        frames if index < frames => Ok(index),
-        frames => Err(format!(
-            "POSESCOPE_PAIR={indices}: {} has {frames} frames, 0 to {}",
-            scene.name(),
-            frames.saturating_sub(1)
-        )),
-    };
-    Ok(Problem {
-        query: scene.query(known(index(query)?)?)?,
-        reference: scene.reference(known(index(reference)?)?)?,
-        uncertainty_radius_m: 15.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    })
 }
 
 static FEATURES: LazyLock<(Features, Features)> = LazyLock::new(|| {
@@ -114,39 +76,6 @@ fn match_one_way(bencher: Bencher) {
         .bench(|| nearest_neighbours(black_box(&query.descriptors), &reference.descriptors));
 }
 
-type Bearings = [Unit<Vector3<f64>>; 3];
-type Points = [Point3<f64>; 3];
-
-/// Random problems that have a solution.
-fn p3p_problems(count: usize) -> Vec<(Bearings, Points)> {
-    let mut rng = Pcg64::seed_from_u64(1);
-    let camera_from_world = random_pose(&mut rng);
-    (0..count)
-        .map(|_| {
-            let in_camera: [Point3<f64>; 3] = std::array::from_fn(|_| random_point(&mut rng));
-            (
-                in_camera.map(|point| Unit::new_normalize(point.coords)),
-                in_camera.map(|point| camera_from_world.inverse() * point),
-            )
-        })
-        .collect()
-}
-
-fn random_point(rng: &mut Pcg64) -> Point3<f64> {
-    let pixel = Point2::new(rng.random_range(0.0..1240.0), rng.random_range(0.0..375.0));
-    PAIR.query
-        .intrinsics
-        .unproject(&pixel, rng.random_range(5.0..50.0))
-}
-
-fn random_pose(rng: &mut Pcg64) -> Pose {
-    let mut angle = || rng.random_range(-1.0..1.0);
-    Pose::new(
-        Vector3::new(angle(), angle(), angle()) * 3.0,
-        Vector3::new(angle(), angle(), angle()),
-    )
-}
-
 #[divan::bench]
 fn p3p_thousand_problems(bencher: Bencher) {
     let problems = p3p_problems(1000);
@@ -161,25 +90,12 @@ fn p3p_thousand_problems(bencher: Bencher) {
 /// 600 correspondences with 1 px of noise, of which a share is false.
 #[divan::bench(args = [50, 90])]
 fn mlesac_percent_outliers(bencher: Bencher, percent: usize) {
+    let case = Outliers {
+        percent,
+        correspondences: 600,
+    };
+    let (correspondences, _) = case.draw(2);
     let intrinsics: Intrinsics = PAIR.query.intrinsics;
-    let mut rng = Pcg64::seed_from_u64(2);
-    let camera_from_world = random_pose(&mut rng);
-    let correspondences: Vec<Correspondence> = (0..600)
-        .map(|i| {
-            let point = random_point(&mut rng);
-            let shown = if i % 100 < percent {
-                random_point(&mut rng)
-            } else {
-                point
-            };
-            let pixel = intrinsics.project(&shown).expect("in front");
-            let mut noise = || rng.random_range(-1.7..1.7);
-            Correspondence {
-                pixel: Point2::new(pixel.x + noise(), pixel.y + noise()),
-                point: camera_from_world.inverse() * point,
-            }
-        })
-        .collect();
     let params = MlesacParams::default();
     bencher.bench(|| {
         mlesac(black_box(&correspondences), &intrinsics, &params, 0, |_| {
@@ -237,34 +153,6 @@ fn hypothesis_by_both_costs<const SPLAT_PX: usize>(bencher: Bencher) {
             }
             sum
         });
-}
-
-fn registered_cost(name: &str) -> Box<dyn Cost> {
-    let entry = cost::ALL.iter().find(|entry| entry.name == name);
-    (entry.expect("is listed").params)().cost()
-}
-
-/// The query of the pair and the cloud of its reference, as a cost looks at them.
-fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, ColoredCloud) {
-    let (query, reference) = (&PAIR.query, &PAIR.reference);
-    let cloud = color_cloud_by(
-        &reference.cloud,
-        &reference.intrinsics,
-        &Params::default().render,
-        cost.reference_channel(&reference.photo.gray),
-    );
-    (Arc::new(cost.query_channel(&query.photo.gray)), cloud)
-}
-
-/// The cameras of the coarse search in a disc of 10 m.
-fn poses_of_a_disc() -> Vec<Pose> {
-    let centre = Offset::default();
-    let lattice = Lattice::new(Phase::PositionCoarse, centre, 10.0, &GridParams::default());
-    let hypotheses = lattice.expect("a small lattice");
-    let hypotheses = hypotheses.hypotheses();
-    hypotheses
-        .map(|(_, offset)| offset.reference_from_camera())
-        .collect()
 }
 
 #[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 10)]

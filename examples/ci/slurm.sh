@@ -1,6 +1,7 @@
 #!/bin/bash
 # An experiment as a Slurm array:  sbatch --array=1-32 examples/ci/slurm.sh
 # then, when all parts are done:   examples/ci/slurm.sh merge 32
+# Arguments behind the script's name go to `posescope eval`, those of every part alike.
 #
 # A part that was killed, by its time limit say, goes on where it was when it is submitted again.
 # For Slurm that is an array of its own, which has to be told the number of all parts:
@@ -22,7 +23,7 @@ if [ "${1:-}" = merge ]; then
     exec posescope eval --merge "${parts[@]}" --out "$runs/whole"
 fi
 
-exec posescope eval "$scene" --experiment "$experiment" --quiet \
+exec posescope eval "$scene" --experiment "$experiment" "$@" --quiet \
     --shard "$SLURM_ARRAY_TASK_ID/${PARTS:-$SLURM_ARRAY_TASK_COUNT}" \
     --threads "${SLURM_CPUS_PER_TASK:-1}" \
     --out "$runs/part-$SLURM_ARRAY_TASK_ID" --resume

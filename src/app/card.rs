@@ -29,7 +29,8 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
 fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
     ui.horizontal_top(|ui| {
         cell(ui, METHOD, |ui| {
-            let name = RichText::new(method.label()).color(theme::method(method));
+            let name = RichText::new(method.label())
+                .color(theme::text(ui.visuals(), theme::method(method)));
             let button = ui.add(egui::Button::new(name.strong()).frame(false));
             if button.on_hover_text("Show what it did").clicked() {
                 commands.send(Command::SelectMethod(method));
@@ -37,6 +38,10 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
         });
         let Some(span) = deciding(state, method) else {
             if state.options.hides_future {
+                return;
+            }
+            if let Some(known) = known(state, method) {
+                told(ui, state, commands, known, true);
                 return;
             }
             let is_at_work =
@@ -49,9 +54,15 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
             return;
         };
         if let Some(result) = &span.result {
-            told(ui, state, commands, result);
+            told(ui, state, commands, result, false);
         }
     });
+}
+
+/// What is known of a method on the query from before this run, such as from the folder of a run.
+fn known(state: &AppState, method: Method) -> Option<&QueryResult> {
+    let known = state.results.get(&state.setup.query)?;
+    known.iter().rfind(|result| result.method == method)
 }
 
 /// A column of a width.
@@ -78,7 +89,8 @@ fn deciding(state: &AppState, method: Method) -> Option<&Span> {
     fused.or_else(here).or_else(|| own().next_back())
 }
 
-fn told(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult) {
+/// `is_old` where it was known before this run.
+fn told(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult, is_old: bool) {
     let shows_truth = state.options.shows_truth;
     let standing = result.standing(state.setup.task.protocol.right, shows_truth);
     cell(ui, STANDING, |ui| {
@@ -107,7 +119,13 @@ fn told(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult) {
             }
         }
     });
-    ui.horizontal_wrapped(|ui| why(ui, state, commands, result, standing));
+    ui.horizontal_wrapped(|ui| {
+        if is_old {
+            ui.weak("known before:")
+                .on_hover_text("From before this run, which has not come so far yet");
+        }
+        why(ui, state, commands, result, standing);
+    });
 }
 
 /// The cause in one sentence, and what helped.

@@ -6,7 +6,9 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
+use super::cost_line::CostLine;
 use super::save_target::SaveTarget;
+use super::selection::VerdictChange;
 use super::setup::ReferencePick;
 use super::view_options::CompareMode;
 use crate::fusion::Fusion;
@@ -54,8 +56,16 @@ pub enum Command {
     },
     /// Look at results that meet this condition.
     FilterResults(String),
+    /// Look at results whose verdict became this; for none, at whatever became of it.
+    FilterVerdictChange(Option<VerdictChange>),
+    /// Keep all results that are known as A, to hold those that follow against.
+    KeepResults,
+    /// Forget the results A.
+    ForgetResults,
     /// Look at two poses beside each other.
     LookBeside([NamedPose; 2]),
+    /// Work out the cost along a line between two poses.
+    TraceLine(CostLine),
     /// Localise the next query, or the one before.
     NextQuery {
         /// Whether the one before is meant.
@@ -152,7 +162,7 @@ pub enum Command {
     SavePicture {
         /// The view; the whole window without.
         view: Option<&'static str>,
-        /// The file, PNG.
+        /// The file, PNG or SVG by its ending.
         path: std::path::PathBuf,
     },
     /// Save scene, query, settings and layout.
@@ -254,6 +264,9 @@ impl Task {
             Command::SelectQuery(_)
             | Command::OpenResult { .. }
             | Command::FilterResults(_)
+            | Command::FilterVerdictChange(_)
+            | Command::KeepResults
+            | Command::ForgetResults
             | Command::NextQuery { .. }
             | Command::NextFailure { .. }
             | Command::Explain

@@ -61,7 +61,15 @@ impl App {
             Command::SelectMethod(method) => state.select_method(method),
             Command::OpenResult { query, result } => state.open_result(query, result),
             Command::FilterResults(filter) => state.options.results_filter = filter,
+            Command::FilterVerdictChange(change) => state.options.verdict_change = change,
+            Command::KeepResults => {
+                state.set_results_before(Some(state.results.clone()));
+                let words = "These results are kept as A; change a setting and run all again";
+                state.note(words, false);
+            }
+            Command::ForgetResults => state.set_results_before(None),
             Command::LookBeside(poses) => state.options.beside = Some(poses),
+            Command::TraceLine(line) => state.trace_line(line),
             Command::SelectQuery(query) => state.select_query(query),
             Command::NextQuery { back } => state.next_query(back, |_, _| true),
             Command::NextFailure { back } => state.next_failure(back),
@@ -229,7 +237,11 @@ impl App {
                     state.note(format!("The view {view} is not in sight"), true);
                     return;
                 }
-                self.pictures.ask(ctx, path, part);
+                let is_svg = path.extension().is_some_and(|ending| ending == "svg");
+                match is_svg {
+                    true => self.drawings.ask(ctx, path, part),
+                    false => self.pictures.ask(ctx, path, part),
+                }
             }
             Command::SaveSession(path) => self.save_session(&path),
             Command::RestoreSession(path) => self.restore_session(&path),

@@ -94,6 +94,14 @@ impl Layout {
         Some(pane.clone())
     }
 
+    /// The tabs that a view is among.
+    fn home_of(&self, name: &str) -> Option<TileId> {
+        let mut tiles = self.tree.tiles.iter();
+        let found =
+            tiles.find(|(_, tile)| matches!(tile, egui_tiles::Tile::Pane(pane) if pane == name));
+        self.tree.tiles.parent_of(*found?.0)
+    }
+
     /// Brings a view to the front; a view that was closed comes back to where it was.
     pub(super) fn show(&mut self, name: &str) {
         if self.alone.is_some() {
@@ -106,10 +114,13 @@ impl Layout {
         });
         let id = found.unwrap_or_else(|| {
             let id = self.tree.tiles.insert_pane(name.to_owned());
-            match self.tree.root() {
-                Some(root) => {
+            // Beside those that are like it, where there are any.
+            let kin = KIN.iter().filter(|kin| kin.contains(&name)).copied();
+            let kin = kin.flatten().find_map(|kin| self.home_of(kin));
+            match kin.or(self.tree.root()) {
+                Some(home) => {
                     self.tree
-                        .move_tile_to_container(id, root, usize::MAX, false);
+                        .move_tile_to_container(id, home, usize::MAX, false);
                 }
                 None => self.tree.root = Some(id),
             }
@@ -171,6 +182,16 @@ impl Layout {
     }
 }
 
+/// Before and behind the name on a tab \[points\].
+const TAB_GAP: f32 = 5.0;
+
+/// Views that are looked for beside each other. One that a layout does not have is opened among its kin.
+const KIN: [&[&str]; 3] = [
+    &["charts", "batch", "migrations"],
+    &["images", "retrieval", "synthetic", "beside", "lockstep"],
+    &["report", "differences", "log"],
+];
+
 /// Views in tabs.
 fn tabs(tiles: &mut Tiles<String>, names: &[&str]) -> TileId {
     let panes: Vec<_> = names
@@ -198,18 +219,13 @@ fn tree(root: TileId, tiles: Tiles<String>) -> Tree<String> {
 
 fn inspecting() -> Tree<String> {
     let mut tiles = Tiles::default();
-    let lists = [
-        views::QUERIES,
-        "references",
-        views::PARAMETERS,
-        "breakpoints",
-    ];
+    let lists = [views::QUERIES, "references", views::PARAMETERS];
     let lists = tabs(&mut tiles, &lists);
     let pictures = tabs(
         &mut tiles,
         &["images", "retrieval", "synthetic", "beside", "lockstep"],
     );
-    let space = tabs(&mut tiles, &["space", "ransac"]);
+    let space = tabs(&mut tiles, &["space", "ransac", "breakpoints"]);
     let surface = tabs(&mut tiles, &["surface"]);
     let histogram = tabs(&mut tiles, &["histogram", "fusion"]);
     let words = tabs(
@@ -220,7 +236,7 @@ fn inspecting() -> Tree<String> {
     let middle = tiles.insert_vertical_tile(vec![pictures, lower]);
     let right = tiles.insert_vertical_tile(vec![space, words]);
     let root = tiles.insert_horizontal_tile(vec![lists, middle, right]);
-    let thirds = [(lists, 0.22), (middle, 0.48), (right, 0.30)];
+    let thirds = [(lists, 0.24), (middle, 0.47), (right, 0.29)];
     share(&mut tiles, root, &thirds);
     // Photos of drives are wide; the map with its legend needs more room than the histogram.
     share(&mut tiles, middle, &[(pictures, 0.44), (lower, 0.56)]);
@@ -261,7 +277,13 @@ fn sorting() -> Tree<String> {
     let mut tiles = Tiles::default();
     let batch = tabs(
         &mut tiles,
-        &["batch", "charts", views::QUERIES, "references"],
+        &[
+            "batch",
+            "charts",
+            "migrations",
+            views::QUERIES,
+            "references",
+        ],
     );
     let pictures = tabs(&mut tiles, &["images", "synthetic"]);
     let words = tabs(&mut tiles, &["surface", "ransac", "report"]);
@@ -342,6 +364,10 @@ impl Behavior<String> for Panes<'_> {
 
     fn is_tab_closable(&self, _tiles: &Tiles<String>, _tile: TileId) -> bool {
         true
+    }
+
+    fn tab_title_spacing(&self, _visuals: &egui::Visuals) -> f32 {
+        TAB_GAP
     }
 
     /// A closed view is hidden: so it keeps its place until it is wanted again.

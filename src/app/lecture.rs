@@ -28,7 +28,8 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState) {
     let stage = run.stages_at(cursor).last().map(|bar| bar.stage);
     ui.horizontal_wrapped(|ui| {
         if let Some(method) = span.part.method() {
-            let name = RichText::new(method.label()).color(theme::method(method));
+            let name = RichText::new(method.label())
+                .color(theme::text(ui.visuals(), theme::method(method)));
             ui.label(name.size(LARGE).strong());
         }
         ui.label(RichText::new(stage.map_or("", about)).size(LARGE));

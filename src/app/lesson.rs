@@ -248,10 +248,10 @@ fn asked_ui(
                 };
                 ui.label(match (index == *right, given == Given::Choice(index)) {
                     (true, _) => RichText::new(format!("{text}  ● right"))
-                        .color(theme::TRUTH)
+                        .color(theme::text(ui.visuals(), theme::TRUTH))
                         .strong(),
                     (false, true) => RichText::new(format!("{text}  ▲ wrong"))
-                        .color(theme::ESTIMATE)
+                        .color(theme::text(ui.visuals(), theme::ESTIMATE))
                         .strong(),
                     (false, false) => RichText::new(text).weak(),
                 });

@@ -115,15 +115,25 @@ impl Prober {
 impl ProbeRequest {
     fn answer(&self) -> Probe {
         let begun = Instant::now();
-        let comparisons = self
-            .methods
-            .iter()
-            .filter_map(|&method| {
-                let estimator = estimator::entry(method).make(&self.params);
-                let comparison = estimator.compare_at(&self.problem, &self.pose)?;
-                Some((method, Arc::new(comparison)))
-            })
-            .collect();
+        let compare = |method: Method| {
+            let estimator = estimator::entry(method).make(&self.params);
+            let comparison = estimator.compare_at(&self.problem, &self.pose)?;
+            Some((method, Arc::new(comparison)))
+        };
+        // Beside each other, and not in the pool of threads: a thread of the pool that waits for what
+        // another method makes of the frame would take up a part of that itself, and wait for ever.
+        let comparisons = thread::scope(|scope| {
+            let started: Vec<_> = self
+                .methods
+                .iter()
+                .map(|&method| scope.spawn(move || compare(method)))
+                .collect();
+            let ended = started.into_iter().map(|thread| match thread.join() {
+                Ok(comparison) => comparison,
+                Err(panic) => std::panic::resume_unwind(panic),
+            });
+            ended.flatten().collect()
+        });
         Probe {
             pose: self.pose,
             comparisons,

@@ -120,7 +120,7 @@ pub(super) fn menu(ui: &mut Ui, commands: &Queue) {
         item("Spawn a Rerun viewer", help, Command::SpawnViewer);
         let help = "Put the command line that repeats this run on the clipboard (Ctrl+C)";
         item("Copy the command line", help, Command::CopyCommandLine);
-        let help = "The whole window as PNG (Ctrl+P)";
+        let help = "The whole window, as PNG or by the ending .svg (Ctrl+P)";
         item(
             "Picture of the window …",
             help,
@@ -129,7 +129,11 @@ pub(super) fn menu(ui: &mut Ui, commands: &Queue) {
         for entry in super::views::ALL {
             let text = format!("Picture of {} …", entry.title);
             let target = SaveTarget::Picture(Some(entry.name));
-            item(&text, "This view as PNG", ask(target));
+            let help = match entry.is_drawn {
+                true => "This view, as PNG or by the ending .svg",
+                false => "This view, as PNG",
+            };
+            item(&text, help, ask(target));
         }
         let help = "Scene, query, settings and layout";
         item("Session …", help, ask(SaveTarget::Session));
@@ -148,6 +152,8 @@ impl AppState {
         let setup = &self.setup;
         let identity = Identity {
             scene: setup.references.name().to_owned(),
+            query_scene: (setup.queries.name() != setup.references.name())
+                .then(|| setup.queries.name().to_owned()),
             queries: vec![setup.query_name().to_owned()],
             references: setup.reference_names(),
             configuration: run.params.to_toml(),

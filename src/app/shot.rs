@@ -10,10 +10,10 @@ use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
 use super::headless::Painter;
+use super::selection::KnownResults;
 use super::setup::Setup;
-use super::state::Results;
 use super::window::WindowError;
-use super::{App, views};
+use super::{App, vector, views};
 use crate::method::Method;
 use crate::session::RunState;
 
@@ -96,58 +96,102 @@ pub enum ShotError {
 ///
 /// # Errors
 /// [`ShotError`] where there is no such view or moment, nothing to draw with, or bad data.
-pub fn shoot(setup: Setup, results: Results, shot: &Shot) -> Result<RgbImage, ShotError> {
+pub fn shoot(setup: Setup, results: KnownResults, shot: &Shot) -> Result<RgbImage, ShotError> {
     let view = match &shot.view {
         Some(name) => Some(views::find(name).map_err(ShotError::Unknown)?),
         None => None,
     };
     let painter = Painter::new(shot.size_px)?;
-    let ctx = egui::Context::default();
-    ctx.set_theme(shot.theme);
-    let mut app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
-    app.is_bare = true;
-    // Nothing moves in a picture.
-    ctx.all_styles_mut(|style| style.animation_time = 0.0);
-    let mut window = Window {
-        app: &mut app,
-        ctx: &ctx,
-        painter: &painter,
-        shot,
-        frames: 0,
+    let mut window = Window::new(setup, results, shot, Some(&painter));
+    let output = window.shown(view)?;
+    painter.paint(&window.ctx, output).map_err(ShotError::Paint)
+}
+
+/// Runs what is set up to its end and writes one view as SVG, for which no graphics adapter is needed.
+///
+/// # Errors
+/// [`ShotError`] where there is no such view or moment, the view is painted rather than drawn, or bad data.
+pub fn draw(setup: Setup, results: KnownResults, shot: &Shot) -> Result<String, ShotError> {
+    let Some(name) = &shot.view else {
+        let why = "a whole window is painted: name one of its views with --view for an SVG";
+        return Err(ShotError::Unknown(why.to_owned()));
     };
-    window.run_to_end()?;
-    window.go_to(shot.moment)?;
-    if shot.lockstep.is_some() {
-        window.app.send(Command::StepTogether(shot.lockstep));
+    let view = views::find(name).map_err(ShotError::Unknown)?;
+    if !views::ALL
+        .iter()
+        .any(|entry| entry.name == view && entry.is_drawn)
+    {
+        let why = vector::NotDrawn::Painted;
+        return Err(ShotError::Unknown(format!("{view}: {why}")));
     }
-    if let Some(pose) = shot.camera {
-        window.app.send(Command::JumpCamera(pose));
-    }
-    window.app.send(Command::Arrange(shot.arrangement));
-    if view.is_some() {
-        window.app.send(Command::Maximize(view));
-    }
-    let output = window.settled();
-    painter.paint(&ctx, output).map_err(ShotError::Paint)
+    let mut window = Window::new(setup, results, shot, None);
+    let output = window.shown(Some(view))?;
+    let ground = window.ctx.global_style().visuals.panel_fill;
+    let area = window.ctx.content_rect();
+    let drawn = window.app.drawings.svg(&output.shapes, area, ground);
+    drawn.map_err(|why| ShotError::Paint(format!("{view}: {why}")))
 }
 
 /// The application with nothing around it.
 struct Window<'a> {
-    app: &'a mut App,
-    ctx: &'a egui::Context,
-    painter: &'a Painter,
+    app: App,
+    ctx: egui::Context,
+    /// What paints; nothing where only shapes and words are wanted.
+    painter: Option<&'a Painter>,
     shot: &'a Shot,
     frames: usize,
 }
 
-impl Window<'_> {
+impl<'a> Window<'a> {
     /// Between two looks at what other threads have done.
     const PAUSE: Duration = Duration::from_millis(5);
+    /// The greatest side of a picture where nothing paints it \[px\].
+    const MAX_SIDE: usize = 8192;
+
+    fn new(
+        setup: Setup,
+        results: KnownResults,
+        shot: &'a Shot,
+        painter: Option<&'a Painter>,
+    ) -> Self {
+        let ctx = egui::Context::default();
+        ctx.set_theme(shot.theme);
+        let state = painter.map(Painter::render_state);
+        let mut app = App::of(&ctx, state, setup).with_results(results);
+        app.is_bare = true;
+        // Nothing moves in a picture.
+        ctx.all_styles_mut(|style| style.animation_time = 0.0);
+        Self {
+            app,
+            ctx,
+            painter,
+            shot,
+            frames: 0,
+        }
+    }
+
+    /// The frame that was asked for, with a view alone in it or the whole window.
+    fn shown(&mut self, view: Option<&'static str>) -> Result<egui::FullOutput, ShotError> {
+        let shot = self.shot;
+        self.run_to_end()?;
+        self.go_to(shot.moment)?;
+        if shot.lockstep.is_some() {
+            self.app.send(Command::StepTogether(shot.lockstep));
+        }
+        if let Some(pose) = shot.camera {
+            self.app.send(Command::JumpCamera(pose));
+        }
+        self.app.send(Command::Arrange(shot.arrangement));
+        if view.is_some() {
+            self.app.send(Command::Maximize(view));
+        }
+        Ok(self.settled())
+    }
 
     fn run_to_end(&mut self) -> Result<(), ShotError> {
         self.app.send(Command::RunToEnd);
         loop {
-            self.app.update(self.ctx);
+            self.app.update(&self.ctx);
             match self.app.app_state().run_state() {
                 RunState::Finished => return Ok(()),
                 RunState::Broken(why) => return Err(ShotError::Broken(why.clone())),
@@ -190,12 +234,17 @@ impl Window<'_> {
         /// Sizes are known one frame late, and pictures are asked for in the frame that wants them.
         const FEWEST: usize = 6;
         loop {
-            self.app.update(self.ctx);
+            self.app.update(&self.ctx);
             let mut output = self.frame();
-            self.painter.take_textures(&mut output);
+            match self.painter {
+                Some(painter) => painter.take_textures(&mut output),
+                // The drawings have seen them.
+                None => output.textures_delta.clear(),
+            }
             let state = self.app.app_state();
             let is_waiting = state.is_probing()
                 || [0, 1].into_iter().any(|side| state.is_looking_beside(side))
+                || state.is_tracing_line()
                 || state.queries.is_painting();
             if !is_waiting && self.frames >= FEWEST {
                 return output;
@@ -209,7 +258,7 @@ impl Window<'_> {
         let size = size.map(|side| side as f32 / self.ctx.pixels_per_point());
         let mut input = egui::RawInput {
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size.into())),
-            max_texture_side: Some(self.painter.max_side()),
+            max_texture_side: Some(self.painter.map_or(Self::MAX_SIDE, Painter::max_side)),
             time: Some(self.frames as f64 / 60.0),
             focused: true,
             ..egui::RawInput::default()

@@ -1,18 +1,19 @@
 //! The application's state: the run, the cursor in it, the camera in hand, what is switched on.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::cost_line::{CostAlong, CostLine, LineTracer};
 use super::navigation::Navigation;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
+use super::selection::{Known, KnownResults, Results, Selection};
 use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
 use crate::geometry::Pose;
 use crate::lesson::Moment;
-use crate::localize::QueryResult;
+use crate::method::Method;
 use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
@@ -34,9 +35,6 @@ pub struct KeptRun {
     /// Where the cursor was.
     pub cursor: usize,
 }
-
-/// Results by query.
-pub type Results = BTreeMap<usize, Vec<QueryResult>>;
 
 /// The state of the application: everything that the views draw from.
 pub struct AppState {
@@ -62,6 +60,8 @@ pub struct AppState {
     pub(super) prober: Prober,
     /// For two poses that are looked at beside each other.
     pub(super) beside: [Prober; 2],
+    /// For the cost along the line from a result to the truth.
+    pub(super) line_tracer: LineTracer,
     /// The queries, what is known of them.
     pub queries: Queries,
     /// The latest notes, the newest last.
@@ -70,6 +70,11 @@ pub struct AppState {
     pub textures: Textures,
     /// Results of the queries that were run, by query.
     pub results: Results,
+    /// The results A, which those of now are held against.
+    results_before: Option<Results>,
+    /// Grows with every change of the known results.
+    results_version: u64,
+    pub(super) selection: Selection,
     /// The results that the window was opened with, which a restored session goes back to.
     first_results: Results,
 }
@@ -83,6 +88,7 @@ impl AppState {
             params,
             prober: Prober::new(ctx.clone()),
             beside: [(); 2].map(|()| Prober::new(ctx.clone())),
+            line_tracer: LineTracer::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
             frames,
             session,
@@ -96,15 +102,35 @@ impl AppState {
             notes: Vec::new(),
             textures: Textures::default(),
             results: Results::new(),
+            results_before: None,
+            results_version: 0,
+            selection: Selection::default(),
             first_results: Results::new(),
             setup,
         }
     }
 
     /// Takes results over that were known before the window was opened.
-    pub(super) fn set_known_results(&mut self, results: Results) {
-        self.results.clone_from(&results);
-        self.first_results = results;
+    pub(super) fn set_known_results(&mut self, results: KnownResults) {
+        self.results.clone_from(&results.now);
+        self.first_results = results.now;
+        self.set_results_before(results.before);
+    }
+
+    /// Takes over what the results of now are held against; without any, nothing.
+    pub(super) fn set_results_before(&mut self, before: Option<Results>) {
+        self.results_before = before;
+        self.options.verdict_change = None;
+        self.results_version += 1;
+    }
+
+    /// All results that are known, with those that they are held against.
+    pub(super) fn known(&self) -> Known<'_> {
+        Known {
+            now: &self.results,
+            before: self.results_before.as_ref(),
+            version: self.results_version,
+        }
     }
 
     /// The present run.
@@ -177,6 +203,7 @@ impl AppState {
             match outcome {
                 Ok(results) => {
                     self.results.insert(query, results);
+                    self.results_version += 1;
                 }
                 Err(why) => self.note(why, true),
             }
@@ -192,11 +219,31 @@ impl AppState {
             self.prober.ask(&problem, &methods, &self.params, pose);
         }
         self.poll_beside();
+        if let Err(why) = self.line_tracer.poll() {
+            self.note(why, true);
+        }
     }
 
     /// Whether the answer for one of the two poses is still worked out.
     pub fn is_looking_beside(&self, side: usize) -> bool {
         self.options.beside.is_some() && self.beside[side].is_busy()
+    }
+
+    /// What is known of a method's cost along the line that was asked for last.
+    pub fn cost_along(&self, method: Method) -> Option<&CostAlong> {
+        self.line_tracer.along(method)
+    }
+
+    /// Whether the cost along a line is still worked out.
+    pub fn is_tracing_line(&self) -> bool {
+        self.line_tracer.is_busy()
+    }
+
+    /// Has the cost along a line worked out for the problem at the cursor.
+    pub(super) fn trace_line(&mut self, line: CostLine) {
+        if let Some(problem) = self.problem().cloned() {
+            self.line_tracer.ask(&problem, &self.params, line);
+        }
     }
 
     fn poll_beside(&mut self) {
@@ -229,6 +276,7 @@ impl AppState {
             RunState::Finished => {
                 let results = self.session.run().results().cloned().collect();
                 self.results.insert(self.setup.query, results);
+                self.results_version += 1;
             }
             RunState::Broken(why) => self.note(why.clone(), true),
             _ => {}
@@ -256,6 +304,7 @@ impl AppState {
         self.options.selected_feature = None;
         self.prober.forget();
         self.beside.iter_mut().for_each(Prober::forget);
+        self.line_tracer.forget();
     }
 
     /// Explains the results that are wrong, or no longer; what was computed is at hand.
@@ -286,6 +335,7 @@ impl AppState {
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
         self.results = self.first_results.clone();
+        self.set_results_before(None);
         self.queries = Queries::new(self.ctx.clone());
         self.setup = setup;
         self.params = Arc::new(self.setup.task.params.clone());
@@ -301,6 +351,7 @@ impl AppState {
     pub(super) fn change_setup(&mut self, setup: Setup, navigation: Navigation) {
         self.stop_queries();
         self.results = Results::new();
+        self.set_results_before(None);
         self.setup = setup;
         self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;

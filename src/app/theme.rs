@@ -1,12 +1,49 @@
-//! Colours and sizes of the window.
+//! The design of the window in one place: type scale, spacing, and the tokens of colour with which text and
+//! marks are drawn in both themes.
+//!
+//! A colour says what something is, the same in pictures of the window and in recordings (after Okabe and
+//! Ito); shapes and words say it too. As text it is read on grounds that it was not made for: [`text`]
+//! moves it towards the text of the theme until it has [`CONTRAST`] on each of them.
 
-use egui::Color32;
+use egui::{Color32, FontId, TextStyle, Visuals};
 
 use crate::estimator;
 use crate::features::FeatureState;
 use crate::localize::Standing;
 use crate::method::Method;
 use crate::palette::{self, Rgb};
+
+/// The least contrast of a text with its ground: that of WCAG 2.2, criterion 1.4.3, for text of any size.
+pub const CONTRAST: f32 = 4.5;
+
+/// The sizes of text \[points\], from what stands beside a mark to a heading.
+mod size {
+    pub(super) const SMALL: f32 = 10.0;
+    pub(super) const CAPTION: f32 = 11.0;
+    pub(super) const LABEL: f32 = 12.0;
+    pub(super) const BODY: f32 = 13.0;
+    pub(super) const HEADING: f32 = 18.0;
+}
+
+/// Between two things beside and below each other \[points\].
+const GAP: egui::Vec2 = egui::vec2(6.0, 4.0);
+/// Until a hint is shown \[s\].
+const HINT_DELAY: f32 = 0.3;
+
+/// Numbers of axes and names of stages.
+pub fn small() -> FontId {
+    FontId::proportional(size::SMALL)
+}
+
+/// Captions of pictures.
+pub fn caption() -> FontId {
+    FontId::proportional(size::CAPTION)
+}
+
+/// Names of things in space.
+pub fn label() -> FontId {
+    FontId::proportional(size::LABEL)
+}
 
 /// Colour of the reference.
 pub const REFERENCE: Color32 = rgb(palette::REFERENCE);
@@ -16,9 +53,34 @@ pub const ESTIMATE: Color32 = rgb(palette::ESTIMATE);
 pub const TRUTH: Color32 = rgb(palette::TRUTH);
 /// Colour of the camera in hand.
 pub const CAMERA: Color32 = rgb(palette::UNDECIDED);
-
 /// Colour of a pose that is too far from the truth.
 pub const FAR: Color32 = Color32::from_rgb(0xE6, 0x9F, 0x00);
+
+/// Colour of stages that make something ready.
+pub const STAGE_PREPARE: Color32 = Color32::from_rgb(0x6A, 0x8C, 0xAF);
+/// Colour of stages that search.
+pub const STAGE_SEARCH: Color32 = Color32::from_rgb(0x8F, 0xA8, 0x6E);
+/// Colour of the stage that gives features a depth.
+pub const STAGE_LIFT: Color32 = Color32::from_rgb(0xB0, 0x9A, 0x5B);
+/// Colour of the stage in which correspondences agree.
+pub const STAGE_CONSENSUS: Color32 = Color32::from_rgb(0x9A, 0x7F, 0xB0);
+/// Colour of stages that judge.
+pub const STAGE_JUDGE: Color32 = Color32::from_rgb(0x5F, 0x9E, 0x8F);
+
+/// Everything whose colour stands for what it is.
+#[cfg(test)]
+const MEANINGS: [Color32; 10] = [
+    REFERENCE,
+    ESTIMATE,
+    TRUTH,
+    CAMERA,
+    FAR,
+    STAGE_PREPARE,
+    STAGE_SEARCH,
+    STAGE_LIFT,
+    STAGE_CONSENSUS,
+    STAGE_JUDGE,
+];
 
 /// A colour as egui takes it.
 pub const fn rgb([r, g, b]: Rgb) -> Color32 {
@@ -30,13 +92,13 @@ pub fn state(index: usize) -> Color32 {
     rgb(palette::STATES[index.min(FeatureState::NAMES.len() - 1)])
 }
 
-/// The colour of what a result is worth.
-pub fn standing(visuals: &egui::Visuals, standing: Standing) -> Color32 {
+/// The colour of what a result is worth, as text.
+pub fn standing(visuals: &Visuals, standing: Standing) -> Color32 {
     match standing {
-        Standing::Right => TRUTH,
+        Standing::Right => text(visuals, TRUTH),
         Standing::Unmeasured => visuals.text_color(),
-        Standing::LowConfidence => FAR,
-        Standing::Wrong | Standing::NoPose => ESTIMATE,
+        Standing::LowConfidence => text(visuals, FAR),
+        Standing::Wrong | Standing::NoPose => text(visuals, ESTIMATE),
     }
 }
 
@@ -71,6 +133,81 @@ pub fn turbo(value: f64) -> Color32 {
     rgb(palette::turbo(value))
 }
 
+/// What words of a theme stand on: panels, fields, rows of tables, buttons.
+fn grounds(visuals: &Visuals) -> [Color32; 5] {
+    [
+        visuals.panel_fill,
+        visuals.window_fill,
+        visuals.extreme_bg_color,
+        over(visuals.panel_fill, visuals.faint_bg_color),
+        visuals.widgets.inactive.weak_bg_fill,
+    ]
+}
+
+/// A colour that is not quite opaque on another one.
+fn over(ground: Color32, color: Color32) -> Color32 {
+    ground.blend(color)
+}
+
+/// The colour of something as text: as near to its own as can be read on every ground of the theme.
+pub fn text(visuals: &Visuals, color: Color32) -> Color32 {
+    const STEPS: usize = 20;
+    let end = match visuals.dark_mode {
+        true => Color32::WHITE,
+        false => Color32::BLACK,
+    };
+    let grounds = grounds(visuals);
+    let mixed = (0..=STEPS).map(|step| color.lerp_to_gamma(end, step as f32 / STEPS as f32));
+    let mut readable = mixed.filter(|mixed| {
+        let mut grounds = grounds.iter();
+        grounds.all(|ground| contrast(*mixed, *ground) >= CONTRAST)
+    });
+    readable.next().unwrap_or(end)
+}
+
+/// Black or white, whichever is read better on a colour.
+pub fn on(ground: Color32) -> Color32 {
+    let better = |a: &Color32, b: &Color32| contrast(*a, ground).total_cmp(&contrast(*b, ground));
+    let ends = [Color32::BLACK, Color32::WHITE];
+    ends.into_iter().max_by(better).unwrap_or(Color32::WHITE)
+}
+
+/// The contrast of two opaque colours, 1 to 21 (WCAG 2.2, "contrast ratio").
+pub fn contrast(a: Color32, b: Color32) -> f32 {
+    let luminance = |color: Color32| {
+        let linear = |channel: u8| {
+            let share = f32::from(channel) / 255.0;
+            match share <= 0.04045 {
+                true => share / 12.92,
+                false => ((share + 0.055) / 1.055).powf(2.4),
+            }
+        };
+        0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
+    };
+    let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
+    a.max(b) / a.min(b)
+}
+
+/// A theme: egui's own, with pale words that can be read.
+fn visuals(theme: egui::Theme) -> Visuals {
+    let mut visuals = theme.default_visuals();
+    let pale = match theme {
+        egui::Theme::Dark => Color32::from_gray(170),
+        egui::Theme::Light => Color32::from_gray(88),
+    };
+    visuals.weak_text_color = Some(pale);
+    // What is not to be pressed is read as well as what is.
+    let plain = match theme {
+        egui::Theme::Dark => Color32::from_gray(190),
+        egui::Theme::Light => Color32::from_gray(60),
+    };
+    visuals.widgets.noninteractive.fg_stroke.color = plain;
+    visuals.warn_fg_color = text(&visuals, visuals.warn_fg_color);
+    visuals.error_fg_color = text(&visuals, visuals.error_fg_color);
+    visuals.hyperlink_color = text(&visuals, visuals.hyperlink_color);
+    visuals
+}
+
 pub(super) fn install(ctx: &egui::Context) {
     // The font for text has no arrows and no shapes; that for code has.
     let mut fonts = egui::FontDefinitions::default();
@@ -78,8 +215,90 @@ pub(super) fn install(ctx: &egui::Context) {
         proportional.push("Hack".to_owned());
     }
     ctx.set_fonts(fonts);
+    for theme in [egui::Theme::Dark, egui::Theme::Light] {
+        ctx.set_visuals_of(theme, visuals(theme));
+    }
     ctx.all_styles_mut(|style| {
-        style.spacing.item_spacing = egui::vec2(6.0, 4.0);
-        style.interaction.tooltip_delay = 0.3;
+        style.text_styles = [
+            (TextStyle::Small, small()),
+            (TextStyle::Body, FontId::proportional(size::BODY)),
+            (TextStyle::Button, FontId::proportional(size::BODY)),
+            (TextStyle::Heading, FontId::proportional(size::HEADING)),
+            (TextStyle::Monospace, FontId::monospace(size::BODY)),
+        ]
+        .into();
+        style.spacing.item_spacing = GAP;
+        style.interaction.tooltip_delay = HINT_DELAY;
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const THEMES: [egui::Theme; 2] = [egui::Theme::Dark, egui::Theme::Light];
+
+    #[test]
+    fn contrast_is_that_of_the_standard() {
+        assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 1e-4);
+        assert!((contrast(Color32::WHITE, Color32::WHITE) - 1.0).abs() < 1e-6);
+        // The grey that is just enough on white.
+        let grey = Color32::from_gray(0x76);
+        assert!((contrast(grey, Color32::WHITE) - 4.54).abs() < 0.01);
+    }
+
+    #[test]
+    fn every_token_is_read_on_every_ground_of_both_themes() {
+        for theme in THEMES {
+            let visuals = visuals(theme);
+            let methods = estimator::methods().map(method);
+            let states = (0..FeatureState::NAMES.len()).map(state);
+            let meanings = MEANINGS.into_iter().chain(methods).chain(states);
+            let told = meanings.map(|color| text(&visuals, color));
+            let plain = [
+                visuals.text_color(),
+                visuals.strong_text_color(),
+                visuals.weak_text_color(),
+                visuals.warn_fg_color,
+                visuals.error_fg_color,
+                visuals.hyperlink_color,
+            ];
+            for color in told.chain(plain) {
+                for ground in grounds(&visuals) {
+                    let contrast = contrast(color, ground);
+                    assert!(
+                        contrast >= CONTRAST,
+                        "{theme:?} {color:?} on {ground:?}: {contrast}"
+                    );
+                }
+            }
+            let widgets = &visuals.widgets;
+            for widget in [
+                &widgets.inactive,
+                &widgets.hovered,
+                &widgets.active,
+                &widgets.open,
+            ] {
+                let contrast = contrast(widget.text_color(), widget.weak_bg_fill);
+                assert!(contrast >= CONTRAST, "{theme:?} {widget:?}: {contrast}");
+            }
+            let selection = &visuals.selection;
+            let contrast = contrast(selection.stroke.color, selection.bg_fill);
+            assert!(contrast >= CONTRAST, "{theme:?} selection: {contrast}");
+        }
+    }
+
+    #[test]
+    fn words_on_a_mark_are_read() {
+        let methods = estimator::methods().map(method);
+        for color in MEANINGS.into_iter().chain(methods) {
+            assert!(contrast(on(color), color) >= CONTRAST, "{color:?}");
+        }
+    }
+
+    #[test]
+    fn a_colour_that_can_be_read_stays_what_it_is() {
+        let dark = visuals(egui::Theme::Dark);
+        assert_eq!(text(&dark, FAR), FAR);
+    }
 }

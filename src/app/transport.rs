@@ -62,7 +62,12 @@ fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
     match state.run_state() {
         RunState::Loading => {
             ui.spinner();
-            ui.label("Loading");
+            ui.label(match state.run().ranking {
+                Some([looked_at, candidates]) => {
+                    format!("Choosing references: {looked_at} of {candidates} frames")
+                }
+                None => "Loading".to_owned(),
+            });
         }
         RunState::Running => {
             ui.spinner();
@@ -77,8 +82,11 @@ fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
         RunState::Paused {
             breakpoint: Some(text),
         } => {
-            ui.label(RichText::new(format!("● {text}")).color(theme::ESTIMATE))
-                .on_hover_text("The breakpoint that stopped the run");
+            ui.label(
+                RichText::new(format!("● {text}"))
+                    .color(theme::text(ui.visuals(), theme::ESTIMATE)),
+            )
+            .on_hover_text("The breakpoint that stopped the run");
         }
         RunState::Finished => {
             ui.label("Finished");
@@ -87,7 +95,7 @@ fn run_buttons(ui: &mut Ui, state: &AppState, commands: &Queue) {
             ui.label("Cancelled");
         }
         RunState::Broken(why) => {
-            ui.label(RichText::new("Stopped").color(theme::ESTIMATE))
+            ui.label(RichText::new("Stopped").color(theme::text(ui.visuals(), theme::ESTIMATE)))
                 .on_hover_text(why);
         }
     }
@@ -121,7 +129,7 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
     // A label without text would send what follows it back to the left edge.
     let text = match names.as_slice() {
         [] => RichText::new("not chosen").weak(),
-        names => RichText::new(names.join(", ")).color(theme::REFERENCE),
+        names => RichText::new(names.join(", ")).color(theme::text(ui.visuals(), theme::REFERENCE)),
     };
     ui.label(text).on_hover_text("The references");
     ui.menu_button("References", |ui| {
@@ -286,7 +294,8 @@ pub(super) fn notes(ctx: &egui::Context, state: &AppState, commands: &Queue) {
                     }
                     let text = RichText::new(&note.text);
                     ui.label(if note.is_error {
-                        text.color(theme::ESTIMATE).strong()
+                        text.color(theme::text(ui.visuals(), theme::ESTIMATE))
+                            .strong()
                     } else {
                         text
                     });

@@ -1,20 +1,25 @@
 //! What a view sees: a run at a cursor.
 
+use std::rc::Rc;
 use std::sync::Arc;
 
 use super::camera::NamedPose;
 use super::command::{Command, Queue};
+use super::cost_line::CostAlong;
 use super::lecture;
 use super::prober::Probe;
 use super::queries::Queries;
+use super::selection::{ResultRow, Results, Wanted};
 use super::setup::Setup;
 use super::shown::{ShownReason, ShownView};
-use super::state::{AppState, Results};
+use super::state::AppState;
 use super::textures::Textures;
 use super::view_options::ViewOptions;
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, Side, ViewRendered};
 use crate::geometry::Pose;
+use crate::localize::QueryResult;
+use crate::measure::{ConditionError, Migration};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::{Part, Run, Span};
@@ -131,6 +136,48 @@ impl<'a> ViewContext<'a> {
         self.state.hovered
     }
 
+    /// The results that are looked at, in the order of the queries: those that meet the condition that was
+    /// typed, whose verdict became what was asked for.
+    ///
+    /// # Errors
+    /// What is wrong with the condition.
+    pub fn selected(&self) -> Result<Rc<[ResultRow]>, ConditionError> {
+        let known = self.state.known();
+        let wanted = Wanted {
+            condition: self.options.results_filter.clone(),
+            change: self.options.verdict_change.clone(),
+            only_changed: self.options.only_differences && known.before.is_some(),
+            right: self.setup.task.protocol.right,
+        };
+        self.state.selection.rows(known, &wanted)
+    }
+
+    /// A result that is known.
+    pub fn result(&self, row: ResultRow) -> Option<&'a QueryResult> {
+        self.state.known().result(row)
+    }
+
+    /// Whether there are results A, which those of now are held against.
+    pub fn has_results_before(&self) -> bool {
+        self.state.known().before.is_some()
+    }
+
+    /// What the same method gave for the same query and setting in the results A.
+    pub fn result_before(&self, row: ResultRow) -> Option<&'a QueryResult> {
+        let known = self.state.known();
+        known.before(row.query, known.result(row)?)
+    }
+
+    /// What became of the verdicts since the results A, also of those that stayed what they were.
+    pub fn migrations(&self) -> Rc<[Migration]> {
+        self.state.selection.migrations(self.state.known())
+    }
+
+    /// Grows with every change of the known results.
+    pub fn results_version(&self) -> u64 {
+        self.state.known().version
+    }
+
     /// A pose that the present run's search knows by name (`world_from_camera`).
     pub fn named_pose(&self, name: NamedPose) -> Option<Pose> {
         self.state.named_pose(name)
@@ -164,6 +211,11 @@ impl<'a> ViewContext<'a> {
     /// Whether the answer for the pose that is looked at is still worked out.
     pub fn is_probing(&self) -> bool {
         self.pinned.is_none() && self.state.is_probing()
+    }
+
+    /// What is known of a method's cost along the line that was asked for last, of the present run.
+    pub fn cost_along(&self, method: Method) -> Option<&'a CostAlong> {
+        self.state.cost_along(method)
     }
 
     /// The part of the run that the cursor is in.

@@ -1,6 +1,7 @@
 //! How a person looks at the runs: what is switched on, and what is selected.
 
 use super::camera::NamedPose;
+use super::selection::VerdictChange;
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct ViewOptions {
     pub beside: Option<[NamedPose; 2]>,
     /// Which results of queries are looked at, as a condition.
     pub results_filter: String,
+    /// What has to have become of the verdicts of results that are looked at.
+    pub verdict_change: Option<VerdictChange>,
     /// Whether only what differs is shown.
     pub only_differences: bool,
     /// Whether query and synthetic view are shown in turn.
@@ -48,6 +51,7 @@ impl Default for ViewOptions {
             lockstep: None,
             beside: None,
             results_filter: String::new(),
+            verdict_change: None,
             only_differences: false,
             blinking: false,
             wants_filter: false,

@@ -16,7 +16,9 @@ mod legend;
 mod lockstep;
 mod log;
 mod mesh_painter;
+mod migrations;
 mod parameters;
+mod place;
 mod queries;
 mod ransac;
 mod readout;
@@ -47,6 +49,9 @@ pub struct Entry {
     pub title: &'static str,
     /// What the view shows, in one phrase.
     pub about: &'static str,
+    /// Whether it is made of lines, marks, words and pictures, which SVG knows, rather than painted by the
+    /// graphics card.
+    pub is_drawn: bool,
     /// Makes the view. The render state is for those that draw on the graphics card themselves.
     pub new: fn(Option<&RenderState>) -> Box<dyn View>,
 }
@@ -79,114 +84,140 @@ pub const ALL: &[Entry] = &[
         name: QUERIES,
         title: "Queries",
         about: "all queries with what is known of them",
+        is_drawn: true,
         new: |_| Box::<queries::QueriesView>::default(),
     },
     Entry {
         name: "batch",
         title: "Batch",
         about: "the results of all queries in a table: filter, sort, open",
+        is_drawn: true,
         new: |_| Box::<batch::BatchView>::default(),
     },
     Entry {
         name: "references",
         title: "References",
         about: "which frames the query is localised against, and how their poses are fused",
+        is_drawn: true,
         new: |_| Box::<references::ReferencesView>::default(),
     },
     Entry {
         name: PARAMETERS,
         title: "Parameters",
         about: "every parameter with unit, range and meaning",
+        is_drawn: true,
         new: |_| Box::<parameters::ParametersView>::default(),
     },
     Entry {
         name: "breakpoints",
         title: "Breakpoints",
         about: "where a run is to stop",
+        is_drawn: true,
         new: |_| Box::<breakpoints::BreakpointsView>::default(),
     },
     Entry {
         name: "images",
         title: "Images",
         about: "both photos, their matches, and where each feature ended",
+        is_drawn: true,
         new: |_| Box::<images::ImagesView>::default(),
     },
     Entry {
         name: "retrieval",
         title: "Retrieval",
         about: "frames that resemble the query, and what in them lies alike",
+        is_drawn: true,
         new: |_| Box::<retrieval::RetrievalView>::default(),
     },
     Entry {
         name: "synthetic",
         title: "Synthetic",
         about: "the synthetic view beside the query, and what the cost makes of them",
+        is_drawn: true,
         new: |_| Box::<synthetic::SynthesisView>::default(),
     },
     Entry {
         name: "space",
         title: "3-D",
         about: "cloud, cameras, rays and costs in space",
+        is_drawn: false,
         new: |state| Box::new(space::SpaceView::new(state)),
     },
     Entry {
         name: "ransac",
         title: "RANSAC",
         about: "likelihood and inliers of every hypothesis, the test of the best",
+        is_drawn: true,
         new: |_| Box::<ransac::RansacView>::default(),
     },
     Entry {
         name: "surface",
         title: "Cost surface",
         about: "cost and coverage of every position tried, minima, slices",
+        is_drawn: true,
         new: |_| Box::<surface::SurfaceView>::default(),
     },
     Entry {
         name: "histogram",
         title: "Histogram",
         about: "joint histogram and entropies of MI, residuals of PM",
+        is_drawn: true,
         new: |_| Box::<histogram::HistogramView>::default(),
     },
     Entry {
         name: "fusion",
         title: "Fusion",
         about: "what each reference gives alone, its weight, and the fused pose",
+        is_drawn: true,
         new: |_| Box::<fusion::FusionView>::default(),
     },
     Entry {
         name: "beside",
         title: "Beside truth",
         about: "what the cost compares at two poses, and which parts of the query speak for which",
+        is_drawn: true,
         new: |_| Box::<beside::BesideView>::default(),
     },
     Entry {
         name: "charts",
         title: "Charts",
-        about: "the results of all queries: scatter of two measures, errors, verdicts",
+        about: "the results of all queries: scatter of two measures, errors, recall, verdicts",
+        is_drawn: true,
         new: |_| Box::<charts::ChartsView>::default(),
+    },
+    Entry {
+        name: "migrations",
+        title: "Migrations",
+        about: "what became of the verdicts of all queries since other results, as a matrix",
+        is_drawn: true,
+        new: |_| Box::<migrations::MigrationsView>::default(),
     },
     Entry {
         name: "differences",
         title: "A | B",
         about: "two runs as one table: what was changed, and what became different",
+        is_drawn: true,
         new: |_| Box::<differences::DifferencesView>::default(),
     },
     Entry {
         name: "lockstep",
         title: "Lock-step",
         about: "all methods beside each other, each as many steps into its work",
+        is_drawn: true,
         new: |_| Box::<lockstep::LockstepView>::default(),
     },
     Entry {
         name: "report",
         title: "Report",
         about: "verdicts, errors, timings, parameters",
+        is_drawn: true,
         new: |_| Box::<report::ReportView>::default(),
     },
     Entry {
         name: "log",
         title: "Log",
         about: "every decision in words",
+        is_drawn: true,
         new: |_| Box::<log::LogView>::default(),
     },
 ];

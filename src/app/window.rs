@@ -4,8 +4,10 @@ use egui::ViewportBuilder;
 
 use super::App;
 use super::adapter;
+use super::arrangement::Arrangement;
+use super::command::Command;
+use super::selection::KnownResults;
 use super::setup::Setup;
-use super::state::Results;
 use crate::lesson::Lesson;
 
 /// Why no window could be opened, and what would help.
@@ -55,12 +57,20 @@ pub fn window_options() -> eframe::NativeOptions {
     }
 }
 
-/// Opens the window with the results that are known already, and returns when it is closed.
+/// Opens the window with the results that are known already, in a table where there are any, and returns
+/// when it is closed.
 ///
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
-pub fn open(setup: Setup, results: Results) -> Result<(), WindowError> {
-    open_with(setup, move |app| app.with_results(results))
+pub fn open(setup: Setup, results: KnownResults) -> Result<(), WindowError> {
+    open_with(setup, move |app| {
+        let has_results = !results.now.is_empty();
+        let mut app = app.with_results(results);
+        if has_results {
+            app.send(Command::Arrange(Arrangement::Batch));
+        }
+        app
+    })
 }
 
 /// Opens the window with a lesson, of which `setup` is what its first page localises.

@@ -18,6 +18,8 @@ const DONE: u8 = 0;
 const NOT_GOOD_ENOUGH: u8 = 1;
 const USAGE: u8 = 2;
 const BAD_DATA: u8 = 3;
+/// There is no graphics card that was asked for, or it failed.
+const NO_GPU: u8 = 5;
 /// What shells say of a process that Ctrl-C ended.
 const INTERRUPTED: u8 = 130;
 /// The exit code of a panic.
@@ -56,6 +58,12 @@ pub enum CliError {
     Lesson(#[from] LessonError),
     #[error(transparent)]
     LessonSetting(#[from] SettingError),
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] posescope_gpu::GpuError),
+    #[cfg(not(feature = "gpu"))]
+    #[error("this program was built without the feature `gpu`, which --compute gpu needs")]
+    NoGpu,
     /// There is nothing to draw with, or no room for the picture.
     #[cfg(feature = "app")]
     #[error("{0}")]
@@ -115,6 +123,10 @@ impl CliError {
             | Self::Record(_) => BAD_DATA,
             #[cfg(feature = "app")]
             Self::Picture(_) => BAD_DATA,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(_) => NO_GPU,
+            #[cfg(not(feature = "gpu"))]
+            Self::NoGpu => NO_GPU,
             Self::Interrupted(_) => INTERRUPTED,
         })
     }

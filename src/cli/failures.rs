@@ -127,8 +127,11 @@ impl<'a> FailureRecordings<'a> {
             ..Targets::default()
         };
         let frames = query.localizer.references().frames();
+        let references = query.localizer.references().name();
+        let queries = query.localizer.queries().name();
         let identity = Identity {
-            scene: query.localizer.references().name().to_owned(),
+            scene: references.to_owned(),
+            query_scene: (queries != references).then(|| queries.to_owned()),
             queries: vec![query.item.query.to_owned()],
             references: (query.request.references.frames.iter())
                 .map(|&frame| frames[frame].clone())

@@ -158,8 +158,10 @@ fn estimates(setting: &OpenSetting) -> u64 {
 fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Recorder, CliError> {
     let first = &settings[0];
     let scene = first.scenes.references.name();
+    let queries = first.scenes.queries.name();
     let identity = Identity {
         scene: scene.to_owned(),
+        query_scene: (queries != scene).then(|| queries.to_owned()),
         queries: vec![format!("lesson {}", lesson.name)],
         references: lesson.variants[0].1.references.clone().unwrap_or_default(),
         configuration: first.task.params.to_toml(),

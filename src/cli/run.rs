@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use posescope::estimator;
 use posescope::localize::{
-    Chooser, Localizer, NoObserver, QueryResult, Ranking, References, Request, Selection,
+    ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
 use posescope::run::default_failure_radius_m;
@@ -13,6 +13,7 @@ use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
+use super::choice::ChoiceProgress;
 use super::event_export::EventExport;
 use super::failure::CliError;
 use super::interrupt::Interrupt;
@@ -61,7 +62,15 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         true => (0..queries.frames().len()).collect(),
         false => wanted,
     };
-    let tasks = plan.queries(wanted)?;
+    let interrupt = Interrupt::listen();
+    let mut progress = ChoiceProgress::new(terminal, &interrupt, &args.scene);
+    let tasks = match plan.queries(wanted, &mut progress) {
+        Err(CliError::Choice(ChoiceError::Cancelled(_))) if interrupt.is_raised() => {
+            return Err(CliError::Interrupted("no query is done".to_owned()));
+        }
+        tasks => tasks?,
+    };
+    drop(progress);
     let mut json = match &args.json {
         Some(path) => Some(JsonLines::create(path)?),
         None => None,
@@ -71,7 +80,6 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let estimates = tasks.iter().map(|task| task.references.frames.len());
     let estimates_planned = estimates.sum::<usize>() * methods.len();
     let bar = terminal.bar(estimates_planned as u64);
-    let interrupt = Interrupt::listen();
     let mut observer = CliObserver::new(bar.clone(), plan.recorder(&tasks)?, interrupt.clone());
     if let Some(folder) = &args.export_matches {
         plan.check_features()?;
@@ -193,7 +201,11 @@ impl Plan<'_> {
         output::print(&text.trim_end())
     }
 
-    fn queries(&self, wanted: Vec<usize>) -> Result<Vec<PlannedQuery>, CliError> {
+    fn queries(
+        &self,
+        wanted: Vec<usize>,
+        progress: &mut ChoiceProgress<'_>,
+    ) -> Result<Vec<PlannedQuery>, CliError> {
         let (args, task, protocol) = (self.args, self.task, &self.task.protocol);
         let references = self.localizer.references();
         let named = args
@@ -223,7 +235,7 @@ impl Plan<'_> {
             .into_iter()
             .map(|query| {
                 let references = if named.is_empty() {
-                    self.chosen(&chooser, query)?
+                    self.chosen(&chooser, query, progress)?
                 } else {
                     named.clone().into()
                 };
@@ -232,8 +244,13 @@ impl Plan<'_> {
             .collect()
     }
 
-    fn chosen(&self, chooser: &Chooser<'_>, query: usize) -> Result<References, CliError> {
-        let chosen = chooser.choose(query, &|_| false, &mut NoObserver)?;
+    fn chosen(
+        &self,
+        chooser: &Chooser<'_>,
+        query: usize,
+        progress: &mut ChoiceProgress<'_>,
+    ) -> Result<References, CliError> {
+        let chosen = chooser.choose(query, &|_| false, progress)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(
@@ -264,6 +281,7 @@ impl Plan<'_> {
         let (from, of) = (self.localizer.references(), self.localizer.queries());
         let identity = Identity {
             scene: from.name().to_owned(),
+            query_scene: (of.name() != from.name()).then(|| of.name().to_owned()),
             queries: names(of, &mut tasks.iter().map(|task| task.query)),
             references: names(from, &mut references.copied()),
             configuration: self.task.params.to_toml(),

@@ -1,4 +1,4 @@
-//! `posescope shot`: a picture of the window, or of one of its views, without a window.
+//! `posescope shot`: a picture of the window, or of one of its views, or a view as SVG, without a window.
 
 use posescope::app::{self, Shot, ShotError};
 use posescope::session::RunMode;
@@ -25,16 +25,24 @@ pub fn shot(args: &ShotArgs, terminal: &Terminal) -> Result<(), CliError> {
             false => egui::Theme::Dark,
         },
     };
-    let picture = app::shoot(setup, results, &shot).map_err(|error| match error {
+    let failed = |error| match error {
         ShotError::Unknown(why) => CliError::Usage(why),
         other => CliError::Picture(other.to_string()),
-    })?;
-    if let Some(folder) = args.out.parent() {
-        std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    };
+    let folder = || match args.out.parent() {
+        Some(folder) => std::fs::create_dir_all(folder).map_err(CliError::io(folder)),
+        None => Ok(()),
+    };
+    if args.out.extension().is_some_and(|ending| ending == "svg") {
+        let drawn = app::draw(setup, results, &shot).map_err(failed)?;
+        folder()?;
+        std::fs::write(&args.out, drawn).map_err(CliError::io(&args.out))?;
+    } else {
+        let picture = app::shoot(setup, results, &shot).map_err(failed)?;
+        folder()?;
+        let said = |error| CliError::Picture(format!("{}: {error}", args.out.display()));
+        picture.save(&args.out).map_err(said)?;
     }
-    picture
-        .save(&args.out)
-        .map_err(|error| CliError::Picture(format!("{}: {error}", args.out.display())))?;
     if !terminal.is_quiet() {
         eprintln!("Picture: {}", args.out.display());
     }

@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use clap::Parser as _;
-use posescope::app::{self, ReferencePick, Results, Setup, WindowError};
+use posescope::app::{self, KnownResults, ReferencePick, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::params::Params;
-use posescope::run::{Protocol, default_failure_radius_m, read_results, read_run};
+use posescope::run::{Protocol, ScenePair, default_failure_radius_m, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
@@ -52,14 +52,34 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
 }
 
 /// What the window is opened on, and the results that are known already.
-pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, Results), CliError> {
+pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), CliError> {
     let folder = Path::new(&args.scene);
     let (mut setup, results) = match folder.join("run.toml").is_file() {
         true => of_a_run(args, folder)?,
-        false => (of_a_scene(args)?, Results::new()),
+        false if args.before.is_some() => {
+            return Err(CliError::Usage(format!(
+                "--before holds a run against another one, and {} is the folder of none",
+                args.scene
+            )));
+        }
+        false => (of_a_scene(args)?, KnownResults::default()),
     };
     setup.mode = mode;
     Ok((setup, results))
+}
+
+/// The results of a run folder that are about a pair of scenes, and a line about those that are not.
+fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Results, CliError> {
+    let (results, elsewhere) = app::results_of_run(folder, pair, queries)?;
+    if elsewhere > 0 {
+        let (references, queries) = (&pair.scene, &pair.query_scene);
+        eprintln!(
+            "posescope: {}: {elsewhere} results are not shown, because they are not about queries of \
+             {queries} and references of {references}",
+            folder.display()
+        );
+    }
+    Ok(results)
 }
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
@@ -130,9 +150,8 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
 }
 
 /// The queries of a run, with its results; the first failure is looked at first.
-fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError> {
+fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), CliError> {
     let file = read_run(folder)?;
-    let known: Vec<QueryResult> = read_results(folder)?.collect::<Result<_, _>>()?;
     let Some(pair) = file.pairs.first() else {
         return Err(CliError::NoReference(format!(
             "{}: the run has no scenes",
@@ -168,12 +187,11 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
             path: folder.join("run.toml"),
             source,
         })?;
-    let mut results = Results::new();
-    for result in known {
-        if let Ok(frame) = queries.find(&result.query) {
-            results.entry(frame).or_default().push(result);
-        }
-    }
+    let results = results_of(folder, pair, queries.as_ref())?;
+    let before = match &args.before {
+        Some(before) => Some(results_of(before, pair, queries.as_ref())?),
+        None => None,
+    };
     let failure_radius_m = file.failure_radius_m;
     let is_failure = |results: &[QueryResult]| {
         let mut results = results.iter();
@@ -220,5 +238,9 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, Results), CliError
         mode: RunMode::Paused,
         folder: saving_folder().to_owned(),
     };
-    Ok((setup, results))
+    let known = KnownResults {
+        now: results,
+        before,
+    };
+    Ok((setup, known))
 }

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::metrics::Row;
+use super::migration::{Migration, migrations};
+use crate::code::Code;
 use crate::localize::Verdict;
-use crate::method::Method;
 
 /// Changes of a pose's error that are not worth mentioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,25 +63,12 @@ pub struct Difference {
     pub verdicts: [Verdict; 2],
 }
 
-/// So many results of a method had one primary verdict and have another.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Migration {
-    /// The method.
-    pub method: Method,
-    /// The code in the first run, `ok` where nothing was found.
-    pub before: String,
-    /// The code in the second run.
-    pub after: String,
-    /// How many results.
-    pub count: usize,
-}
-
 /// All differences of two runs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunComparison {
     /// By change, then in the order of the first run.
     pub differences: Vec<Difference>,
-    /// What the primary verdicts became, the most frequent first.
+    /// What the primary verdicts became that are others now, the most frequent first.
     pub migrations: Vec<Migration>,
     /// Results that both have.
     pub common: usize,
@@ -97,17 +85,14 @@ impl RunComparison {
         let mut others: BTreeMap<String, &Row> =
             after.0.iter().map(|row| (key(row), row)).collect();
         let mut comparison = Self::default();
-        let mut migrations: BTreeMap<(Method, String, String), usize> = BTreeMap::new();
+        let mut pairs = Vec::new();
         for row in before.0 {
             let Some(other) = others.remove(&key(row)) else {
                 comparison.only_before += 1;
                 continue;
             };
             comparison.common += 1;
-            let [was, is] = [row, other].map(code);
-            if was != is {
-                *migrations.entry((row.method, was, is)).or_default() += 1;
-            }
+            pairs.push((row.method, [row, other].map(primary)));
             let verdicts = [row.verdict(before.1), other.verdict(after.1)];
             let [was, is] = verdicts.map(Verdict::is_success);
             if let Some(change) = change(was, is, row, other, tolerance) {
@@ -120,16 +105,8 @@ impl RunComparison {
             }
         }
         comparison.only_after = others.len();
-        let migrations = migrations.into_iter();
-        comparison.migrations = migrations
-            .map(|((method, before, after), count)| Migration {
-                method,
-                before,
-                after,
-                count,
-            })
-            .collect();
-        (comparison.migrations).sort_by_key(|migration| std::cmp::Reverse(migration.count));
+        comparison.migrations = migrations(pairs);
+        comparison.migrations.retain(Migration::is_change);
         comparison.differences.sort_by_key(|one| one.change);
         comparison
     }
@@ -147,9 +124,8 @@ impl RunComparison {
 }
 
 /// The primary verdict of a result.
-fn code(row: &Row) -> String {
-    let primary = row.diagnosis.first();
-    primary.map_or("ok".to_owned(), |finding| finding.code.to_string())
+fn primary(row: &Row) -> Option<Code> {
+    Some(row.diagnosis.first()?.code)
 }
 
 fn change(was: bool, is: bool, before: &Row, after: &Row, tolerance: &Tolerance) -> Option<Change> {

@@ -3,11 +3,13 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
+mod bars;
 mod basins;
 mod causes;
 
 use super::metrics::{Measures, Row};
 use super::tables::slug;
+use crate::estimator;
 use crate::method::Method;
 use crate::run::Experiment;
 use crate::run::RunFile;
@@ -15,18 +17,28 @@ use crate::run::RunFile;
 /// A name and a drawing, or what went wrong.
 pub type Plot = (String, Result<String, String>);
 
-/// Okabe and Ito's colours, which colour-blind readers tell apart; by method.
-const COLORS: [(Method, RGBColor); 4] = [
-    (Method::FB, RGBColor(0x00, 0x72, 0xB2)),
-    (Method::PM, RGBColor(0xE6, 0x9F, 0x00)),
-    (Method::MI, RGBColor(0x00, 0x9E, 0x73)),
-    (Method::HY, RGBColor(0xD5, 0x5E, 0x00)),
+/// Colours that colour-blind readers tell apart on white, the first after Okabe and Ito: the paper's four
+/// methods, and those behind them in the registry, which take turns.
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0x00, 0x72, 0xB2),
+    RGBColor(0xE6, 0x9F, 0x00),
+    RGBColor(0x00, 0x9E, 0x73),
+    RGBColor(0xD5, 0x5E, 0x00),
+    RGBColor(0x56, 0xB4, 0xE9),
+    RGBColor(0xCC, 0x79, 0xA7),
+    RGBColor(0x7A, 0x5C, 0x2E),
+    RGBColor(0x70, 0x70, 0x70),
 ];
 
-/// The colour of a method in plots; black for one beyond the paper.
+/// The colour of a method in plots; black for one of another system.
 pub fn method_color(method: Method) -> (u8, u8, u8) {
-    let known = COLORS.iter().find(|(known, _)| *known == method);
-    known.map_or((0, 0, 0), |(_, color)| color.rgb())
+    let place = estimator::methods().position(|known| known == method);
+    let paper = Method::PAPER.len();
+    match place {
+        Some(place) if place < COLORS.len() => COLORS[place].rgb(),
+        Some(place) => COLORS[paper + (place - paper) % (COLORS.len() - paper)].rgb(),
+        None => (0, 0, 0),
+    }
 }
 
 /// The colour of the bars of the nth verdict.
@@ -47,6 +59,11 @@ pub(super) struct Line {
 /// wrong over the distance of the reference, and how wide and deep the basins of the truth are.
 pub fn plots(run: &RunFile, measures: &[Measures], rows: &[Row]) -> Vec<Plot> {
     let mut all = Vec::new();
+    if run.experiment == Some(Experiment::Large) && run.pairs.len() > 1 {
+        let groups = bars::by_pair(run, measures);
+        let axis = "references of each scene, queries of it or of another";
+        all.push(("success".to_owned(), bars::draw(axis, &groups)));
+    }
     for pair in &run.pairs {
         let of_pair: Vec<&Measures> = measures
             .iter()
@@ -59,17 +76,8 @@ pub fn plots(run: &RunFile, measures: &[Measures], rows: &[Row]) -> Vec<Plot> {
             true => format!("{what}-{}", slug(&pair.scene)),
             false => format!("{what}-{}-{}", slug(&pair.scene), slug(&pair.query_scene)),
         };
-        let axis = match run.experiment {
-            Some(Experiment::Single) => Some("uncertainty radius (m)"),
-            Some(Experiment::Multi) => Some("reference images (r-wavg)"),
-            _ => None,
-        };
-        if let Some(axis) = axis {
-            let lines = success_lines(run, &of_pair);
-            all.push((
-                name("success"),
-                draw(axis, "success rate (%)", &lines, true),
-            ));
+        if let Some((axis, groups)) = bars::by_setting(run, &of_pair) {
+            all.push((name("success"), bars::draw(axis, &groups)));
         }
         let lines = recall_lines(&run.protocol.methods, &of_pair);
         if !lines.is_empty() {
@@ -98,25 +106,6 @@ pub fn plots(run: &RunFile, measures: &[Measures], rows: &[Row]) -> Vec<Plot> {
 /// Dotted lines over a setting; what is a share of a hundred has an axis up to there.
 pub(super) fn curves(x_axis: &str, y_axis: &str, lines: &[Line]) -> Result<String, String> {
     draw(x_axis, y_axis, lines, true)
-}
-
-fn success_lines(run: &RunFile, measures: &[&Measures]) -> Vec<Line> {
-    let is_multi = run.experiment == Some(Experiment::Multi);
-    let robust =
-        |one: &&&Measures| !is_multi || one.group.fusion.is_some_and(|f| f.name == "r-wavg");
-    let point = |one: &&Measures| {
-        let setting = one.group.setting?;
-        let x = if is_multi {
-            setting.references as f64
-        } else {
-            setting.radius_m
-        };
-        Some((x, 100.0 * one.success_rate))
-    };
-    lines(&run.protocol.methods, |method| {
-        let of_method = measures.iter().filter(|one| one.method == method);
-        of_method.filter(robust).filter_map(point).collect()
-    })
 }
 
 /// For the last group alone: the largest radius, or the most references. Steps, all as long as the

@@ -1,5 +1,6 @@
 //! The tables of a run: an overview, and those of the paper with its figures beside ours.
 
+mod advantage;
 mod verdicts;
 
 use super::metrics::{Measures, RECALL_LIMITS};
@@ -34,6 +35,7 @@ pub fn tables(run: &RunFile, measures: &[Measures]) -> Vec<Table> {
         if run.pairs.len() > 1 && !run.queries.is_empty() {
             tables.push(confusion(run, measures));
         }
+        tables.extend(advantage::advantage(run, measures));
     }
     tables
 }
@@ -162,6 +164,20 @@ impl<'a> OfPair<'a> {
             fusion: None,
             measure,
         }
+    }
+
+    /// A figure of the paper's tables 5 (KITTI) and 6.
+    fn figure_of_large(&self, method: Method, measure: &str) -> Option<f64> {
+        let table = if self.pair.scene.starts_with("kitti") {
+            5
+        } else {
+            6
+        };
+        paper::figure(&FigureKey {
+            references: 5,
+            fusion: Some("r-wavg"),
+            ..self.figure_key(table, method.name(), measure)
+        })
     }
 }
 
@@ -356,18 +372,8 @@ fn large(run: &RunFile, measures: &[Measures]) -> Table {
             cells.extend(triple(one));
             cells.push(number(one.of_successes.median_m, 3));
             cells.push(number(one.of_successes.median_deg, 3));
-            let papers = ["success_percent", "rmse_m", "rmse_deg"].map(|measure| {
-                let number = if of_pair.pair.scene.starts_with("kitti") {
-                    5
-                } else {
-                    6
-                };
-                paper::figure(&FigureKey {
-                    references: 5,
-                    fusion: Some("r-wavg"),
-                    ..of_pair.figure_key(number, one.method.name(), measure)
-                })
-            });
+            let papers = ["success_percent", "rmse_m", "rmse_deg"]
+                .map(|measure| of_pair.figure_of_large(one.method, measure));
             rows.push((cells, papers));
         }
     }
@@ -479,4 +485,4 @@ fn percent(share: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

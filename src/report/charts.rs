@@ -51,23 +51,47 @@ pub(super) fn with_words(
     text
 }
 
-/// A plot whose lines say to which method they belong.
-pub(super) fn with_lines_named(svg: &str, methods: &[Method]) -> String {
+/// A plot whose lines and bars say to which method they belong.
+pub(super) fn with_methods_named(svg: &str, methods: &[Method]) -> String {
     let plain = with_words(svg, "polyline", 0, &[]);
-    let mut parts = plain.split("<polyline ");
+    let lines = titled(
+        &plain,
+        "polyline",
+        |attributes, color| {
+            attributes.contains(&format!("stroke=\"{color}\""))
+                && attributes.contains("stroke-width=\"2\"")
+        },
+        methods,
+    );
+    titled(
+        &lines,
+        "rect",
+        |attributes, color| attributes.contains(&format!("fill=\"{color}\"")),
+        methods,
+    )
+}
+
+/// The name of a method as the title of each such element that is its own, by its colour.
+fn titled(
+    svg: &str,
+    element: &str,
+    is_of: impl Fn(&str, &str) -> bool,
+    methods: &[Method],
+) -> String {
+    let opening = format!("<{element} ");
+    let mut parts = svg.split(&opening);
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        text += "<polyline ";
+        text += &opening;
         let (attributes, rest) = part.split_once("/>").unwrap_or((part, ""));
-        let is_of = |method: &&Method| {
+        let of_it = |method: &&Method| {
             let (r, g, b) = method_color(**method);
-            let stroke = format!("stroke=\"#{r:02X}{g:02X}{b:02X}\"");
-            attributes.contains(&stroke) && attributes.contains("stroke-width=\"2\"")
+            is_of(attributes, &format!("#{r:02X}{g:02X}{b:02X}"))
         };
-        match methods.iter().find(is_of) {
+        match methods.iter().find(of_it) {
             Some(method) => {
                 let name = escaped(&method.name().to_uppercase());
-                text += &format!("{attributes}><title>{name}</title></polyline>{rest}");
+                text += &format!("{attributes}><title>{name}</title></{element}>{rest}");
             }
             None => text += part,
         }

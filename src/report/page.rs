@@ -13,6 +13,10 @@ use crate::session::Task;
 const STYLE: &str = include_str!("../../assets/report/report.css");
 const SCRIPT: &str = include_str!("../../assets/report/report.js");
 
+/// Rerun's viewer in the browser, of the version that writes our recordings; it reads the recording at the
+/// address behind it.
+const WEB_VIEWER: &str = "https://app.rerun.io/version/0.36.3/?url=";
+
 /// The whole file.
 pub(super) fn page(report: &RunReport) -> String {
     let title = title(&report.run);
@@ -465,7 +469,14 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
                     }
                 }
                 dt { "Again" } dd { code { (again(&report.run, one)) } }
-                @if let Some(recording) = &one.recording { dt { "Recording" } dd { code { "rerun " (recording) } } }
+                @if let Some(recording) = &one.recording {
+                    dt { "Recording" }
+                    dd {
+                        code { "rerun " (recording) } " "
+                        // The script makes it a link where the page comes from a server.
+                        a hidden data-viewer=(WEB_VIEWER) data-recording=(recording) { "in Rerun's web viewer" }
+                    }
+                }
             }
             div.pictures {
                 @if let Some(svg) = &one.pictures.matches {

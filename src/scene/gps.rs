@@ -15,11 +15,6 @@ use nalgebra::{Matrix3, Point3, Similarity3, Translation3, UnitQuaternion, Vecto
 use super::frame_names::FrameNames;
 use super::lines::{Line, TextFile, excerpt_of};
 use super::{Scene, SceneError};
-use crate::camera::Intrinsics;
-use crate::cloud::Cloud;
-use crate::geometry::Pose;
-use crate::image::Photo;
-use crate::problem::{Query, ReferenceTuple};
 
 /// The mean radius of the earth \[m\]. The fit takes up what is left of it.
 const EARTH_RADIUS_M: f64 = 6_371_000.0;
@@ -307,53 +302,11 @@ fn similarity(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Similarity3<f64>
 }
 
 impl Scene for Located {
+    posescope_core::inner_scene!(scene: name, frames, intrinsics, pose, time_s, has_cloud, photo, cloud, query, reference, fingerprint, as_degraded);
+
     fn position(&self, frame: usize) -> Option<Point3<f64>> {
         let known = self.positions.get(&frame).copied();
         known.or_else(|| self.scene.position(frame))
-    }
-
-    fn name(&self) -> &str {
-        self.scene.name()
-    }
-
-    fn frames(&self) -> &[String] {
-        self.scene.frames()
-    }
-
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.scene.intrinsics(frame)
-    }
-
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.scene.pose(frame)
-    }
-
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(frame)
-    }
-
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.scene.has_cloud(frame)
-    }
-
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        self.scene.photo(frame)
-    }
-
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.scene.cloud(frame)
-    }
-
-    fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
-        self.scene.query(frame)
-    }
-
-    fn reference(&self, frame: usize) -> Result<Arc<ReferenceTuple>, SceneError> {
-        self.scene.reference(frame)
-    }
-
-    fn fingerprint(&self) -> u64 {
-        self.scene.fingerprint()
     }
 }
 

@@ -151,7 +151,7 @@ impl Retriever {
         index.check(scene.name(), scene.fingerprint(), &features)?;
         Ok(Self {
             index,
-            surf: params.retrieval.surf(&params.surf),
+            surf: params.surf,
             params: params.retrieval,
         })
     }
@@ -184,8 +184,11 @@ impl Retriever {
 
     /// The frames that resemble the query, of those that are allowed.
     pub fn retrieve(&self, query: &Query, allowed: impl Fn(usize) -> bool) -> Retrieval {
+        // All of them, as FB asks for them: they are found once.
         let features = remembered(&query.photo.gray, &query.memo, &self.surf);
-        self.index.query(&features.value, &self.params, allowed)
+        let indexed = self.params.surf(&self.surf).max_keypoints;
+        let features = features.value.strongest(indexed);
+        self.index.query(&features, &self.params, allowed)
     }
 
     /// The index.

@@ -1,6 +1,7 @@
 //! What a worker has to say, on its way to the session.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::loaded::Loaded;
 use super::run::Part;
@@ -11,9 +12,15 @@ use crate::trace::Record;
 /// What the worker says to the session.
 pub(super) enum Message {
     Chosen(References),
+    /// So many of the candidates for references were looked at.
+    Ranking {
+        looked_at: usize,
+        candidates: usize,
+    },
     Loaded(Arc<Loaded>),
     Began(Part),
-    Told(Box<Record>),
+    /// An event, and how long the run had worked when it was told.
+    Told(Box<Record>, Duration),
     Waits {
         breakpoint: Option<String>,
     },

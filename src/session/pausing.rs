@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::breakpoint::Breakpoints;
 use super::loaded::Loaded;
@@ -104,6 +105,9 @@ pub(super) struct PausingObserver {
     seen_mode_change: u64,
     /// The event that was passed on last, as the stepping sees it.
     last: Option<EventPosition>,
+    begun: Instant,
+    /// How long it has waited for somebody.
+    waited: Duration,
 }
 
 /// Where an event is among the stages.
@@ -192,6 +196,8 @@ impl PausingObserver {
             pause_at: PauseAt::new(mode, None),
             seen_mode_change,
             last: None,
+            begun: Instant::now(),
+            waited: Duration::ZERO,
         }
     }
 
@@ -202,8 +208,20 @@ impl PausingObserver {
         Ok(())
     }
 
+    /// How long the run has worked, without the time it waited for somebody.
+    fn worked(&self) -> Duration {
+        self.begun.elapsed().saturating_sub(self.waited)
+    }
+
     /// Waits for a mode to go on in. To pause is none.
     fn wait(&mut self) -> Result<(), Cancelled> {
+        let since = Instant::now();
+        let answer = self.wait_for_mode();
+        self.waited += since.elapsed();
+        answer
+    }
+
+    fn wait_for_mode(&mut self) -> Result<(), Cancelled> {
         let control = Arc::clone(&self.control);
         let mut state = control.lock();
         while !state.cancelled
@@ -242,6 +260,13 @@ impl LocalizeObserver for PausingObserver {
 
     fn begin_retrieval(&mut self) {
         let _ = self.send(Message::Began(Part::Retrieval));
+    }
+
+    fn choosing(&mut self, looked_at: usize, candidates: usize) {
+        let _ = self.send(Message::Ranking {
+            looked_at,
+            candidates,
+        });
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
@@ -285,7 +310,7 @@ impl LocalizeObserver for PausingObserver {
 
 impl Sink for PausingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        self.send(Message::Told(Box::new(record.clone())))?;
+        self.send(Message::Told(Box::new(record.clone()), self.worked()))?;
         let breakpoint = {
             let control = Arc::clone(&self.control);
             let mut state = control.lock();

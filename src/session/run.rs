@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::loaded::Loaded;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
@@ -24,8 +24,12 @@ pub struct Run {
     /// Its photos and clouds, once they are read.
     pub loaded: Option<Arc<Loaded>>,
     history: History,
+    /// How long the run had worked when each record was told.
+    worked: Vec<Duration>,
     spans: Vec<Span>,
     stages: Vec<StageBar>,
+    /// While references are chosen by looks: how many candidates were looked at, and how many there are.
+    pub ranking: Option<[usize; 2]>,
     /// What would have helped a result is being looked for.
     pub explaining: Option<Explaining>,
     /// Positions in `stages` of those that are open, the outermost first.
@@ -145,7 +149,7 @@ impl Run {
         });
     }
 
-    pub(super) fn push(&mut self, record: Record) {
+    pub(super) fn push(&mut self, record: Record, worked: Duration) {
         let at = self.len();
         match &record.event {
             Event::StageStarted(started) => {
@@ -172,6 +176,7 @@ impl Run {
             self.stages[bar].records.end = at + 1;
         }
         self.history.push(record);
+        self.worked.push(worked);
         if let Some(span) = self.spans.last_mut() {
             span.records.end = at + 1;
         }
@@ -224,6 +229,20 @@ impl Run {
     /// All records.
     pub fn records(&self) -> &[Record] {
         self.history.records()
+    }
+
+    /// How long the run had worked when a record was told, without the time that it waited for somebody;
+    /// being watched is part of it. A record that is still to come has the time of the last one.
+    pub fn worked_until(&self, record: usize) -> Duration {
+        let last = self.worked.len().saturating_sub(1);
+        let time = self.worked.get(record.min(last));
+        time.copied().unwrap_or_default()
+    }
+
+    /// The last record that was told before the run had worked longer than that.
+    pub fn record_at(&self, worked: Duration) -> usize {
+        let behind = self.worked.partition_point(|time| *time <= worked);
+        behind.saturating_sub(1)
     }
 
     /// The parts of the estimators, in the order in which they ran.

@@ -132,6 +132,7 @@ fn data(event: &Event) -> Value {
         }),
         Event::ConsensusJudged(event) => json!({
             "inliers": event.acceptance.inliers,
+            "counted": event.counted.name(),
             "log10_nfa": event.acceptance.log10_nfa,
             "needed": event.acceptance.needed,
             "distance_m": event.distance_m,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, CompareMode, SaveTarget, Setup};
+use posescope::app::{App, Command, CompareMode, Results, SaveTarget, Setup};
 use posescope::localize::Standing;
 use posescope::method::Method;
 use posescope::scene::{self, Scene};
@@ -183,7 +183,7 @@ fn a_batch_is_filtered_sorted_and_opened() {
         ..setup()
     });
     let known = [(1, results(&all)), (GREY, results(&grey))];
-    let mut window = window_with_results(setup(), known.into());
+    let mut window = window_with_results(setup(), Results::from(known));
     press(&mut window, Modifiers::NONE, Key::F4);
     window.run_steps(3);
     assert!(is_said(
@@ -238,4 +238,36 @@ fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
     window.run_steps(3);
     assert!(name.exists());
     assert!(is_said(&window, "Recording: "));
+}
+
+#[test]
+fn what_is_known_from_a_run_folder_is_told_before_the_query_is_run_again() {
+    let grey = finished(Setup {
+        query: GREY,
+        ..setup()
+    });
+    let known: Results = [(GREY, results(&grey))].into();
+    let mut window = window_with_results(
+        Setup {
+            query: GREY,
+            ..setup()
+        },
+        known.clone(),
+    );
+    run_until_idle(&mut window);
+    assert!(is_said(&window, "known before:"));
+    for result in &known[&GREY] {
+        let primary = result.diagnosis.first().expect("a verdict");
+        assert!(is_said(&window, &primary.text), "{}", primary.text);
+    }
+    // The table says the cause in a phrase.
+    press(&mut window, Modifiers::NONE, Key::F4);
+    window.run_steps(3);
+    let code = known[&GREY][0].diagnosis[0].code;
+    assert!(is_said(&window, code.about()), "{}", code.about());
+    // Once the run has come so far, the card tells of it alone.
+    press(&mut window, Modifiers::NONE, Key::F9);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    window.run_steps(2);
+    assert!(!is_said(&window, "known before:"));
 }

@@ -3,7 +3,7 @@
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, NamedPose, Results};
+use posescope::app::{App, Command, KnownResults, NamedPose, Results};
 use posescope::code::Code;
 use posescope::event::{Event, Stage};
 use posescope::localize::QueryResult;
@@ -206,4 +206,133 @@ fn a_result_is_opened_at_the_step_that_decided_it() {
         panic!("not the end of a stage");
     };
     assert_eq!(ended.stage, Stage::Detect);
+}
+
+/// The results of three queries, held against the same with other verdicts at one of them.
+fn over_two_runs() -> (Harness<'static, App>, Results, Results) {
+    let mut now = Results::new();
+    for query in [1, 2, GREY] {
+        let mut setup = setup();
+        setup.query = query;
+        let window = finished(setup);
+        now.insert(query, crate::window::results(&window));
+    }
+    // What the grey photo is told of becomes what the first is told of, for MI alone.
+    let mut before = now.clone();
+    let told = now[&GREY].iter().find(|one| one.method == Method::MI);
+    let told = told.expect("asked for").diagnosis.clone();
+    assert!(!told.is_empty());
+    let other = before.get_mut(&1).expect("known").iter_mut();
+    for result in other.filter(|one| one.method == Method::MI) {
+        assert!(result.diagnosis.is_empty());
+        result.diagnosis.clone_from(&told);
+    }
+    let known = KnownResults {
+        now: now.clone(),
+        before: Some(before.clone()),
+    };
+    let mut window = crate::window::window_with_results(setup(), known);
+    run_until_idle(&mut window);
+    (window, before, now)
+}
+
+#[test]
+fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
+    let (mut window, before, now) = over_two_runs();
+    press(&mut window, Modifiers::NONE, Key::F4);
+    show(&mut window, "migrations");
+    let code = before[&1]
+        .iter()
+        .find(|one| one.method == Method::MI)
+        .expect("asked for")
+        .diagnosis[0]
+        .code;
+    let results: usize = now.values().map(Vec::len).sum();
+    let words = format!("1 of {results} verdicts changed: MI {code} → ok 1");
+    assert!(is_said(&window, &words), "{words}");
+    // As `posescope diff` counts it.
+    let rows = |results: &Results| -> Vec<posescope::measure::Row> {
+        let rows = results.values().flatten().map(|result| {
+            let line = serde_json::to_value(result).expect("written");
+            serde_json::from_value(line).expect("a row")
+        });
+        rows.collect()
+    };
+    let compared = posescope::measure::RunComparison::of(
+        (&rows(&before), 10.0),
+        (&rows(&now), 10.0),
+        &posescope::measure::Tolerance::default(),
+    );
+    assert_eq!(compared.migrations.len(), 1);
+    let [only] = compared.migrations.as_slice() else {
+        panic!("one change");
+    };
+    assert_eq!(
+        format!(
+            "{} {} {} {}",
+            only.method, only.before, only.after, only.count
+        ),
+        format!("mi {code} ok 1")
+    );
+
+    window.get_by_label(&format!("MI {code} → ok: 1")).click();
+    window.run_steps(4);
+    assert!(is_said(&window, &format!("1 of {results} results")));
+    assert!(is_said(&window, "wrong or without a pose: MI 0"));
+    // The same among a condition, and away again.
+    window.get_by_label(&format!("MI {code} → ok ×")).click();
+    window.run_steps(4);
+    assert!(is_said(&window, &format!("{results} of {results} results")));
+    press(&mut window, Modifiers::NONE, Key::D);
+    window.run_steps(3);
+    assert!(is_said(&window, &format!("1 of {results} results")));
+}
+
+#[test]
+fn results_are_kept_and_those_that_follow_are_held_against_them() {
+    let mut window = over_a_run();
+    show(&mut window, "migrations");
+    assert!(is_said(&window, "There are no results A"));
+    show(&mut window, "batch");
+    window.get_by_label("Keep results as A").click();
+    window.run_steps(3);
+    show(&mut window, "migrations");
+    assert!(is_said(&window, "None of 12 verdicts changed"));
+    // Nothing is right any more within a hair.
+    window.state_mut().send(Command::SetParam {
+        key: "grid.coarse_step".to_owned(),
+        value: "3".to_owned(),
+    });
+    window.run_steps(2);
+    run_until_idle(&mut window);
+    show(&mut window, "batch");
+    window.get_by_label("Forget A").click();
+    window.run_steps(3);
+    show(&mut window, "migrations");
+    assert!(is_said(&window, "There are no results A"));
+}
+
+#[test]
+fn recall_says_how_many_are_right_within_the_tolerance_of_the_run() {
+    let mut window = over_a_run();
+    show(&mut window, "charts");
+    window.get_by_label("Recall").click();
+    window.run_steps(3);
+    let state = window.state().app_state();
+    let right = state.setup.task.protocol.right;
+    let of_mi: Vec<&QueryResult> = state
+        .results
+        .values()
+        .flatten()
+        .filter(|result| result.method == Method::MI)
+        .collect();
+    let within = of_mi.iter().filter(|result| {
+        result.error.is_some_and(|error| {
+            error.translation_m <= right.translation_m && error.rotation_deg <= right.rotation_deg
+        })
+    });
+    let share = 100.0 * within.count() as f64 / of_mi.len() as f64;
+    assert!(share > 0.0 && share < 100.0);
+    let words = format!("MI {share:.1} %");
+    assert!(is_said(&window, &words), "{words}");
 }

@@ -7,10 +7,7 @@ use std::process::{Command as Process, Stdio};
 use std::sync::Arc;
 
 use assert_cmd::Command;
-use posescope::camera::Intrinsics;
-use posescope::cloud::Cloud;
 use posescope::code::Code;
-use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
 use posescope::method::Method;
@@ -488,30 +485,15 @@ struct PanickingScene {
 }
 
 impl Scene for PanickingScene {
-    fn name(&self) -> &str {
-        self.scene.name()
-    }
-    fn frames(&self) -> &[String] {
-        self.scene.frames()
-    }
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.scene.intrinsics(frame)
-    }
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.scene.pose(frame)
-    }
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(frame)
-    }
+    posescope::inner_scene!(scene: name, frames, intrinsics, pose, time_s, cloud);
+
     fn has_cloud(&self, frame: usize) -> bool {
         self.scene.has_cloud(frame) && frame != self.frame
     }
+
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         assert!(frame != self.frame, "a trap\nfor the photo");
         self.scene.photo(frame)
-    }
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.scene.cloud(frame)
     }
 }
 

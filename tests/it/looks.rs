@@ -25,7 +25,8 @@ fn show(window: &mut Harness<'_, App>, view: &'static str) {
     // What is in sight asks for its thumbnails.
     window.run_steps(2);
     wait(window, |app| {
-        !app.app_state().is_probing() && !app.app_state().queries.is_painting()
+        let state = app.app_state();
+        !state.is_probing() && !state.is_tracing_line() && !state.queries.is_painting()
     });
     window.run_steps(4);
 }

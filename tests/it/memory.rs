@@ -50,28 +50,17 @@ impl Counting {
 }
 
 impl Scene for Counting {
+    posescope::inner_scene!(walls: frames, intrinsics, pose, time_s, has_cloud);
+
     fn name(&self) -> &str {
         self.name
     }
-    fn frames(&self) -> &[String] {
-        self.walls.frames()
-    }
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.walls.intrinsics(frame)
-    }
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.walls.pose(frame)
-    }
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.walls.time_s(frame)
-    }
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.walls.has_cloud(frame)
-    }
+
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         self.photos[frame].fetch_add(1, Ordering::Relaxed);
         self.walls.photo(frame)
     }
+
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         self.clouds[frame].fetch_add(1, Ordering::Relaxed);
         self.walls.cloud(frame)
@@ -277,31 +266,15 @@ fn scenes_of_one_name_are_not_taken_for_each_other() {
 struct RendezvousScene(Walls, Barrier);
 
 impl Scene for RendezvousScene {
+    posescope::inner_scene!(0: frames, intrinsics, pose, time_s, has_cloud, cloud);
+
     fn name(&self) -> &str {
         "meeting"
     }
-    fn frames(&self) -> &[String] {
-        self.0.frames()
-    }
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.0.intrinsics(frame)
-    }
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.0.pose(frame)
-    }
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.0.time_s(frame)
-    }
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.0.has_cloud(frame)
-    }
+
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         self.1.wait();
         self.0.photo(frame)
-    }
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.1.wait();
-        self.0.cloud(frame)
     }
 }
 
@@ -329,33 +302,27 @@ fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
 struct UnusualScene(Walls);
 
 impl Scene for UnusualScene {
+    posescope::inner_scene!(0: frames, has_cloud, photo, cloud);
+
     fn name(&self) -> &str {
         "peculiar"
     }
-    fn frames(&self) -> &[String] {
-        self.0.frames()
-    }
+
     fn intrinsics(&self, frame: usize) -> Intrinsics {
         Intrinsics {
             fx: 200.0 + frame as f64,
             ..self.0.intrinsics(frame)
         }
     }
+
     fn pose(&self, frame: usize) -> Option<Pose> {
         (frame != 2).then(|| self.0.pose(frame)).flatten()
     }
+
     fn time_s(&self, frame: usize) -> Option<f64> {
         (frame != 1).then_some(7.5 * frame as f64)
     }
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.0.has_cloud(frame)
-    }
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        self.0.photo(frame)
-    }
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.0.cloud(frame)
-    }
+
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         let query = Arc::unwrap_or_clone(self.0.query(frame)?);
         Ok(Arc::new(Query {
@@ -364,6 +331,7 @@ impl Scene for UnusualScene {
             ..query
         }))
     }
+
     fn fingerprint(&self) -> u64 {
         0x0123_4567_89AB_CDEF
     }
@@ -433,12 +401,12 @@ fn a_scene_at_hand_says_all_that_the_scene_says() {
 struct TwoCameras(Walls);
 
 impl Scene for TwoCameras {
+    posescope::inner_scene!(0: frames, pose, time_s, has_cloud, cloud);
+
     fn name(&self) -> &str {
         "two cameras"
     }
-    fn frames(&self) -> &[String] {
-        self.0.frames()
-    }
+
     fn intrinsics(&self, frame: usize) -> Intrinsics {
         let camera = self.0.intrinsics(frame);
         match frame {
@@ -453,15 +421,7 @@ impl Scene for TwoCameras {
             _ => camera,
         }
     }
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.0.pose(frame)
-    }
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.0.time_s(frame)
-    }
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.0.has_cloud(frame)
-    }
+
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let photo = self.0.photo(frame)?;
         let Intrinsics { width, height, .. } = self.intrinsics(frame);
@@ -478,9 +438,6 @@ impl Scene for TwoCameras {
         Ok(Photo::from_gray(image::GrayImage::from_fn(
             width, height, mean,
         )))
-    }
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.0.cloud(frame)
     }
 }
 

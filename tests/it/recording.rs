@@ -33,6 +33,7 @@ const LOCKSTEP: &str = entities::LOCKSTEP_TIMELINE;
 fn identity() -> Identity {
     Identity {
         scene: "two walls".to_owned(),
+        query_scene: None,
         queries: vec!["query".to_owned()],
         references: vec!["reference".to_owned()],
         configuration: Params::default().to_toml(),
@@ -603,4 +604,36 @@ fn any_method_is_recorded_be_it_registered_or_not() {
     recorder.close().expect("a whole recording");
     let unregistered = timelines(&chunks(&path));
     assert!(unregistered.contains_key(&entities::direct(mine, "synthetic")));
+}
+
+#[test]
+fn frames_of_two_scenes_are_told_apart_in_a_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("night.rrd");
+    let two = Identity {
+        scene: "snow".to_owned(),
+        query_scene: Some("night".to_owned()),
+        ..identity()
+    };
+    assert_eq!(two.recording_name(), "night query ← snow reference");
+    assert_eq!(identity().recording_name(), "two walls query");
+    let targets = Targets {
+        save: Some(path.clone()),
+        ..Targets::default()
+    };
+    let mut recorder = Recorder::open(&targets, &two, &[Method::FB]).expect("a writable file");
+    run(&mut recorder, &[Method::FB], &Params::default());
+    recorder.close().expect("a whole recording");
+    let file = BufReader::new(File::open(&path).expect("the recording"));
+    let told: String = DecoderApp::decode_lazy(file)
+        .filter_map(|message| match message.expect("a readable message") {
+            LogMsg::ArrowMsg(store, message) if store.is_recording() => {
+                Some(format!("{:?}", message.batch))
+            }
+            _ => None,
+        })
+        .collect();
+    for words in ["# Query night ", "Against snow ", "reference snow "] {
+        assert!(told.contains(words), "{words}");
+    }
 }

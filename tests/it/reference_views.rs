@@ -5,13 +5,19 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, ReferencePick};
-use posescope::localize::Selection;
+use posescope::app::{App, Command, ReferencePick, Setup};
+use posescope::camera::Intrinsics;
+use posescope::cloud::Cloud;
+use posescope::event::KindSet;
+use posescope::geometry::Pose;
+use posescope::image::Photo;
+use posescope::localize::{Chooser, LocalizeObserver, Localizer, Selection};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::scene::{IndexOptions, Retriever};
-use posescope::session::{IndexFile, Part, RunState};
+use posescope::scene::{IndexOptions, Retriever, Scene, SceneError};
+use posescope::session::{IndexFile, Part, RunMode, RunState};
 use posescope::sink::rerun::entities;
+use posescope::trace::{Cancelled, Record, Sink};
 
 use crate::recording::{chunks, timelines};
 use crate::walls_scene::Walls;
@@ -204,4 +210,94 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     assert!(timelines(&chunks(&recording)).contains_key(entities::RETRIEVAL_TABLE));
     let name = format!("{} matches with {}", found.matches.len(), first.name);
     assert!(is_said(&window, &name), "{name}");
+}
+
+/// Hears how many candidates were looked at.
+#[derive(Default)]
+struct Counted(Vec<(usize, usize)>);
+
+impl Sink for Counted {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+}
+
+impl LocalizeObserver for Counted {
+    fn choosing(&mut self, looked_at: usize, candidates: usize) {
+        self.0.push((looked_at, candidates));
+    }
+}
+
+#[test]
+fn a_choice_by_matches_says_how_far_it_is() {
+    let (scene, params) = (Walls::new(), Params::default());
+    let localizer = Localizer::new(&scene, &scene, &params, 7);
+    let chooser = Chooser {
+        localizer: &localizer,
+        params: &params,
+        selection: Selection::Matched(1),
+        radius_m: 3.0,
+        seed: 7,
+        index: None,
+    };
+    let mut heard = Counted::default();
+    let chosen = chooser.choose(1, &|_| false, &mut heard).expect("readable");
+    assert_eq!(chosen.frames.len(), 1);
+    assert_eq!(heard.0, [(1, 2), (2, 2)]);
+}
+
+/// The small world, whose photos take long to be read.
+struct Slow(Walls);
+
+impl Scene for Slow {
+    fn name(&self) -> &str {
+        self.0.name()
+    }
+    fn frames(&self) -> &[String] {
+        self.0.frames()
+    }
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        self.0.intrinsics(frame)
+    }
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.0.pose(frame)
+    }
+    fn time_s(&self, frame: usize) -> Option<f64> {
+        self.0.time_s(frame)
+    }
+    fn has_cloud(&self, frame: usize) -> bool {
+        self.0.has_cloud(frame)
+    }
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        std::thread::sleep(std::time::Duration::from_millis(400));
+        self.0.photo(frame)
+    }
+    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
+        self.0.cloud(frame)
+    }
+}
+
+#[test]
+fn the_bar_says_how_many_frames_were_looked_at() {
+    let scene: Arc<dyn Scene> = Arc::new(Slow(Walls::new()));
+    let mut slow = Setup {
+        references: Arc::clone(&scene),
+        queries: scene,
+        chosen: Vec::new().into(),
+        mode: RunMode::Running,
+        ..setup()
+    };
+    slow.task.by_hand = false;
+    slow.task.protocol.references = Selection::Matched(1);
+    let mut window = crate::window::window(slow);
+    let mut is_told = false;
+    while *window.state().app_state().run_state() == RunState::Loading {
+        window.step();
+        is_told |= is_said(&window, "Choosing references: 2 of 2 frames");
+    }
+    assert!(is_told);
 }

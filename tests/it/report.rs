@@ -34,8 +34,20 @@ fn named<'a>(page: &'a str, before: &str, end: char) -> Vec<&'a str> {
         .collect()
 }
 
-/// The page names nothing outside itself, and everything inside that it names is there.
+/// Where recordings can be looked at without a viewer of one's own: the version that writes them.
+fn web_viewer() -> String {
+    let manifest = text(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
+    let manifest: toml::Table = manifest.parse().expect("a manifest");
+    let version = manifest["dependencies"]["rerun"]["version"].as_str();
+    let version = version.and_then(|version| version.strip_prefix('='));
+    let version = version.expect("one version exactly");
+    format!(" data-viewer=\"https://app.rerun.io/version/{version}/?url=\"")
+}
+
+/// The page names nothing outside itself but a viewer for its recordings, and everything inside that it
+/// names is there.
 fn assert_self_contained(page: &str) {
+    let page = &page.replace(&web_viewer(), "");
     let (body, _) = page.split_once("<script>").expect("there is a script");
     let mut all = named(body, " href=\"", '"');
     all.extend(named(body, " src=\"", '"'));
@@ -71,6 +83,11 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     assert!(page.contains("kitti/42") && page.contains("success@mi &gt;= 0"));
     // The black photo is a failure of fb with the line that opens its recording.
     assert!(page.contains("<code>rerun failures/000002-fb.rrd</code>"));
+    let link = format!(
+        "<a hidden{} data-recording=\"failures/000002-fb.rrd\">",
+        web_viewer()
+    );
+    assert!(page.contains(&link));
     assert!(page.contains("too few features"));
     // A direct method's failure has its costs.
     assert!(

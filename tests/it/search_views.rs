@@ -11,7 +11,7 @@ use posescope::grid::{Phase, least_covered};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState, Span};
 
-use crate::window::{run_until_idle, setup, window};
+use crate::window::{run_until_idle, setup, wait, window};
 
 /// The small world after all of its run.
 fn finished() -> Harness<'static, App> {
@@ -370,7 +370,10 @@ fn the_acceptance_test_is_told_in_words() {
     let needed = judged.acceptance.needed.expect("enough correspondences");
     text(
         &window,
-        &format!("{} inliers ≥ {needed} needed", judged.acceptance.inliers),
+        &format!(
+            "{} places of inliers ≥ {needed} needed",
+            judged.acceptance.inliers
+        ),
     );
     text(
         &window,
@@ -405,4 +408,130 @@ fn every_moment_of_a_run_can_be_drawn() {
         assert_eq!(ransac, 1, "RANSAC at {cursor}");
     }
     window.check_accessibility();
+}
+
+#[test]
+fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
+    let mut setup = setup();
+    setup.mode = RunMode::Running;
+    // A grid that misses the truth.
+    for assignment in ["grid.coarse_step=3", "grid.fine_range=0.2"] {
+        setup.task.params.assign(assignment).expect("a parameter");
+    }
+    let mut window = window(setup);
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    move_to_end(&mut window, Method::MI);
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.run_steps(3);
+    wait(&mut window, |app| {
+        app.app_state().cost_along(Method::MI).is_some() && !app.app_state().is_tracing_line()
+    });
+    window.run_steps(2);
+    let state = window.state().app_state();
+    let along = state.cost_along(Method::MI).expect("traced");
+    let result = span(&window, Method::MI).result.expect("a result");
+    let reported = result.cost.as_ref().expect("a cost");
+    let at = |share: f64| {
+        let found = along.scores.iter().find(|(place, _)| *place == share);
+        found
+            .expect("both ends are tried")
+            .1
+            .expect("tried")
+            .cost
+            .expect("covered")
+    };
+    assert_eq!(at(0.0), reported.best);
+    assert_eq!(at(1.0), reported.truth.expect("known"));
+    // In between every cost is that of a pose between the two.
+    for (share, score) in along.scores.iter().step_by(7) {
+        let pose = along.line.pose(*share);
+        let loaded = state.run().loaded.as_deref().expect("loaded");
+        let params = &state.setup.task.params;
+        let estimator = posescope::estimator::entry(Method::MI).make(params);
+        let compared = estimator.compare_at(&loaded.problems[0], &pose);
+        assert_eq!(compared.map(|one| one.score), *score);
+    }
+    let words = text(&window, "Cost from the result to the truth: Cost ");
+    assert!(
+        words.contains(&format!("{:.4} at the result", reported.best)),
+        "{words}"
+    );
+    let truth = format!("{:.4} at the truth", reported.truth.expect("known"));
+    assert!(words.contains(&truth), "{words}");
+    let error = result.error.expect("known").translation_m;
+    assert!(words.contains(&format!("{error:.2} m away")), "{words}");
+
+    // Pointing at the middle of the picture looks at a pose between both.
+    let plot = window
+        .get_by_label_contains("Cost from the result to the truth")
+        .rect();
+    window.hover_at(plot.center());
+    window.run_steps(3);
+    let hovered = window.state().app_state().hovered.expect("a pose");
+    let way = hovered.translation.vector - along_from(&window);
+    let length = window
+        .state()
+        .app_state()
+        .cost_along(Method::MI)
+        .expect("traced")
+        .line
+        .length_m();
+    assert!(way.norm() < 1.3 * length, "{way} of {length}");
+    // A truth that is hidden has no line.
+    window.state_mut().send(Command::ShowTruth);
+    window.run_steps(3);
+    assert!(texts(&window, "Cost from the result").is_empty());
+    assert!(!texts(&window, "The truth is hidden (G shows it)").is_empty());
+}
+
+fn along_from(window: &Harness<'_, App>) -> nalgebra::Vector3<f64> {
+    let along = window.state().app_state().cost_along(Method::MI);
+    along.expect("traced").line.from.translation.vector
+}
+
+/// The pixels of a colour in a part of a picture.
+fn pixels_of(picture: &image::RgbaImage, color: egui::Color32) -> usize {
+    let [r, g, b, _] = color.to_array();
+    let alike = |pixel: &&image::Rgba<u8>| {
+        let off = |a: u8, b: u8| a.abs_diff(b) <= 6;
+        off(pixel.0[0], r) && off(pixel.0[1], g) && off(pixel.0[2], b)
+    };
+    picture.pixels().filter(alike).count()
+}
+
+#[test]
+fn the_truth_is_seen_whatever_else_is_there() {
+    let setup = posescope::app::Setup {
+        mode: RunMode::Running,
+        ..setup()
+    };
+    let Some(crate::painted::PaintedWindow { mut window, .. }) =
+        crate::painted::painted(setup, [760.0, 520.0])
+    else {
+        return;
+    };
+    run_until_idle(&mut window);
+    window.state_mut().send(Command::SelectMethod(Method::MI));
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.run_steps(3);
+    // The colour of the truth, which recordings have too.
+    let truth = egui::Color32::from_rgb(0x00, 0x9E, 0x73);
+    let map = |window: &mut Harness<'_, App>| {
+        let rect = window.get_by_label_contains("Cost map").rect();
+        let picture = window.render().expect("painted");
+        let [x, y, width, height] =
+            [rect.left(), rect.top(), rect.width(), rect.height()].map(|side| side as u32);
+        image::imageops::crop_imm(&picture, x, y, width, height).to_image()
+    };
+    let alone = pixels_of(&map(&mut window), truth);
+    assert!(alone > 20, "{alone}");
+    // The camera goes to the truth, where its own mark lies on that place too.
+    window
+        .state_mut()
+        .send(Command::JumpCamera(posescope::app::NamedPose::Truth));
+    window.run_steps(3);
+    wait(&mut window, |app| !app.app_state().is_probing());
+    window.run_steps(3);
+    let beneath = pixels_of(&map(&mut window), truth);
+    assert!(5 * beneath > 4 * alone, "{beneath} of {alone}");
 }

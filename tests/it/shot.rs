@@ -84,3 +84,63 @@ fn what_is_not_there_is_said_in_one_line() {
     assert_eq!(code, Some(3), "{said}");
     assert!(said.contains("/dev/null"), "{said}");
 }
+
+/// A drawing needs no graphics adapter.
+#[test]
+fn a_view_is_drawn_as_shapes_and_words() {
+    let sequence = SmallSequence::write();
+    let path = sequence.path().join("pictures/surface.svg");
+    let file = path.to_string_lossy().into_owned();
+    let surface = ["--view", "surface", "--at", "mi", "--size", "760x900"];
+    let (code, said) = shot(&sequence, &[&surface[..], &["--out", &file]].concat());
+    assert_eq!(code, Some(0), "{said}");
+    let text = std::fs::read_to_string(&path).expect("written");
+    assert!(text.starts_with("<svg ") && text.contains("viewBox=\"0 0 760 900\""));
+    // Words are words, the map is a picture, marks and curves are shapes.
+    for part in [
+        ">coarse minimum (",
+        ">truth (",
+        "<image ",
+        "<polyline ",
+        "<circle ",
+        ">Cost 0.",
+    ] {
+        assert!(text.contains(part), "{part} in {}", &text[..400]);
+    }
+    let parsed = elements_of(&text);
+    assert!(parsed > 100, "{parsed} elements");
+
+    // The same again is the same drawing.
+    let (code, _) = shot(&sequence, &[&surface[..], &["--out", &file]].concat());
+    assert_eq!(code, Some(0));
+    assert!(std::fs::read_to_string(&path).expect("written") == text);
+    for (more, words) in [
+        (&["--view", "space"][..], "only its pixels are known"),
+        (&[][..], "name one of its views"),
+    ] {
+        let (code, said) = shot(&sequence, &[more, &["--out", &file]].concat());
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+/// Counts the elements of a document whose tags are closed in the order in which they were opened.
+fn elements_of(text: &str) -> usize {
+    let mut open: Vec<&str> = Vec::new();
+    let mut count = 0;
+    for tag in text.split('<').skip(1) {
+        let (tag, rest) = tag.split_once('>').expect("every tag ends");
+        assert!(!rest.contains('>'), "{rest}");
+        match tag.strip_prefix('/') {
+            Some(name) => assert_eq!(open.pop(), Some(name)),
+            None => {
+                count += 1;
+                if !tag.ends_with('/') {
+                    open.push(tag.split_whitespace().next().expect("a name"));
+                }
+            }
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+    count
+}

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, CompareMode, Results, Setup};
+use posescope::app::{App, Command, CompareMode, KnownResults, Results, Setup};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
@@ -50,7 +50,11 @@ pub fn window(setup: Setup) -> Harness<'static, App> {
 }
 
 /// The window with results that are known before it is opened.
-pub fn window_with_results(setup: Setup, results: Results) -> Harness<'static, App> {
+pub fn window_with_results(
+    setup: Setup,
+    results: impl Into<KnownResults>,
+) -> Harness<'static, App> {
+    let results = results.into();
     Harness::builder()
         .with_size([1500.0, 950.0])
         .build_eframe(|creation| App::new(creation, setup).with_results(results))

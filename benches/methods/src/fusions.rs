@@ -15,18 +15,15 @@ mod truth;
 use std::collections::HashMap;
 use std::time::Instant;
 
-use posescope::camera::Intrinsics;
-use posescope::cloud::Cloud;
 use posescope::fusion::Fusion;
 use posescope::geometry::Pose;
-use posescope::image::Photo;
 use posescope::localize::{
     LocalizeError, Localizer, NoObserver, QueryResult, Request, frames_within,
 };
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scene::street::{Size, Street};
-use posescope::scene::{self, Scene, SceneError};
+use posescope::scene::{self, Scene};
 use xxhash_rust::xxh3::xxh3_64;
 
 struct Options {
@@ -105,36 +102,10 @@ struct Corrected {
 }
 
 impl Scene for Corrected {
-    fn name(&self) -> &str {
-        self.scene.name()
-    }
-
-    fn frames(&self) -> &[String] {
-        self.scene.frames()
-    }
-
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.scene.intrinsics(frame)
-    }
+    posescope::inner_scene!(scene: name, frames, intrinsics, time_s, has_cloud, photo, cloud);
 
     fn pose(&self, frame: usize) -> Option<Pose> {
         self.poses.get(&self.frames()[frame]).copied()
-    }
-
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(frame)
-    }
-
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.scene.has_cloud(frame)
-    }
-
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        self.scene.photo(frame)
-    }
-
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.scene.cloud(frame)
     }
 }
 

@@ -14,6 +14,7 @@ mod median;
 mod mutual_information;
 mod orientation;
 mod photometric;
+mod tallying;
 
 use std::fmt;
 
@@ -26,6 +27,8 @@ pub use joint_histogram::{Entropies, JointHistogram, LEAST_ENTROPY, bin, count_p
 pub use mutual_information::{MutualInformation, MutualInformationParams};
 pub use orientation::{Orientation, OrientationParams};
 pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
+
+pub use tallying::{LesserHalf, Tallying};
 
 use crate::describe::{Describe, choice};
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
@@ -88,6 +91,12 @@ pub trait Cost: Send + Sync {
     /// of its own, says so here; the answers are those of [`Self::evaluate`], bit for bit.
     fn evaluator(&self) -> Evaluator<'_> {
         Evaluator::Pairs(Box::new(|pairs| self.evaluate(pairs)))
+    }
+
+    /// The whole numbers that decide the cost, and how, so that a [device](crate::render::Device) can find
+    /// them; `None` where only the pairs do. The cost is that of [`Self::evaluate`], bit for bit.
+    fn tallying(&self) -> Option<Tallying> {
+        None
     }
 
     /// The smooth cost that is descended instead of searching a grid for the least of this one; `None` for

@@ -14,7 +14,7 @@ use crate::judge::{Freedoms, Refined};
 use crate::method::Method;
 use crate::render::{ColoredCloud, Comparison, Score};
 use crate::retrieval::ReferenceRanking;
-use crate::robust::{Acceptance, Trial};
+use crate::robust::{Acceptance, Counted, Trial};
 
 /// One of the two photos of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -284,6 +284,8 @@ pub struct PoseRefined {
 pub struct ConsensusJudged {
     /// The test for more inliers than chance explains.
     pub acceptance: Acceptance,
+    /// What it counted.
+    pub counted: Counted,
     /// Distance of the pose from the reference \[m\].
     pub distance_m: f64,
     /// Whether the pose is returned.

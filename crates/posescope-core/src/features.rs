@@ -13,20 +13,22 @@
 //!
 //! [`sift`] is another: Lowe, *Distinctive Image Features from Scale-Invariant Keypoints*, IJCV 60(2), 2004.
 //!
-//! `matching` then compares the descriptors of two images: [`nearest_neighbours`] finds
+//! `nearest` and `matching` then compare the descriptors of two images: [`nearest_neighbours`] finds
 //! the two nearest of every descriptor, and [`classify`] says of each whether its best match
-//! is distinct, mutual, or neither.
+//! is distinct, mutual, or neither; [`best_matches_interruptible`] does both.
 //!
 //! All of it runs on all threads of the current [`rayon`] pool and gives the same result
 //! on any number of them. [`surf_interruptible`] and [`nearest_neighbours_interruptible`] can be
 //! stopped on the way.
 
+mod boxes;
 mod descriptor;
 mod detector;
 mod found;
 mod hessian;
 mod integral;
 mod matching;
+mod nearest;
 mod orientation;
 mod params;
 mod remembered;
@@ -37,9 +39,8 @@ mod surf;
 use nalgebra::Point2;
 
 pub use found::{FoundMatches, PairMatches};
-pub use matching::{
-    Match, MatchVerdict, Neighbours, classify, nearest_neighbours, nearest_neighbours_interruptible,
-};
+pub use matching::{Match, MatchVerdict, best_matches_interruptible, classify};
+pub use nearest::{Neighbours, nearest_neighbours, nearest_neighbours_interruptible};
 pub use params::SurfParams;
 pub use remembered::{remembered, remembered_interruptible};
 pub use sift::{SiftDescriptor, SiftFeatures, SiftParams, sift, sift_interruptible};
@@ -85,4 +86,16 @@ pub struct Features {
     /// What they look like: `descriptors[i]` belongs to `keypoints[i]`. Empty for features whose
     /// descriptors are of another kind.
     pub descriptors: Vec<Descriptor>,
+}
+
+impl Features {
+    /// The `count` strongest: what is found where [`SurfParams::max_keypoints`] is so many.
+    #[must_use]
+    pub fn strongest(&self, count: usize) -> Self {
+        let first = |length: usize| ..count.min(length);
+        Self {
+            keypoints: self.keypoints[first(self.keypoints.len())].to_vec(),
+            descriptors: self.descriptors[first(self.descriptors.len())].to_vec(),
+        }
+    }
 }

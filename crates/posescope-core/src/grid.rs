@@ -5,6 +5,7 @@
 //! yaw about its up axis (−y). Height, pitch and roll stay the reference's.
 
 mod basin;
+mod settle;
 
 pub use basin::Basin;
 

@@ -3,6 +3,7 @@
 
 mod canvas;
 mod color;
+mod device;
 mod projection;
 mod score;
 mod scorer;
@@ -11,6 +12,8 @@ mod worker;
 
 pub use canvas::{Canvas, PointArrays, Values};
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
+pub use device::{Device, Loaded, Tally, Workload, use_device};
+pub use projection::ProjectionRows;
 pub use score::Score;
 pub use scorer::{Comparison, MOST_AT_A_TIME, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};

@@ -25,4 +25,4 @@ pub use consensus::{Consensus, Hypothesis, MlesacError, Trial};
 pub use likelihood::LikelihoodScore;
 pub use mlesac::mlesac;
 pub use params::MlesacParams;
-pub use places::Places;
+pub use places::{Counted, Places};

@@ -3,6 +3,7 @@
 mod degraded;
 mod error;
 mod frames;
+mod inner;
 
 use std::sync::Arc;
 

@@ -1,51 +1,54 @@
 //! All results of a run in a table: filtered, sorted, and each a click away.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
 
 use super::View;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{Command, ResultRow, ViewContext, theme};
 use crate::diagnosis::Tolerance;
 use crate::localize::{QueryResult, Standing};
-use crate::measure::{Condition, ConditionError, Field, Order, select};
+use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
 
 /// What the table shows, with the width of its column \[points\].
-const COLUMNS: [(&str, f32); 9] = [
+const COLUMNS: [(&str, f32); 10] = [
     ("query", 84.0),
-    ("reference", 110.0),
     ("method", 56.0),
     ("is", 104.0),
-    ("error", 72.0),
-    ("rotation", 64.0),
-    ("start", 64.0),
+    ("error", 60.0),
     ("code", 48.0),
+    ("cause", 330.0),
+    ("rotation", 64.0),
+    ("start", 60.0),
     ("confidence", 76.0),
+    ("reference", 110.0),
 ];
+
+/// Width of the column with the verdicts of the results A \[points\].
+const WAS: f32 = 40.0;
 
 /// The results of all queries that were run.
 #[derive(Default)]
 pub struct BatchView {
     order: Option<Order>,
     /// What was shown last, and what it was made from.
-    made: Option<(Made, Vec<Row>)>,
+    made: Option<(Made, Shown)>,
 }
 
-/// What the rows depend on.
-#[derive(Clone, PartialEq)]
+/// The rows in their order, and what is said of them.
+struct Shown {
+    rows: Vec<ResultRow>,
+    words: String,
+}
+
+/// What the rows depend on, beside their order; equal where it is the very same.
 struct Made {
-    typed: String,
+    chosen: Rc<[ResultRow]>,
     order: Option<Order>,
-    results: usize,
     right: Tolerance,
-}
-
-/// A result by its query and its place among the query's.
-#[derive(Clone, Copy)]
-pub(super) struct Row {
-    pub(super) query: usize,
-    pub(super) place: usize,
+    version: u64,
 }
 
 impl View for BatchView {
@@ -61,103 +64,107 @@ impl View for BatchView {
                 context.send(Command::FilterResults(typed));
             }
         });
-        let condition = match condition(context) {
-            Ok(condition) => condition,
+        changes(ui, context);
+        let chosen = match context.selected() {
+            Ok(chosen) => chosen,
             Err(error) => {
-                ui.label(RichText::new(error.to_string()).color(theme::ESTIMATE));
+                ui.label(
+                    RichText::new(error.to_string())
+                        .color(theme::text(ui.visuals(), theme::ESTIMATE)),
+                );
                 return;
             }
         };
-        let results: usize = context.results.values().map(Vec::len).sum();
-        if results == 0 {
+        if context.results.is_empty() {
             ui.weak(
                 "No query was run yet: Run all in the list of queries, or open the folder of a run",
             );
             return;
         }
-        self.make(context, results, right, condition.as_ref());
-        let Some((_, rows)) = &self.made else { return };
-        ui.weak(words(context, rows, results, right));
-        header(ui, &mut self.order);
+        self.make(context, chosen, right);
+        let Some((_, Shown { rows, words })) = &self.made else {
+            return;
+        };
+        ui.weak(words);
         let height = ui.spacing().interact_size.y;
-        let area = ScrollArea::both().auto_shrink(false);
-        area.show_rows(ui, height, rows.len(), |ui, range| {
-            for row in &rows[range] {
-                if let Some(result) = result(context, *row) {
-                    draw(ui, context, *row, result, right);
+        // The names of the columns move sideways with the rows, and stay above them.
+        let sideways = ScrollArea::horizontal().auto_shrink(false);
+        sideways.show(ui, |ui| {
+            header(ui, context, &mut self.order);
+            let area = ScrollArea::vertical().auto_shrink(false);
+            area.show_rows(ui, height, rows.len(), |ui, range| {
+                for row in &rows[range] {
+                    if let Some(result) = context.result(*row) {
+                        draw(ui, context, *row, result, right);
+                    }
                 }
-            }
+            });
         });
     }
 }
 
 impl BatchView {
-    /// Filters and sorts, where anything has changed.
-    fn make(
-        &mut self,
-        context: &ViewContext<'_>,
-        results: usize,
-        right: Tolerance,
-        condition: Option<&Condition>,
-    ) {
-        let wanted = Made {
-            typed: context.options.results_filter.clone(),
-            order: self.order,
-            results,
-            right,
-        };
-        if self.made.as_ref().is_some_and(|(made, _)| *made == wanted) {
+    /// Sorts, where anything has changed.
+    fn make(&mut self, context: &ViewContext<'_>, chosen: Rc<[ResultRow]>, right: Tolerance) {
+        let version = context.results_version();
+        if let Some((made, _)) = &self.made
+            && Rc::ptr_eq(&made.chosen, &chosen)
+            && made.order == self.order
+            && made.right == right
+            && made.version == version
+        {
             return;
         }
-        let all = known(context);
-        let only: Vec<&QueryResult> = all.iter().map(|(_, result)| *result).collect();
-        let chosen = select(&only, right, condition, self.order);
-        let rows = chosen.into_iter().map(|index| all[index].0).collect();
-        self.made = Some((wanted, rows));
+        let results: Vec<&QueryResult> = chosen
+            .iter()
+            .filter_map(|row| context.result(*row))
+            .collect();
+        let order = select(&results, right, None, self.order);
+        let rows: Vec<ResultRow> = order.into_iter().map(|index| chosen[index]).collect();
+        let words = words(context, &rows, right);
+        let made = Made {
+            chosen,
+            order: self.order,
+            right,
+            version,
+        };
+        self.made = Some((made, Shown { rows, words }));
     }
 }
 
-/// All results that are known.
-fn known<'a>(context: &ViewContext<'a>) -> Vec<(Row, &'a QueryResult)> {
-    let all = context.results.iter().flat_map(|(&query, results)| {
-        let results = results.iter().enumerate();
-        results.map(move |(place, result)| (Row { query, place }, result))
+/// What the results are held against, and what has to have become of them.
+fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
+    ui.horizontal_wrapped(|ui| {
+        if let Some(change) = &context.options.verdict_change {
+            let button = ui.button(format!("{change} ×"));
+            if button.on_hover_text("Look at all verdicts again").clicked() {
+                context.send(Command::FilterVerdictChange(None));
+            }
+        }
+        let keep = ui.button("Keep results as A");
+        let help = "Hold the results that follow against these: change a setting, Run all, look at Migrations";
+        if keep.on_hover_text(help).clicked() {
+            context.send(Command::KeepResults);
+        }
+        if context.has_results_before() {
+            let mut only = context.options.only_differences;
+            let toggle = ui.toggle_value(&mut only, "Only what changed");
+            if toggle.on_hover_text("Verdicts that are others than in A (D)").clicked() {
+                context.send(Command::OnlyDifferences);
+            }
+            let forget = ui.button("Forget A");
+            if forget.on_hover_text("Forget the results A").clicked() {
+                context.send(Command::ForgetResults);
+            }
+        }
     });
-    all.collect()
-}
-
-/// The results that the condition chooses, in the order of the queries.
-///
-/// # Errors
-/// What is wrong with the condition.
-pub(super) fn chosen<'a>(
-    context: &ViewContext<'a>,
-) -> Result<Vec<(Row, &'a QueryResult)>, ConditionError> {
-    let condition = condition(context)?;
-    let right = context.setup.task.protocol.right;
-    let mut all = known(context);
-    if let Some(condition) = condition {
-        all.retain(|(_, result)| condition.is_met(result, right));
-    }
-    Ok(all)
-}
-
-/// The condition that is asked for, if one is.
-fn condition(context: &ViewContext<'_>) -> Result<Option<Condition>, ConditionError> {
-    match context.options.results_filter.trim() {
-        "" => Ok(None),
-        typed => typed.parse().map(Some),
-    }
-}
-
-fn result<'a>(context: &ViewContext<'a>, row: Row) -> Option<&'a QueryResult> {
-    context.results.get(&row.query)?.get(row.place)
 }
 
 /// How many are shown, and how many of them are wrong or missing, by method.
-fn words(context: &ViewContext<'_>, rows: &[Row], results: usize, right: Tolerance) -> String {
+fn words(context: &ViewContext<'_>, rows: &[ResultRow], right: Tolerance) -> String {
+    let results: usize = context.results.values().map(Vec::len).sum();
     let mut failed: BTreeMap<Method, usize> = BTreeMap::new();
-    for result in rows.iter().filter_map(|row| result(context, *row)) {
+    for result in rows.iter().filter_map(|row| context.result(*row)) {
         let is_failed = result.standing(right, true) >= Standing::Wrong;
         *failed.entry(result.method).or_default() += usize::from(is_failed);
     }
@@ -173,7 +180,7 @@ fn words(context: &ViewContext<'_>, rows: &[Row], results: usize, right: Toleran
 }
 
 /// The names of the columns. A click sorts, another one the other way round, a third not at all.
-fn header(ui: &mut Ui, order: &mut Option<Order>) {
+fn header(ui: &mut Ui, context: &ViewContext<'_>, order: &mut Option<Order>) {
     ui.horizontal(|ui| {
         for (name, width) in COLUMNS {
             let Ok(field) = Field::find(name) else {
@@ -205,16 +212,23 @@ fn header(ui: &mut Ui, order: &mut Option<Order>) {
                 };
             }
         }
+        if context.has_results_before() {
+            let size = [WAS, ui.spacing().interact_size.y];
+            let label = egui::Label::new(RichText::new("was").small());
+            ui.add_sized(size, label)
+                .on_hover_text("The primary verdict in A");
+        }
     });
 }
 
 fn draw(
     ui: &mut Ui,
     context: &ViewContext<'_>,
-    Row { query, place }: Row,
+    at: ResultRow,
     result: &QueryResult,
     right: Tolerance,
 ) {
+    let ResultRow { query, place } = at;
     let standing = result.standing(right, true);
     let is_here = query == context.setup.query;
     let row = ui.horizontal(|ui| {
@@ -229,12 +243,24 @@ fn draw(
             if name == "is" {
                 text = text.color(theme::standing(ui.visuals(), standing));
             } else if name == "method" {
-                text = text.color(theme::method(result.method));
+                text = text.color(theme::text(ui.visuals(), theme::method(result.method)));
             } else if is_here {
                 text = text.strong();
             }
             let label = egui::Label::new(text).truncate().selectable(false);
             ui.add_sized([width, ui.spacing().interact_size.y], label);
+        }
+        if context.has_results_before() {
+            let primary = |result: &QueryResult| Some(result.diagnosis.first()?.code);
+            let was = context
+                .result_before(at)
+                .map(|was| verdict_name(primary(was)));
+            let mut text = RichText::new(was.unwrap_or("–"));
+            if was.is_some_and(|was| was != verdict_name(primary(result))) {
+                text = text.strong();
+            }
+            let label = egui::Label::new(text).selectable(false);
+            ui.add_sized([WAS, ui.spacing().interact_size.y], label);
         }
     });
     let answer = row.response.interact(Sense::click());

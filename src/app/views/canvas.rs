@@ -1,6 +1,8 @@
 //! A picture that can be zoomed and dragged.
 
-use egui::{Color32, FontId, Painter, Pos2, Rect, Response, TextureId, Ui, Vec2, pos2, vec2};
+use egui::{Color32, Painter, Pos2, Rect, Response, TextureId, Ui, Vec2, pos2, vec2};
+
+use crate::app::theme;
 
 /// The greatest magnification over the fitted picture.
 const LARGEST_ZOOM: f32 = 60.0;
@@ -148,7 +150,7 @@ impl Placement {
 
 /// Words in a corner of a picture, readable on any ground.
 pub(super) fn tag(painter: &Painter, at: Pos2, text: &str, color: Color32) {
-    let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(11.0), color);
+    let galley = painter.layout_no_wrap(text.to_owned(), theme::caption(), color);
     let ground = Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 1.0));
     let ground = ground.translate(vec2(4.0, 1.0));
     painter.rect_filled(ground, 2.0, Color32::from_black_alpha(190));

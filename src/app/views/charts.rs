@@ -1,14 +1,15 @@
 //! The results of all queries as pictures: any two measures against each other, how many are how good, and
 //! which verdicts are frequent.
 
+mod recall;
+
 use std::collections::BTreeMap;
 
 use egui::{ComboBox, DragValue, Ui};
 use egui_plot::{Bar, BarChart, Legend, Line, MarkerShape, Plot, PlotPoint, Points};
 
 use super::View;
-use super::batch::{Row, chosen};
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{Command, ResultRow, ViewContext, theme};
 use crate::code::Code;
 use crate::localize::{QueryResult, Standing};
 use crate::measure::{Field, Value};
@@ -20,16 +21,22 @@ enum Chart {
     #[default]
     Scatter,
     Errors,
+    Recall,
     Verdicts,
 }
 
 impl Chart {
-    const ALL: [(Self, &'static str, &'static str); 3] = [
+    const ALL: [(Self, &'static str, &'static str); 4] = [
         (Self::Scatter, "Scatter", "Any two measures of each result"),
         (
             Self::Errors,
             "Errors",
             "The share of results within an error",
+        ),
+        (
+            Self::Recall,
+            "Recall",
+            "The share that is right, over what right means: metres and degrees together",
         ),
         (
             Self::Verdicts,
@@ -64,8 +71,12 @@ impl Default for ChartsView {
 
 impl View for ChartsView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let results = match chosen(context) {
-            Ok(results) => results,
+        let results: Vec<Chosen<'_>> = match context.selected() {
+            Ok(rows) => {
+                let rows = rows.iter();
+                rows.filter_map(|row| Some((*row, context.result(*row)?)))
+                    .collect()
+            }
             Err(error) => {
                 ui.weak(error.to_string());
                 return;
@@ -86,7 +97,7 @@ impl View for ChartsView {
                     measure(ui, "Across", &mut self.across);
                     measure(ui, "Up", &mut self.up);
                 }
-                Chart::Errors => {
+                Chart::Errors | Chart::Recall => {
                     let label = ui.label("up to");
                     let drag = DragValue::new(&mut self.limit_m).range(0.05..=100.0);
                     ui.add(drag.speed(0.05).suffix(" m")).labelled_by(label.id);
@@ -97,6 +108,7 @@ impl View for ChartsView {
         match self.chart {
             Chart::Scatter => self.scatter(ui, context, &results),
             Chart::Errors => self.errors(ui, &results),
+            Chart::Recall => recall::ui(ui, context, &results, self.limit_m),
             Chart::Verdicts => verdicts(ui, &results),
         }
     }
@@ -115,7 +127,7 @@ fn measure(ui: &mut Ui, label: &str, name: &mut &'static str) {
     answer.response.labelled_by(label.id);
 }
 
-type Chosen<'a> = (Row, &'a QueryResult);
+type Chosen<'a> = (ResultRow, &'a QueryResult);
 
 impl ChartsView {
     fn scatter(&self, ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>]) {

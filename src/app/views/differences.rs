@@ -88,7 +88,7 @@ fn title(ui: &mut Ui, result: &QueryResult) {
         .map_or(String::new(), |fusion| format!(" {fusion}"));
     let words = format!("{}{fusion}", result.method.label());
     let name = RichText::new(words)
-        .color(theme::method(result.method))
+        .color(theme::text(ui.visuals(), theme::method(result.method)))
         .strong();
     ui.horizontal(|ui| {
         ui.label(name);

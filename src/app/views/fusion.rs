@@ -33,7 +33,7 @@ impl View for FusionView {
             let name = method.name().to_uppercase();
             ui.label(
                 RichText::new(format!("{name}, {} references", fused[0].shares.len()))
-                    .color(theme::method(method))
+                    .color(theme::text(ui.visuals(), theme::method(method)))
                     .strong(),
             );
             table(ui, context, method, &fused);
@@ -88,7 +88,9 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Refer
         }
         ui.end_row();
         for (index, share) in fused[0].shares.iter().enumerate() {
-            ui.label(RichText::new(&share.reference).color(theme::REFERENCE));
+            ui.label(
+                RichText::new(&share.reference).color(theme::text(ui.visuals(), theme::REFERENCE)),
+            );
             ui.label(share.matches.to_string());
             ui.label(error(context, share.pose.as_ref()));
             for fusion in fused {
@@ -119,7 +121,7 @@ fn weight(ui: &mut Ui, share: &Share, color: Color32) {
             );
         }
         ShareOutcome::Failed => {
-            ui.label(RichText::new("× failed").color(theme::ESTIMATE))
+            ui.label(RichText::new("× failed").color(theme::text(ui.visuals(), theme::ESTIMATE)))
                 .on_hover_text("It had a weight, but no pose");
         }
         ShareOutcome::Unsupportive => {
@@ -138,8 +140,10 @@ fn weight(ui: &mut Ui, share: &Share, color: Color32) {
                 painter.rect_filled(Rect::from_min_size(rect.min, filled), 1.0, color);
                 ui.label(format!("{:.0} %", 100.0 * share.weight));
                 if share.outcome == ShareOutcome::Outvoted {
-                    ui.label(RichText::new("outvoted").color(theme::ESTIMATE))
-                        .on_hover_text("Alone it puts the query elsewhere, more than 1 m away");
+                    ui.label(
+                        RichText::new("outvoted").color(theme::text(ui.visuals(), theme::ESTIMATE)),
+                    )
+                    .on_hover_text("Alone it puts the query elsewhere, more than 1 m away");
                 }
             });
             if let Some(support) = share.support {

@@ -7,11 +7,11 @@ mod residuals;
 use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
+use super::place::place;
 use crate::app::{ShownView, ViewContext};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
-use crate::grid::Offset;
 use crate::method::Method;
 
 /// The joint histogram, or the residuals, of the synthetic view that is shown.
@@ -85,17 +85,8 @@ fn caption(ui: &mut Ui, context: &ViewContext<'_>, shown: &ShownView) {
     ui.horizontal_wrapped(|ui| {
         let mut words = shown.reason.name().to_owned();
         if let Some(problem) = context.problem() {
-            let offset = Offset::of(&problem.reference_from_query(&shown.pose));
-            let numbers = [
-                offset.right_m,
-                offset.forward_m,
-                offset.yaw_rad.to_degrees(),
-            ];
-            // A sum is no negative zero.
-            let [right, ahead, left] = numbers.map(|number| (100.0 * number).round() / 100.0 + 0.0);
-            words.push_str(&format!(
-                ": {right:.2} m right, {ahead:.2} m ahead, {left:.2}° left"
-            ));
+            words += ": ";
+            words += &place(&problem.reference_from_query(&shown.pose));
         }
         ui.weak(words);
         let is_old = context

@@ -97,7 +97,8 @@ impl LockstepView {
         let is_over = step + 1 >= steps && span.result.is_some();
         let here = context.at(cursor);
         ui.horizontal(|ui| {
-            let name = RichText::new(method.label()).color(theme::method(method));
+            let name = RichText::new(method.label())
+                .color(theme::text(ui.visuals(), theme::method(method)));
             ui.label(name.strong());
             let stages = context.run.stages_at(cursor).skip(1);
             let stages: Vec<_> = stages.map(|bar| bar.stage.name()).collect();
@@ -118,7 +119,12 @@ impl LockstepView {
             }
         });
         let told = here.told().unwrap_or_default();
-        ui.add(egui::Label::new(RichText::new(told).weak()).truncate());
+        // Room for two lines, so that nothing moves from step to step.
+        let lines = 2.0 * ui.text_style_height(&egui::TextStyle::Body);
+        ui.allocate_ui(egui::vec2(ui.available_width(), lines), |ui| {
+            ui.set_min_height(lines);
+            ui.add(egui::Label::new(RichText::new(told).weak()).wrap());
+        });
         let panel = self.panels.entry(method).or_default();
         ui.push_id(method.name(), |ui| {
             // A hybrid is seen in the pictures of the part that is at work.

@@ -1,5 +1,7 @@
 //! Every decision in words.
 
+use std::ops::Range;
+
 use egui::{RichText, ScrollArea, TextStyle, Ui};
 
 use super::View;
@@ -14,7 +16,23 @@ pub struct LogView {
     lines: Vec<(usize, String)>,
     told: usize,
     cursor_shown: Option<usize>,
+    /// The lines as they are broken for a width, and that width in letters.
+    rows: Vec<Row>,
+    letters: usize,
 }
+
+/// A part of a line that fits into the view.
+struct Row {
+    line: usize,
+    /// Spaces before it, where it is not the first part.
+    indent: String,
+    part: Range<usize>,
+}
+
+/// How much farther in the parts of a line begin behind the first \[letters\].
+const HANGING: usize = 2;
+/// Lines are not broken to less than that \[letters\].
+const NARROWEST: usize = 24;
 
 impl LogView {
     fn take_in(&mut self, context: &ViewContext<'_>) {
@@ -46,22 +64,27 @@ impl View for LogView {
             ui.weak("Nothing was told yet");
             return;
         }
+        self.wrap(ui);
         let here = self.lines.partition_point(|(at, _)| *at <= context.cursor);
+        let first_here = self.rows.partition_point(|row| row.line + 1 < here);
         let height = ui.text_style_height(&TextStyle::Monospace);
-        let mut area = ScrollArea::both().auto_shrink(false);
+        // An id of its own: a view that has all the room would share it with the view before.
+        let mut area = ScrollArea::vertical().id_salt("log").auto_shrink(false);
         if self.cursor_shown != Some(context.cursor) {
             self.cursor_shown = Some(context.cursor);
             let spacing = ui.spacing().item_spacing.y;
-            let above = (here as f32 * (height + spacing) - 0.5 * ui.available_height()).max(0.0);
+            let above =
+                (first_here as f32 * (height + spacing) - 0.5 * ui.available_height()).max(0.0);
             area = area.vertical_scroll_offset(above);
         }
-        area.show_rows(ui, height, self.lines.len(), |ui, rows| {
-            for row in rows {
-                let (at, words) = &self.lines[row];
+        area.show_rows(ui, height, self.rows.len(), |ui, rows| {
+            for row in &self.rows[rows] {
+                let (at, words) = &self.lines[row.line];
+                let words = format!("{}{}", row.indent, &words[row.part.clone()]);
                 let mut text = RichText::new(words).monospace();
-                if row + 1 == here {
+                if row.line + 1 == here {
                     text = text.strong();
-                } else if row >= here {
+                } else if row.line >= here {
                     text = text.weak();
                 }
                 let label = egui::Label::new(text).sense(egui::Sense::click()).extend();
@@ -70,5 +93,97 @@ impl View for LogView {
                 }
             }
         });
+    }
+}
+
+impl LogView {
+    /// Breaks lines that are longer than the view is wide.
+    fn wrap(&mut self, ui: &Ui) {
+        let font = TextStyle::Monospace.resolve(ui.style());
+        let letter = ui.fonts_mut(|fonts| fonts.glyph_width(&font, 'm'));
+        let room = ui.available_width() - ui.spacing().scroll.allocated_width();
+        let letters = ((room / letter.max(1.0)) as usize).max(NARROWEST);
+        if letters != self.letters {
+            self.letters = letters;
+            self.rows.clear();
+        }
+        let wrapped = self.rows.last().map_or(0, |row| row.line + 1);
+        for line in wrapped..self.lines.len() {
+            let (_, words) = &self.lines[line];
+            let indent = words.len() - words.trim_start().len();
+            for (index, part) in parts(words, letters, indent + HANGING)
+                .into_iter()
+                .enumerate()
+            {
+                self.rows.push(Row {
+                    line,
+                    indent: match index {
+                        0 => String::new(),
+                        _ => " ".repeat(indent + HANGING),
+                    },
+                    part,
+                });
+            }
+        }
+    }
+}
+
+/// The parts of a line of which each fits into so many letters, broken between words where there are any;
+/// those behind the first have an indent to stand behind.
+fn parts(line: &str, letters: usize, indent: usize) -> Vec<Range<usize>> {
+    let mut parts = Vec::new();
+    let mut begin = 0;
+    loop {
+        let room = match begin {
+            0 => letters,
+            _ => letters.saturating_sub(indent).max(1),
+        };
+        let rest = &line[begin..];
+        let Some((end, next)) = rest.char_indices().nth(room) else {
+            parts.push(begin..line.len());
+            return parts;
+        };
+        // The spaces that a line begins with are no place to break it.
+        let from = rest.len() - rest.trim_start().len();
+        let whole_words = &rest[..end + next.len_utf8()];
+        let broken = whole_words.rfind(' ').filter(|space| *space > from);
+        let end = begin + broken.unwrap_or(end);
+        parts.push(begin..end);
+        begin = end + line[end..].len() - line[end..].trim_start().len();
+        if begin == line.len() {
+            return parts;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn wrapped(line: &str, letters: usize) -> Vec<&str> {
+        let parts = parts(line, letters, 4).into_iter();
+        parts.map(|part| &line[part]).collect()
+    }
+
+    #[test]
+    fn a_line_breaks_between_words_and_a_long_word_anywhere() {
+        assert_eq!(wrapped("  one two three", 20), ["  one two three"]);
+        assert_eq!(wrapped("  one two three", 9), ["  one two", "three"]);
+        assert_eq!(wrapped("abcdefghij", 6), ["abcdef", "gh", "ij"]);
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_is_lost_and_nothing_is_too_long(
+            line in "( ){0,6}[a-zé→]{1,9}( [a-zé→]{1,30}){0,12}", letters in 6_usize..60,
+        ) {
+            let parts = wrapped(&line, letters);
+            prop_assert_eq!(parts.concat().replace(' ', ""), line.replace(' ', ""));
+            for (index, part) in parts.iter().enumerate() {
+                let room = if index == 0 { letters } else { letters - 4 };
+                prop_assert!(part.chars().count() <= room, "{:?}", parts);
+            }
+        }
     }
 }

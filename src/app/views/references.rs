@@ -166,7 +166,11 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
         }
         thumbnail(ui, context, Side::Reference, frame);
         ui.vertical(|ui| {
-            ui.label(RichText::new(name).monospace().color(theme::REFERENCE));
+            ui.label(
+                RichText::new(name)
+                    .monospace()
+                    .color(theme::text(ui.visuals(), theme::REFERENCE)),
+            );
             ui.horizontal(|ui| {
                 let results: Vec<QueryResult> = context
                     .run

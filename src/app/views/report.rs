@@ -79,7 +79,11 @@ fn name(ui: &mut Ui, span: &Span) {
         Some(fusion) => format!("{} {fusion}", method.name().to_uppercase()),
         None => method.name().to_uppercase(),
     };
-    ui.label(RichText::new(name).color(theme::method(method)).strong());
+    ui.label(
+        RichText::new(name)
+            .color(theme::text(ui.visuals(), theme::method(method)))
+            .strong(),
+    );
 }
 
 /// The verdict in words and its colour. An error tells the ground truth, which may be hidden.

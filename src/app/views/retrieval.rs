@@ -80,7 +80,9 @@ impl RetrievalView {
                 let name = RichText::new(&frame.name).monospace();
                 let is_looked_at = index == self.looked_at;
                 let name = match index < ranking.chosen && !is_looked_at {
-                    true => name.color(theme::REFERENCE).strong(),
+                    true => name
+                        .color(theme::text(ui.visuals(), theme::REFERENCE))
+                        .strong(),
                     false => name,
                 };
                 ui.label((index + 1).to_string());

@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use eframe::egui_wgpu::RenderState;
 use egui::{Color32, Rect, Response, Role, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo};
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 
 use super::View;
 use crate::app::camera::NamedPose;
@@ -48,6 +48,8 @@ pub struct SpaceView {
     layers: Layers,
     orbit: Option<Orbit>,
     through: Option<LookThrough>,
+    /// The shape of the pane.
+    height_over_width: f32,
     camera_drag: CameraDrag,
     cloud: Option<PreparedCloud>,
     /// The points of no cloud.
@@ -80,6 +82,7 @@ impl SpaceView {
             layers: Layers::default(),
             orbit: None,
             through: None,
+            height_over_width: 1.0,
             camera_drag: CameraDrag::default(),
             cloud: None,
             nothing: Arc::default(),
@@ -108,7 +111,7 @@ impl View for SpaceView {
         let jumps =
             ui.horizontal_wrapped(|ui| controls::jumps(ui, context, self.next_flip.is_some()));
         if let Some(request) = looks.inner.or(jumps.inner) {
-            self.apply(request, &geometry);
+            self.apply(request, &geometry, &content.cameras);
         }
         self.blink(ui, context);
         self.say_trouble(ui);
@@ -133,15 +136,16 @@ impl SpaceView {
         }
     }
 
-    fn apply(&mut self, request: ViewRequest, geometry: &SceneGeometry) {
-        let middle = geometry.on_ground(0.0, 0.2 * geometry.radius_m, 0.0);
+    fn apply(&mut self, request: ViewRequest, geometry: &SceneGeometry, cameras: &[SceneCamera]) {
         match request {
             ViewRequest::Reset => {
-                self.orbit = Some(Orbit::overview(middle, geometry.radius_m));
+                // As long as nobody turns it, the overview follows what there is to be seen.
+                self.orbit = None;
                 self.through = None;
             }
             ViewRequest::Top => {
-                self.orbit = Some(Orbit::from_above(middle, geometry.radius_m));
+                let (middle, radius_m) = self.overview(geometry, cameras);
+                self.orbit = Some(Orbit::from_above(middle, radius_m));
                 self.through = None;
             }
             ViewRequest::Through(kind) => {
@@ -199,6 +203,7 @@ impl SpaceView {
     ) {
         let size = ui.available_size().max(Vec2::splat(60.0));
         let (pane, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        self.height_over_width = size.y / size.x;
         self.steer(ui, geometry, &response, &content.cameras);
         let view_camera = self.view_camera(geometry, size, &content.cameras);
 
@@ -226,7 +231,7 @@ impl SpaceView {
             context.send(Command::TakeCamera(Some(pose)));
         }
         if let Some(kind) = labels::cameras(ui, pane, &view_camera, &content.cameras) {
-            self.apply(ViewRequest::Through(kind), geometry);
+            self.apply(ViewRequest::Through(kind), geometry, &content.cameras);
         }
         response.widget_info(|| {
             let words = format!("3-D view of {count} points. {headline}");
@@ -262,6 +267,8 @@ impl SpaceView {
             let factor = f64::from(pinch) * (0.004 * f64::from(scroll)).exp();
             (factor != 1.0).then_some((factor, at - response.rect.min.to_vec2()))
         });
+        let (middle, radius_m) = self.overview(geometry, cameras);
+        let overview = Orbit::overview(middle, radius_m);
         match (&mut self.through, pose) {
             (Some(through), Some(_)) => {
                 if is_dragged {
@@ -275,10 +282,9 @@ impl SpaceView {
                 }
             }
             _ => {
-                let overview = Orbit::overview(
-                    geometry.on_ground(0.0, 0.2 * geometry.radius_m, 0.0),
-                    geometry.radius_m,
-                );
+                if !is_dragged && zoomed.is_none() {
+                    return;
+                }
                 let orbit = self.orbit.get_or_insert(overview);
                 match (is_dragged, shifts) {
                     (true, true) => orbit.pan(delta, size),
@@ -290,6 +296,12 @@ impl SpaceView {
                 }
             }
         }
+    }
+
+    /// What is seen as long as nobody has turned the scene: reference, estimates and truth together.
+    fn overview(&self, geometry: &SceneGeometry, cameras: &[SceneCamera]) -> (Point3<f64>, f64) {
+        let centres: Vec<Point3<f64>> = cameras.iter().map(SceneCamera::centre).collect();
+        geometry.overview(&centres, f64::from(self.height_over_width))
     }
 
     fn looked_through<'a>(&self, cameras: &'a [SceneCamera]) -> Option<&'a SceneCamera> {
@@ -310,8 +322,10 @@ impl SpaceView {
                     .shifted(through.shifted)
             }
             _ => {
-                let middle = geometry.on_ground(0.0, 0.2 * geometry.radius_m, 0.0);
-                let overview = || Orbit::overview(middle, geometry.radius_m);
+                let overview = || {
+                    let (middle, radius_m) = self.overview(geometry, cameras);
+                    Orbit::overview(middle, radius_m)
+                };
                 self.orbit.unwrap_or_else(overview).view_camera(size)
             }
         }

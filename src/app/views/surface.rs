@@ -1,5 +1,6 @@
 //! The cost surface: where the search has been, what it found there, and where it went.
 
+mod line;
 mod maps;
 mod marks;
 mod scale;
@@ -20,7 +21,7 @@ use scale::{NO_SAY, Scale, number, swatch};
 use search::Search;
 
 /// What could be done with the map.
-const HELP: &str = "Point at a cell; click, drag: camera; wheel: zoom; Shift+drag: pan";
+const HELP: &str = "Click, drag: camera; wheel: zoom; Shift+drag: pan";
 
 /// Room for the legend beside the map \[points\].
 const LEGEND: f32 = 200.0;
@@ -111,6 +112,8 @@ impl SurfaceView {
             scale: &scale,
             marks: &marks,
             floor,
+            line: line::wanted(context, search)
+                .map(|line| [line.from, line.to].map(|pose| search.offset(&pose))),
         };
         let readout = Readout::reserve(ui);
         // Beside the map where there is room, below it elsewhere.
@@ -138,8 +141,11 @@ impl SurfaceView {
         }
         self.floor_ui(ui, context, search, run_floor);
         ui.separator();
+        let on_line = line::ui(ui, context, search, &marks, floor, width);
+        ui.separator();
         slices::ui(ui, context, search, floor, width);
-        under_pointer.map(|(pose, _)| pose).or(pointed_at)
+        let on_map = under_pointer.map(|(pose, _)| pose);
+        on_map.or(pointed_at).or(on_line)
     }
 
     /// The floor and what it would change.

@@ -7,7 +7,8 @@ use posescope::measure::Gate;
 use posescope::report::PICTURES;
 use posescope::run::{Experiment, PaperProtocol, Protocol, Shard, Sweep};
 
-use super::{ProtocolArgs, positive, share};
+use super::positive;
+use super::protocol::{ProtocolArgs, share};
 
 #[derive(Clone, Debug, Args)]
 pub struct EvalArgs {

@@ -51,8 +51,8 @@ pub struct ShotArgs {
     /// On a light ground
     #[arg(long)]
     pub light: bool,
-    /// The picture to write, PNG or JPEG by its ending
-    #[arg(long, value_name = "FILE.png|FILE.jpg")]
+    /// The picture to write: PNG, JPEG, or SVG of a view that is drawn, by its ending
+    #[arg(long, value_name = "FILE.png|FILE.jpg|FILE.svg")]
     pub out: PathBuf,
 }
 

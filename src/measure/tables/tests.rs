@@ -9,7 +9,7 @@ fn fusion(name: &str) -> Fusion {
     name.parse().expect("a fusion")
 }
 
-fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
+pub(in crate::measure) fn run(experiment: Experiment, scenes: &[(&str, &str)]) -> RunFile {
     let names = |of: fn(&(&str, &str)) -> String| scenes.iter().map(of).collect::<Vec<_>>();
     RunFile {
         schema: RUN_SCHEMA.to_owned(),
@@ -82,6 +82,49 @@ fn lines(tables: &[Table], name: &str) -> Vec<String> {
     let table = tables.iter().find(|table| table.name == name);
     let table = table.unwrap_or_else(|| panic!("{name} among {tables:?}"));
     table.rows.iter().map(|row| row.join(" | ")).collect()
+}
+
+#[test]
+fn the_papers_own_cells_give_the_averages_of_its_abstract() {
+    let conditions =
+        ["overcast", "sun", "night", "rain", "snow"].map(|name| format!("robotcar/{name}"));
+    let pairs: Vec<(&str, &str)> = conditions
+        .iter()
+        .flat_map(|scene| {
+            conditions
+                .iter()
+                .map(move |queries| (scene.as_str(), queries.as_str()))
+        })
+        .collect();
+    let mut run = run(Experiment::Large, &pairs);
+    run.protocol.methods = Method::PAPER.to_vec();
+    let rows: Vec<Row> = pairs
+        .iter()
+        .flat_map(|(scene, queries)| {
+            // FB solves none of two, MI one, HY both.
+            let solved = [
+                ("a", "fb", None),
+                ("b", "fb", None),
+                ("a", "mi", Some(1.0)),
+                ("b", "mi", None),
+                ("a", "hy", Some(1.0)),
+                ("b", "hy", Some(1.0)),
+            ];
+            solved.map(|(query, method, error)| Row {
+                query_scene: (scene != queries).then(|| (*queries).to_owned()),
+                ..at(row(query, method, error), scene, 10.0, 2, Some("r-wavg"))
+            })
+        })
+        .collect();
+    let tables = tables(&run, &measure(&rows, 10.0));
+    assert_eq!(
+        lines(&tables, "advantage"),
+        [
+            "FB | 25 | 100.0 | 25.1",
+            "PM | 0 | – | 16.8",
+            "MI | 25 | 50.0 | 5.8"
+        ]
+    );
 }
 
 #[test]

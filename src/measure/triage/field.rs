@@ -85,6 +85,11 @@ impl Field {
                 .first()
                 .map_or(String::new(), |d| d.code.to_string())
         }),
+        words("cause", "the primary verdict in one phrase", |r| {
+            r.diagnosis
+                .first()
+                .map_or(String::new(), |d| d.code.about().to_owned())
+        }),
         words("codes", "all verdicts", |r| {
             let codes: Vec<&str> = r.diagnosis.iter().map(|d| d.code.name()).collect();
             codes.join(" ")

@@ -47,7 +47,7 @@ pub fn record_checkup(
         let origin = *origin.get_or_insert(Origin(place));
         stream.set_query(index);
         stream.advance();
-        scene::log_reference(&mut stream, index, &tuple, origin);
+        scene::log_reference(&mut stream, index, &tuple, &tuple.name, origin);
         let params = RenderParams::default();
         let colored = color_cloud(&tuple.cloud, &tuple.photo.gray, &tuple.intrinsics, &params);
         scene::log_cloud(&mut stream, index, &tuple, &colored, origin);

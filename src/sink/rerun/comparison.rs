@@ -89,6 +89,7 @@ fn open(
     };
     let identity = Identity {
         scene: first.scene.clone(),
+        query_scene: first.query_scene.clone(),
         queries: vec![name(before), name(after)],
         ..Identity::default()
     };

@@ -17,7 +17,6 @@ use super::{Identity, RecordError, Targets, blueprint, entities, report, retriev
 use crate::estimator;
 use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
-use crate::image::Degradation;
 use crate::localize::{LocalizeObserver, PoseReport, QueryResult, StageTimes};
 use crate::method::Method;
 use crate::narration;
@@ -33,9 +32,7 @@ use crate::trace::{Cancelled, Record, Sink};
 /// more events and reports the error when it is closed.
 pub struct Recorder {
     stream: Stream,
-    configuration: String,
-    degraded: Degradation,
-    failure_radius_m: f64,
+    identity: Identity,
     params: Params,
     methods: Vec<Method>,
     /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
@@ -102,9 +99,7 @@ impl Recorder {
         Ok(Self {
             stream: Stream::open(targets, identity)?,
             params,
-            configuration: identity.configuration.clone(),
-            degraded: identity.degraded,
-            failure_radius_m: identity.failure_radius_m,
+            identity: identity.clone(),
             methods: methods.to_vec(),
             origin: None,
             is_laid_out: false,
@@ -247,8 +242,8 @@ impl Recorder {
     }
 
     fn result_in_words(&mut self, result: &QueryResult) {
-        let outcome = result.words(self.failure_radius_m);
-        let level = match result.is_success(self.failure_radius_m) {
+        let outcome = result.words(self.identity.failure_radius_m);
+        let level = match result.is_success(self.identity.failure_radius_m) {
             true => TextLogLevel::INFO,
             false => TextLogLevel::WARN,
         };
@@ -262,14 +257,7 @@ impl Recorder {
         } = &self.query;
         // It says what all methods found: where they advance together that is told too early.
         self.stream.set_lockstep(None);
-        let text = report::markdown(
-            problems,
-            results,
-            &self.configuration,
-            self.degraded,
-            self.failure_radius_m,
-            origin,
-        );
+        let text = report::markdown(problems, results, &self.identity, origin);
         self.stream
             .log(entities::REPORT, &TextDocument::from_markdown(text));
     }
@@ -466,7 +454,8 @@ impl LocalizeObserver for Recorder {
         let stream = &mut self.stream;
         scene::log_query(stream, &first.query);
         for (index, problem) in problems.iter().enumerate() {
-            scene::log_reference(stream, index, &problem.reference, origin);
+            let label = self.identity.reference_label(&problem.reference.name);
+            scene::log_reference(stream, index, &problem.reference, &label, origin);
         }
         if let Some(truth) = truth {
             let camera = PlacedCamera {

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
+use super::Identity;
 use super::scene::Origin;
 use crate::geometry::PoseError;
-use crate::image::Degradation;
 use crate::localize::{QueryResult, Verdict};
 use crate::params::Params;
 use crate::problem::Problem;
@@ -13,31 +13,33 @@ use crate::problem::Problem;
 pub(super) fn markdown(
     problems: &[Problem],
     results: &[QueryResult],
-    configuration: &str,
-    degraded: Degradation,
-    failure_radius_m: f64,
+    identity: &Identity,
     origin: Origin,
 ) -> String {
     let mut text = String::new();
     if let Some(problem) = problems.first() {
-        let names: Vec<&str> = problems.iter().map(|p| p.reference.name.as_str()).collect();
+        let references = problems.iter().map(|p| &p.reference.name);
+        let names: Vec<String> = references
+            .map(|name| identity.reference_label(name))
+            .collect();
         text += &format!(
             "# Query {}\n\nAgainst {}, within {} m, seed {}.\n\n",
-            problem.query.name,
+            identity.query_label(&problem.query.name),
             names.join(", "),
             problem.uncertainty_radius_m,
             problem.seed
         );
     }
     text += &story(results);
-    text += &errors(results, failure_radius_m);
+    text += &errors(results, identity.failure_radius_m);
     text += &features(results);
     text += &costs(results);
     text += &costs_at_poses(results);
+    let degraded = identity.degraded;
     if !degraded.is_none() {
         text += &format!("The photo of the query was degraded before: `{degraded}`.\n\n");
     }
-    text += &changes(configuration);
+    text += &changes(&identity.configuration);
     let Origin(origin) = origin;
     text += &format!(
         "\nThe world is drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \

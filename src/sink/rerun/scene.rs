@@ -43,11 +43,12 @@ pub(super) fn log_query(stream: &mut Stream, query: &Query) {
     stream.log_image(entities::QUERY_IMAGE, jpeg(&picture::photo(&query.photo)));
 }
 
-/// A reference's camera with its photo.
+/// A reference's camera with its photo, under its name.
 pub(super) fn log_reference(
     stream: &mut Stream,
     index: usize,
     tuple: &ReferenceTuple,
+    label: &str,
     origin: Origin,
 ) {
     let owner = entities::reference(index);
@@ -56,7 +57,7 @@ pub(super) fn log_reference(
         world_from_camera: &tuple.world_from_camera,
         intrinsics: &tuple.intrinsics,
         color: palette::REFERENCE,
-        label: format!("reference {}", tuple.name),
+        label: format!("reference {label}"),
     };
     camera.log(stream, origin);
     stream.log_image(

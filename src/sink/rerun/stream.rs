@@ -46,7 +46,7 @@ impl Stream {
         let id = identity.recording_id();
         let recording = RecordingStreamBuilder::new(APPLICATION_ID)
             .recording_id(id.as_str())
-            .recording_name(format!("{} {}", identity.scene, identity.queries.join(" ")))
+            .recording_name(identity.recording_name())
             .send_properties(true)
             // Somebody asked for this recording, whatever the environment says.
             .enabled(true)

@@ -33,6 +33,8 @@ pub struct Targets {
 pub struct Identity {
     /// The scene's name.
     pub scene: String,
+    /// The name of the queries' scene, where it is another one.
+    pub query_scene: Option<String>,
     /// The query frames' names.
     pub queries: Vec<String>,
     /// The reference frames' names.
@@ -48,6 +50,34 @@ pub struct Identity {
 }
 
 impl Identity {
+    /// A query's name, with its scene where there are two: frames of both may be called alike.
+    pub fn query_label(&self, name: &str) -> String {
+        match &self.query_scene {
+            Some(scene) => format!("{scene} {name}"),
+            None => name.to_owned(),
+        }
+    }
+
+    /// A reference's name, with its scene where there are two.
+    pub fn reference_label(&self, name: &str) -> String {
+        match &self.query_scene {
+            Some(_) => format!("{} {name}", self.scene),
+            None => name.to_owned(),
+        }
+    }
+
+    /// What a viewer calls the recording.
+    pub fn recording_name(&self) -> String {
+        let queries = self.queries.join(" ");
+        match &self.query_scene {
+            Some(scene) => {
+                let references = self.references.join(" ");
+                format!("{scene} {queries} ← {} {references}", self.scene)
+            }
+            None => format!("{} {queries}", self.scene),
+        }
+    }
+
     /// The recording id: equal for equal runs, whenever and wherever they are made.
     pub fn recording_id(&self) -> String {
         // The debug form quotes every string, so that no two identities are spelled alike.

@@ -2,7 +2,7 @@
 
 use super::{
     Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    MakesCost, SearchRule, Similarity, SmoothCost,
+    MakesCost, SearchRule, Similarity, SmoothCost, Tallying,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -82,6 +82,14 @@ impl Cost for MutualInformation {
 
     fn evaluator(&self) -> Evaluator<'_> {
         Evaluator::of_entropies(self.params.bins, distance)
+    }
+
+    fn tallying(&self) -> Option<Tallying> {
+        let bins = self.params.bins;
+        Some(Tallying::Counts {
+            bins,
+            cost: distance,
+        })
     }
 
     fn descended(&self) -> Option<SmoothCost> {

@@ -11,7 +11,7 @@ use image::Luma;
 
 use super::{
     Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    LEAST_ENTROPY, MakesCost, Similarity,
+    LEAST_ENTROPY, MakesCost, Similarity, Tallying,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -128,6 +128,14 @@ impl Cost for Orientation {
 
     fn evaluator(&self) -> Evaluator<'_> {
         Evaluator::of_entropies(self.params.bins, distance)
+    }
+
+    fn tallying(&self) -> Option<Tallying> {
+        let bins = self.params.bins;
+        Some(Tallying::Counts {
+            bins,
+            cost: distance,
+        })
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {

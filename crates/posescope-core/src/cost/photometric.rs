@@ -1,9 +1,11 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
+use fearless_simd::{Level, dispatch};
+
 use super::median::MedianFinder;
 use super::{
-    Cost, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, MakesCost, SearchRule,
-    SmoothCost,
+    Cost, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, LesserHalf, MakesCost,
+    SearchRule, SmoothCost, Tallying,
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -78,8 +80,10 @@ impl Photometric {
 impl Photometric {
     /// The mean of E^power over the errors E ≤ θ, of which there is one at least.
     ///
-    /// Eight sums are added at once, each of every eighth error: what is added to what depends on
-    /// nothing but the errors, and no addition waits for the last.
+    /// Eight sums are added at once, each of every eighth error, and no addition waits for the last. Errors
+    /// are rounded so that all sums are exact; those that are squared again are not, and what is added to
+    /// what depends on nothing but their order.
+    #[inline(always)]
     fn mean_up_to(&self, threshold: f32, errors: &[f32]) -> f64 {
         const SUMS: usize = 8;
         let squared_again = self.params.power == 2;
@@ -89,7 +93,11 @@ impl Photometric {
             for ((&error, sum), counted) in some.iter().zip(&mut sums).zip(&mut counted) {
                 let counts = error <= threshold;
                 let error = f64::from(if counts { error } else { 0.0 });
-                *sum += if squared_again { error * error } else { error };
+                *sum += if squared_again {
+                    error * error
+                } else {
+                    LesserHalf::rounded(error)
+                };
                 // A view has no 2³² pixels; a check would keep the eight from being added at once.
                 *counted = counted.wrapping_add(u32::from(counts));
             }
@@ -98,9 +106,19 @@ impl Photometric {
     }
 }
 
+#[inline(always)]
 fn squared_difference(pair: &IntensityPair) -> f32 {
     let difference = pair.query - pair.synthetic;
     difference * difference
+}
+
+/// The squared differences of all pairs, in the place of what `errors` held.
+#[inline(always)]
+fn squared_differences(pairs: &[IntensityPair], errors: &mut Vec<f32>) {
+    errors.resize(pairs.len(), 0.0);
+    for (error, pair) in errors.iter_mut().zip(pairs) {
+        *error = squared_difference(pair);
+    }
 }
 
 /// The lower median; `None` of nothing. Leaves `values` partly sorted, which is why it takes time
@@ -127,14 +145,18 @@ impl Cost for Photometric {
     }
 
     fn evaluator(&self) -> Evaluator<'_> {
+        let level = Level::new();
         let mut errors = Vec::new();
         let mut medians = MedianFinder::new();
         Evaluator::Pairs(Box::new(move |pairs| {
-            errors.clear();
-            errors.extend(pairs.iter().map(squared_difference));
+            dispatch!(level, _simd => squared_differences(pairs, &mut errors));
             let threshold = medians.lower_median(&errors)?;
-            Some(self.mean_up_to(threshold, &errors))
+            Some(dispatch!(level, _simd => self.mean_up_to(threshold, &errors)))
         }))
+    }
+
+    fn tallying(&self) -> Option<Tallying> {
+        (self.params.power == 1).then_some(Tallying::LesserHalf)
     }
 
     fn descended(&self) -> Option<SmoothCost> {

@@ -6,7 +6,7 @@ use serde_json::json;
 use super::matches::TrueMatches;
 use super::{Code, Diagnosis, Subject, failure_alone, suspicion};
 use crate::camera::Intrinsics;
-use crate::estimator::Failure;
+use crate::estimator::{Failure, FeatureCounts};
 use crate::geometry::PoseError;
 use crate::robust::{effective_area_px, inliers_beyond_chance};
 use crate::solver::{Correspondence, pose_covariance, refine};
@@ -250,7 +250,7 @@ fn few_matches(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosis
     let funnel = &matches.funnel;
     let counts = subject.outcome.counts?;
     let without_depth = if many_without_depth(matches, counts.unique) {
-        matches.wrong_depth + lost_for_depth(subject, matches)
+        matches.wrong_depth + lost_for_depth(&counts, matches)
     } else {
         0
     };
@@ -280,13 +280,10 @@ fn many_without_depth(matches: &TrueMatches, unique: usize) -> bool {
 
 /// True matches that a better cloud would have kept. Where the cloud gives depths as clouds do, those
 /// that have none lie where no scan reaches, and more of them would not have come from there.
-fn lost_for_depth(subject: &Subject<'_>, matches: &TrueMatches) -> usize {
+fn lost_for_depth(counts: &FeatureCounts, matches: &TrueMatches) -> usize {
     /// Share of the reference keypoints that a scan gives a depth at least.
     const USUAL: f64 = 0.1;
-    let keypoints = subject
-        .outcome
-        .counts
-        .map_or(0, |counts| counts.reference_keypoints);
+    let keypoints = counts.reference_keypoints;
     let is_usual = matches.funnel.with_depth as f64 >= USUAL * keypoints as f64;
     if is_usual { 0 } else { matches.no_depth }
 }
@@ -296,7 +293,7 @@ fn bad_depths(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosis>
     let right = matches.funnel.lifted;
     let (wrong, missing) = (matches.wrong_depth, matches.no_depth);
     let counts = subject.outcome.counts?;
-    let lost = wrong + lost_for_depth(subject, matches);
+    let lost = wrong + lost_for_depth(&counts, matches);
     let starved = right < FEW_MATCHES && lost >= FEW_MATCHES.min(counts.unique / 2);
     let misled =
         wrong >= FEW_MATCHES && wrong > right && !is_beyond_chance(subject, matches, right);
@@ -478,4 +475,36 @@ fn deviation_m(subject: &Subject<'_>, matches: &TrueMatches) -> Option<f64> {
     )?;
     let variances = Vector3::new(covariance[(3, 3)], covariance[(4, 4)], covariance[(5, 5)]);
     Some(variances.sum().sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::matches::Funnel;
+    use super::*;
+
+    /// Of 200 reference keypoints so many have a depth; 40 true matches have none.
+    fn lost(with_depth: usize) -> usize {
+        let counts = FeatureCounts {
+            reference_keypoints: 200,
+            ..FeatureCounts::default()
+        };
+        let matches = TrueMatches {
+            funnel: Funnel {
+                with_depth,
+                ..Funnel::default()
+            },
+            correspondences: Vec::new(),
+            is_true: Vec::new(),
+            is_inlier: Vec::new(),
+            wrong_depth: 0,
+            no_depth: 40,
+        };
+        lost_for_depth(&counts, &matches)
+    }
+
+    #[test]
+    fn matches_without_a_depth_are_lost_where_the_cloud_is_sparser_than_clouds_are() {
+        assert_eq!([0, 19].map(lost), [40, 40]);
+        assert_eq!([20, 120].map(lost), [0, 0]);
+    }
 }

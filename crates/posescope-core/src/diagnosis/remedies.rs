@@ -103,8 +103,9 @@ pub fn remedies(code: Code, method: Method, params: &Params, radius_m: f64) -> V
         Code::R9 => vec![vec![radius(1.5)], vec![radius(2.0)], vec![radius(3.0)]],
         _ => Vec::new(),
     };
-    // Whatever it is, another method or another reference may do better.
-    let others = Method::PAPER.into_iter().filter(|other| {
+    // Whatever it is, another method or another reference may do better; a search from many starts first.
+    let others = [Method::named("mi6")].into_iter().chain(Method::PAPER);
+    let others = others.filter(|other| {
         *other != method && estimator::find(*other).is_some_and(|entry| entry.hybrid().is_none())
     });
     tried.extend(others.map(|other| vec![Change::Method(other)]));
@@ -122,6 +123,17 @@ fn rounded(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_search_from_many_starts_is_the_first_other_method_and_twelve_runs_try_all() {
+        let tried = remedies(Code::D3, Method::MI, &Params::default(), 10.0);
+        assert!(tried.len() <= 12, "{tried:?}");
+        let methods = tried.iter().flatten().filter_map(|change| match change {
+            Change::Method(method) => Some(method.name()),
+            _ => None,
+        });
+        assert_eq!(methods.collect::<Vec<_>>(), ["mi6", "fb", "pm"]);
+    }
 
     #[test]
     fn every_remedy_is_one_that_the_parameters_take() {

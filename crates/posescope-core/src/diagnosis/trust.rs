@@ -379,3 +379,29 @@ fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len().checked_sub(1)? / 2;
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(probability: Option<f64>) -> Trust {
+        Trust {
+            probability,
+            position_std_m: None,
+            rotation_std_deg: None,
+            inlier_spread: None,
+            runner_up_margin: None,
+            chance_level: None,
+        }
+    }
+
+    #[test]
+    fn a_pose_is_doubted_below_one_half_and_believed_from_nineteen_in_twenty_on() {
+        let doubted = [0.0, 0.49, 0.5, 0.94, 0.95, 1.0].map(|p| said(Some(p)).is_doubtful());
+        assert_eq!(doubted, [true, true, false, false, false, false]);
+        let low = [0.0, 0.49, 0.5, 0.94, 0.95, 1.0].map(|p| said(Some(p)).is_low());
+        assert_eq!(low, [true, true, true, true, false, false]);
+        // Of a method that was not calibrated nothing is known.
+        assert!(!said(None).is_doubtful() && !said(None).is_low());
+    }
+}

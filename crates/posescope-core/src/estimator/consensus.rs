@@ -4,7 +4,7 @@ use super::{Failure, Halt};
 use crate::event::ConsensusJudged;
 use crate::geometry::Pose;
 use crate::problem::Problem;
-use crate::robust::Acceptance;
+use crate::robust::{Acceptance, Counted};
 use crate::trace::Trace;
 
 /// A pose that so many correspondences agree on, and what is asked of it.
@@ -13,8 +13,10 @@ pub(super) struct FoundConsensus {
     pub(super) reference_from_query: Pose,
     /// Its inliers beside what chance gives.
     pub(super) acceptance: Acceptance,
-    /// The correspondences that they are of.
-    pub(super) correspondences: usize,
+    /// How many they are of.
+    pub(super) tested: usize,
+    /// What was counted.
+    pub(super) counted: Counted,
     /// Whether the inliers are enough.
     pub(super) is_enough: bool,
     /// How far outside the prior it may be, as a share of that; `None` for anywhere.
@@ -33,8 +35,9 @@ impl FoundConsensus {
         let verdict = if !self.is_enough {
             Err(Failure::ChanceConsensus {
                 inliers: self.acceptance.inliers,
-                correspondences: self.correspondences,
-                needed: self.acceptance.needed.unwrap_or(self.correspondences + 1),
+                tested: self.tested,
+                needed: self.acceptance.needed.unwrap_or(self.tested + 1),
+                counted: self.counted,
             })
         } else if self.slack.is_some_and(is_too_far) {
             Err(Failure::OutsideRadius {
@@ -46,6 +49,7 @@ impl FoundConsensus {
         };
         trace.emit(|| ConsensusJudged {
             acceptance: self.acceptance,
+            counted: self.counted,
             distance_m,
             accepted: verdict.is_ok(),
         })?;

@@ -314,12 +314,13 @@ impl Search<'_, '_> {
         let mut scores = vec![None; lattice.cells()];
         let mut least = None;
         let (memory, scorer) = (self.memory, self.scorer);
+        let at_a_time = scorer.at_a_time_of(lattice.cells());
         let found = memory.scores(&lattice, || {
             let mut found = Vec::new();
             let mut hypotheses = lattice.hypotheses();
             loop {
                 trace.checkpoint()?;
-                let some: Vec<_> = hypotheses.by_ref().take(scorer.at_a_time()).collect();
+                let some: Vec<_> = hypotheses.by_ref().take(at_a_time).collect();
                 if some.is_empty() {
                     return Ok(found);
                 }
@@ -341,11 +342,13 @@ impl Search<'_, '_> {
                 self.tell(lattice.phase, offset, score, &mut least, trace)?;
             }
         }
-        let surface = Arc::new(ScoredLattice {
+        let mut surface = ScoredLattice {
             lattice,
             scores,
             least_covered: self.least_covered,
-        });
+        };
+        surface.settle(scorer);
+        let surface = Arc::new(surface);
         let minimum = surface.minimum();
         if let Some(cell) = minimum
             && let (Some(offset), Some(score)) =

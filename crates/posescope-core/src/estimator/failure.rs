@@ -3,6 +3,7 @@
 use crate::code::Code;
 use crate::grid::LatticeTooLarge;
 use crate::method::Method;
+use crate::robust::Counted;
 
 /// A typed reason with its evidence. In statistics it counts as an infinite error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,16 +52,18 @@ pub enum Failure {
     },
     /// The consensus is one that chance gives as well.
     #[error(
-        "{inliers} of {correspondences} correspondences agree on a pose, which chance explains; \
-         {needed} are needed"
+        "{inliers} of {tested} {} agree on a pose, which chance explains; {needed} are needed",
+        counted.name()
     )]
     ChanceConsensus {
         /// Inliers of the returned pose.
         inliers: usize,
-        /// Correspondences tried.
-        correspondences: usize,
+        /// How many they are of.
+        tested: usize,
         /// Inliers that would be accepted.
         needed: usize,
+        /// What was counted.
+        counted: Counted,
     },
     /// The pose is farther from the reference than the query can be.
     #[error(

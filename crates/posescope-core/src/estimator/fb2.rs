@@ -29,8 +29,8 @@ use crate::event::{
     PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    FeatureState, Features, Keypoint, Match, MatchVerdict, SiftFeatures, SiftParams, classify,
-    nearest_neighbours_interruptible, sift_interruptible,
+    FeatureState, Features, Keypoint, Match, MatchVerdict, SiftFeatures, SiftParams,
+    best_matches_interruptible, sift_interruptible,
 };
 use crate::geometry::Pose;
 use crate::image::Photo;
@@ -39,7 +39,9 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::{RenderParams, color_cloud_by};
-use crate::robust::{Acceptance, MlesacError, effective_area_px, inliers_beyond_chance, mlesac};
+use crate::robust::{
+    Acceptance, Counted, MlesacError, effective_area_px, inliers_beyond_chance, mlesac,
+};
 use crate::solver::{Correspondence, refine};
 use crate::trace::{Cancelled, Trace};
 
@@ -240,12 +242,11 @@ impl Guided {
     ) -> Result<Solved, Halt> {
         let decisions = trace.stage(Stage::Match, |trace| {
             let (query, reference) = (&detected.query, &detected.reference);
-            let mut checkpoint = || trace.checkpoint();
+            let checkpoint = || trace.checkpoint();
             let (query, reference) = (&query.descriptors, &reference.descriptors);
-            let forward = nearest_neighbours_interruptible(query, reference, &mut checkpoint)?;
-            let backward = nearest_neighbours_interruptible(reference, query, &mut checkpoint)?;
+            let ratio = self.params.ratio as f32;
             let decisions: Arc<[Option<Match>]> =
-                classify(&forward, &backward, self.params.ratio as f32).into();
+                best_matches_interruptible(query, reference, ratio, checkpoint)?.into();
             trace.emit(|| MatchesDecided {
                 decisions: Arc::clone(&decisions),
             })?;
@@ -523,7 +524,8 @@ impl Guided {
         let found = FoundConsensus {
             reference_from_query: solved.pose.inverse(),
             acceptance,
-            correspondences: solved.pairings.len(),
+            tested: solved.pairings.len(),
+            counted: Counted::Correspondences,
             is_enough: acceptance
                 .needed
                 .is_some_and(|needed| acceptance.inliers >= needed),

@@ -21,8 +21,8 @@ use crate::event::{
     PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams, classify,
-    nearest_neighbours_interruptible, remembered_interruptible,
+    Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams,
+    best_matches_interruptible, remembered_interruptible,
 };
 use crate::geometry::Pose;
 use crate::memo::{Exact, MemoId, Recalled, Remembered};
@@ -31,8 +31,8 @@ use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::{RenderParams, color_cloud_by};
 use crate::robust::{
-    Acceptance, AcceptanceRule, Consensus, MlesacError, MlesacParams, Places, Trial, mlesac,
-    places_beyond_chance,
+    Acceptance, AcceptanceRule, Consensus, Counted, MlesacError, MlesacParams, Places, Trial,
+    mlesac, places_beyond_chance,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
@@ -438,17 +438,26 @@ impl FeatureBased {
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
         let intrinsics = &problem.query.intrinsics;
-        let (acceptance, places) =
-            self.beyond_chance(correspondences, consensus, intrinsics, f64::NEG_INFINITY);
+        let beyond = self.beyond_chance(correspondences, consensus, intrinsics, f64::NEG_INFINITY);
         let found = FoundConsensus {
             reference_from_query: consensus.pose.inverse(),
-            acceptance,
-            correspondences: places,
-            is_enough: self.accepts(&acceptance),
+            acceptance: beyond.acceptance,
+            tested: beyond.tested,
+            counted: beyond.counted,
+            is_enough: self.accepts(&beyond.acceptance),
             slack: self.slack(),
         };
         found.judged(problem, trace)
     }
+}
+
+/// What speaks for a consensus.
+pub(super) struct BeyondChance {
+    pub(super) acceptance: Acceptance,
+    /// How many the inliers are of.
+    pub(super) tested: usize,
+    /// What was counted.
+    pub(super) counted: Counted,
 }
 
 /// The correspondences with one reference.
@@ -523,7 +532,7 @@ impl FeatureBased {
         }
     }
 
-    /// Whether the inliers of a consensus are more than chance gives, and of how many: pixels of the query
+    /// Whether the inliers of a consensus are more than chance gives: pixels of the query
     /// that are at one place count once where `fb.once` says so, and in any case those that are at most
     /// `least_reach_px` apart.
     pub(super) fn beyond_chance(
@@ -532,7 +541,7 @@ impl FeatureBased {
         consensus: &Consensus,
         intrinsics: &Intrinsics,
         least_reach_px: f64,
-    ) -> (Acceptance, usize) {
+    ) -> BeyondChance {
         let threshold_px = self.params.mlesac.inlier_threshold_px;
         // The paper's rule counts whatever there is.
         let is_once = self.params.once && self.params.accept == AcceptanceRule::Consensus;
@@ -545,7 +554,14 @@ impl FeatureBased {
         let area_px = intrinsics.area();
         // False matches gather where the texture is, so chance has less room than the whole image.
         let acceptance = places_beyond_chance(&consensus.inliers, &places, threshold_px, area_px);
-        (acceptance, places.count())
+        BeyondChance {
+            acceptance,
+            tested: places.count(),
+            counted: match reach_px >= 0.0 {
+                true => Counted::Places,
+                false => Counted::Correspondences,
+            },
+        }
     }
 
     /// Whether the rule accepts a verdict.
@@ -581,12 +597,11 @@ fn best_matches<E>(
     query: &Features,
     reference: &Features,
     params: &FeatureParams,
-    mut checkpoint: impl FnMut() -> Result<(), E>,
+    checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Arc<[Option<Match>]>, E> {
     let (query, reference) = (&query.descriptors, &reference.descriptors);
-    let forward = nearest_neighbours_interruptible(query, reference, &mut checkpoint)?;
-    let backward = nearest_neighbours_interruptible(reference, query, &mut checkpoint)?;
-    let mut matches = classify(&forward, &backward, params.ratio as f32);
+    let ratio = params.ratio as f32;
+    let mut matches = best_matches_interruptible(query, reference, ratio, checkpoint)?;
     if !params.unique {
         for found in matches.iter_mut().flatten() {
             if let MatchVerdict::NotUnique { .. } = found.verdict {

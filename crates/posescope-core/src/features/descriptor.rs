@@ -2,7 +2,10 @@
 
 use std::array;
 
-use super::integral::{IntegralImage, Span};
+use fearless_simd::{Level, dispatch};
+
+use super::boxes::{Spans, Strips, aligned, scattered};
+use super::integral::IntegralImage;
 use super::{Descriptor, Keypoint};
 
 /// Sub-regions along each side of the window.
@@ -33,11 +36,15 @@ const REGION_SIGMA: f32 = 1.5;
 /// on their epipolar lines, and 6 % more upright ones.
 const BOX_SIDE: f32 = 2.0;
 
-/// Gradients in the frame of a keypoint, row by row.
-type Gradients = [[[f32; 2]; SIDE]; SIDE];
+/// Sides of the square of boxes.
+const BOXES: usize = SIDE + 1;
+
+/// dx, |dx|, dy, |dy| in the frame of a keypoint, row by row.
+type Gradients = [[[f32; 4]; SIDE]; SIDE];
 
 /// Computes descriptors.
 pub(super) struct Describer {
+    level: Level,
     gradient_weights: [[f32; REGION_SIDE]; REGION_SIDE],
     region_weights: [[f32; REGIONS]; REGIONS],
 }
@@ -45,20 +52,38 @@ pub(super) struct Describer {
 impl Describer {
     pub(super) fn new() -> Self {
         Self {
+            level: Level::new(),
             gradient_weights: gaussian(GRADIENT_SIGMA),
             region_weights: gaussian(REGION_SIGMA),
         }
     }
 
     /// Describes the window of 24 σ × 24 σ about a keypoint, turned to its angle.
-    pub(super) fn describe(&self, integral: &IntegralImage, keypoint: &Keypoint) -> Descriptor {
-        let gradients = gradients(integral, keypoint);
+    pub(super) fn describe(
+        &self,
+        integral: &IntegralImage,
+        keypoint: &Keypoint,
+        strips: &mut Strips,
+    ) -> Descriptor {
+        dispatch!(self.level, _simd => self.described(integral, keypoint, strips))
+    }
+
+    #[inline(always)]
+    fn described(
+        &self,
+        integral: &IntegralImage,
+        keypoint: &Keypoint,
+        strips: &mut Strips,
+    ) -> Descriptor {
+        let gradients = gradients(integral, keypoint, strips);
         let mut descriptor = [0.0; 4 * REGIONS * REGIONS];
-        for (index, entries) in descriptor.chunks_exact_mut(4).enumerate() {
-            let (row, column) = (index / REGIONS, index % REGIONS);
-            let sums = self.region_sums(&gradients, REGION_STRIDE * column, REGION_STRIDE * row);
-            for (entry, sum) in entries.iter_mut().zip(sums) {
-                *entry = self.region_weights[row][column] * sum;
+        for (row, entries) in descriptor.chunks_exact_mut(4 * REGIONS).enumerate() {
+            let sums = self.sums_of_regions(&gradients, REGION_STRIDE * row);
+            let entries = entries.chunks_exact_mut(4).zip(sums);
+            for ((entries, sums), weight) in entries.zip(&self.region_weights[row]) {
+                for (entry, sum) in entries.iter_mut().zip(sums) {
+                    *entry = weight * sum;
+                }
             }
         }
         let norm = descriptor.iter().map(|v| v * v).sum::<f32>().sqrt();
@@ -68,18 +93,18 @@ impl Describer {
         descriptor
     }
 
-    /// Weighted Σdx, Σ|dx|, Σdy, Σ|dy| of the sub-region from gradient (`left`, `top`).
-    #[inline]
-    fn region_sums(&self, gradients: &Gradients, left: usize, top: usize) -> [f32; 4] {
-        let mut sums = [0.0; 4];
-        for (row, weights) in self.gradient_weights.iter().enumerate() {
-            let gradients = &gradients[top + row][left..][..REGION_SIDE];
-            for (weight, [dx, dy]) in weights.iter().zip(gradients) {
-                let (dx, dy) = (weight * dx, weight * dy);
-                sums[0] += dx;
-                sums[1] += dx.abs();
-                sums[2] += dy;
-                sums[3] += dy.abs();
+    /// Weighted Σdx, Σ|dx|, Σdy, Σ|dy| of the four sub-regions from row `top` on.
+    #[inline(always)]
+    fn sums_of_regions(&self, gradients: &Gradients, top: usize) -> [[f32; 4]; REGIONS] {
+        let mut sums = [[0.0; 4]; REGIONS];
+        for (gradients, weights) in gradients[top..].iter().zip(&self.gradient_weights) {
+            for (column, weight) in weights.iter().enumerate() {
+                for (region, sums) in sums.iter_mut().enumerate() {
+                    let gradient = &gradients[REGION_STRIDE * region + column];
+                    for (sum, value) in sums.iter_mut().zip(gradient) {
+                        *sum += weight * value;
+                    }
+                }
             }
         }
         sums
@@ -99,33 +124,60 @@ fn gaussian<const N: usize>(sigma: f32) -> [[f32; N]; N] {
 ///
 /// The paper responds to gradients along the image axes and turns those. Here the grid of
 /// boxes itself is turned, though not each box; every box serves four gradients.
-fn gradients(integral: &IntegralImage, keypoint: &Keypoint) -> Gradients {
-    let (width, height) = (integral.width(), integral.height());
-    let (sin, cos) = keypoint.angle.sin_cos();
-    let (step_x, step_y) = (keypoint.scale * cos, keypoint.scale * sin);
-    let side = BOX_SIDE * keypoint.scale;
-    let middle = 0.5 * SIDE as f32;
-    let mut boxes = [[0.0; SIDE + 1]; SIDE + 1];
-    for (row, boxes) in boxes.iter_mut().enumerate() {
-        let v = row as f32 - middle;
-        for (column, sum) in boxes.iter_mut().enumerate() {
-            let u = column as f32 - middle;
-            let x = keypoint.x + step_x * u - step_y * v;
-            let y = keypoint.y + step_y * u + step_x * v;
-            *sum = integral.area(Span::new(x, side, width), Span::new(y, side, height));
-        }
-    }
-    let mut gradients = [[[0.0; 2]; SIDE]; SIDE];
-    for (row, gradients) in gradients.iter_mut().enumerate() {
-        let (above, below) = (&boxes[row], &boxes[row + 1]);
+#[inline(always)]
+fn gradients(integral: &IntegralImage, keypoint: &Keypoint, strips: &mut Strips) -> Gradients {
+    let boxes = boxes(integral, keypoint, strips);
+    let mut gradients = [[[0.0; 4]; SIDE]; SIDE];
+    for (gradients, [above, below]) in gradients.iter_mut().zip(boxes.array_windows()) {
         for (column, gradient) in gradients.iter_mut().enumerate() {
             // The two diagonals of a square of boxes.
             let falling = below[column + 1] - above[column];
             let rising = above[column + 1] - below[column];
-            *gradient = [falling + rising, falling - rising];
+            let (dx, dy) = (falling + rising, falling - rising);
+            *gradient = [dx, dx.abs(), dy, dy.abs()];
         }
     }
     gradients
+}
+
+/// Sums over the boxes of the window.
+#[inline(always)]
+fn boxes(
+    integral: &IntegralImage,
+    keypoint: &Keypoint,
+    strips: &mut Strips,
+) -> [[f32; BOXES]; BOXES] {
+    let (width, height) = (integral.width(), integral.height());
+    let side = BOX_SIDE * keypoint.scale;
+    let middle = 0.5 * SIDE as f32;
+    // Plain loops: the closures of `map` would not be compiled for wide vectors.
+    let mut steps = [0.0; BOXES];
+    for (index, step) in steps.iter_mut().enumerate() {
+        *step = index as f32 - middle;
+    }
+    let (mut xs, mut ys) = ([0.0; BOXES], [0.0; BOXES]);
+    if keypoint.angle == 0.0 {
+        for (i, step) in steps.iter().enumerate() {
+            xs[i] = keypoint.x + keypoint.scale * step;
+            ys[i] = keypoint.y + keypoint.scale * step;
+        }
+        let columns = Spans::new(&xs, side, width);
+        let rows = Spans::new(&ys, side, height);
+        return aligned(integral, &columns, &rows, strips);
+    }
+    let (sin, cos) = keypoint.angle.sin_cos();
+    let (step_x, step_y) = (keypoint.scale * cos, keypoint.scale * sin);
+    let mut boxes = [[0.0; BOXES]; BOXES];
+    for (boxes, v) in boxes.iter_mut().zip(&steps) {
+        for (i, u) in steps.iter().enumerate() {
+            xs[i] = keypoint.x + step_x * u - step_y * v;
+            ys[i] = keypoint.y + step_y * u + step_x * v;
+        }
+        let columns = Spans::new(&xs, side, width);
+        let rows = Spans::new(&ys, side, height);
+        *boxes = scattered(integral, &columns, &rows);
+    }
+    boxes
 }
 
 #[cfg(test)]
@@ -149,7 +201,8 @@ mod tests {
     }
 
     fn describe(image: &GrayImage, keypoint: Keypoint) -> Descriptor {
-        Describer::new().describe(&IntegralImage::new(image), &keypoint)
+        let integral = IntegralImage::new(image);
+        Describer::new().describe(&integral, &keypoint, &mut Strips::default())
     }
 
     fn distance(a: &Descriptor, b: &Descriptor) -> f32 {

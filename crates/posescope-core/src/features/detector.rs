@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, dispatch};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -90,13 +91,17 @@ impl Neighbourhood<'_> {
             margin.div_ceil(layer.step) + self.reach..(last + 1).saturating_sub(self.reach)
         };
         let columns = inside(integral.width());
+        let level = Level::new();
         inside(integral.height())
             .into_par_iter()
             .flat_map_iter(|row| {
-                let strong = move |&column: &usize| layer.at(column, row) > threshold;
+                let peaks = dispatch!(
+                    level,
+                    _simd => peaks([row - 1, row, row + 1].map(|row| layer.row(row)), threshold)
+                );
                 columns
                     .clone()
-                    .filter(strong)
+                    .filter(move |&column| peaks[column])
                     .filter(move |&column| self.is_maximum(column, row))
                     .filter_map(move |column| self.localise(integral, column, row))
             })
@@ -168,6 +173,26 @@ impl Neighbourhood<'_> {
             laplacian_positive: layer.filter.laplacian(integral, x, y) > 0,
         })
     }
+}
+
+/// Which samples of the middle one of three rows exceed a threshold and their neighbours right, left,
+/// above and below, of equal ones the first: few others are left to be compared with all around them.
+#[inline(always)]
+fn peaks([above, row, below]: [&[f32]; 3], threshold: f32) -> Vec<bool> {
+    let count = row.len();
+    let mut peaks = vec![false; count];
+    let inner = count.saturating_sub(2);
+    let (above, below) = (&above[1..][..inner], &below[1..][..inner]);
+    let (left, middle, right) = (&row[..inner], &row[1..][..inner], &row[2..][..inner]);
+    for (i, peak) in peaks[1..][..inner].iter_mut().enumerate() {
+        let value = middle[i];
+        *peak = (value > threshold)
+            & (value > above[i])
+            & (value > left[i])
+            & (value >= right[i])
+            & (value >= below[i]);
+    }
+    peaks
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Responses of the box-filter Hessian (sections 3.2 and 3.3).
 
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::integral::IntegralImage;
@@ -68,6 +69,7 @@ impl BoxFilter {
     }
 
     /// The determinants of the Hessians along row `y`, from the first pixel where the filter fits.
+    #[inline(always)]
     fn determinants(
         &self,
         integral: &IntegralImage,
@@ -83,26 +85,25 @@ impl BoxFilter {
         let [dxx, dyy, dxy] = buffers.resized(count);
 
         let (length, middle, whole) = (self.half_length, self.lobe / 2, self.margin());
-        let edges = [y - length, y + length + 1].map(|row| {
+        let edges = |row: usize| {
             let (left, right) = (before(row, middle), after(row, middle));
             [before(row, whole), left, right, after(row, whole)]
-        });
-        second_difference(edges, dxx);
+        };
+        second_difference([edges(y - length), edges(y + length + 1)], dxx);
 
-        let rows = [y - whole, y - middle, y + middle + 1, y + whole + 1];
-        let edges = [
-            rows.map(|row| before(row, length)),
-            rows.map(|row| after(row, length)),
-        ];
-        second_difference(edges, dyy);
+        let [top, upper, lower, bottom] = [y - whole, y - middle, y + middle + 1, y + whole + 1];
+        let left = [top, upper, lower, bottom].map(|row| before(row, length));
+        let right = [top, upper, lower, bottom].map(|row| after(row, length));
+        second_difference([left, right], dyy);
 
         let (near, far) = (self.half_gap, self.half_gap + self.lobe);
-        let rows = [y - far, y - near, y + near + 1, y + far + 1];
-        let edges = rows.map(|row| {
+        let edges = |row: usize| {
             let (left, right) = (before(row, near), after(row, near));
             [before(row, far), left, right, after(row, far)]
-        });
-        mixed_difference(edges, dxy);
+        };
+        mixed_difference([edges(y - far), edges(y - near)], dxy, |_, upper| upper);
+        let edges = [edges(y + far + 1), edges(y + near + 1)];
+        mixed_difference(edges, dxy, i32::wrapping_add);
 
         // On the images x²/2 and xy, whose derivatives are 1, the sums are lobe² times the numbers
         // divided by: what remains is normalised for scale.
@@ -110,6 +111,7 @@ impl BoxFilter {
         let second = 1.0 / lobe_area as f32;
         let centre_distance = self.lobe + 2 * self.half_gap + 1;
         let mixed = MIXED_WEIGHT / (centre_distance * centre_distance) as f32;
+        let (dxx, dyy, dxy) = (&dxx[..count], &dyy[..count], &dxy[..count]);
         for (i, determinant) in determinants.iter_mut().enumerate() {
             let (xx, yy) = (second * dxx[i] as f32, second * dyy[i] as f32);
             let xy = mixed * dxy[i] as f32;
@@ -135,6 +137,7 @@ impl Buffers {
 
 /// Sums over three boxes side by side, weighted 1, −2, 1: the four edges of the boxes in two rows
 /// of the integral image, or in two columns.
+#[inline(always)]
 fn second_difference(edges: [[&[u32]; 4]; 2], sums: &mut [i32]) {
     let count = sums.len();
     let [[a0, a1, a2, a3], [b0, b1, b2, b3]] = edges;
@@ -153,19 +156,24 @@ fn second_difference(edges: [[&[u32]; 4]; 2], sums: &mut [i32]) {
     }
 }
 
-/// Sums over the upper left and lower right of four boxes, less those over the other two: the four
-/// edges of the boxes in four rows of the integral image.
-fn mixed_difference(edges: [[&[u32]; 4]; 4], sums: &mut [i32]) {
+/// Right one less left one of two boxes side by side, whose four edges are given in their outer and
+/// their inner row of the integral image, joined with what is there.
+#[inline(always)]
+fn mixed_difference(
+    [outer, inner]: [[&[u32]; 4]; 2],
+    sums: &mut [i32],
+    join: impl Fn(i32, i32) -> i32,
+) {
     let count = sums.len();
-    sums.fill(0);
-    for ([e0, e1, e2, e3], sign) in edges.into_iter().zip([1, -1, -1, 1]) {
-        let (e0, e1, e2, e3) = (&e0[..count], &e1[..count], &e2[..count], &e3[..count]);
-        for i in 0..count {
-            let left = e1[i].wrapping_sub(e0[i]);
-            let right = e3[i].wrapping_sub(e2[i]);
-            let difference = right.wrapping_sub(left) as i32;
-            sums[i] = sums[i].wrapping_add(difference.wrapping_mul(sign));
-        }
+    let [o0, o1, o2, o3] = outer.map(|edge| &edge[..count]);
+    let [i0, i1, i2, i3] = inner.map(|edge| &edge[..count]);
+    for i in 0..count {
+        let difference = |e0: &[u32], e1: &[u32], e2: &[u32], e3: &[u32]| {
+            let (left, right) = (e1[i].wrapping_sub(e0[i]), e3[i].wrapping_sub(e2[i]));
+            right.wrapping_sub(left)
+        };
+        let (outer, inner) = (difference(o0, o1, o2, o3), difference(i0, i1, i2, i3));
+        sums[i] = join(sums[i], outer.wrapping_sub(inner) as i32);
     }
 }
 
@@ -193,6 +201,7 @@ impl Layer {
         } else {
             0..0
         };
+        let level = Level::new();
         responses
             .par_chunks_exact_mut(columns)
             .enumerate()
@@ -202,7 +211,10 @@ impl Layer {
                 || (Buffers::default(), vec![0.0; dense_count]),
                 |(buffers, dense), (y, samples)| {
                     // Every pixel of the row, even if few are kept: vectors make up for it.
-                    filter.determinants(integral, y, buffers, dense);
+                    dispatch!(
+                        level,
+                        _simd => filter.determinants(integral, y, buffers, dense)
+                    );
                     let kept = dense.iter().skip(first - margin).step_by(step);
                     for (sample, &determinant) in samples[first / step..].iter_mut().zip(kept) {
                         *sample = determinant;
@@ -229,6 +241,11 @@ impl Layer {
                 .flat_map(|row| row.iter().step_by(stride).copied())
                 .collect(),
         }
+    }
+
+    /// The determinants along a row of samples.
+    pub(super) fn row(&self, row: usize) -> &[f32] {
+        &self.responses[row * self.columns..][..self.columns]
     }
 
     /// The determinant of the Hessian at a sample.

@@ -46,6 +46,7 @@ impl IntegralImage {
     }
 
     /// Row `y` of the table, `width + 1` sums, for `y` from 0 to `height`.
+    #[inline(always)]
     pub(super) fn row(&self, y: usize) -> &[u32] {
         let stride = self.width + 1;
         &self.sums[y * stride..][..stride]
@@ -63,7 +64,7 @@ impl IntegralImage {
     ///
     /// Gradients are taken on boxes with sides of 1.2 px upwards. Rounded to whole pixels, they
     /// would differ from each other by up to a factor of two in area.
-    #[inline]
+    #[inline(always)]
     pub(super) fn area(&self, columns: Span, rows: Span) -> f32 {
         let upper = self.corners(columns, rows.first);
         let upper_inner = self.corners(columns, rows.first + 1);
@@ -77,7 +78,7 @@ impl IntegralImage {
     }
 
     /// The four entries of one row of the table at the edges of the cut and the whole pixels.
-    #[inline]
+    #[inline(always)]
     fn corners(&self, columns: Span, row: usize) -> [u32; 4] {
         let row = row * (self.width + 1);
         let first = &self.sums[row + columns.first..][..2];
@@ -87,7 +88,7 @@ impl IntegralImage {
 }
 
 /// Sums over the three boxes between two rows of four corners each.
-#[inline]
+#[inline(always)]
 fn cells(above: [u32; 4], below: [u32; 4]) -> [f32; 3] {
     let strip = [
         below[0].wrapping_sub(above[0]),
@@ -106,12 +107,14 @@ fn cells(above: [u32; 4], below: [u32; 4]) -> [f32; 3] {
 /// The extent of a box along one axis: a cut pixel, whole pixels, another cut pixel.
 #[derive(Clone, Copy)]
 pub(super) struct Span {
-    /// The first pixel, and its share inside.
-    first: usize,
-    head: f32,
-    /// The last pixel, and its share inside.
-    last: usize,
-    tail: f32,
+    /// The first pixel.
+    pub(super) first: usize,
+    /// Its share inside.
+    pub(super) head: f32,
+    /// The last pixel.
+    pub(super) last: usize,
+    /// Its share inside.
+    pub(super) tail: f32,
 }
 
 impl Span {
@@ -121,7 +124,7 @@ impl Span {
     /// A span that would leave the image is moved back to its border: the image goes on as its
     /// outermost pixels, without the edge that a black frame would add. `side` must not exceed
     /// `extent`.
-    #[inline]
+    #[cfg(test)]
     pub(super) fn new(centre: f32, side: f32, extent: usize) -> Self {
         // Pixel centres are integers, so the image starts half a pixel before 0.
         let room = (extent as f32 - side).max(0.0);

@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use image::GrayImage;
 use rayon::prelude::*;
 
+use super::boxes::Strips;
 use super::descriptor::Describer;
 use super::detector::detect;
 use super::integral::IntegralImage;
@@ -63,7 +64,9 @@ pub fn surf_interruptible<E>(
             checkpoint()?;
             keypoints
                 .par_iter_mut()
-                .for_each(|keypoint| keypoint.angle = estimator.angle(&integral, keypoint));
+                .for_each_init(Strips::default, |strips, keypoint| {
+                    keypoint.angle = estimator.angle(&integral, keypoint, strips);
+                });
         }
     }
     let describer = Describer::new();
@@ -72,7 +75,9 @@ pub fn surf_interruptible<E>(
         checkpoint()?;
         let described = keypoints
             .par_iter()
-            .map(|keypoint| describer.describe(&integral, keypoint));
+            .map_init(Strips::default, |strips, keypoint| {
+                describer.describe(&integral, keypoint, strips)
+            });
         descriptors.par_extend(described);
     }
     Ok(Features {
@@ -118,6 +123,8 @@ mod tests {
         let few = surf(&scene(), &params);
         assert_eq!(few.keypoints, all.keypoints[..7]);
         assert_eq!(few.descriptors, all.descriptors[..7]);
+        assert_eq!(few, all.strongest(7));
+        assert_eq!(all.strongest(1_000_000), all);
     }
 
     #[test]

@@ -26,7 +26,8 @@ pub struct Chooser<'a> {
 
 impl Chooser<'_> {
     /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
-    /// that it must not be one; the query itself never is. `observer` hears nothing, but can stop it.
+    /// that it must not be one; the query itself never is. `observer` hears how far it is, and
+    /// can stop it.
     ///
     /// # Errors
     /// [`ChoiceError`].
@@ -91,8 +92,11 @@ impl Chooser<'_> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let count = self.selection.count();
         let depth = ReferenceRanking::depth(count);
+        let mut looked_at = 0;
         let frames: Vec<RankedReference> = by
             .rank(&*queries.query(query)?, candidates, depth, &mut || {
+                looked_at += 1;
+                observer.choosing(looked_at, candidates.len());
                 checkpoint(observer)
             })?
             .into_iter()

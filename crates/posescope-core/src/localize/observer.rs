@@ -17,6 +17,12 @@ pub trait LocalizeObserver: Sink {
         let _ = (index, problems, truth);
     }
 
+    /// References of a query are being chosen by their looks: so many of so many candidates were looked at, or
+    /// are now.
+    fn choosing(&mut self, looked_at: usize, candidates: usize) {
+        let _ = (looked_at, candidates);
+    }
+
     /// How the references were ranked is going to be told.
     fn begin_retrieval(&mut self) {}
 

@@ -8,6 +8,7 @@ use nalgebra::Point3;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
@@ -213,6 +214,9 @@ pub enum ChoiceError {
     Cancelled(#[from] Cancelled),
 }
 
+/// Photos that are looked at between two looks at whether to stop.
+const AT_ONCE: usize = 8;
+
 /// Ranks by exhaustive matching of features.
 pub struct ByMatches<'a> {
     /// The references' scene. Features are kept with its frames where these are remembered.
@@ -236,15 +240,21 @@ impl Ranking for ByMatches<'_> {
         let surf = &self.params.surf;
         let of_query = remembered(&query.photo.gray, &query.memo, surf).value;
         let mut ranked = Vec::new();
-        for &candidate in candidates {
-            checkpoint()?;
-            // Neither its pose nor its cloud is needed.
+        // Neither their poses nor their clouds are needed.
+        let matches = |&candidate: &usize| -> Result<(usize, usize), SceneError> {
             let frame = self.scene.query(candidate)?;
             let features = remembered(&frame.photo.gray, &frame.memo, surf).value;
-            ranked.push((
-                count_matches(&of_query, &features, &self.params.fb),
-                candidate,
-            ));
+            let count = count_matches(&of_query, &features, &self.params.fb);
+            Ok((count, candidate))
+        };
+        for together in candidates.chunks(AT_ONCE) {
+            for _ in together {
+                checkpoint()?;
+            }
+            let looked_at: Vec<_> = together.par_iter().map(matches).collect();
+            for one in looked_at {
+                ranked.push(one?);
+            }
         }
         ranked.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         ranked.truncate(count);

@@ -51,6 +51,11 @@ const PLACE_BITS: u32 = 24;
 /// Drawings after which the slots are cleared.
 const MOST_DRAWINGS: u32 = 1 << (u32::BITS - PLACE_BITS);
 
+/// The bits above which a pixel's row stands, and its column below.
+const ROW_BITS: u32 = 16;
+/// More columns or rows than any image has that is drawn on in squares.
+const MOST_ROWS: usize = (1 << ROW_BITS) - 1;
+
 /// Draws points for one hypothesis after the other, and keeps what query and synthetic view show where
 /// both exist.
 ///
@@ -71,7 +76,8 @@ pub struct Canvas<T> {
 /// Where the points fall.
 #[derive(Default)]
 struct Projected {
-    /// Row-major position of the nearest pixel, or one that no image has.
+    /// Position of the nearest pixel, or one that no image has: row-major where a point covers its own
+    /// pixel alone, and otherwise the row in the upper bits and the column in the lower.
     pixels: Vec<u32>,
     /// Depths \[m\].
     depths: Vec<f32>,
@@ -96,10 +102,12 @@ pub struct Values<'a, T> {
 
 impl<T: Copy + Default> Canvas<T> {
     /// An empty canvas for a camera; each point covers a square of `splat_px` (odd) pixels. `None` for
-    /// an image of more pixels than it can tell apart, 16 million.
+    /// an image of more pixels than it can tell apart, 16 million, or 65,000 in a row.
     pub fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
-        let pixels = intrinsics.width as usize * intrinsics.height as usize;
-        (pixels <= 1 << PLACE_BITS).then(|| Self {
+        let [width, height] = [intrinsics.width, intrinsics.height].map(|side| side as usize);
+        let pixels = width * height;
+        let longest = width.max(height) + splat_px;
+        (pixels <= 1 << PLACE_BITS && longest < MOST_ROWS).then(|| Self {
             level: Level::new(),
             intrinsics: *intrinsics,
             reach: (splat_px / 2) as i32,
@@ -135,11 +143,16 @@ impl<T: Copy + Default> Canvas<T> {
         } = self;
         let (level, reach) = (*level, self.reach);
         let projection = Projection::new(&self.intrinsics, reach, camera_from_points);
+        let projection = match reach {
+            0 => projection,
+            _ => projection.with_stride(1 << ROW_BITS),
+        };
         dispatch!(level, simd => projected.project(simd, points, &projection));
-        if reach == 0 {
-            self.draw_points(values);
-        } else {
-            self.draw_squares(values);
+        match reach {
+            0 => self.draw_points(values),
+            1 => self.draw_squares::<3>(values),
+            2 => self.draw_squares::<5>(values),
+            _ => self.draw_squares::<0>(values),
         }
         &self.covered.pairs[..self.covered.count]
     }
@@ -162,26 +175,41 @@ impl<T: Copy + Default> Canvas<T> {
         }
     }
 
-    fn draw_squares(&mut self, values: Values<'_, T>) {
+    /// Draws squares of `SIDE` pixels, or 0 for such as the canvas was made for.
+    fn draw_squares<const SIDE: usize>(&mut self, values: Values<'_, T>) {
         let first_slot = self.drawing << PLACE_BITS;
         let reach = self.reach;
         let [width, height] =
             [self.intrinsics.width, self.intrinsics.height].map(|side| side as i32);
-        // A point may be outside the image by as much as it reaches.
-        let wide = width + 2 * reach;
+        let slots = self.slots.as_mut_slice();
+        let query = &values.query[..slots.len()];
         let Projected { pixels, depths } = &self.projected;
         for ((&pixel, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             if pixel == Eight::OUT_OF_VIEW {
                 continue;
             }
-            let column = pixel as i32 % wide - reach;
-            let row = pixel as i32 / wide - reach;
-            let columns = (column - reach).max(0)..(column + reach + 1).min(width);
-            for row in (row - reach).max(0)..(row + reach + 1).min(height) {
+            // A point may be outside the image by as much as it reaches.
+            let left = (pixel & (MOST_ROWS as u32)) as i32 - 2 * reach;
+            let top = (pixel >> ROW_BITS) as i32 - 2 * reach;
+            let side = 2 * reach + 1;
+            if SIDE > 0 && left >= 0 && top >= 0 && left + side <= width && top + side <= height {
+                let mut begin = (top * width + left) as usize;
+                for _ in 0..SIDE {
+                    let slots = &mut slots[begin..][..SIDE];
+                    for (slot, &query) in slots.iter_mut().zip(&query[begin..][..SIDE]) {
+                        self.covered
+                            .put(slot, first_slot, depth, Pair { query, synthetic });
+                    }
+                    begin += width as usize;
+                }
+                continue;
+            }
+            let columns = left.max(0)..(left + side).min(width);
+            for row in top.max(0)..(top + side).min(height) {
                 let begin = (row * width + columns.start) as usize;
                 let pixels = begin..begin + columns.len();
-                let slots = self.slots[pixels.clone()].iter_mut();
-                for (slot, &query) in slots.zip(&values.query[pixels]) {
+                let slots = slots[pixels.clone()].iter_mut();
+                for (slot, &query) in slots.zip(&query[pixels]) {
                     self.covered
                         .put(slot, first_slot, depth, Pair { query, synthetic });
                 }

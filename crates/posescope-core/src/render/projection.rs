@@ -9,19 +9,25 @@ use crate::geometry::Pose;
 /// Nearer points are not seen \[m\].
 const NEAREST_M: f32 = 0.1;
 
+/// A projection of single precision: for a point p, `row · (p, 1)` is column times depth, row times depth,
+/// and depth \[px·m, px·m, m\].
+pub type ProjectionRows = [[f32; 4]; 3];
+
 /// Pose and intrinsics in single precision: half the memory traffic of the inner loop, and exact to
 /// 1/1000 px at the ranges of a scanner.
 pub(super) struct Projection {
-    rows: [[f32; 4]; 3],
+    rows: ProjectionRows,
     width: u32,
     height: u32,
     reach: i32,
+    /// From one row to the next in the positions of pixels.
+    stride: i32,
 }
 
 /// Eight points in a camera.
 pub(super) struct Eight {
-    /// Row-major position of the nearest pixel in the image that is larger by the reach on each side,
-    /// or [`Self::OUT_OF_VIEW`].
+    /// Position of the nearest pixel in the image that is larger by the reach on each side, or
+    /// [`Self::OUT_OF_VIEW`]: the row times the stride, and the column.
     pub pixels: [u32; 8],
     /// Depth \[m\].
     pub depths: [f32; 8],
@@ -49,7 +55,19 @@ impl Projection {
             width: intrinsics.width,
             height: intrinsics.height,
             reach,
+            stride: intrinsics.width as i32 + 2 * reach,
         }
+    }
+
+    /// What a device projects by.
+    pub fn rows(&self) -> ProjectionRows {
+        self.rows
+    }
+
+    /// The same projection with other positions of pixels.
+    pub fn with_stride(self, stride: u32) -> Self {
+        let stride = stride as i32;
+        Self { stride, ..self }
     }
 
     /// Column and row of the nearest pixel, in the image or not, and depth \[m\]; `None` behind the
@@ -88,8 +106,7 @@ impl Projection {
             & column.simd_lt(self.width as f32 + reach)
             & row.simd_lt(self.height as f32 + reach);
         let [column, row] = [simd.cvt_i32_f32x8(column), simd.cvt_i32_f32x8(row)];
-        let wide = self.width as i32 + 2 * self.reach;
-        let pixels = (row + self.reach) * wide + (column + self.reach);
+        let pixels = (row + self.reach) * self.stride + (column + self.reach);
         let pixels = simd.reinterpret_u32_i32x8(pixels);
         let out_of_view = u32x8::splat(simd, Eight::OUT_OF_VIEW);
         Eight {

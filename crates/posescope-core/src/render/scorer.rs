@@ -1,15 +1,19 @@
 //! Scoring many hypotheses of the direct methods at once.
 
+mod on_device;
+
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
+use super::device::device_in_use;
 use super::worker::{Prepared, Worker};
 use super::{ColoredPoint, Rasterizer, Score, SplattedPixel, SyntheticView};
 use crate::camera::Intrinsics;
 use crate::cost::{Cost, Explanation, IntensityPair};
 use crate::geometry::Pose;
 use crate::image::FloatImage;
+use on_device::OnDevice;
 
 /// A synthetic view beside the query, and what the cost makes of the two.
 #[derive(Clone, Debug)]
@@ -42,6 +46,8 @@ pub struct Scorer<'a> {
     splat_px: usize,
     cost: &'a dyn Cost,
     prepared: OnceLock<Arc<Prepared>>,
+    /// What scores many hypotheses instead of the threads.
+    on_device: OnDevice,
     /// Those that no thread works with at present.
     idle: Mutex<Vec<Worker<'a>>>,
 }
@@ -63,6 +69,7 @@ impl<'a> Scorer<'a> {
             splat_px,
             cost,
             prepared: OnceLock::new(),
+            on_device: OnDevice::new(device_in_use()),
             idle: Mutex::default(),
         }
     }
@@ -77,6 +84,7 @@ impl<'a> Scorer<'a> {
             splat_px: self.splat_px,
             cost: self.cost,
             prepared: self.prepared.clone(),
+            on_device: self.on_device.unused(),
             idle: Mutex::default(),
         }
     }
@@ -87,8 +95,15 @@ impl<'a> Scorer<'a> {
         (PER_THREAD * rayon::current_num_threads()).min(MOST_AT_A_TIME)
     }
 
-    /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
+    /// The scores of many cameras `reference_from_camera`, in their order, on the device where there is
+    /// one, or else on all threads.
     pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+        let scored = self.score_on_device(reference_from_camera);
+        scored.unwrap_or_else(|| self.score_on_threads(reference_from_camera))
+    }
+
+    /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
+    pub(crate) fn score_on_threads(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
         let prepared = self
             .prepared
             .get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)));

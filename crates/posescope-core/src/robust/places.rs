@@ -2,6 +2,25 @@
 
 use nalgebra::Point2;
 
+/// What is counted where a consensus is held against chance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Counted {
+    /// Every correspondence.
+    Correspondences,
+    /// Places in the query photo, whatever the number of correspondences at each.
+    Places,
+}
+
+impl Counted {
+    /// The word for many of them.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Correspondences => "correspondences",
+            Self::Places => "places",
+        }
+    }
+}
+
 /// The places in the query photo that correspondences are of.
 ///
 /// A detector finds one corner at several scales, and several references may match one keypoint. Such

@@ -2,12 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
-
 use super::{Scene, SceneError, fingerprint};
-use crate::camera::Intrinsics;
-use crate::cloud::Cloud;
-use crate::geometry::Pose;
 use crate::image::{Degradation, Photo};
 
 /// The photos of a scene, degraded; poses, clouds and names are the scene's own. What is degraded are
@@ -43,6 +38,8 @@ impl DegradedScene {
 }
 
 impl Scene for DegradedScene {
+    crate::inner_scene!(scene: name, frames, intrinsics, pose, position, time_s, has_cloud, cloud);
+
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let photo = self.scene.photo(frame)?;
         Ok((self.degradation).of(&photo, self.seed, &self.frames()[frame]))
@@ -60,37 +57,5 @@ impl Scene for DegradedScene {
             self.seed
         );
         fingerprint(self.scene.as_ref(), more.as_bytes())
-    }
-
-    fn name(&self) -> &str {
-        self.scene.name()
-    }
-
-    fn frames(&self) -> &[String] {
-        self.scene.frames()
-    }
-
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.scene.intrinsics(frame)
-    }
-
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.scene.pose(frame)
-    }
-
-    fn position(&self, frame: usize) -> Option<Point3<f64>> {
-        self.scene.position(frame)
-    }
-
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(frame)
-    }
-
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.scene.has_cloud(frame)
-    }
-
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.scene.cloud(frame)
     }
 }

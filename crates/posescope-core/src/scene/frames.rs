@@ -3,13 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use nalgebra::Point3;
-
-use super::{DegradedScene, Scene, SceneError, pose_of, reference_of};
-use crate::camera::Intrinsics;
-use crate::cloud::Cloud;
-use crate::geometry::Pose;
-use crate::image::Photo;
+use super::{Scene, SceneError, pose_of, reference_of};
 use crate::memo::Memo;
 use crate::problem::{Query, ReferenceTuple};
 use crate::recent::{Limit, Recent};
@@ -172,6 +166,8 @@ impl<'a> CachedScene<'a> {
 }
 
 impl Scene for CachedScene<'_> {
+    crate::inner_scene!(scene: name, frames, intrinsics, pose, position, time_s, has_cloud, photo, cloud, as_degraded, fingerprint);
+
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::clone(&self.frame(frame)?.query))
     }
@@ -184,49 +180,5 @@ impl Scene for CachedScene<'_> {
         }
         let made = reference_of(self, frame, world_from_camera, &known.query)?;
         Ok(Arc::clone(known.reference.get_or_init(|| made)))
-    }
-
-    fn name(&self) -> &str {
-        self.scene.name()
-    }
-
-    fn frames(&self) -> &[String] {
-        self.scene.frames()
-    }
-
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.scene.intrinsics(frame)
-    }
-
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        self.scene.pose(frame)
-    }
-
-    fn position(&self, frame: usize) -> Option<Point3<f64>> {
-        self.scene.position(frame)
-    }
-
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(frame)
-    }
-
-    fn has_cloud(&self, frame: usize) -> bool {
-        self.scene.has_cloud(frame)
-    }
-
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        self.scene.photo(frame)
-    }
-
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        self.scene.cloud(frame)
-    }
-
-    fn as_degraded(&self) -> Option<&DegradedScene> {
-        self.scene.as_degraded()
-    }
-
-    fn fingerprint(&self) -> u64 {
-        self.scene.fingerprint()
     }
 }

@@ -92,11 +92,7 @@ pub(super) fn ui(
         }
     }
     let words = pointed_at.as_ref().map(|at| at.words.as_str());
-    readout.say(
-        ui,
-        words,
-        "Point at a bin; bright: many pairs (logarithmic)",
-    );
+    readout.say(ui, words, "Point at a bin (bright: many)");
     numbers(ui, context, method, shown, histogram);
 }
 
@@ -271,7 +267,7 @@ fn numbers(
     ui.separator();
     ui.label(
         egui::RichText::new(method.label())
-            .color(theme::method(method))
+            .color(theme::text(ui.visuals(), theme::method(method)))
             .strong(),
     );
     let quality = similarity.map(|similarity| (similarity.name, quality));

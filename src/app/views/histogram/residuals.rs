@@ -75,7 +75,11 @@ pub(super) fn ui(
         ));
     }
     ui.separator();
-    ui.label(egui::RichText::new(method.label()).color(counted).strong());
+    ui.label(
+        egui::RichText::new(method.label())
+            .color(theme::text(ui.visuals(), counted))
+            .strong(),
+    );
     comparison(ui, context, method, shown.score.cost, None);
 }
 

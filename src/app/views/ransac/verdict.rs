@@ -9,7 +9,7 @@ use crate::depth::LiftedMatch;
 use crate::event::{ConsensusJudged, DepthsLifted, FeaturesDetected, PoseRefined, Side};
 use crate::geometry::Pose;
 use crate::localize::Status;
-use crate::robust::{AcceptanceRule, Hypothesis, Trial};
+use crate::robust::{AcceptanceRule, Counted, Hypothesis, Trial};
 use crate::session::Span;
 
 /// Draws what is known at the end of the records that are shown.
@@ -187,25 +187,30 @@ fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &Cons
     ui.label(RichText::new(verdict).strong());
     let ConsensusJudged {
         acceptance,
+        counted,
         distance_m,
         ..
     } = judged;
     let params = &context.run.params.fb;
     let compared = |is_met| if is_met { "≥" } else { "<" };
     let inliers = acceptance.inliers;
+    let agreeing = match counted {
+        Counted::Correspondences => "inliers",
+        Counted::Places => "places of inliers",
+    };
     let is_met = params.accept.accepts(acceptance);
     ui.label(match (params.accept, acceptance.needed) {
         (AcceptanceRule::Consensus, Some(needed)) => format!(
-            "{inliers} inliers {} {needed} needed to be more than chance (false alarms expected: \
+            "{inliers} {agreeing} {} {needed} needed to be more than chance (false alarms expected: \
              10^{:.1})",
             compared(is_met),
             acceptance.log10_nfa
         ),
         (AcceptanceRule::Consensus, None) => {
-            format!("{inliers} inliers; so few correspondences are never more than chance")
+            format!("{inliers} {agreeing}; so few matches are never more than chance")
         }
         (AcceptanceRule::Paper, _) => {
-            format!("{inliers} inliers {} 4, the paper's rule", compared(is_met))
+            format!("{inliers} {agreeing} {} 4, the paper's rule", compared(is_met))
         }
     });
     let Some(problem) = context

@@ -2,13 +2,14 @@
 
 use egui::text::LayoutJob;
 use egui::{
-    Align2, Color32, CornerRadius, FontId, Pos2, Rect, Role, Sense, Stroke, TextFormat, Ui, Vec2,
+    Align2, Color32, CornerRadius, Pos2, Rect, Role, Sense, Stroke, TextFormat, Ui, Vec2,
     WidgetInfo, vec2,
 };
 
 use super::cameras::{CameraKind, SceneCamera};
 use super::ground::GridLabel;
 use super::view_camera::ViewCamera;
+use crate::app::theme;
 
 /// Labels of cameras, none over another; a click on one answers with its camera.
 pub(super) fn cameras(
@@ -71,10 +72,11 @@ pub(super) fn cameras(
 }
 
 fn name(ui: &Ui, camera: &SceneCamera) -> LayoutJob {
-    let format = |color| TextFormat::simple(FontId::proportional(12.0), color);
+    let format = |color| TextFormat::simple(theme::label(), color);
     let mut job = LayoutJob::default();
     let shape = camera.kind.shape();
-    job.append(shape, 0.0, format(camera.kind.color()));
+    let own = theme::text(ui.visuals(), camera.kind.color());
+    job.append(shape, 0.0, format(own));
     let color = ui.visuals().strong_text_color();
     job.append(&camera.kind.name(), 4.0, format(color));
     job
@@ -96,7 +98,7 @@ pub(super) fn marks(ui: &Ui, pane: Rect, view_camera: &ViewCamera, marks: &[Grid
         };
         let at = at + pane.min.to_vec2();
         let color = ui.visuals().text_color();
-        let font = FontId::proportional(11.0);
+        let font = theme::caption();
         let galley = painter.layout_no_wrap(mark.text.clone(), font, color);
         let place = Rect::from_min_size(at + vec2(3.0, 1.0), galley.size());
         if pane.contains_rect(place) && !taken.iter().any(|other| other.intersects(place)) {
@@ -120,7 +122,7 @@ pub(super) fn legend(ui: &Ui, pane: Rect, bars: &[Bar], words: &[(String, Color3
     const BAR: Vec2 = vec2(90.0, 8.0);
     let painter = ui.painter_at(pane);
     let text = ui.visuals().text_color();
-    let font = FontId::proportional(11.0);
+    let font = theme::caption();
     let line = 15.0;
     let mut bottom = pane.left_bottom() + vec2(8.0, -6.0);
     let written = |at: Pos2, words: &str, color: Color32| {
@@ -132,7 +134,7 @@ pub(super) fn legend(ui: &Ui, pane: Rect, bars: &[Bar], words: &[(String, Color3
         place.right()
     };
     for (words, color) in words.iter().rev() {
-        written(bottom, words, *color);
+        written(bottom, words, theme::text(ui.visuals(), *color));
         bottom.y -= line;
     }
     for bar in bars.iter().rev() {
@@ -156,12 +158,7 @@ pub(super) fn legend(ui: &Ui, pane: Rect, bars: &[Bar], words: &[(String, Color3
 pub(super) fn headline(ui: &Ui, pane: Rect, words: &str) {
     let painter = ui.painter_at(pane);
     let color = ui.visuals().strong_text_color();
-    let galley = painter.layout(
-        words.to_owned(),
-        FontId::proportional(12.0),
-        color,
-        pane.width() - 16.0,
-    );
+    let galley = painter.layout(words.to_owned(), theme::label(), color, pane.width() - 16.0);
     let place = Rect::from_min_size(pane.min + vec2(8.0, 6.0), galley.size());
     let ground = ui.visuals().extreme_bg_color.gamma_multiply(0.6);
     painter.rect_filled(place.expand(2.0), CornerRadius::same(2), ground);

@@ -1,6 +1,6 @@
 //! The frame that the scene is drawn in, and where things are in it.
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Point2, Point3, Unit, Vector3};
 
 use crate::app::ViewContext;
 use crate::geometry::Pose;
@@ -43,6 +43,43 @@ impl SceneGeometry {
     /// A place on the ground, raised by some metres.
     pub(super) fn on_ground(&self, right_m: f64, forward_m: f64, above_m: f64) -> Point3<f64> {
         self.scene_from_reference * Point3::new(right_m, GROUND_M - above_m, forward_m)
+    }
+
+    /// The circle on the ground that an overview shows: its middle, and its radius \[m\]. All cameras are in
+    /// it, in a pane that is so many times as high as it is wide.
+    pub(super) fn overview<'a>(
+        &self,
+        cameras: impl IntoIterator<Item = &'a Point3<f64>>,
+        height_over_width: f64,
+    ) -> (Point3<f64>, f64) {
+        /// A camera on the rim would touch the border.
+        const MARGIN: f64 = 1.15;
+        let reference_from_scene = self.scene_from_reference.inverse();
+        // What the search can reach is ahead of the reference rather than around it.
+        let usual = Point2::new(0.0, 0.2 * self.radius_m);
+        let places = cameras.into_iter().map(|camera| {
+            let place = reference_from_scene * camera;
+            Point2::new(place.x, place.z)
+        });
+        let places: Vec<Point2<f64>> = places.chain([Point2::origin()]).collect();
+        let farthest = |middle: &Point2<f64>| {
+            let distances = places.iter().map(|place| (place - middle).norm());
+            distances.fold(0.0, f64::max)
+        };
+        let (middle, radius_m) = match farthest(&usual) * MARGIN {
+            near if near <= self.radius_m => (usual, self.radius_m),
+            _ => {
+                let corners = places
+                    .iter()
+                    .fold((places[0], places[0]), |(low, high), place| {
+                        (low.inf(place), high.sup(place))
+                    });
+                let middle = nalgebra::center(&corners.0, &corners.1);
+                (middle, self.radius_m.max(MARGIN * farthest(&middle)))
+            }
+        };
+        let radius_m = radius_m * height_over_width.max(1.0);
+        (self.on_ground(middle.x, middle.y, 0.0), radius_m)
     }
 
     /// What is straight up, seen from the reference camera.
@@ -123,5 +160,26 @@ mod tests {
         assert_eq!(geometry(15.0).grid_m(), 5.0);
         assert_eq!(geometry(3.0).grid_m(), 0.5);
         assert_eq!(geometry(10.0).grid_m(), 2.0);
+    }
+
+    proptest! {
+        #[test]
+        fn an_overview_has_every_camera_within_its_circle(
+            places in proptest::collection::vec((-60.0..60.0, -60.0..60.0), 0..6),
+            radius_m in 1.0..20.0, tall in 0.2..3.0,
+        ) {
+            let geometry = geometry(radius_m);
+            let scene_from_reference = geometry.scene_from_reference;
+            let in_scene = |&(x, z): &(f64, f64)| scene_from_reference * Point3::new(x, 0.0, z);
+            let cameras: Vec<Point3<f64>> = places.iter().map(in_scene).collect();
+            let (middle, shown_m) = geometry.overview(&cameras, tall);
+            prop_assert!(shown_m >= radius_m);
+            let reference = in_scene(&(0.0, 0.0));
+            for camera in cameras.iter().chain([&reference]) {
+                let off = scene_from_reference.inverse() * (camera - middle);
+                let distance = off.x.hypot(off.z);
+                prop_assert!(distance * tall.max(1.0) <= shown_m + 1e-9, "{} {}", distance, shown_m);
+            }
+        }
     }
 }

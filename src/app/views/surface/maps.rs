@@ -3,10 +3,10 @@
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
-use super::marks::{MapMark, place};
+use super::marks::{MapMark, MarkKind, place};
 use super::scale::{NO_SAY, Scale, bar, number};
 use super::search::{Search, Searched, cell_of};
-use crate::app::{Command, ViewContext};
+use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset};
 use crate::render::Score;
@@ -72,6 +72,8 @@ pub(super) struct MapContent<'a> {
     pub(super) marks: &'a [MapMark],
     /// The floor of the slider.
     pub(super) floor: f64,
+    /// From the result to the truth, where both are known and shown.
+    pub(super) line: Option<[Offset; 2]>,
 }
 
 impl CostMap {
@@ -227,7 +229,7 @@ fn plot(
     let narrow = |axis: AxisHints<'static>, thickness| {
         axis.min_thickness(thickness)
             .label_spacing(egui::Rangef::new(24.0, 40.0))
-            .tick_label_font(egui::FontId::proportional(10.0))
+            .tick_label_font(theme::small())
             .formatter(|mark, _| format!("{}", (1000.0 * mark.value).round() / 1000.0))
     };
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
@@ -272,7 +274,7 @@ fn plot(
 
 fn small(ui: &Ui, text: &str) -> egui::RichText {
     egui::RichText::new(text)
-        .size(10.0)
+        .font(theme::small())
         .color(ui.visuals().weak_text_color())
 }
 
@@ -395,10 +397,21 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
         painter.circle_filled(at, 2.0, strong);
     }
     painter.line(way, Stroke::new(1.0, strong));
+    if let Some(ends) = &shown.line {
+        let ends = ends.map(|end| screen(&end));
+        for (width, color) in [(3.0, Color32::WHITE), (1.0, Color32::BLACK)] {
+            let stroke = Stroke::new(width, color);
+            painter.extend(egui::Shape::dashed_line(&ends, stroke, 6.0, 4.0));
+        }
+    }
+    // A small map is not to vanish under its marks.
+    let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
     for mark in shown.marks {
-        // A small map is not to vanish under its marks.
-        let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
-        mark.paint(&painter, screen(&mark.offset), reach);
+        let at = screen(&mark.offset);
+        match mark.kind == MarkKind::Truth && !transform.frame().contains(at) {
+            true => mark.paint_beyond(&painter, *transform.frame(), at, reach),
+            false => mark.paint(&painter, at, reach),
+        }
     }
     if let Some(cell) = pointed_at
         && let Some(searched) = shown.search.positions().nth(cell.lattice)

@@ -1,6 +1,9 @@
 //! Places on the maps, each with a shape of its own, and their legend.
 
-use egui::{Align2, Color32, FontId, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
+use egui::{
+    Align2, Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2,
+};
+use egui_plot::MarkerShape;
 
 use super::scale::number;
 use super::search::{Minimum, Search};
@@ -33,19 +36,22 @@ const RANKED: usize = 5;
 pub(super) struct MapMark {
     pub(super) kind: MarkKind,
     pub(super) offset: Offset,
-    pose: Pose,
-    words: String,
+    pub(super) pose: Pose,
+    /// The cost there, where it is known of the place itself.
+    pub(super) cost: Option<f64>,
+    pub(super) words: String,
 }
 
 impl MapMark {
     /// Everything that is to be marked, what matters most last. `floor` is what the slider says.
     pub(super) fn all(context: &ViewContext<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
         let mut marks = Vec::new();
-        let mut add = |kind, offset, pose, name: &str, note: String| {
+        let mut add = |kind, offset, pose, cost, name: &str, note: String| {
             marks.push(Self {
                 kind,
                 offset,
                 pose,
+                cost,
                 words: format!("{name} {}{note}", place(&offset)),
             });
         };
@@ -56,7 +62,7 @@ impl MapMark {
         };
         let start = Offset::default();
         let pose = search.pose(&start);
-        add(MarkKind::Start, start, pose, "start", at_cell(&start));
+        add(MarkKind::Start, start, pose, None, "start", at_cell(&start));
         let own_floor = search.least_covered(context.run.params.grid.coverage_floor);
         for (rank, minimum, margin) in ranked(search, search.least_covered(floor)) {
             let note = format!(", +{}", number(margin));
@@ -65,6 +71,7 @@ impl MapMark {
                 MarkKind::Ranked(rank),
                 minimum.offset,
                 pose,
+                Some(minimum.cost),
                 "minimum",
                 note,
             );
@@ -83,6 +90,7 @@ impl MapMark {
                     kind,
                     minimum.offset,
                     search.pose(&minimum.offset),
+                    Some(minimum.cost),
                     name,
                     note,
                 );
@@ -91,9 +99,10 @@ impl MapMark {
         if let Some(step) = search.steps.last() {
             let offset = Offset::of(&step.reference_from_camera);
             let pose = search.problem.world_from_query(&step.reference_from_camera);
-            let cost = step.score.cost.map_or(String::new(), number);
-            let note = format!(", {cost}, after {} steps", search.steps.len());
-            add(MarkKind::Fine, offset, pose, "descent", note);
+            let cost = step.score.cost;
+            let words = cost.map_or(String::new(), number);
+            let note = format!(", {words}, after {} steps", search.steps.len());
+            add(MarkKind::Fine, offset, pose, cost, "descent", note);
         }
         if let Some(moved) = moved(search, own_floor, search.least_covered(floor)) {
             let note = format!(", {}", number(moved.cost));
@@ -102,6 +111,7 @@ impl MapMark {
                 MarkKind::Floored,
                 moved.offset,
                 pose,
+                Some(moved.cost),
                 "minimum at this floor",
                 note,
             );
@@ -120,11 +130,12 @@ impl MapMark {
         for (kind, pose, name) in cameras {
             if let Some(pose) = pose {
                 let offset = search.offset(&pose);
-                let cost = match at_truth.filter(|_| kind == MarkKind::Truth) {
+                let cost = at_truth.filter(|_| kind == MarkKind::Truth);
+                let note = match cost {
                     Some(cost) => format!(", {}", number(cost)),
                     None => at_cell(&offset),
                 };
-                add(kind, offset, pose, name, cost);
+                add(kind, offset, pose, cost, name, note);
             }
         }
         marks
@@ -142,6 +153,16 @@ impl MapMark {
             painter.line_segment([at, tip], Stroke::new(1.5, self.kind.color()));
         }
         self.kind.paint(painter, at, reach);
+    }
+
+    /// Paints a mark that lies beyond the map on its rim, with an arrow towards it.
+    pub(super) fn paint_beyond(&self, painter: &Painter, map: Rect, at: Pos2, reach: f32) {
+        let rim = map.shrink(3.0 * reach).clamp(at);
+        let ahead = (at - rim).normalized();
+        for (width, color) in [(4.5, Color32::WHITE), (2.0, self.kind.color())] {
+            painter.arrow(rim, 3.0 * reach * ahead, Stroke::new(width, color));
+        }
+        self.kind.paint(painter, rim, reach);
     }
 }
 
@@ -192,7 +213,19 @@ pub(super) fn place(offset: &Offset) -> String {
 }
 
 impl MarkKind {
-    fn color(self) -> Color32 {
+    /// The shape that is most like its own among those of plots.
+    pub(super) fn plot_shape(self) -> MarkerShape {
+        match self {
+            Self::Start | Self::Ranked(_) | Self::Floored => MarkerShape::Circle,
+            Self::Coarse => MarkerShape::Square,
+            Self::Fine => MarkerShape::Diamond,
+            Self::Feature => MarkerShape::Up,
+            Self::Truth => MarkerShape::Plus,
+            Self::Camera => MarkerShape::Down,
+        }
+    }
+
+    pub(super) fn color(self) -> Color32 {
         match self {
             Self::Start => theme::REFERENCE,
             Self::Coarse | Self::Fine => theme::ESTIMATE,
@@ -217,7 +250,7 @@ impl MarkKind {
             Self::Coarse => {
                 let square = [(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)];
                 let size = Vec2::splat(1.8 * reach);
-                let rect = egui::Rect::from_center_size(at, size);
+                let rect = Rect::from_center_size(at, size);
                 let white = Stroke::new(3.5, Color32::WHITE);
                 painter.rect_stroke(rect, 0.0, white, egui::StrokeKind::Middle);
                 painter.add(outlined(&square, Color32::TRANSPARENT, color));

@@ -130,7 +130,7 @@ pub(super) fn bar(ui: &mut Ui, width: f32, what: &str, [dark, bright]: &[String;
 }
 
 fn ends(ui: &Ui, rect: Rect, dark: &str, bright: &str) {
-    let font = egui::FontId::proportional(10.0);
+    let font = theme::small();
     let color = ui.visuals().weak_text_color();
     let painter = ui.painter();
     painter.text(

@@ -301,7 +301,7 @@ fn slice(ui: &mut Ui, along: SliceAxis, width: f32, curves: &[Curve<'_>], marks:
 }
 
 /// A piece of a line, as in the plots.
-fn key(ui: &mut Ui, color: Color32, style: LineStyle) {
+pub(super) fn key(ui: &mut Ui, color: Color32, style: LineStyle) {
     let (rect, _) = ui.allocate_exact_size(egui::vec2(16.0, 10.0), egui::Sense::hover());
     let ends = [rect.left_center(), rect.right_center()];
     let stroke = egui::Stroke::new(2.0, color);

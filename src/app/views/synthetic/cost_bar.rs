@@ -38,7 +38,7 @@ pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Opti
         ui.label(RichText::new(&name).strong());
         for cost in &costs {
             let Some(value) = cost.value else { continue };
-            ui.label(RichText::new(cost.glyph).color((cost.color)(ui)));
+            ui.label(RichText::new(cost.glyph).color(theme::text(ui.visuals(), (cost.color)(ui))));
             ui.label(format!("{} {value:.4}", cost.name));
             ui.add_space(6.0);
         }

@@ -94,7 +94,8 @@ impl Mode {
                 picture::synthetic(&made.view).into()
             }),
             Self::Residual => of("synthetic/residual", &|made| {
-                picture::residual(&made.view, &made.pairs).into()
+                let range = picture::residual_range(&made.pairs);
+                picture::residual_within(&made.view, &made.pairs, range).into()
             }),
             Self::Weights => {
                 shown.comparison.explanation.as_ref()?;
@@ -114,13 +115,12 @@ impl Mode {
         let explanation = shown.and_then(|shown| shown.comparison.explanation.as_ref());
         match (self, explanation) {
             (Self::Residual, _) => {
-                let ends = [
-                    (0.0, "-64"),
-                    (0.25, "-32"),
-                    (0.5, "0"),
-                    (0.75, "32"),
-                    (1.0, "64"),
-                ];
+                let pairs = shown.map_or(&[][..], |shown| &shown.comparison.pairs);
+                let range = picture::residual_range(pairs);
+                let words = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| format!("{}", share * range));
+                let places = [0.0, 0.25, 0.5, 0.75, 1.0];
+                let ends: [(f64, &str); 5] =
+                    std::array::from_fn(|tick| (places[tick], words[tick].as_str()));
                 diverging_bar(ui, "query minus view, grey values", &ends);
                 ui.weak("query darker ← → query brighter");
             }

@@ -109,8 +109,7 @@ impl JointFeatures {
         let supports = pool.supports(&consensus, references.len());
 
         let intrinsics = &lead.query.intrinsics;
-        let (acceptance, places) =
-            (self.features).beyond_chance(correspondences, &consensus, intrinsics, 0.0);
+        let beyond = (self.features).beyond_chance(correspondences, &consensus, intrinsics, 0.0);
         // Where the query can be, the reference says that explains most of it.
         let inliers = |index: usize| supports[index].map_or(0.0, |support| support.amount());
         let most = (0..references.len())
@@ -120,9 +119,10 @@ impl JointFeatures {
         let nearest = references[most].problem;
         let found = FoundConsensus {
             reference_from_query: between(nearest, lead) * consensus.pose.inverse(),
-            acceptance,
-            correspondences: places,
-            is_enough: self.features.accepts(&acceptance),
+            acceptance: beyond.acceptance,
+            tested: beyond.tested,
+            counted: beyond.counted,
+            is_enough: self.features.accepts(&beyond.acceptance),
             slack: self.features.slack(),
         };
         let pose = found.judged(nearest, &mut Trace::off())?;

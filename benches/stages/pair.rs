@@ -1,0 +1,80 @@
+//! The pair of frames that is measured on, and what the direct methods make of it.
+
+use std::error::Error;
+use std::sync::{Arc, LazyLock};
+
+use posescope::cost::{self, Cost};
+use posescope::geometry::Pose;
+use posescope::grid::{GridParams, Lattice, Offset, Phase};
+use posescope::image::FloatImage;
+use posescope::params::Params;
+use posescope::problem::Problem;
+use posescope::render::{ColoredCloud, color_cloud_by};
+use posescope::scene;
+
+/// Two frames of the street, 8 m apart, or those that the environment names.
+pub static PAIR: LazyLock<Problem> = LazyLock::new(|| {
+    let variable = |name: &str, default: &str| std::env::var(name).unwrap_or(default.to_owned());
+    let scene = variable("POSESCOPE_SCENE", "street");
+    let indices = variable("POSESCOPE_PAIR", "70,62");
+    named_pair(&scene, &indices).unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        std::process::exit(2);
+    })
+});
+
+fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
+    let expected = || {
+        format!(
+            "POSESCOPE_PAIR={indices}: the indices of a query and a reference expected, as 70,62"
+        )
+    };
+    let (query, reference) = indices.split_once(',').ok_or_else(expected)?;
+    let index = |text: &str| text.trim().parse::<usize>().map_err(|_| expected());
+    let scene = scene::open(scene, None)?;
+    let known = |index: usize| match scene.frames().len() {
+        frames if index < frames => Ok(index),
+        frames => Err(format!(
+            "POSESCOPE_PAIR={indices}: {} has {frames} frames, 0 to {}",
+            scene.name(),
+            frames.saturating_sub(1)
+        )),
+    };
+    Ok(Problem {
+        query: scene.query(known(index(query)?)?)?,
+        reference: scene.reference(known(index(reference)?)?)?,
+        uncertainty_radius_m: 15.0,
+        prior_m: None,
+        seed: 0,
+        matches: None,
+    })
+}
+
+/// The cost of the method of this name, as it is by default.
+pub fn registered_cost(name: &str) -> Box<dyn Cost> {
+    let entry = cost::ALL.iter().find(|entry| entry.name == name);
+    (entry.expect("is listed").params)().cost()
+}
+
+/// The query of the pair and the cloud of its reference, as a cost looks at them.
+pub fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, ColoredCloud) {
+    let (query, reference) = (&PAIR.query, &PAIR.reference);
+    let cloud = color_cloud_by(
+        &reference.cloud,
+        &reference.intrinsics,
+        &Params::default().render,
+        cost.reference_channel(&reference.photo.gray),
+    );
+    (Arc::new(cost.query_channel(&query.photo.gray)), cloud)
+}
+
+/// The cameras of the coarse search in a disc of 10 m.
+pub fn poses_of_a_disc() -> Vec<Pose> {
+    let centre = Offset::default();
+    let lattice = Lattice::new(Phase::PositionCoarse, centre, 10.0, &GridParams::default());
+    let hypotheses = lattice.expect("a small lattice");
+    let hypotheses = hypotheses.hypotheses();
+    hypotheses
+        .map(|(_, offset)| offset.reference_from_camera())
+        .collect()
+}

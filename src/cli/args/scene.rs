@@ -1,0 +1,106 @@
+//! The arguments of what takes a scene as a whole: `overview`, `synth`, `doctor` and `index`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use posescope::scene::layout::LAYOUTS;
+use posescope::scene::street::{Size, Street};
+
+use super::ConfigArgs;
+
+#[derive(Debug, Args)]
+pub struct OverviewArgs {
+    /// Where the frames are, as for `run`
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<String>,
+    /// The format of the scenes, if their content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Write the table as Markdown, CSV and LaTeX, and a map of each route as SVG, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct SynthArgs {
+    /// Where to write: DIR/CONDITION, or in the layout kitti DIR/sequences/CONDITION and
+    /// DIR/poses/CONDITION.txt
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// The layout, by the name of the scene format that reads it. tum can say depths up to 13 m only,
+    /// 7scenes up to 65 m; colmap has some of each scan's points
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = LAYOUTS[0].name,
+        value_parser = PossibleValuesParser::new(LAYOUTS.iter().map(|layout| layout.name))
+    )]
+    pub layout: String,
+    /// The size of the images: 620x188 or 1241x376 pixels
+    #[arg(
+        long,
+        default_value = "full",
+        value_parser = PossibleValuesParser::new(Street::sizes())
+            .try_map(|name: String| Street::size(&name).ok_or("a size expected"))
+    )]
+    pub size: Size,
+    /// Write every Nth frame only; frames keep their numbers, poses and times stay complete
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub every: NonZeroUsize,
+    /// Write this traversal only; repeatable
+    #[arg(long, value_parser = PossibleValuesParser::new(Street::conditions()))]
+    pub condition: Vec<String>,
+    /// Write into a folder that is not empty, replacing sequences of the same names
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Where the frames are, as for `run`
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Write the cloud of a frame on its photo
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// Save a recording of the frames that were compared, with their clouds in the world and on the photos
+    #[arg(long, value_name = "FILE.rrd")]
+    pub save: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct IndexArgs {
+    /// Where the frames are, as for `run`
+    pub scene: String,
+    /// The format of the scene, if its content does not tell
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Number of visual words
+    #[arg(long, value_name = "N", default_value = "10000")]
+    pub words: NonZeroUsize,
+    /// Index every Nth frame only
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub every: NonZeroUsize,
+    /// Leave out a frame, or the queries of a run folder; repeatable. Where queries are of the same drive,
+    /// an index with their own photos knows more of them than another drive would
+    #[arg(long, value_name = "FRAME|RUN")]
+    pub without: Vec<String>,
+    /// The file to write [default: in the user's cache directory, where `run` finds it]
+    #[arg(long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Build it even if it is up to date, and replace whatever the file is
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Number of threads [default: one per core]; the index does not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+}

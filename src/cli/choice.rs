@@ -1,0 +1,84 @@
+//! Choosing references by their looks, with a bar.
+
+use posescope::event::KindSet;
+use posescope::localize::{LocalizeObserver, NoObserver};
+use posescope::trace::{Cancelled, Record, Sink};
+
+use super::interrupt::Interrupt;
+use super::terminal::Terminal;
+
+/// From so many candidates on an index is worth its time.
+const MANY: usize = 100;
+
+/// A bar over the candidates, and once a word on what is quicker where there are many.
+pub struct ChoiceProgress<'a> {
+    terminal: &'a Terminal,
+    interrupt: &'a Interrupt,
+    /// The scene of the references, as the command line names it.
+    scene: &'a str,
+    bar: Option<indicatif::ProgressBar>,
+    has_advised: bool,
+}
+
+impl<'a> ChoiceProgress<'a> {
+    pub fn new(terminal: &'a Terminal, interrupt: &'a Interrupt, scene: &'a str) -> Self {
+        Self {
+            terminal,
+            interrupt,
+            scene,
+            bar: None,
+            has_advised: false,
+        }
+    }
+}
+
+impl Sink for ChoiceProgress<'_> {
+    fn wanted(&self) -> KindSet {
+        NoObserver.wanted()
+    }
+
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.interrupt.check()
+    }
+}
+
+impl LocalizeObserver for ChoiceProgress<'_> {
+    fn choosing(&mut self, looked_at: usize, candidates: usize) {
+        let is_many = candidates >= MANY && !self.terminal.is_quiet();
+        if is_many && !std::mem::replace(&mut self.has_advised, true) {
+            eprintln!(
+                "Each of {candidates} photos is looked at for the one with the most matches; quicker from \
+                 the second query on: `posescope index {}`, then --references retrieve:1",
+                self.scene
+            );
+        }
+        let terminal = self.terminal;
+        let bar = self.bar.get_or_insert_with(|| {
+            let bar = terminal.bar(candidates as u64);
+            bar.set_message("choosing references");
+            bar
+        });
+        bar.set_position(looked_at as u64);
+        if looked_at == candidates
+            && let Some(bar) = self.bar.take()
+        {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn attention(&self) -> Option<std::sync::Arc<std::sync::atomic::AtomicBool>> {
+        Some(self.interrupt.attention())
+    }
+}
+
+impl Drop for ChoiceProgress<'_> {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Where hypotheses are scored: `--compute`.
+
+use super::failure::CliError;
+
+/// Where the hypotheses of a search are scored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Compute {
+    /// On a graphics card where there is one and the search is large, or else on the processor
+    #[default]
+    Auto,
+    /// On the processor
+    Cpu,
+    /// On a graphics card, or software that plays one; without either, exit code 5
+    Gpu,
+}
+
+/// Runs a command with its hypotheses scored there.
+#[cfg(feature = "gpu")]
+pub fn with(
+    compute: Compute,
+    command: impl FnOnce() -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    use std::sync::Arc;
+
+    use posescope::render::{Device, use_device};
+    use posescope_gpu::{Gpu, GpuError};
+
+    let gpu = match compute {
+        Compute::Cpu => return command(),
+        Compute::Auto => Arc::new(Gpu::if_any()),
+        Compute::Gpu => Arc::new(Gpu::asked_for()?),
+    };
+    use_device(Arc::clone(&gpu) as Arc<dyn Device>);
+    command()?;
+    // Whoever asked for the card is not to believe that it did what the processor did instead.
+    match gpu.complaint() {
+        Some(why) if compute == Compute::Gpu || matches!(why, GpuError::Disagrees(_)) => {
+            Err(why.into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Runs a command with its hypotheses scored there.
+#[cfg(not(feature = "gpu"))]
+pub fn with(
+    compute: Compute,
+    command: impl FnOnce() -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    match compute {
+        Compute::Auto | Compute::Cpu => command(),
+        Compute::Gpu => Err(CliError::NoGpu),
+    }
+}

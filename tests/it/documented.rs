@@ -1,0 +1,197 @@
+//! Every command of posescope that README and docs show is run, with fewer queries.
+
+mod commands;
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+use crate::binary::posescope;
+use crate::data;
+use commands::{commands, documents, own_arguments};
+
+/// What has to be there before the commands of a page are run, as its reader has it.
+const BEFORE: [(&str, &[&str]); 2] = [
+    (
+        "ci.md",
+        &["eval street --limit 1 --method mi --out baseline -q"],
+    ),
+    (
+        "other-systems.md",
+        &[
+            "eval street --limit 1 --method fb --radius 5 --out known -q",
+            "export known --format vloc --out poses.txt",
+            "run …/sequences/00 --query 3823 --reference 3814 --method fb --export-matches hloc-outputs -q",
+        ],
+    ),
+];
+
+/// The page whose commands build an index.
+const INDEXED: [&str; 1] = ["retrieval.md"];
+
+/// What is too long for a test, or wants what is not at hand, with the tests that do it otherwise.
+const NOT_HERE: [(&str, &str); 8] = [
+    (
+        "eval street --queries street:night --experiment large",
+        "retrieval",
+    ),
+    ("run SCENE --query IMG_0815.jpg", "loose_photo"),
+    ("eval DIR/overcast", "robotcar"),
+    ("run …/sequences/00 --all", "foreign"),
+    ("view …/sequences/00 --query 3823 --estimates", "foreign"),
+    ("lesson four-points", "lessons"),
+    ("lesson light", "lessons"),
+    (
+        "run …/sequences/00 --query 3823 --reference 3814 --method pm,mi",
+        "compute",
+    ),
+];
+
+/// The words of a command, as this page's reader would give them to a small machine.
+fn adapted(own: &[String], sequences: Option<&Path>) -> Option<Vec<String>> {
+    let line = own.join(" ");
+    if NOT_HERE.iter().any(|(start, _)| line.starts_with(start)) {
+        return None;
+    }
+    let mut words = Vec::new();
+    let mut own = own.iter();
+    while let Some(word) = own.next() {
+        match word.as_str() {
+            "--limit" => {
+                own.next();
+                words.extend(["--limit".to_owned(), "1".to_owned()]);
+            }
+            "SCENE" => words.push("street".to_owned()),
+            "…/sequences/00" => words.push(sequences?.join("00").display().to_string()),
+            _ => words.push(word.clone()),
+        }
+    }
+    let has = |word: &str| words.iter().any(|one| one == word);
+    let briefer: &[&str] = match (has("index"), has("eval") && has("large")) {
+        (true, _) => &["--words", "100", "--every", "100"],
+        (_, true) => &["--limit", "1", "--method", "fb"],
+        _ if has("surface") => &["--step", "2", "--yaw-step", "10"],
+        _ => &[],
+    };
+    words.extend(briefer.iter().map(|word| (*word).to_owned()));
+    Some(words)
+}
+
+fn run(folder: &Path, words: &[String], has_index: bool) {
+    let mut command: Command = posescope();
+    if has_index {
+        // It is none of other tests' business.
+        command.env("POSESCOPE_CACHE", folder.join("cache"));
+    }
+    command.current_dir(folder).args(words);
+    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.env_remove("GITHUB_STEP_SUMMARY");
+    let output = command.output().expect("it runs");
+    assert!(
+        output.status.success(),
+        "{words:?}: {}\n{}",
+        output.status,
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+fn go_through(page: &str) {
+    let sequences = data::sample("kitti/sequences");
+    let path = documents().into_iter().find(|path| path.ends_with(page));
+    let path = path.unwrap_or_else(|| panic!("{page} is a page"));
+    let folder = TempDir::new().expect("a folder");
+    let has_index = INDEXED.contains(&page);
+    for (_, before) in BEFORE.iter().filter(|(name, _)| *name == page) {
+        for line in *before {
+            let words = shlex::split(line).expect("words");
+            if let Some(words) = adapted(&words, sequences.as_deref()) {
+                run(folder.path(), &words, has_index);
+            }
+        }
+    }
+    let mut done = 0;
+    for words in commands(&path) {
+        let Some(own) = own_arguments(&words) else {
+            continue;
+        };
+        let Some(words) = adapted(own, sequences.as_deref()) else {
+            println!("skipped: {}", words.join(" "));
+            continue;
+        };
+        run(folder.path(), &words, has_index);
+        done += 1;
+    }
+    assert!(
+        done > 0 || sequences.is_none(),
+        "{page} has no command that could be run"
+    );
+}
+
+/// The pages with commands of ours, each with a test of its own, so that they run side by side.
+const PAGES: [&str; 9] = [
+    "README.md",
+    "ci.md",
+    "compute.md",
+    "diagnosis.md",
+    "lessons.md",
+    "other-systems.md",
+    "retrieval.md",
+    "scenes.md",
+    "start.md",
+];
+
+#[test]
+fn every_page_with_commands_is_gone_through() {
+    let pages = documents().into_iter().filter(|page| {
+        let commands = commands(page);
+        commands.iter().any(|words| own_arguments(words).is_some())
+    });
+    let names = pages.map(|page| page.file_name().expect("a name").to_owned());
+    assert_eq!(names.collect::<Vec<_>>(), PAGES);
+}
+
+#[test]
+fn the_readme_can_be_followed() {
+    go_through(PAGES[0]);
+}
+
+#[test]
+fn the_page_on_ci_can_be_followed() {
+    go_through(PAGES[1]);
+}
+
+#[test]
+fn the_page_on_where_it_computes_can_be_followed() {
+    go_through(PAGES[2]);
+}
+
+#[test]
+fn the_page_on_diagnosis_can_be_followed() {
+    go_through(PAGES[3]);
+}
+
+#[test]
+fn the_page_on_lessons_can_be_followed() {
+    go_through(PAGES[4]);
+}
+
+#[test]
+fn the_page_on_other_systems_can_be_followed() {
+    go_through(PAGES[5]);
+}
+
+#[test]
+fn the_page_on_retrieval_can_be_followed() {
+    go_through(PAGES[6]);
+}
+
+#[test]
+fn the_page_on_scenes_can_be_followed() {
+    go_through(PAGES[7]);
+}
+
+#[test]
+fn the_start_can_be_followed() {
+    go_through(PAGES[8]);
+}

@@ -1,0 +1,115 @@
+//! Results have the same bytes on any processor: those that an emulator plays, and the one that is here.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use assert_cmd::cargo::cargo_bin;
+
+use crate::binary::CACHE;
+use crate::data::authors_pair;
+
+/// One that has nothing beyond SSE4.2, and one with AVX2 and FMA but no AVX-512.
+const PROCESSORS: [&str; 2] = ["Nehalem", "Haswell"];
+
+/// The emulator, or why there is none.
+fn emulator() -> Option<PathBuf> {
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&paths)
+        .map(|folder| folder.join("qemu-x86_64"))
+        .find(|path| path.is_file());
+    match found {
+        Some(path) if cfg!(target_arch = "x86_64") => Some(path),
+        _ => {
+            println!("skipped: no qemu-x86_64 (Debian's qemu-user)");
+            None
+        }
+    }
+}
+
+/// The results of an evaluation, on an emulated processor or on this one.
+fn results(asked: &[&str], processor: Option<(&Path, &str)>, folder: &Path) -> Vec<u8> {
+    let binary = cargo_bin("posescope");
+    let mut command = match processor {
+        Some((emulator, processor)) => {
+            let mut command = Command::new(emulator);
+            command.args(["-cpu", processor]).arg(binary);
+            command
+        }
+        None => Command::new(binary),
+    };
+    command
+        .env("POSESCOPE_CACHE", CACHE)
+        .arg("eval")
+        .args(asked);
+    command.args([
+        "--compute",
+        "cpu",
+        "--max-recordings",
+        "0",
+        "--pictures",
+        "0",
+        "-q",
+    ]);
+    let out = folder.join(processor.map_or("here", |(_, name)| name));
+    let output = command.arg("--out").arg(&out).output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    fs::read(out.join("results.jsonl")).expect("results")
+}
+
+fn assert_same_everywhere(asked: &[&str], processors: &[&str]) {
+    let Some(emulator) = emulator() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    // This one first: what it leaves in the cache is drawn in half a minute by the others.
+    let here = results(asked, None, folder.path());
+    assert!(here.len() > 1000, "{} bytes", here.len());
+    for processor in processors {
+        let there = results(asked, Some((&emulator, processor)), folder.path());
+        assert!(there == here, "{processor} has other results");
+    }
+}
+
+#[test]
+fn a_night_photo_of_the_street_has_the_same_results_on_any_processor() {
+    assert_same_everywhere(
+        &[
+            "street:night",
+            "--queries",
+            "street:overcast",
+            "--only",
+            "70",
+            "--references",
+            "nearest:1",
+            "--radius",
+            "5",
+            "--method",
+            "fb,pm,mi,hy,nid",
+        ],
+        &PROCESSORS,
+    );
+}
+
+#[test]
+fn the_real_pair_has_the_same_results_on_any_processor() {
+    let Some(sequence) = authors_pair() else {
+        return;
+    };
+    let sequence = sequence.display().to_string();
+    assert_same_everywhere(
+        &[
+            &sequence,
+            "--only",
+            "3823",
+            "--references",
+            "nearest:1",
+            "--radius",
+            "10.5",
+            "--method",
+            "fb,pm,mi",
+        ],
+        &PROCESSORS[..1],
+    );
+}

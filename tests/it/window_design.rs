@@ -1,0 +1,374 @@
+//! What the window promises of its looks, in every view, layout and theme: nothing is cut off, everything can
+//! be read, and nothing untrue is said of what is not there.
+
+use egui::epaint::ClippedShape;
+use egui::{Color32, Key, Modifiers, Pos2, Rect, Shape, TextureId};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use posescope::app::{App, Command, Setup, views};
+use posescope::method::Method;
+use posescope::session::{RunMode, RunState};
+
+use crate::window::{finished as finished_of, is_said, press};
+use crate::window::{run_until_idle, setup, wait};
+
+/// The smallest window that the views are made for \[points\].
+const SMALL: [f32; 2] = [1280.0, 800.0];
+
+/// A window of a size whose run is over, with so many pixels to a point.
+fn finished(size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
+    let setup = Setup {
+        mode: RunMode::Running,
+        ..setup()
+    };
+    let mut window = Harness::builder()
+        .with_size(size)
+        .with_pixels_per_point(pixels_per_point)
+        .build_eframe(|creation| App::new(creation, setup));
+    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    window.state_mut().send(Command::SelectMethod(Method::MI));
+    settle(&mut window);
+    window
+}
+
+fn settle(window: &mut Harness<'_, App>) {
+    window.run_steps(3);
+    wait(window, |app| {
+        let state = app.app_state();
+        !state.is_probing() && !state.is_tracing_line() && !state.queries.is_painting()
+    });
+    window.run_steps(3);
+}
+
+/// A text that was drawn, with all that is known of where.
+struct Drawn {
+    words: String,
+    rect: Rect,
+    clip: Rect,
+    is_elided: bool,
+    /// The ground that its middle is on, where it is one colour.
+    ground: Option<Color32>,
+    /// Its colours.
+    colors: Vec<Color32>,
+}
+
+/// All texts of a frame that are in sight, in the order in which they were drawn.
+fn texts(shapes: &[ClippedShape]) -> Vec<Drawn> {
+    let mut grounds: Vec<(Rect, Option<Color32>)> = Vec::new();
+    let mut drawn = Vec::new();
+    for ClippedShape {
+        clip_rect, shape, ..
+    } in shapes
+    {
+        take(shape, *clip_rect, &mut grounds, &mut drawn);
+    }
+    drawn
+}
+
+fn take(
+    shape: &Shape,
+    clip: Rect,
+    grounds: &mut Vec<(Rect, Option<Color32>)>,
+    drawn: &mut Vec<Drawn>,
+) {
+    match shape {
+        Shape::Vec(shapes) => {
+            for shape in shapes {
+                take(shape, clip, grounds, drawn);
+            }
+        }
+        Shape::Rect(rect) => {
+            let is_picture = rect.brush.is_some();
+            let color = (!is_picture).then_some(rect.fill);
+            let is_there = is_picture || rect.fill != Color32::TRANSPARENT;
+            if is_there && rect.blur_width == 0.0 {
+                grounds.push((rect.rect.intersect(clip), color));
+            }
+        }
+        Shape::Mesh(mesh) if mesh.texture_id != TextureId::default() => {
+            grounds.push((mesh.calc_bounds().intersect(clip), None));
+        }
+        // What else is filled is a mark, whose own words are chosen for it.
+        Shape::Mesh(mesh) => grounds.push((mesh.calc_bounds().intersect(clip), None)),
+        Shape::Circle(circle) if circle.fill != Color32::TRANSPARENT => {
+            grounds.push((shape.visual_bounding_rect().intersect(clip), None));
+        }
+        Shape::Path(path) if path.closed && path.fill != Color32::TRANSPARENT => {
+            grounds.push((shape.visual_bounding_rect().intersect(clip), None));
+        }
+        Shape::Text(text) => {
+            let rect = text.visual_bounding_rect();
+            if !rect.is_positive() || !rect.intersects(clip) {
+                return;
+            }
+            let sections = text.galley.job.sections.iter();
+            let own = sections.map(|section| match section.format.color {
+                Color32::PLACEHOLDER => text.fallback_color,
+                color => color,
+            });
+            let colors = match text.override_text_color {
+                Some(color) => vec![color],
+                None => own.collect(),
+            };
+            drawn.push(Drawn {
+                words: text.galley.text().to_owned(),
+                rect,
+                clip,
+                is_elided: text.galley.elided,
+                ground: ground_at(grounds, first_row(text).intersect(clip).center()),
+                colors: colors
+                    .into_iter()
+                    .map(|color| color.gamma_multiply(text.opacity_factor))
+                    .collect(),
+            });
+        }
+        _ => {}
+    }
+}
+
+/// Where the first row of a text is: a paragraph may go around other things.
+fn first_row(text: &egui::epaint::TextShape) -> Rect {
+    let rows = text.galley.rows.iter();
+    let mut written = rows.filter(|row| !row.glyphs.is_empty());
+    let row = written.next().map(|row| row.rect_without_leading_space());
+    row.map_or(text.visual_bounding_rect(), |row| {
+        row.translate(text.pos.to_vec2())
+    })
+}
+
+/// The colour that was there at a place, as the rectangles that were drawn make it.
+fn ground_at(grounds: &[(Rect, Option<Color32>)], at: Pos2) -> Option<Color32> {
+    let mut ground = None;
+    for (_, color) in grounds.iter().filter(|(rect, _)| rect.contains(at)) {
+        ground = match (ground, color) {
+            (_, None) => None,
+            (_, Some(color)) if color.is_opaque() => Some(*color),
+            (Some(below), Some(color)) => Some(Color32::blend(below, *color)),
+            (None, Some(_)) => None,
+        };
+    }
+    ground
+}
+
+/// The contrast of two opaque colours (WCAG 2.2).
+fn contrast(a: Color32, b: Color32) -> f64 {
+    let luminance = |color: Color32| {
+        let linear = |channel: u8| {
+            let share = f64::from(channel) / 255.0;
+            match share <= 0.04045 {
+                true => share / 12.92,
+                false => ((share + 0.055) / 1.055).powf(2.4),
+            }
+        };
+        0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
+    };
+    let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
+    a.max(b) / a.min(b)
+}
+
+/// Where something stands that cannot be used at present: it is pale on purpose.
+fn disabled(window: &Harness<'_, App>) -> Vec<Rect> {
+    let nodes = window.root().children_recursive();
+    let disabled = nodes.filter(|node| node.accesskit_node().is_disabled());
+    disabled.map(|node| node.rect().expand(2.0)).collect()
+}
+
+/// Goes through every view alone, and through the three layouts, and tells each by its name.
+fn everywhere(window: &mut Harness<'_, App>, mut see: impl FnMut(&Harness<'_, App>, &str)) {
+    for key in [Key::F2, Key::F3, Key::F4] {
+        press(window, Modifiers::NONE, key);
+        settle(window);
+        see(window, key.name());
+    }
+    press(window, Modifiers::NONE, Key::F2);
+    for entry in views::ALL {
+        window.state_mut().send(Command::Maximize(Some(entry.name)));
+        settle(window);
+        see(window, entry.name);
+    }
+    window.state_mut().send(Command::Maximize(None));
+    settle(window);
+}
+
+#[test]
+fn every_word_can_be_read_on_its_ground_in_both_themes() {
+    const LEAST: f64 = 4.5;
+    let mut window = finished(SMALL, 1.0);
+    let mut unreadable = std::collections::BTreeSet::new();
+    let mut judged = 0;
+    for theme in [egui::Theme::Dark, egui::Theme::Light] {
+        window.ctx.set_theme(theme);
+        everywhere(&mut window, |window, place| {
+            let pale = disabled(window);
+            for text in texts(&window.output().shapes) {
+                let Some(ground) = text.ground else { continue };
+                if pale.iter().any(|rect| rect.contains(text.rect.center())) {
+                    continue;
+                }
+                judged += 1;
+                // Numbers of an axis fade in as one zooms.
+                let is_tick = text.words.parse::<f64>().is_ok();
+                for color in text.colors {
+                    if is_tick && !color.is_opaque() {
+                        continue;
+                    }
+                    let seen = Color32::blend(ground, color);
+                    let contrast = contrast(seen, ground);
+                    if contrast < LEAST && !text.words.trim().is_empty() {
+                        let words: String = text.words.chars().take(40).collect();
+                        unreadable.insert(format!(
+                            "{theme:?} {place}: {contrast:.1} {color:?} on {ground:?}: {words}"
+                        ));
+                    }
+                }
+            }
+        });
+    }
+    assert!(judged > 2000, "{judged}");
+    let unreadable: Vec<String> = unreadable.into_iter().collect();
+    assert!(unreadable.is_empty(), "{}", unreadable.join("\n"));
+}
+
+/// Views that are wider than their room on purpose, and are moved sideways.
+const SIDEWAYS: [&str; 5] = ["batch", "report", "differences", "lockstep", "F4"];
+
+#[test]
+fn no_word_is_cut_off_at_any_scale() {
+    let mut cut = std::collections::BTreeSet::new();
+    for (size, scale) in [(SMALL, 1.0), ([1500.0, 950.0], 1.5), ([1500.0, 950.0], 2.0)] {
+        let mut window = finished(size, scale);
+        assert_eq!(window.ctx.pixels_per_point(), scale);
+        everywhere(&mut window, |window, place| {
+            for text in texts(&window.output().shapes) {
+                let visible = text.rect.intersect(text.clip);
+                let missing = text.rect.width() - visible.width();
+                let is_cut = missing > 2.0 && !SIDEWAYS.contains(&place);
+                if is_cut || text.is_elided {
+                    let words: String = text.words.chars().take(60).collect();
+                    cut.insert(format!(
+                        "{size:?} at {scale}, {place}: {missing:.0} of {words}"
+                    ));
+                }
+            }
+        });
+    }
+    let cut: Vec<String> = cut.into_iter().collect();
+    assert!(cut.is_empty(), "{}", cut.join("\n"));
+}
+
+#[test]
+fn all_buttons_of_the_bars_are_in_the_window() {
+    for (size, scale) in [(SMALL, 1.0), ([1500.0, 950.0], 1.5), ([1500.0, 950.0], 2.0)] {
+        let window = finished(size, scale);
+        let whole = Rect::from_min_size(Pos2::ZERO, size.into()).expand(0.5);
+        for label in [
+            "▶ Run", "Into", "To end", "Truth", "Keep A", "Views", "Save", "?", "By time",
+        ] {
+            let rect = window.get_by_label(label).rect();
+            assert!(whole.contains_rect(rect), "{label} at {rect:?} of {size:?}");
+        }
+    }
+}
+
+#[test]
+fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
+    let mut window = finished([820.0, 520.0], 1.0);
+    window.state_mut().send(Command::Maximize(Some("log")));
+    settle(&mut window);
+    let shapes = &window.output().shapes;
+    let log: Vec<Drawn> = texts(shapes);
+    assert!(log.len() > 10);
+    for text in log {
+        assert!(
+            text.rect.right() <= text.clip.right() + 1.0,
+            "{}",
+            text.words
+        );
+    }
+}
+
+/// What is said where there is nothing to show names what would be there, and what to do.
+#[test]
+fn empty_views_say_what_to_do() {
+    let mut waiting = crate::window::window(setup());
+    run_until_idle(&mut waiting);
+    for (view, words) in [
+        ("surface", "Nothing is searched yet"),
+        ("batch", "No query was run yet: Run all"),
+        ("charts", "No result to draw: run all queries"),
+        ("migrations", "There are no results A"),
+        ("fusion", "reference"),
+    ] {
+        waiting.state_mut().send(Command::Maximize(Some(view)));
+        waiting.run_steps(3);
+        assert!(is_said(&waiting, words), "{view}");
+        // Nothing has failed before anything ran.
+        assert!(!is_said(&waiting, "failed:"), "{view}");
+    }
+}
+
+#[test]
+fn the_timeline_goes_by_events_or_by_time_and_is_zoomed_by_the_wheel() {
+    let mut window = finished_of(setup());
+    let last = window.state().app_state().run().len() - 1;
+    assert!(is_said(
+        &window,
+        &format!("Stages of the run, events 0 to {last}")
+    ));
+    // Stages that have the room are named in their bars.
+    let named = |window: &Harness<'_, App>| {
+        let line = window.get_by_label_contains("Stages of the run").rect();
+        let mut names: Vec<String> = texts(&window.output().shapes)
+            .into_iter()
+            .filter(|text| line.contains(text.rect.center()))
+            .map(|text| text.words)
+            .collect();
+        names.dedup();
+        names
+    };
+    assert!(
+        named(&window).iter().any(|name| name == "position_coarse"),
+        "{:?}",
+        named(&window)
+    );
+    let line = window.get_by_label_contains("Stages of the run").rect();
+    window.hover_at(line.center());
+    window.run_steps(2);
+    for _ in 0..12 {
+        window.event(egui::Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Line,
+            delta: egui::vec2(0.0, 3.0),
+            phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Wheel,
+            modifiers: Modifiers::NONE,
+        });
+        window.run_steps(2);
+    }
+    window.run_steps(10);
+    assert!(!is_said(
+        &window,
+        &format!("Stages of the run, events 0 to {last}")
+    ));
+    window.get_by_label("Whole run").click();
+    window.run_steps(3);
+    assert!(is_said(
+        &window,
+        &format!("Stages of the run, events 0 to {last}")
+    ));
+
+    window.get_by_label("By time").click();
+    window.run_steps(3);
+    let run = window.state().app_state().run();
+    let all = run.worked_until(last).as_secs_f64();
+    assert!(is_said(
+        &window,
+        &format!("Stages of the run, 0.00 s to {all:.2} s")
+    ));
+    // The clock never runs backwards, and leads back to the record that it was told by.
+    let times: Vec<_> = (0..=last).map(|record| run.worked_until(record)).collect();
+    assert!(times.is_sorted() && times[last] > times[0]);
+    for record in (0..=last).step_by(50) {
+        let there = run.record_at(times[record]);
+        assert!(there >= record && times[there] == times[record]);
+    }
+}
