@@ -72,7 +72,7 @@ impl Session {
         let control = Arc::new(Control::new(mode, breakpoints));
         // Unbounded: a full queue that nobody drains would keep a cancelled worker waiting.
         let (outbox, inbox) = mpsc::channel();
-        let run = Run::new(job.task.params.clone());
+        let run = Run::of(&job.task);
         job::spawn(job, Arc::clone(&control), outbox, Arc::new(wake));
         Self {
             control,

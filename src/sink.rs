@@ -6,6 +6,6 @@ mod progress;
 #[cfg(feature = "rerun")]
 pub mod rerun;
 
-pub use events::EventLines;
+pub use events::{EventLines, SceneNames};
 #[cfg(feature = "cli")]
 pub use progress::Progress;

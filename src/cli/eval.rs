@@ -124,7 +124,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     };
     let outcome = execution.run_remaining(&mut folder, &mut observer);
     bar.finish_and_clear();
-    observer.close();
+    let told = observer.close();
     match outcome {
         Err(RunError::Cancelled(_)) if interrupt.is_raised() => {
             let (done, all) = (folder.done(), run.items().count());
@@ -135,6 +135,7 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         }
         outcome => {
             outcome?;
+            told?;
             Ok(run)
         }
     }

@@ -1,47 +1,76 @@
 //! Writing every event of a run.
 
-use std::fs::File;
-use std::io::{self, BufWriter};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use posescope::method::Method;
 use posescope::problem::Problem;
-use posescope::sink::EventLines;
+use posescope::sink::{EventLines, SceneNames};
 use posescope::trace::Record;
 
 use super::failure::CliError;
 
-/// A file of events.
+/// A file of events, into which queries come whole: one that is interrupted in a run that goes on later is
+/// told once.
 pub struct EventExport {
     path: PathBuf,
-    lines: EventLines<BufWriter<File>>,
+    file: File,
+    scenes: SceneNames,
+    /// What was told of the query at work.
+    lines: EventLines<Vec<u8>>,
     broken: Option<io::Error>,
 }
 
 impl EventExport {
-    /// Opens the file before anything is computed.
+    /// Opens the file before anything is computed; what it had is gone.
     pub fn to(path: &Path) -> Result<Self, CliError> {
-        let file = File::create(path).map_err(CliError::io(path))?;
+        Self::opened(path, File::create(path))
+    }
+
+    /// Goes on behind what the file has.
+    pub fn after(path: &Path) -> Result<Self, CliError> {
+        let file = OpenOptions::new().create(true).append(true).open(path);
+        Self::opened(path, file)
+    }
+
+    fn opened(path: &Path, file: io::Result<File>) -> Result<Self, CliError> {
         Ok(Self {
             path: path.to_owned(),
-            lines: EventLines::to(BufWriter::new(file)),
+            file: file.map_err(CliError::io(path))?,
+            scenes: SceneNames::default(),
+            lines: EventLines::to(Vec::new()),
             broken: None,
         })
     }
 
-    /// Writes an event. The first error is kept, and nothing is written after it.
+    /// What comes is of frames of these scenes.
+    pub fn name_scenes(&mut self, scenes: SceneNames) {
+        self.scenes = scenes;
+    }
+
+    /// Takes an event. The first error is kept, and nothing is taken after it.
     pub fn accept(&mut self, record: &Record, problem: &Problem, method: Method) {
         if self.broken.is_none() {
-            self.broken = self.lines.write(problem, method, record).err();
+            let written = self.lines.write(&self.scenes, problem, method, record);
+            self.broken = written.err();
         }
     }
 
-    /// Says whether all of it has arrived.
+    /// The query at work is done: what was told of it is written.
+    pub fn end_query(&mut self) {
+        let told = std::mem::replace(&mut self.lines, EventLines::to(Vec::new()));
+        if self.broken.is_none() {
+            let written = told.close().and_then(|told| self.file.write_all(&told));
+            self.broken = written.err();
+        }
+    }
+
+    /// Says whether all of it has arrived. A query that is not done is left out.
     pub fn close(self) -> Result<(), CliError> {
-        let outcome = match self.broken {
-            Some(error) => Err(error),
-            None => self.lines.close(),
-        };
-        outcome.map_err(CliError::io(self.path))
+        match self.broken {
+            Some(error) => Err(CliError::io(self.path)(error)),
+            None => Ok(()),
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! Recordings of the queries of a run that failed: `failures/QUERY-METHOD.rrd`.
+//! What a run leaves beside its results: recordings of the queries that failed,
+//! `failures/QUERY-METHOD.rrd`, and events where they are asked for.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,11 +12,13 @@ use posescope::localize::{LocalizeError, LocalizeObserver};
 use posescope::params::Params;
 use posescope::run::{
     FAILURES, FailedQuery, FolderError, RunError, RunFile, RunFolder, RunItem, RunObserver,
-    recording_name,
+    ScenePair, recording_name,
 };
+use posescope::sink::SceneNames;
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
 
 use super::args::EvalArgs;
+use super::event_export::EventExport;
 use super::failure::CliError;
 use super::interrupt::Interrupt;
 use super::observer::CliObserver;
@@ -23,7 +26,8 @@ use super::observer::CliObserver;
 /// Names of failed queries without a recording, one per line.
 const DROPPED: &str = "dropped.txt";
 
-/// Observes a run: a progress bar, and a recording of each failure while the budget lasts.
+/// Observes a run: a progress bar, a recording of each failure while the budget lasts, and every event where
+/// they are asked for.
 ///
 /// A failure is localised once more to be recorded: most queries succeed, and recording each of them
 /// would cost more than repeating a few.
@@ -102,6 +106,12 @@ impl<'a> FailureRecordings<'a> {
         } else {
             fs::write(&list, &still_dropped).map_err(FolderError::io(&list))?;
         }
+        let mut observer = CliObserver::new(indicatif::ProgressBar::hidden(), None, interrupt);
+        observer.events = match &args.events {
+            Some(events) if args.resume => Some(EventExport::after(events)?),
+            Some(events) => Some(EventExport::to(events)?),
+            None => None,
+        };
         Ok(Self {
             folder: path,
             budget,
@@ -111,14 +121,15 @@ impl<'a> FailureRecordings<'a> {
             failure_radius_m: run.failure_radius_m,
             several_pairs,
             bar,
-            observer: CliObserver::new(indicatif::ProgressBar::hidden(), None, interrupt),
+            observer,
             dropped: still_dropped.lines().count(),
         })
     }
 
-    /// Says what was not kept.
-    pub fn close(self) {
+    /// Says what was not kept, and whether the events have arrived.
+    pub fn close(self) -> Result<(), CliError> {
         tell_dropped(self.dropped, &self.folder);
+        self.observer.events.map_or(Ok(()), EventExport::close)
     }
 
     fn record(&self, query: &FailedQuery<'_>, path: &Path) -> Result<(), RecordError> {
@@ -213,6 +224,18 @@ impl RunObserver for FailureRecordings<'_> {
         &mut self.observer
     }
 
+    fn begin(&mut self, item: &RunItem<'_>) {
+        if let Some(events) = &mut self.observer.events {
+            let ScenePair {
+                scene, query_scene, ..
+            } = item.pair;
+            events.name_scenes(SceneNames {
+                references: scene.clone(),
+                query: Some(query_scene.clone()).filter(|query| query != scene),
+            });
+        }
+    }
+
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
         let name = recording_name(
             query.item.pair,
@@ -242,6 +265,9 @@ impl RunObserver for FailureRecordings<'_> {
     }
 
     fn done(&mut self, item: &RunItem<'_>) {
+        if let Some(events) = &mut self.observer.events {
+            events.end_query();
+        }
         self.bar.set_message(item.query.to_owned());
         self.bar.inc(1);
     }

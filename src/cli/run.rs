@@ -10,6 +10,7 @@ use posescope::method::Method;
 use posescope::run::default_failure_radius_m;
 use posescope::scene::{Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
+use posescope::sink::SceneNames;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
@@ -86,7 +87,14 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         observer.export = Some(MatchExport::to(folder)?);
     }
     if let Some(path) = &args.events {
-        observer.events = Some(EventExport::to(path)?);
+        let mut events = EventExport::to(path)?;
+        let name = |scene: &dyn Scene| scene.name().to_owned();
+        let references = name(scenes.references.as_ref());
+        events.name_scenes(SceneNames {
+            query: Some(name(queries)).filter(|query| *query != references),
+            references,
+        });
+        observer.events = Some(events);
     }
     if !task.breakpoints.is_empty() {
         let breakpoints = Breakpoints::new(task.breakpoints.iter().cloned());
@@ -99,7 +107,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
             fusions: task.protocol.fusions.clone(),
             setting: None,
         };
-        plan.localizer.localize(
+        let localized = plan.localizer.localize(
             index,
             query.query,
             &[request],
@@ -110,7 +118,12 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
                 results.push((result, times.total()));
                 written
             },
-        )
+        );
+        // Of a query that was stopped, what was told until then.
+        if let Some(events) = &mut observer.events {
+            events.end_query();
+        }
+        localized
     });
     bar.finish_and_clear();
 

@@ -105,6 +105,11 @@ pub struct FailedQuery<'a> {
 
 /// An observer of a run over many queries.
 pub trait RunObserver {
+    /// A query is about to be localised.
+    fn begin(&mut self, item: &RunItem<'_>) {
+        let _ = item;
+    }
+
     /// The observer that the next query is localised under.
     fn query_observer(&mut self) -> &mut dyn LocalizeObserver;
 
@@ -161,6 +166,7 @@ impl Execution<'_> {
             let localizer = localizer.with_foreign(protocol.foreign(queries)?);
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
+                observer.begin(item);
                 let results = self.results(item, &localizer, &left_out, observer)?;
                 folder.append(&results)?;
                 observer.done(item);

@@ -6,8 +6,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::loaded::Loaded;
+use super::task::Task;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
 use crate::history::History;
+use crate::image::Degradation;
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
@@ -21,6 +23,12 @@ use crate::trace::Record;
 pub struct Run {
     /// The parameters it was made with.
     pub params: Params,
+    /// How far it searched \[m\].
+    pub radius_m: f64,
+    /// The seed of its random choices.
+    pub seed: u64,
+    /// What was done to the photo of its query before.
+    pub degraded: Degradation,
     /// Its photos and clouds, once they are read.
     pub loaded: Option<Arc<Loaded>>,
     history: History,
@@ -130,12 +138,27 @@ pub struct StageBar {
 }
 
 impl Run {
-    /// An empty run with these parameters.
-    pub fn new(params: Params) -> Self {
+    /// An empty run of a task.
+    pub fn of(task: &Task) -> Self {
         Self {
-            params,
+            params: task.params.clone(),
+            radius_m: task.radius_m,
+            seed: task.protocol.seed,
+            degraded: task.protocol.degrade,
             ..Self::default()
         }
+    }
+
+    /// What two runs of a query may differ in, a line each: parameters that are not the default, and what is
+    /// said on the command line.
+    pub fn settings(&self) -> Vec<String> {
+        let mut settings = self.params.changes();
+        settings.push(format!("--radius {}", self.radius_m));
+        settings.push(format!("--seed {}", self.seed));
+        if !self.degraded.is_none() {
+            settings.push(format!("--degrade {}", self.degraded));
+        }
+        settings
     }
 
     pub(super) fn begin(&mut self, part: Part) {

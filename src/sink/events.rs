@@ -18,6 +18,15 @@ use crate::render::Score;
 use crate::robust::Hypothesis;
 use crate::trace::Record;
 
+/// The names of the scenes that frames are from.
+#[derive(Clone, Debug, Default)]
+pub struct SceneNames {
+    /// That of the references.
+    pub references: String,
+    /// That of the query, where it is another.
+    pub query: Option<String>,
+}
+
 /// Writes events of several queries, methods and references one after the other.
 pub struct EventLines<W: Write> {
     writer: W,
@@ -33,8 +42,18 @@ impl<W: Write> EventLines<W> {
     ///
     /// # Errors
     /// What the writer says.
-    pub fn write(&mut self, problem: &Problem, method: Method, record: &Record) -> io::Result<()> {
+    pub fn write(
+        &mut self,
+        scenes: &SceneNames,
+        problem: &Problem,
+        method: Method,
+        record: &Record,
+    ) -> io::Result<()> {
+        let query_scene = scenes.query.iter();
+        let query_scene = query_scene.map(|name| ("query_scene".to_owned(), json!(name)));
         let head = [
+            ("scene", json!(scenes.references)),
+            ("radius_m", json!(problem.uncertainty_radius_m)),
             ("query", json!(problem.query.name)),
             ("reference", json!(problem.reference.name)),
             ("method", json!(method.name())),
@@ -44,6 +63,7 @@ impl<W: Write> EventLines<W> {
         ];
         let mut line = Map::new();
         line.extend(head.map(|(key, value)| (key.to_owned(), value)));
+        line.extend(query_scene);
         if let Value::Object(data) = data(&record.event) {
             line.extend(data);
         }
@@ -51,12 +71,13 @@ impl<W: Write> EventLines<W> {
         self.writer.write_all(b"\n")
     }
 
-    /// Writes what is left in a buffer.
+    /// Writes what is left in a buffer, and hands the writer back.
     ///
     /// # Errors
     /// What the writer says.
-    pub fn close(mut self) -> io::Result<()> {
-        self.writer.flush()
+    pub fn close(mut self) -> io::Result<W> {
+        self.writer.flush()?;
+        Ok(self.writer)
     }
 }
 

@@ -77,7 +77,7 @@ fn two_runs_are_one_table_of_what_became_different() {
     let before = results(&window);
     press(&mut window, Modifiers::NONE, Key::P);
     window.run_steps(3);
-    assert!(is_said(&window, "Both have the same parameters"));
+    assert!(is_said(&window, "Both were asked the same"));
     assert!(is_said(&window, "no difference"));
 
     window.state_mut().send(Command::SetParam {
@@ -97,6 +97,13 @@ fn two_runs_are_one_table_of_what_became_different() {
         let mut said = window.query_all_by_label(&words);
         assert!(said.next().is_some(), "{words}");
     }
+
+    let degradation = "gamma=0.5".parse().expect("a degradation");
+    window.state_mut().send(Command::Degrade(degradation));
+    window.run_steps(2);
+    run_until_idle(&mut window);
+    window.run_steps(3);
+    assert!(is_said(&window, "--degrade gamma=0.5"));
 }
 
 /// A window over a run of three queries, as if its folder was opened.

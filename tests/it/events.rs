@@ -1,4 +1,4 @@
-//! `run --events`: every event as data.
+//! `--events`: every event as data.
 
 use std::fs;
 
@@ -80,6 +80,71 @@ fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
     );
     // Nothing is as large as a picture.
     assert!(text.lines().all(|line| line.len() < 200_000));
+}
+
+/// What a run over the first queries tells, in this folder, with these words more.
+fn told_by_eval(sequence: &SmallSequence, out: &str, more: &[&str]) -> String {
+    let path = sequence.path().join(format!("{out}.jsonl"));
+    let output = posescope()
+        .arg("eval")
+        .arg(sequence.folder())
+        .args(["--only", "5", "--only", "6", "--method", "fb,pm", "-q"])
+        .args([
+            "--radius",
+            "2,3",
+            "--max-recordings",
+            "0",
+            "--pictures",
+            "0",
+        ])
+        .args(more)
+        .arg("--out")
+        .arg(sequence.path().join(out))
+        .arg("--events")
+        .arg(&path)
+        .output()
+        .expect("the binary starts");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    fs::read_to_string(path).expect("text")
+}
+
+#[test]
+fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
+    let sequence = SmallSequence::write();
+    let whole = told_by_eval(&sequence, "whole", &[]);
+    let events: Vec<Json> = whole
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("an object"))
+        .collect();
+    for query in ["000005", "000006"] {
+        for radius in [2.0, 3.0] {
+            let of_it = |event: &&Json| event["query"] == query && event["radius_m"] == radius;
+            assert!(events.iter().any(|event| of_it(&event)), "{query} {radius}");
+        }
+    }
+    assert!(
+        events
+            .iter()
+            .all(|event| event["scene"] == events[0]["scene"])
+    );
+
+    let first = told_by_eval(&sequence, "first", &["--shard", "1/2"]);
+    let second = told_by_eval(&sequence, "second", &["--shard", "2/2"]);
+    assert!(!first.is_empty() && !second.is_empty());
+    assert_eq!(first.clone() + &second, whole);
+
+    // As a run that was stopped after its first query leaves it.
+    let results = sequence.path().join("whole/results.jsonl");
+    let lines = fs::read_to_string(&results).expect("text");
+    let of_first: String = lines
+        .split_inclusive('\n')
+        .filter(|line| line.contains("\"query\":\"000005\""))
+        .collect();
+    assert!(!of_first.is_empty() && of_first.len() < lines.len());
+    fs::write(&results, of_first).expect("room");
+    fs::write(sequence.path().join("whole.jsonl"), &first).expect("room");
+    assert_eq!(told_by_eval(&sequence, "whole", &["--resume"]), whole);
 }
 
 #[test]

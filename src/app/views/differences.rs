@@ -38,7 +38,7 @@ impl View for DifferencesView {
             }
         });
         ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-            changed(ui, &a.params.changes(), &b.params.changes());
+            changed(ui, &a.settings(), &b.settings());
             let right = context.setup.task.protocol.right;
             for result in b.results() {
                 let same = |other: &&QueryResult| {
@@ -61,7 +61,7 @@ impl View for DifferencesView {
     }
 }
 
-/// The parameters that one of the runs has otherwise.
+/// What one of the runs was asked otherwise.
 fn changed(ui: &mut Ui, a: &[String], b: &[String]) {
     let only = |these: &[String], those: &[String]| -> Vec<String> {
         let own = these.iter().filter(|change| !those.contains(change));
@@ -69,7 +69,7 @@ fn changed(ui: &mut Ui, a: &[String], b: &[String]) {
     };
     let (only_a, only_b) = (only(a, b), only(b, a));
     if only_a.is_empty() && only_b.is_empty() {
-        ui.weak("Both have the same parameters");
+        ui.weak("Both were asked the same");
     }
     for (name, changes) in [("A", only_a), ("B", only_b)] {
         for change in changes {

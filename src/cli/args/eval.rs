@@ -104,6 +104,10 @@ pub struct EvalArgs {
     /// Draw matches and costs of at most as many failures in report.html [default: 24; with --sweep 0]
     #[arg(long, value_name = "N")]
     pub pictures: Option<usize>,
+    /// Write every event as JSON, one object per line: all that was decided, for a notebook. --resume goes on
+    /// behind what the file has
+    #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["merge", "sweep"])]
+    pub events: Option<PathBuf>,
     /// Keep recordings of failures of at most this size together [MB]
     #[arg(long, value_name = "MB", default_value_t = 500)]
     pub max_recording_mb: u64,
