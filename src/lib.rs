@@ -41,6 +41,8 @@ mod palette;
 #[cfg(feature = "rerun")]
 mod picture;
 #[cfg(feature = "rerun")]
+mod place;
+#[cfg(feature = "rerun")]
 pub mod report;
 pub mod run;
 pub mod scene;

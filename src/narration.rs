@@ -7,7 +7,7 @@ use crate::event::{
 use crate::features::MatchVerdict;
 use crate::fusion::ShareOutcome;
 use crate::geometry::PoseError;
-use crate::grid::Offset;
+use crate::place::place;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 
 /// One sentence for an event that is a decision; `None` for the others.
@@ -101,7 +101,7 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             event.step,
             event.smooth_cost,
             cost(event.score.cost),
-            at(&Offset::of(&event.reference_from_camera))
+            place(&event.reference_from_camera)
         ),
         Event::StartsRefined(event) => refined(event)?,
         Event::CandidatesJudged(event) => judged(event),
@@ -130,7 +130,7 @@ fn rendered(event: &ViewRendered) -> String {
         "{what}: cost {} over {} pixels, {}",
         cost(event.comparison.score.cost),
         event.comparison.score.covered,
-        at(&event.offset)
+        place(&event.offset.reference_from_camera())
     )
 }
 
@@ -223,13 +223,4 @@ fn ranked(event: &ReferencesRanked) -> String {
 
 fn cost(cost: Option<f64>) -> String {
     cost.map_or("none".to_owned(), |cost| format!("{cost:.4}"))
-}
-
-fn at(offset: &Offset) -> String {
-    format!(
-        "{:.2} m right, {:.2} m ahead, {:.2}° left",
-        offset.right_m,
-        offset.forward_m,
-        offset.yaw_rad.to_degrees()
-    )
 }

@@ -18,7 +18,6 @@ mod log;
 mod mesh_painter;
 mod migrations;
 mod parameters;
-mod place;
 mod queries;
 mod ransac;
 mod readout;

@@ -10,7 +10,7 @@ use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
 
 use crate::window::{finished as finished_of, is_said, press};
-use crate::window::{run_until_idle, setup, wait};
+use crate::window::{results, run_until_idle, setup, wait};
 
 /// The smallest window that the views are made for \[points\].
 const SMALL: [f32; 2] = [1280.0, 800.0];
@@ -285,6 +285,37 @@ fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
             text.words
         );
     }
+}
+
+#[test]
+fn the_decision_at_the_cursor_stays_in_sight_when_the_window_shrinks() {
+    let mut window = finished([820.0, 950.0], 1.0);
+    window.state_mut().send(Command::Maximize(Some("log")));
+    settle(&mut window);
+    let found = results(&window);
+    let found = found.iter().find(|result| result.method == Method::MI);
+    let best = found.and_then(|found| found.cost.as_ref()).expect("a cost");
+    let decision = format!("result: cost {:.4}", best.best);
+    assert!(is_said(&window, &decision));
+    window.set_size([820.0, 420.0].into());
+    settle(&mut window);
+    assert!(is_said(&window, &decision));
+
+    // Whoever scrolled away is not brought back.
+    let log = window.get_by_label_contains(&decision).rect().center();
+    window.hover_at(log);
+    window.event(egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: [0.0, 4000.0].into(),
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Unknown,
+        modifiers: Modifiers::NONE,
+    });
+    settle(&mut window);
+    assert!(!is_said(&window, &decision));
+    window.set_size([820.0, 500.0].into());
+    settle(&mut window);
+    assert!(!is_said(&window, &decision));
 }
 
 /// What is said where there is nothing to show names what would be there, and what to do.

@@ -2,15 +2,15 @@
 //! which verdicts are frequent.
 
 mod recall;
+mod verdicts;
 
 use std::collections::BTreeMap;
 
 use egui::{ComboBox, DragValue, Ui};
-use egui_plot::{Bar, BarChart, Legend, Line, MarkerShape, Plot, PlotPoint, Points};
+use egui_plot::{Legend, Line, MarkerShape, Plot, PlotPoint, Points};
 
 use super::View;
 use crate::app::{Command, ResultRow, ViewContext, theme};
-use crate::code::Code;
 use crate::localize::{QueryResult, Standing};
 use crate::measure::{Field, Value};
 use crate::method::Method;
@@ -41,7 +41,7 @@ impl Chart {
         (
             Self::Verdicts,
             "Verdicts",
-            "How often each verdict is the first, by method",
+            "How often each verdict is the first, by method or by condition",
         ),
     ];
 }
@@ -56,6 +56,8 @@ pub struct ChartsView {
     up: &'static str,
     /// The greatest error that is drawn \[m\].
     limit_m: f64,
+    /// Whether verdicts are told by condition too.
+    by_condition: bool,
 }
 
 impl Default for ChartsView {
@@ -65,6 +67,7 @@ impl Default for ChartsView {
             across: "start",
             up: "error",
             limit_m: 2.0,
+            by_condition: false,
         }
     }
 }
@@ -102,14 +105,21 @@ impl View for ChartsView {
                     let drag = DragValue::new(&mut self.limit_m).range(0.05..=100.0);
                     ui.add(drag.speed(0.05).suffix(" m")).labelled_by(label.id);
                 }
-                Chart::Verdicts => {}
+                Chart::Verdicts => {
+                    ui.selectable_value(&mut self.by_condition, false, "by method");
+                    ui.selectable_value(&mut self.by_condition, true, "by condition")
+                        .on_hover_text(
+                            "A column for each pair of scenes that queries and references are from",
+                        );
+                }
             }
         });
         match self.chart {
             Chart::Scatter => self.scatter(ui, context, &results),
             Chart::Errors => self.errors(ui, &results),
             Chart::Recall => recall::ui(ui, context, &results, self.limit_m),
-            Chart::Verdicts => verdicts(ui, &results),
+            Chart::Verdicts if self.by_condition => verdicts::by_condition(ui, context, &results),
+            Chart::Verdicts => verdicts::by_method(ui, &results),
         }
     }
 }
@@ -247,68 +257,6 @@ fn steps(errors: &[f64], all: usize, limit_m: f64) -> Vec<[f64; 2]> {
     let last = line.last().map_or(0.0, |point| point[1]);
     line.push([limit_m, last]);
     line
-}
-
-/// The most frequent first, one bar for each method on top of the other.
-fn verdicts(ui: &mut Ui, results: &[Chosen<'_>]) {
-    let mut counts: BTreeMap<Code, BTreeMap<Method, usize>> = BTreeMap::new();
-    for (_, result) in results {
-        if let Some(finding) = result.diagnosis.first() {
-            let of_code = counts.entry(finding.code).or_default();
-            *of_code.entry(result.method).or_default() += 1;
-        }
-    }
-    if counts.is_empty() {
-        ui.weak("None of these results has a verdict: all are right and sure");
-        return;
-    }
-    let mut codes: Vec<(Code, BTreeMap<Method, usize>)> = counts.into_iter().collect();
-    codes.sort_by_key(|(code, counts)| (std::cmp::Reverse(counts.values().sum::<usize>()), *code));
-    let names: Vec<&str> = codes.iter().map(|(code, _)| code.name()).collect();
-    let methods: std::collections::BTreeSet<Method> = codes
-        .iter()
-        .flat_map(|(_, counts)| counts.keys().copied())
-        .collect();
-    let labels = names.clone();
-    let plot = Plot::new("verdicts")
-        .y_axis_label("results")
-        .legend(Legend::default())
-        .x_axis_formatter(move |mark, _| {
-            let index = mark.value.round();
-            let is_whole = (mark.value - index).abs() < 1e-6;
-            let name = labels.get(index.max(0.0) as usize);
-            match (is_whole && index >= 0.0, name) {
-                (true, Some(name)) => (*name).to_owned(),
-                _ => String::new(),
-            }
-        })
-        .show(ui, |plot| {
-            let mut below = vec![0.0; codes.len()];
-            for method in methods {
-                let bars = codes
-                    .iter()
-                    .enumerate()
-                    .filter_map(|(index, (code, counts))| {
-                        let count = *counts.get(&method)? as f64;
-                        let bar = Bar::new(index as f64, count)
-                            .base_offset(below[index])
-                            .width(0.7)
-                            .name(format!("{} {code}: {}", method.label(), code.about()));
-                        below[index] += count;
-                        Some(bar)
-                    });
-                let bars: Vec<Bar> = bars.collect();
-                plot.bar_chart(BarChart::new(method.label(), bars).color(theme::method(method)));
-            }
-        });
-    let words: Vec<String> = codes
-        .iter()
-        .map(|(code, counts)| format!("{code} {}", counts.values().sum::<usize>()))
-        .collect();
-    plot.response.widget_info(|| {
-        let words = format!("Verdicts: {}", words.join(", "));
-        egui::WidgetInfo::labeled(egui::Role::Image, true, words)
-    });
 }
 
 #[cfg(test)]

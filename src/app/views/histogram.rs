@@ -7,12 +7,12 @@ mod residuals;
 use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
-use super::place::place;
 use crate::app::{ShownView, ViewContext};
 use crate::cost::Explanation;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
 use crate::method::Method;
+use crate::place::place;
 
 /// The joint histogram, or the residuals, of the synthetic view that is shown.
 #[derive(Default)]

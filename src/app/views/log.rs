@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use egui::{RichText, ScrollArea, TextStyle, Ui};
+use egui::{RichText, ScrollArea, TextStyle, Ui, Vec2};
 
 use super::View;
 use crate::app::{Command, ViewContext};
@@ -15,10 +15,31 @@ pub struct LogView {
     /// Sentences with their positions, and how many records they were made from.
     lines: Vec<(usize, String)>,
     told: usize,
-    cursor_shown: Option<usize>,
+    sight: Sight,
     /// The lines as they are broken for a width, and that width in letters.
     rows: Vec<Row>,
     letters: usize,
+}
+
+/// What keeps the decision at the cursor in sight until somebody scrolls.
+#[derive(Default)]
+struct Sight {
+    /// The cursor, and the room there was, when it was put there.
+    put_for: Option<(usize, Vec2)>,
+    /// Where it was put, and where the view is since \[points from the top\].
+    put_at: f32,
+    now_at: f32,
+}
+
+impl Sight {
+    /// Whether it is to be put there again: the cursor moved, or the room changed and nobody scrolled.
+    fn is_lost(&self, cursor: usize, room: Vec2) -> bool {
+        match self.put_for {
+            Some((before, _)) if before != cursor => true,
+            Some((_, before)) => before != room && self.put_at == self.now_at,
+            None => true,
+        }
+    }
 }
 
 /// A part of a line that fits into the view.
@@ -70,14 +91,15 @@ impl View for LogView {
         let height = ui.text_style_height(&TextStyle::Monospace);
         // An id of its own: a view that has all the room would share it with the view before.
         let mut area = ScrollArea::vertical().id_salt("log").auto_shrink(false);
-        if self.cursor_shown != Some(context.cursor) {
-            self.cursor_shown = Some(context.cursor);
+        let room = ui.available_size();
+        let is_lost = self.sight.is_lost(context.cursor, room);
+        if is_lost {
             let spacing = ui.spacing().item_spacing.y;
             let above =
                 (first_here as f32 * (height + spacing) - 0.5 * ui.available_height()).max(0.0);
             area = area.vertical_scroll_offset(above);
         }
-        area.show_rows(ui, height, self.rows.len(), |ui, rows| {
+        let shown = area.show_rows(ui, height, self.rows.len(), |ui, rows| {
             for row in &self.rows[rows] {
                 let (at, words) = &self.lines[row.line];
                 let words = format!("{}{}", row.indent, &words[row.part.clone()]);
@@ -93,6 +115,11 @@ impl View for LogView {
                 }
             }
         });
+        self.sight.now_at = shown.state.offset.y;
+        if is_lost {
+            self.sight.put_for = Some((context.cursor, room));
+            self.sight.put_at = self.sight.now_at;
+        }
     }
 }
 

@@ -10,11 +10,11 @@ use egui::{Color32, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
 use self::mode::Mode;
 use super::View;
 use super::canvas::{self, PanZoom};
-use super::place::place;
 use crate::app::textures::color_image;
 use crate::app::{Command, ShownView, ViewContext};
 use crate::event::{Moment, Side, ViewRendered};
 use crate::method::Method;
+use crate::place::place;
 use crate::problem::Problem;
 
 /// How long each of two blinking pictures is shown \[s\].

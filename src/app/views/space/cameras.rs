@@ -11,6 +11,7 @@ use crate::camera::Intrinsics;
 use crate::estimator::{self, Parts};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
+use crate::place::place;
 
 /// Whose camera it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,13 +169,8 @@ pub(super) fn cameras(
     };
     let truth = context.truth();
     let camera = |kind: CameraKind, world: Pose| {
-        let offset = geometry.offset(&world);
-        let mut about = format!(
-            "{:.2} m right, {:.2} m ahead, {:.2}° left of the reference",
-            offset.right_m,
-            offset.forward_m,
-            offset.yaw_rad.to_degrees()
-        );
+        let reference_from_camera = geometry.reference_from(&world);
+        let mut about = format!("from the reference: {}", place(&reference_from_camera));
         if let Some(truth) = truth
             && kind != CameraKind::Truth
         {

@@ -4,7 +4,6 @@ use nalgebra::{Point2, Point3, Unit, Vector3};
 
 use crate::app::ViewContext;
 use crate::geometry::Pose;
-use crate::grid::Offset;
 
 /// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's
 /// camera.
@@ -87,16 +86,10 @@ impl SceneGeometry {
         self.scene_from_reference.rotation * -Vector3::y_axis()
     }
 
-    /// Where a camera is, seen from the reference camera, as the search would say it.
-    pub(super) fn offset(&self, world_from_camera: &Pose) -> Offset {
+    /// A camera's pose in the reference camera's frame.
+    pub(super) fn reference_from(&self, world_from_camera: &Pose) -> Pose {
         let scene_from_camera = self.scene_from_world * world_from_camera;
-        let reference_from_camera = self.scene_from_reference.inverse() * scene_from_camera;
-        let ahead = reference_from_camera.rotation * Vector3::z();
-        Offset {
-            right_m: reference_from_camera.translation.x,
-            forward_m: reference_from_camera.translation.z,
-            yaw_rad: (-ahead.x).atan2(ahead.z),
-        }
+        self.scene_from_reference.inverse() * scene_from_camera
     }
 
     /// How large cameras are drawn \[m\].
@@ -126,6 +119,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    use crate::grid::Offset;
+
     fn geometry(radius_m: f64) -> SceneGeometry {
         SceneGeometry {
             scene_from_world: Pose::new([3.0, 1.0, -2.0].into(), [0.1, 0.7, 0.0].into()),
@@ -142,7 +137,8 @@ mod tests {
             let offset = Offset { right_m, forward_m, yaw_rad };
             let geometry = geometry(15.0);
             let scene_from_camera = geometry.scene_from_reference * offset.reference_from_camera();
-            let found = geometry.offset(&(geometry.scene_from_world.inverse() * scene_from_camera));
+            let world_from_camera = geometry.scene_from_world.inverse() * scene_from_camera;
+            let found = Offset::of(&geometry.reference_from(&world_from_camera));
             prop_assert!((found.right_m - right_m).abs() < 1e-9);
             prop_assert!((found.forward_m - forward_m).abs() < 1e-9);
             prop_assert!((found.yaw_rad - yaw_rad).abs() < 1e-9);

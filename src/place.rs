@@ -1,9 +1,9 @@
-//! Where a camera is, in words that all views share: without signs, with the sides named.
+//! Where a camera is, in words that views, log and recordings share: without signs, with the sides named.
 
 use crate::geometry::Pose;
 
 /// A camera's place in the reference camera's frame, in words.
-pub(super) fn place(reference_from_camera: &Pose) -> String {
+pub(crate) fn place(reference_from_camera: &Pose) -> String {
     let along = |value: f64, positive: &str, negative: &str| {
         let word = if value <= -0.005 { negative } else { positive };
         format!("{:.2} m {word}", value.abs())
