@@ -84,7 +84,10 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::PhaseSearched(event) => {
             let phase = event.surface.lattice.phase.name();
             match &event.best {
-                Some(best) => format!("{phase}: the least cost is at {}", at(best)),
+                Some(best) => format!(
+                    "{phase}: the least cost is at {}",
+                    place(&best.reference_from_camera())
+                ),
                 None if event.surface.minimum().is_some() => {
                     format!("{phase}: shown, and not searched")
                 }

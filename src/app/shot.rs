@@ -242,10 +242,7 @@ impl<'a> Window<'a> {
                 None => output.textures_delta.clear(),
             }
             let state = self.app.app_state();
-            let is_waiting = state.is_probing()
-                || [0, 1].into_iter().any(|side| state.is_looking_beside(side))
-                || state.is_tracing_line()
-                || state.queries.is_painting();
+            let is_waiting = state.is_working_out();
             if !is_waiting && self.frames >= FEWEST {
                 return output;
             }

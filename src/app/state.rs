@@ -229,6 +229,14 @@ impl AppState {
         self.options.beside.is_some() && self.beside[side].is_busy()
     }
 
+    /// Whether anything of what the views show is still worked out, beside a run.
+    pub fn is_working_out(&self) -> bool {
+        self.is_probing()
+            || [0, 1].into_iter().any(|side| self.is_looking_beside(side))
+            || self.is_tracing_line()
+            || self.queries.is_painting()
+    }
+
     /// What is known of a method's cost along the line that was asked for last.
     pub fn cost_along(&self, method: Method) -> Option<&CostAlong> {
         self.line_tracer.along(method)

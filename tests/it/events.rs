@@ -82,13 +82,14 @@ fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
     assert!(text.lines().all(|line| line.len() < 200_000));
 }
 
-/// What a run over the first queries tells, in this folder, with these words more.
+/// What a run over the first queries tells, in this folder, with these words more; but for what it remembers
+/// of frames that it had before.
 fn told_by_eval(sequence: &SmallSequence, out: &str, more: &[&str]) -> String {
     let path = sequence.path().join(format!("{out}.jsonl"));
     let output = posescope()
         .arg("eval")
         .arg(sequence.folder())
-        .args(["--only", "5", "--only", "6", "--method", "fb,pm", "-q"])
+        .args(["--only", "4", "--only", "5", "--method", "fb,pm", "-q"])
         .args([
             "--radius",
             "2,3",
@@ -106,7 +107,8 @@ fn told_by_eval(sequence: &SmallSequence, out: &str, more: &[&str]) -> String {
         .expect("the binary starts");
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{stderr}");
-    fs::read_to_string(path).expect("text")
+    let text = fs::read_to_string(path).expect("text");
+    text.replace("\"reused\":true", "\"reused\":false")
 }
 
 #[test]
@@ -117,7 +119,7 @@ fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
         .lines()
         .map(|line| serde_json::from_str(line).expect("an object"))
         .collect();
-    for query in ["000005", "000006"] {
+    for query in ["000004", "000005"] {
         for radius in [2.0, 3.0] {
             let of_it = |event: &&Json| event["query"] == query && event["radius_m"] == radius;
             assert!(events.iter().any(|event| of_it(&event)), "{query} {radius}");
@@ -132,19 +134,23 @@ fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
     let first = told_by_eval(&sequence, "first", &["--shard", "1/2"]);
     let second = told_by_eval(&sequence, "second", &["--shard", "2/2"]);
     assert!(!first.is_empty() && !second.is_empty());
-    assert_eq!(first.clone() + &second, whole);
+    assert!(
+        first.clone() + &second == whole,
+        "the parts are not the whole"
+    );
 
     // As a run that was stopped after its first query leaves it.
     let results = sequence.path().join("whole/results.jsonl");
     let lines = fs::read_to_string(&results).expect("text");
     let of_first: String = lines
         .split_inclusive('\n')
-        .filter(|line| line.contains("\"query\":\"000005\""))
+        .filter(|line| line.contains("\"query\":\"000004\""))
         .collect();
     assert!(!of_first.is_empty() && of_first.len() < lines.len());
     fs::write(&results, of_first).expect("room");
     fs::write(sequence.path().join("whole.jsonl"), &first).expect("room");
-    assert_eq!(told_by_eval(&sequence, "whole", &["--resume"]), whole);
+    let resumed = told_by_eval(&sequence, "whole", &["--resume"]);
+    assert!(resumed == whole, "what is gone on with is not the whole");
 }
 
 #[test]

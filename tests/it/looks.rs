@@ -24,10 +24,7 @@ fn show(window: &mut Harness<'_, App>, view: &'static str) {
     window.state_mut().send(Command::Maximize(Some(view)));
     // What is in sight asks for its thumbnails.
     window.run_steps(2);
-    wait(window, |app| {
-        let state = app.app_state();
-        !state.is_probing() && !state.is_tracing_line() && !state.queries.is_painting()
-    });
+    wait(window, |app| !app.app_state().is_working_out());
     window.run_steps(4);
 }
 

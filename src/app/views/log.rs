@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use egui::{RichText, ScrollArea, TextStyle, Ui, Vec2};
+use egui::style::ScrollAnimation;
+use egui::{Align, Rect, RichText, ScrollArea, TextStyle, Ui, Vec2, pos2, vec2};
 
 use super::View;
 use crate::app::{Command, ViewContext};
@@ -29,6 +30,8 @@ struct Sight {
     /// Where it was put, and where the view is since \[points from the top\].
     put_at: f32,
     now_at: f32,
+    /// Whether it is on its way there: areas scroll a frame after they are asked to.
+    is_moving: bool,
 }
 
 impl Sight {
@@ -36,7 +39,8 @@ impl Sight {
     fn is_lost(&self, cursor: usize, room: Vec2) -> bool {
         match self.put_for {
             Some((before, _)) if before != cursor => true,
-            Some((_, before)) => before != room && self.put_at == self.now_at,
+            // What is shown is rounded to pixels.
+            Some((_, before)) => before != room && (self.put_at - self.now_at).abs() < 1.0,
             None => true,
         }
     }
@@ -89,17 +93,20 @@ impl View for LogView {
         let here = self.lines.partition_point(|(at, _)| *at <= context.cursor);
         let first_here = self.rows.partition_point(|row| row.line + 1 < here);
         let height = ui.text_style_height(&TextStyle::Monospace);
-        // An id of its own: a view that has all the room would share it with the view before.
-        let mut area = ScrollArea::vertical().id_salt("log").auto_shrink(false);
         let room = ui.available_size();
         let is_lost = self.sight.is_lost(context.cursor, room);
-        if is_lost {
-            let spacing = ui.spacing().item_spacing.y;
-            let above =
-                (first_here as f32 * (height + spacing) - 0.5 * ui.available_height()).max(0.0);
-            area = area.vertical_scroll_offset(above);
-        }
+        let row_height = height + ui.spacing().item_spacing.y;
+        // An id of its own: a view that has all the room would share it with the view before.
+        let area = ScrollArea::vertical().id_salt("log").auto_shrink(false);
         let shown = area.show_rows(ui, height, self.rows.len(), |ui, rows| {
+            if is_lost {
+                let top = ui.max_rect().top() - rows.start as f32 * row_height;
+                let line = Rect::from_min_size(
+                    pos2(ui.max_rect().left(), top + first_here as f32 * row_height),
+                    vec2(1.0, height),
+                );
+                ui.scroll_to_rect_animation(line, Some(Align::Center), ScrollAnimation::none());
+            }
             for row in &self.rows[rows] {
                 let (at, words) = &self.lines[row.line];
                 let words = format!("{}{}", row.indent, &words[row.part.clone()]);
@@ -115,10 +122,13 @@ impl View for LogView {
                 }
             }
         });
-        self.sight.now_at = shown.state.offset.y;
+        self.sight.now_at = shown.state.clamped_offset().y;
+        if self.sight.is_moving {
+            self.sight.put_at = self.sight.now_at;
+        }
+        self.sight.is_moving = is_lost;
         if is_lost {
             self.sight.put_for = Some((context.cursor, room));
-            self.sight.put_at = self.sight.now_at;
         }
     }
 }

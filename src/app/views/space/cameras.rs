@@ -57,7 +57,7 @@ impl CameraKind {
             Self::Truth => "×",
             Self::Estimate(method) | Self::BestSoFar(method) => {
                 const SHAPES: [&str; 6] = ["●", "▲", "■", "◆", "◇", "□"];
-                SHAPES[place(method) % SHAPES.len()]
+                SHAPES[rank(method) % SHAPES.len()]
             }
             Self::Hand => "▶",
             Self::Pointer => "↓",
@@ -78,7 +78,7 @@ impl CameraKind {
         match self {
             Self::Reference | Self::Hand => 1.0,
             Self::Truth => 1.24,
-            Self::Estimate(method) => 1.0 + 0.08 * place(method) as f64,
+            Self::Estimate(method) => 1.0 + 0.08 * rank(method) as f64,
             Self::BestSoFar(_) | Self::Pointer => 0.7,
         }
     }
@@ -98,7 +98,7 @@ impl CameraKind {
 }
 
 /// A method's place among all.
-fn place(method: Method) -> usize {
+fn rank(method: Method) -> usize {
     let found = estimator::methods().position(|known| known == method);
     found.unwrap_or_else(|| estimator::all().len())
 }
