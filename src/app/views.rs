@@ -12,6 +12,7 @@ mod differences;
 mod fusion;
 mod histogram;
 mod images;
+mod in_sight;
 mod legend;
 mod lockstep;
 mod log;

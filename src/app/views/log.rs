@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use egui::style::ScrollAnimation;
-use egui::{Align, Rect, RichText, ScrollArea, TextStyle, Ui, Vec2, pos2, vec2};
+use egui::{RichText, ScrollArea, TextStyle, Ui, Vec2};
 
 use super::View;
+use super::in_sight::bring_to_the_middle;
 use crate::app::{Command, ViewContext};
 use crate::event::Event;
 use crate::narration;
@@ -95,17 +95,11 @@ impl View for LogView {
         let height = ui.text_style_height(&TextStyle::Monospace);
         let room = ui.available_size();
         let is_lost = self.sight.is_lost(context.cursor, room);
-        let row_height = height + ui.spacing().item_spacing.y;
         // An id of its own: a view that has all the room would share it with the view before.
         let area = ScrollArea::vertical().id_salt("log").auto_shrink(false);
         let shown = area.show_rows(ui, height, self.rows.len(), |ui, rows| {
             if is_lost {
-                let top = ui.max_rect().top() - rows.start as f32 * row_height;
-                let line = Rect::from_min_size(
-                    pos2(ui.max_rect().left(), top + first_here as f32 * row_height),
-                    vec2(1.0, height),
-                );
-                ui.scroll_to_rect_animation(line, Some(Align::Center), ScrollAnimation::none());
+                bring_to_the_middle(ui, rows.start, first_here, height);
             }
             for row in &self.rows[rows] {
                 let (at, words) = &self.lines[row.line];

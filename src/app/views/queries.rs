@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use egui::{RichText, ScrollArea, Ui};
 
 use super::View;
+use super::in_sight::bring_to_the_middle;
 use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ViewContext, theme};
 use crate::event::Side;
@@ -49,15 +50,14 @@ impl View for QueriesView {
             .copied()
             .filter(|query| !self.only_failures || context.has_failed(*query))
             .collect();
-        let mut area = ScrollArea::vertical().auto_shrink(false);
-        if self.in_sight != Some(context.setup.query) {
-            self.in_sight = Some(context.setup.query);
-            let place = shown.iter().position(|query| *query == context.setup.query);
-            let above = place.unwrap_or(0) as f32 * (THUMBNAIL.y + ui.spacing().item_spacing.y);
-            let middle = 0.5 * (ui.available_height() - THUMBNAIL.y);
-            area = area.vertical_scroll_offset((above - middle).max(0.0));
-        }
+        let is_new = self.in_sight != Some(context.setup.query);
+        self.in_sight = Some(context.setup.query);
+        let area = ScrollArea::vertical().auto_shrink(false);
         area.show_rows(ui, THUMBNAIL.y, shown.len(), |ui, rows| {
+            let place = shown.iter().position(|query| *query == context.setup.query);
+            if let Some(place) = place.filter(|_| is_new) {
+                bring_to_the_middle(ui, rows.start, place, THUMBNAIL.y);
+            }
             for &query in &shown[rows] {
                 row(ui, context, query);
             }
