@@ -157,6 +157,13 @@ impl App {
     fn content(&mut self, ui: &mut egui::Ui) {
         // A question has the keys to itself.
         if self.asking.is_none() {
+            // What is open on top closes first.
+            let close = |input: &mut egui::InputState| {
+                input.consume_key(egui::Modifiers::NONE, egui::Key::Escape)
+            };
+            if self.help && ui.input_mut(close) {
+                self.help = false;
+            }
             if let Some(lesson) = &self.lesson {
                 lesson.read_keys(ui.ctx(), &self.commands);
             }

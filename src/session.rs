@@ -49,6 +49,17 @@ pub enum RunState {
     Broken(String),
 }
 
+impl RunState {
+    /// What has become, in a word or two, of a method that has begun and has no result.
+    pub fn of_what_has_begun(&self) -> &'static str {
+        match self {
+            Self::Loading | Self::Running => "at work",
+            Self::Paused { .. } => "paused",
+            Self::Finished | Self::Cancelled | Self::Broken(_) => "not finished",
+        }
+    }
+}
+
 /// A run on its own thread, and what it has told so far.
 ///
 /// Dropping a session cancels its run and does not wait for the thread.

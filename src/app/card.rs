@@ -44,12 +44,15 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
                 told(ui, state, commands, known, true);
                 return;
             }
-            let is_at_work =
+            let has_begun =
                 state.run().spans().last().is_some_and(|span| {
                     span.part.method() == Some(method) && span.result.is_none()
                 });
             cell(ui, STANDING, |ui| {
-                ui.weak(if is_at_work { "at work" } else { "not run yet" });
+                ui.weak(match has_begun {
+                    true => state.run_state().of_what_has_begun(),
+                    false => "not run yet",
+                });
             });
             return;
         };
@@ -187,7 +190,11 @@ fn helped(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         }
         return;
     };
-    match explanation.helped.first() {
+    let best = explanation.helped.iter().min_by(|a, b| {
+        let off_m = |helped: &Helped| helped.error.translation_m;
+        off_m(a).total_cmp(&off_m(b))
+    });
+    match best {
         Some(Helped { args, error }) => {
             let button = ui.small_button(format!("Try {}", args.join(" ")));
             let help = "Keep this run as A and localise with this";

@@ -537,6 +537,22 @@ pub(super) fn read_keys(ctx: &egui::Context, queue: &Queue) {
     if ctx.egui_wants_keyboard_input() {
         return;
     }
+    // `?` is typed in another way on every keyboard; where it is no key of its own, the text says what was meant.
+    let is_only_typed = ctx.input(|input| {
+        let mut is_typed = false;
+        for event in &input.events {
+            match event {
+                egui::Event::Text(text) if text == "?" => is_typed = true,
+                egui::Event::Key {
+                    key: Key::Questionmark,
+                    pressed: true,
+                    ..
+                } => return false,
+                _ => {}
+            }
+        }
+        is_typed
+    });
     let mut shortcuts = shortcuts();
     // egui takes a key with Shift for one without: those with more modifiers are asked first.
     shortcuts.sort_by_key(|shortcut| {
@@ -553,15 +569,8 @@ pub(super) fn read_keys(ctx: &egui::Context, queue: &Queue) {
             queue.send(shortcut.command.clone());
         }
     }
-    // `?` and `/` are typed in another way on every keyboard; the text says what was meant.
-    let typed = ctx.input(|input| {
-        input.events.iter().find_map(|event| match event {
-            egui::Event::Text(text) if text == "?" => Some(Command::Help),
-            _ => None,
-        })
-    });
-    if let Some(command) = typed {
-        queue.send(command);
+    if is_only_typed {
+        queue.send(Command::Help);
     }
 }
 

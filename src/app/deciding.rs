@@ -16,8 +16,8 @@ pub(super) fn deciding(result: &QueryResult) -> Moment {
         Code::R2 => Some(Stage::Detect),
         Code::R1 | Code::R3 => Some(Stage::Match),
         Code::R4 => Some(Stage::DepthLift),
-        Code::R5 | Code::R6 | Code::R8 => Some(Stage::Consensus),
-        Code::R7 | Code::R9 => Some(Stage::Accept),
+        // Which features are inliers is told when all is decided.
+        Code::R5 | Code::R6 | Code::R7 | Code::R8 | Code::R9 => None,
         Code::D1 | Code::D2 | Code::D3 | Code::D4 | Code::D8 => {
             Some(Stage::Search(Phase::PositionCoarse))
         }

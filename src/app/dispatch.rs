@@ -10,6 +10,7 @@ use super::deciding::deciding;
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::save::Asking;
+use super::save_target::SaveTarget;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use super::state::{AppState, KeptRun};
@@ -229,6 +230,12 @@ impl App {
                 );
             }
             Command::AskWhere(target) => {
+                // What is to be seen in a picture must be in sight by then.
+                if let SaveTarget::Picture(Some(view)) = target
+                    && self.layout.place_of(view).is_none()
+                {
+                    self.commands.send(Command::ShowView(view));
+                }
                 self.asking = Some(Asking::new(target, &state.setup));
             }
             Command::SavePicture { view, path } => {

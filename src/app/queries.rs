@@ -244,6 +244,7 @@ fn localize(
 ) -> Result<Vec<QueryResult>, JobError> {
     let mut setup = setup.clone();
     setup.go_to(query);
+    setup.leave_itself_out();
     let mut observer = UntilStopped(Arc::clone(stop));
     setup.job(frames).work(0, &mut observer, |_| {})
 }

@@ -107,6 +107,19 @@ impl Setup {
         }
     }
 
+    /// Takes the query's own frame from references that were picked by hand for another one: a photo says
+    /// nothing about itself.
+    pub(super) fn leave_itself_out(&mut self) {
+        let is_same_scene = self.references.name() == self.queries.name();
+        if self.task.by_hand && is_same_scene {
+            let others = self.chosen.frames.iter().copied();
+            let others: Vec<usize> = others.filter(|frame| *frame != self.query).collect();
+            if others.len() < self.chosen.frames.len() {
+                self.chosen = others.into();
+            }
+        }
+    }
+
     /// The methods whose cost can be looked at: those asked for that search one, those of the paper
     /// where there are none.
     pub fn direct_methods(&self) -> Vec<Method> {

@@ -1,6 +1,7 @@
 //! The application's state: the run, the cursor in it, the camera in hand, what is switched on.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::cost_line::{CostAlong, CostLine, LineTracer};
 use super::navigation::Navigation;
@@ -26,6 +27,8 @@ pub struct Note {
     pub text: String,
     /// Whether something went wrong.
     pub is_error: bool,
+    /// When it goes by itself \[s of the window's clock\]; what went wrong stays until it is dismissed.
+    until_s: Option<f64>,
 }
 
 /// A run that was kept to be compared with.
@@ -181,8 +184,21 @@ impl AppState {
         self.looking_at().is_some() && self.prober.is_busy()
     }
 
+    /// Lets notes go that were there long enough.
+    fn forget_notes(&mut self) {
+        let now_s = self.ctx.input(|input| input.time);
+        let is_over = |note: &Note| note.until_s.is_some_and(|until_s| until_s <= now_s);
+        self.notes.retain(|note| !is_over(note));
+        let next = self.notes.iter().filter_map(|note| note.until_s);
+        if let Some(next_s) = next.min_by(f64::total_cmp) {
+            let rest = Duration::from_secs_f64(next_s - now_s);
+            self.ctx.request_repaint_after(rest);
+        }
+    }
+
     /// Takes in what the threads have to say.
     pub(super) fn poll(&mut self) {
+        self.forget_notes();
         let was_alive = self.session.is_alive();
         if self.session.drain() {
             if let Some(chosen) = self.session.chosen()
@@ -294,9 +310,13 @@ impl AppState {
     /// Tells the person at the window.
     pub fn note(&mut self, text: impl Into<String>, is_error: bool) {
         const KEPT: usize = 5;
+        /// Long enough to read two lines \[s\].
+        const LASTING_S: f64 = 10.0;
+        let now_s = self.ctx.input(|input| input.time);
         self.notes.push(Note {
             text: text.into(),
             is_error,
+            until_s: (!is_error).then_some(now_s + LASTING_S),
         });
         let surplus = self.notes.len().saturating_sub(KEPT);
         self.notes.drain(..surplus);

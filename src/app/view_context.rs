@@ -22,7 +22,7 @@ use crate::localize::QueryResult;
 use crate::measure::{ConditionError, Migration};
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::session::{Part, Run, Span};
+use crate::session::{Part, Run, RunState, Span};
 
 /// A run at a cursor, and what else of the application's state a view draws from.
 #[derive(Clone, Copy)]
@@ -206,6 +206,11 @@ impl<'a> ViewContext<'a> {
             Some((probe, _)) => Some(probe),
             None => self.state.probe(),
         }
+    }
+
+    /// What the present run is doing.
+    pub fn run_state(&self) -> &'a RunState {
+        self.state.run_state()
     }
 
     /// Whether the answer for the pose that is looked at is still worked out.

@@ -66,3 +66,4 @@ mod view;
 mod walls_scene;
 mod window;
 mod window_design;
+mod window_manners;

@@ -33,7 +33,11 @@ impl View for BesideView {
         choose(ui, context, poses);
         let shown = [0, 1].map(|side| sides[side].and_then(|here| here.shown(method)));
         if let [Some(first), Some(second)] = &shown {
-            ui.label(comparison(method, poses, [first, second]));
+            ui.label(comparison(
+                &costs_of(context, method),
+                poses,
+                [first, second],
+            ));
         }
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             if let (Some(problem), [Some(first), Some(second)]) = (context.problem(), &shown) {
@@ -96,8 +100,18 @@ fn choose(ui: &mut Ui, context: &ViewContext<'_>, poses: [NamedPose; 2]) {
     });
 }
 
+/// Whose costs are compared: a method that searches no cost of its own is seen through that of another.
+fn costs_of(context: &ViewContext<'_>, method: Method) -> String {
+    match context.method() {
+        Some(looked_at) if looked_at != method => {
+            format!("{}, by the cost of {}", looked_at.label(), method.label())
+        }
+        _ => method.label().to_owned(),
+    }
+}
+
 /// Which of the two costs less, in words.
-fn comparison(method: Method, poses: [NamedPose; 2], shown: [&ShownView; 2]) -> String {
+fn comparison(costs_of: &str, poses: [NamedPose; 2], shown: [&ShownView; 2]) -> String {
     let [first, second] = poses.map(NamedPose::word);
     let costs = shown.map(|shown| shown.comparison.score.cost);
     let covered = shown.map(|shown| shown.comparison.score.covered);
@@ -109,15 +123,13 @@ fn comparison(method: Method, poses: [NamedPose; 2], shown: [&ShownView; 2]) -> 
                 (second, a - b)
             };
             format!(
-                "{}: {a:.4} at {first}, {b:.4} at {second}: {cheaper} is cheaper by {less:.4}; \
+                "{costs_of}: {a:.4} at {first}, {b:.4} at {second}: {cheaper} is cheaper by {less:.4}; \
                  {} and {} px covered",
-                method.label(),
-                covered[0],
-                covered[1]
+                covered[0], covered[1]
             )
         }
-        [None, _] => format!("{} has no cost at {first}", method.label()),
-        [_, None] => format!("{} has no cost at {second}", method.label()),
+        [None, _] => format!("{costs_of}: there is no cost at {first}"),
+        [_, None] => format!("{costs_of}: there is no cost at {second}"),
     }
 }
 

@@ -93,7 +93,13 @@ fn verdict(result: &QueryResult, context: &ViewContext<'_>) -> (String, Option<C
     match result.verdict(failure_radius_m) {
         // The reason is told below, in full.
         Verdict::NoPose => {
-            let code = result.reason.as_ref().map(|reason| reason.code);
+            // What the estimator said itself, where the truth is hidden.
+            let found = result
+                .diagnosis
+                .first()
+                .filter(|_| context.options.shows_truth);
+            let code = found.map(|finding| finding.code);
+            let code = code.or_else(|| result.reason.as_ref().map(|reason| reason.code));
             let code = code.map_or(String::new(), |code| format!(", {code}"));
             (format!("× no pose{code}"), Some(theme::ESTIMATE))
         }
@@ -111,7 +117,7 @@ fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
         for span in parts.filter(|span| span.part.method().is_some()) {
             name(ui, span);
             let Some(result) = &span.result else {
-                ui.weak("at work");
+                ui.weak(context.run_state().of_what_has_begun());
                 ui.end_row();
                 continue;
             };

@@ -1,9 +1,9 @@
 //! Several references at once: one pose that their evidence agrees on together.
 //!
-//! The fusions of the paper average poses, each found by itself. A joint estimate has no pose of a single
-//! reference in it: all correspondences are drawn from together, or the costs of all views are added up
-//! at each hypothesis. A problem has one reference here too; a joint estimate is one of several problems
-//! that share their query.
+//! The fusions of the paper average poses, each found by itself. In a joint estimate no reference decides
+//! for itself: all correspondences are drawn from together, or the costs of all views are added up at each
+//! hypothesis, and what a reference found alone is one hypothesis more. A problem has one reference here
+//! too; a joint estimate is one of several problems that share their query.
 
 mod direct;
 mod feature;
@@ -35,7 +35,7 @@ pub struct JointReference<'a> {
     pub problem: &'a Problem,
     /// Feature matches between both: ratio test and uniqueness passed.
     pub matches: usize,
-    /// The pose that this reference alone gave, `world_from_camera`.
+    /// The pose that this reference alone gave, `world_from_camera`: where a search may start from too.
     pub alone: Option<&'a Pose>,
 }
 

@@ -90,8 +90,9 @@ impl CostMap {
         let help = "Colour by coverage instead of cost";
         ui.toggle_value(&mut self.shows_coverage, "Coverage")
             .on_hover_text(help);
-        let words = format!("Floor {floor:.3}");
-        let help = "Leave cells without colour that cover too little to win";
+        let words = format!("Floor {:.0} %", 100.0 * floor);
+        let help = "Leave cells without colour that cover too little to win: less than this share of what \
+                    the reference pose covers";
         ui.add_enabled_ui(!self.shows_coverage, |ui| {
             ui.toggle_value(&mut self.is_floored, words)
                 .on_hover_text(help);

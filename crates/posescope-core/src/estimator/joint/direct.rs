@@ -8,6 +8,7 @@ use crate::event::Stage;
 use crate::fusion::share::Support;
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice, least_covered};
+use crate::judge::{Freedoms, Shrinking, Start, shrink};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{ColoredCloud, Score, Scorer};
@@ -21,6 +22,11 @@ use crate::trace::{Cancelled, Trace};
 /// joint cost is their mean, each weighed by the pixels that it covers. One that covers too little there,
 /// as [`coverage_floor`](crate::grid::GridParams::coverage_floor) says, abstains, and where fewer than
 /// half have a say there is no cost: a place that few can see would be cheap for that reason alone.
+///
+/// The grid ends at a step and at the greatest yaw, and its height, pitch and roll are those of one
+/// reference; an average of several poses is bound to none of that. So the minimum of the grid, and the pose
+/// that each reference found alone, are refined under the joint cost by shrinking steps, and the cheapest is
+/// the answer. With one reference that shows something nothing is refined: the answer is the method's own.
 pub struct JointDirect {
     direct: Direct,
 }
@@ -41,6 +47,15 @@ impl JointEstimator for JointDirect {
         })
     }
 }
+
+/// The first step is that of the grid's fine lattice, the last what neither a photo nor a scan tells apart.
+const REFINEMENT: Shrinking = Shrinking {
+    freedoms: Freedoms::Six,
+    first_m: 0.2,
+    last_m: 0.01,
+    // Three degrees move a view by as much as a metre does.
+    rad_per_m: 0.052,
+};
 
 /// A reference that shows something.
 struct Member<'a> {
@@ -110,7 +125,14 @@ impl JointDirect {
             }
         }
         let best = found.ok_or(Failure::NothingComparable { hypotheses })?;
-        let lead_from_query = best.reference_from_camera();
+        let on_grid = best.reference_from_camera();
+        let alone = references.iter().filter_map(|reference| reference.alone);
+        let lead_from_world = lead.reference.world_from_camera.inverse();
+        let starts = std::iter::once(on_grid).chain(alone.map(|pose| lead_from_world * pose));
+        let lead_from_query = match joint.members.as_slice() {
+            [_] => on_grid,
+            _ => joint.refined(starts, radius_m, trace)?.unwrap_or(on_grid),
+        };
         let area = lead.query.intrinsics.area();
         let mut supports = vec![None; references.len()];
         for member in &joint.members {
@@ -191,6 +213,37 @@ impl Joint<'_> {
             scores,
             least_covered: 0,
         })
+    }
+
+    /// The cheapest pose within the disc that steps which shrink lead to from any of these,
+    /// `lead_from_camera`.
+    fn refined(
+        &self,
+        starts: impl Iterator<Item = Pose>,
+        radius_m: f64,
+        trace: &mut Trace<'_>,
+    ) -> Result<Option<Pose>, Cancelled> {
+        let mut costs = |poses: &[Pose]| {
+            trace.checkpoint()?;
+            let own = self.members.iter().map(|member| member.scores(poses));
+            let own: Vec<Vec<Score>> = own.collect();
+            let cost = |(place, pose): (usize, &Pose)| {
+                let shift = &pose.translation;
+                let score = self.together(own.iter().map(|scores| scores[place]));
+                score.cost.filter(|_| shift.x.hypot(shift.z) <= radius_m)
+            };
+            Ok::<_, Cancelled>(poses.iter().enumerate().map(cost).collect::<Vec<_>>())
+        };
+        let poses: Vec<Pose> = starts.collect();
+        let starts: Vec<Start> = poses
+            .iter()
+            .zip(costs(&poses)?)
+            .filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? }))
+            .collect();
+        let refined = shrink(&starts, &REFINEMENT, costs)?;
+        // The first of equal ones, so that the grid's comes before those of single references.
+        let best = refined.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        Ok(best.map(|best| best.pose))
     }
 
     /// The mean of the costs of those that cover enough, and the pixels that they cover.

@@ -80,7 +80,12 @@ fn places() -> [Pose; 3] {
 }
 
 fn problems(references: Vec<Arc<ReferenceTuple>>) -> Vec<Problem> {
-    let query = Query::new("query", photo(&truth(), TEXTURE), CAMERA).expect("fits");
+    problems_at(&truth(), references)
+}
+
+/// Those of a query elsewhere.
+fn problems_at(place: &Pose, references: Vec<Arc<ReferenceTuple>>) -> Vec<Problem> {
+    let query = Query::new("query", photo(place, TEXTURE), CAMERA).expect("fits");
     let query = Arc::new(query);
     let problem = |reference| Problem::new(Arc::clone(&query), reference, 4.0).expect("fits");
     references.into_iter().map(problem).collect()
@@ -152,6 +157,37 @@ fn references_that_agree_share_the_pose_and_one_of_another_place_is_left_out() {
             shares[3]
         );
     }
+}
+
+#[test]
+fn the_height_of_a_reference_does_not_bind_several() {
+    let raised_m = 0.3;
+    let place = truth() * Pose::translation(0.07, -raised_m, 0.09);
+    let references = places().map(|pose| reference(pose, TEXTURE, 0.0..WIDTH));
+    let problems = problems_at(&place, references.into());
+    for method in [Method::PM, Method::MI] {
+        let (pose, _) = jointly(method, &problems, &[50, 60, 70]);
+        let between = place.inverse() * pose.expect("all agree");
+        let off_m = between.translation.y.abs();
+        assert!(off_m < 0.5 * raised_m, "{method}: {off_m}");
+    }
+}
+
+#[test]
+fn a_heading_beyond_the_grid_of_one_reference_is_started_from_where_another_found_it() {
+    let headed = |yaw_rad: f64, x: f64| {
+        let pose = Pose::from_parts(Vector3::new(x, 0.0, 0.4).into(), yaw(yaw_rad));
+        reference(pose, TEXTURE, 0.0..WIDTH)
+    };
+    // The first has the most matches, and its grid ends at 10 of the 17 degrees.
+    let place = Pose::from_parts(Vector3::new(0.2, 0.0, 1.0).into(), yaw(0.3));
+    let problems = problems_at(&place, vec![headed(0.0, 0.0), headed(0.3, 0.5)]);
+    let (pose, _) = jointly(Method::MI, &problems, &[90, 20]);
+    let error = PoseError::between(&place, &pose.expect("both see it"));
+    assert!(
+        error.translation_m < 0.2 && error.rotation_deg < 1.0,
+        "{error}"
+    );
 }
 
 #[test]

@@ -141,7 +141,7 @@ impl Localizer<'_> {
     }
 
     /// One pose from all references, each of which was asked alone before: what they answered is shown
-    /// beside it, and has no part in it.
+    /// beside it, and at most a place to start from.
     fn estimate_jointly(
         &self,
         solved: &[(&Problem, usize, &MethodOutcome)],

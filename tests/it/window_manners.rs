@@ -1,0 +1,70 @@
+//! What the window does beside what it is asked for: what it tells, how long, and what it leaves out.
+
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use posescope::app::{App, Command};
+
+use crate::window::{is_said, press, run_until_idle, setup, wait, window};
+
+/// On most keyboards a question mark is a key with Shift and a text at once.
+#[test]
+fn the_list_of_keys_opens_with_a_question_mark_and_closes_with_escape() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    let is_open = |window: &Harness<'_, App>| is_said(window, "This list");
+    assert!(!is_open(&window));
+    window.event(egui::Event::Key {
+        key: Key::Questionmark,
+        physical_key: Some(Key::Slash),
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::SHIFT,
+    });
+    window.event(egui::Event::Text("?".to_owned()));
+    window.run_steps(4);
+    assert!(is_open(&window));
+    press(&mut window, Modifiers::NONE, Key::Escape);
+    window.run_steps(4);
+    assert!(!is_open(&window));
+    // Where it is no key of its own.
+    window.event(egui::Event::Text("?".to_owned()));
+    window.run_steps(4);
+    assert!(is_open(&window));
+}
+
+#[test]
+fn what_is_told_goes_by_itself_and_what_went_wrong_stays() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    press(&mut window, Modifiers::NONE, Key::Num3);
+    window.run_steps(3);
+    assert!(is_said(&window, "MI has not begun yet"));
+    // The card does not say that anything works while the run is paused.
+    assert!(!is_said(&window, "at work"));
+    window
+        .state_mut()
+        .send(Command::SetBreakpoints(vec!["nonsense".to_owned()]));
+    // A step is a quarter of a second.
+    window.run_steps(60);
+    assert!(!is_said(&window, "MI has not begun yet"));
+    let notes = &window.state().app_state().notes;
+    assert!(notes.len() == 1 && notes[0].is_error);
+}
+
+/// A reference that was named for one query is one of all queries too.
+#[test]
+fn no_query_of_all_is_localised_against_itself() {
+    let mut setup = setup();
+    setup.offered = vec![0, 1];
+    let reference = setup.chosen.frames[0];
+    assert_eq!(reference, 0);
+    let mut window = window(setup);
+    run_until_idle(&mut window);
+    window.state_mut().send(Command::RunAllQueries);
+    wait(&mut window, |app| {
+        app.app_state().queries.progress().is_none() && !app.app_state().results.is_empty()
+    });
+    let results = &window.state().app_state().results;
+    assert!(!results.contains_key(&reference), "{:?}", results.keys());
+    assert!(is_said(&window, "no reference is chosen for query 000000"));
+}
