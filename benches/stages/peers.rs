@@ -16,19 +16,18 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use cpu_time::ProcessTime;
-use posescope::cost::{self, Evaluator, Pair};
 use posescope::estimator;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::render::{Canvas, PointArrays, Scorer, Values};
+use posescope::render::Scorer;
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::solver::{Correspondence, p3p};
 use posescope::trace::Trace;
 use serde_json::{Value, json};
 
-use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
+use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by, with_both_costs};
 use self::problems::{Outliers, P3pProblem, p3p_problems};
 
 const P3P_PROBLEMS: usize = 20_000;
@@ -287,42 +286,11 @@ impl Bench {
 
     /// One drawing for PM's cost and MI's.
     fn both_costs(&self, splat_px: usize) -> Measured {
-        let [photometric, information] = ["pm", "mi"].map(registered_cost);
-        let (query, cloud) = seen_by(information.as_ref());
-        let (Evaluator::Pairs(mut error), Evaluator::Counts { bins, mut cost }) =
-            (photometric.evaluator(), information.evaluator())
-        else {
-            unreachable!("PM looks at pairs, MI at their histogram");
-        };
-        let of_points: Vec<f32> = cloud.points.iter().map(|point| point.intensity).collect();
-        let values = Values {
-            query: &query,
-            points: &of_points,
-        };
-        let points = PointArrays::new(&cloud.points);
-        let mut canvas = Canvas::new(&PAIR.query.intrinsics, splat_px).expect("a usual photo");
-        let (mut bin_pairs, mut counts) = (Vec::new(), Vec::new());
-        let bin = |value: f32| cost::bin(value, bins) as u8;
-        let mut covered = 0;
-        let (seconds, sum) = timed(|| {
-            let mut sum = 0.0;
-            for pose in &self.poses {
-                let pairs = canvas.draw(&points, values, &pose.inverse());
-                covered += pairs.len();
-                bin_pairs.clear();
-                bin_pairs.extend(pairs.iter().map(|pair| Pair {
-                    query: bin(pair.query),
-                    synthetic: bin(pair.synthetic),
-                }));
-                cost::count_pairs(&bin_pairs, bins, &mut counts);
-                sum += error(pairs).unwrap_or_default() + cost(&counts).unwrap_or_default();
-            }
-            sum
-        });
+        let (seconds, judged) = with_both_costs(splat_px, |judge| timed(|| judge(&self.poses)));
         Measured {
             seconds,
             items: self.poses.len(),
-            outcome: json!({ "covered": covered, "sum": sum }),
+            outcome: json!({ "covered": judged.covered, "sum": judged.sum }),
         }
     }
 }

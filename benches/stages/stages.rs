@@ -17,13 +17,13 @@ use std::time::Instant;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use posescope::camera::Intrinsics;
-use posescope::cost::{self, Evaluator, Pair};
+use posescope::cost;
 use posescope::estimator;
 use posescope::event::KindSet;
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::render::{Canvas, PointArrays, Scorer, Values};
+use posescope::render::Scorer;
 use posescope::retrieval::{Index, RetrievalParams, Vocabulary};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
@@ -33,7 +33,7 @@ use posescope::trace::{Cancelled, Record, Sink, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
+use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by, with_both_costs};
 use self::problems::{Outliers, p3p_problems};
 
 fn main() {
@@ -120,39 +120,11 @@ fn hypothesis<const SPLAT_PX: usize>(bencher: Bencher, name: &str) {
 /// Rendering a hypothesis once and judging it by PM's cost and MI's, on one thread.
 #[divan::bench(consts = [1, 3])]
 fn hypothesis_by_both_costs<const SPLAT_PX: usize>(bencher: Bencher) {
-    let [photometric, information] = ["pm", "mi"].map(registered_cost);
-    let (query, cloud) = seen_by(information.as_ref());
-    let (Evaluator::Pairs(mut error), Evaluator::Counts { bins, mut cost }) =
-        (photometric.evaluator(), information.evaluator())
-    else {
-        unreachable!("PM looks at pairs, MI at their histogram");
-    };
-    let of_points: Vec<f32> = cloud.points.iter().map(|point| point.intensity).collect();
-    let values = Values {
-        query: &query,
-        points: &of_points,
-    };
-    let points = PointArrays::new(&cloud.points);
-    let mut canvas = Canvas::new(&PAIR.query.intrinsics, SPLAT_PX).expect("a photo of usual size");
-    let (mut bin_pairs, mut counts) = (Vec::new(), Vec::new());
-    let bin = |value: f32| cost::bin(value, bins) as u8;
     let poses = poses_of_a_disc();
-    bencher
-        .counter(ItemsCount::new(poses.len()))
-        .bench_local(|| {
-            let mut sum = 0.0;
-            for pose in black_box(&poses) {
-                let pairs = canvas.draw(&points, values, &pose.inverse());
-                bin_pairs.clear();
-                bin_pairs.extend(pairs.iter().map(|pair| Pair {
-                    query: bin(pair.query),
-                    synthetic: bin(pair.synthetic),
-                }));
-                cost::count_pairs(&bin_pairs, bins, &mut counts);
-                sum += error(pairs).unwrap_or_default() + cost(&counts).unwrap_or_default();
-            }
-            sum
-        });
+    let bencher = bencher.counter(ItemsCount::new(poses.len()));
+    with_both_costs(SPLAT_PX, |judge| {
+        bencher.bench_local(|| judge(black_box(&poses)).sum);
+    });
 }
 
 #[divan::bench(args = Method::PAPER.map(Method::name), sample_count = 10)]

@@ -70,6 +70,39 @@ fn results_have_the_same_bytes_wherever_hypotheses_are_scored() {
 }
 
 #[test]
+fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
+    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
+    let said = |compute: &str| {
+        let mut command = posescope();
+        command.arg("run").arg(sequence.folder());
+        command.args(["--query", "0", "--query", "3", "--references", "nearest:1"]);
+        command.args(["--radius", "2", "--method", "pm,mi6", "--compute", compute]);
+        let output = command.output().expect("it starts");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let asked = said("gpu");
+    if asked.contains("no graphics card") {
+        println!("skipped: {}", asked.trim());
+        return;
+    }
+    let without = |said: &str| -> Vec<String> {
+        let lines = said
+            .lines()
+            .filter(|line| line.contains("not on the graphics card"));
+        lines.map(str::to_owned).collect()
+    };
+    let lines = without(&asked);
+    assert_eq!(lines.len(), 1, "{asked}");
+    assert!(
+        lines[0].ends_with(
+            "mi6 searches on the processor, not on the graphics card: it compares three channels at once"
+        ),
+        "{asked}"
+    );
+    assert!(without(&said("auto")).is_empty());
+}
+
+#[test]
 fn without_a_card_who_asks_for_one_is_told_in_one_line_and_others_are_served() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
     let out = sequence.path().join("gpu");

@@ -23,7 +23,10 @@ use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
 pub use evaluator::{CostOf, Evaluator};
-pub use joint_histogram::{Entropies, JointHistogram, LEAST_ENTROPY, bin, count_pairs};
+pub use joint_histogram::{
+    Entropies, JointHistogram, LEAST_ENTROPY, MOST_BYTE_BINS, bin, byte_bin, count_pairs,
+    put_into_bins,
+};
 pub use mutual_information::{MutualInformation, MutualInformationParams};
 pub use orientation::{Orientation, OrientationParams};
 pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};

@@ -3,6 +3,7 @@
 
 mod canvas;
 mod color;
+mod depth_canvas;
 mod device;
 mod projection;
 mod score;
@@ -12,6 +13,8 @@ mod worker;
 
 pub use canvas::{Canvas, PointArrays, Values};
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
+pub use depth_canvas::DepthCanvas;
+pub(crate) use device::leave_out;
 pub use device::{Device, Loaded, Tally, Workload, use_device};
 pub use projection::ProjectionRows;
 pub use score::Score;

@@ -24,9 +24,11 @@ mod loaded;
 mod probe;
 mod slots;
 
+use std::collections::BTreeSet;
 use std::fmt;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use posescope_core::method::Method;
 use posescope_core::render::{Device, Loaded, Workload};
 
 use engine::Engine;
@@ -43,6 +45,8 @@ const LEAST_ASKED: usize = 16;
 pub struct Gpu {
     engine: OnceLock<Result<Arc<Engine>, GpuError>>,
     is_asked_for: bool,
+    /// Methods of which was said that they do without the card.
+    left_out: Mutex<BTreeSet<Method>>,
 }
 
 impl Gpu {
@@ -52,6 +56,7 @@ impl Gpu {
         Self {
             engine: OnceLock::new(),
             is_asked_for: false,
+            left_out: Mutex::default(),
         }
     }
 
@@ -65,6 +70,7 @@ impl Gpu {
         Ok(Self {
             engine: OnceLock::from(Ok(Arc::new(engine))),
             is_asked_for: true,
+            left_out: Mutex::default(),
         })
     }
 
@@ -132,6 +138,14 @@ impl Device for Gpu {
         if let Some(Ok(engine)) = self.engine.get() {
             let card = &engine.card;
             card.fail(GpuError::Disagrees(card.name().to_owned()));
+        }
+    }
+
+    fn left_out(&self, method: Method, why: &str) {
+        let mut told = self.left_out.lock().unwrap_or_else(PoisonError::into_inner);
+        // Once, and not for each of a thousand queries.
+        if self.is_asked_for && told.insert(method) {
+            log::warn!("{method} searches on the processor, not on the graphics card: it {why}");
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use fearless_simd::{Level, Simd, SimdFloat as _, dispatch};
+
 use super::{BinPair, IntensityPair};
 
 /// How often each pair of grey values occurs, and the entropies that follow \[nat\].
@@ -22,9 +24,16 @@ pub struct JointHistogram {
 impl JointHistogram {
     /// Counts the pairs; values fall into `bins` equal intervals of 0 … 255, 255 into the last one.
     pub fn of(pairs: &[IntensityPair], bins: usize) -> Self {
-        let mut counts = vec![0_u32; bins * bins];
-        for pair in pairs {
-            counts[cell(pair, bins)] += 1;
+        let mut counts = Vec::new();
+        if bins <= MOST_BYTE_BINS {
+            let mut binned = Vec::new();
+            put_into_bins(pairs, bins, &mut binned);
+            count_pairs(&binned, bins, &mut counts);
+        } else {
+            counts.resize(bins * bins, 0);
+            for pair in pairs {
+                counts[cell(pair, bins)] += 1;
+            }
         }
         let Entropies {
             query,
@@ -126,6 +135,54 @@ pub fn bin(value: f32, bins: usize) -> usize {
     ((value * scale) as usize).min(bins - 1)
 }
 
+/// The most bins that a byte tells apart.
+pub const MOST_BYTE_BINS: usize = 256;
+
+/// As [`bin`], for [`MOST_BYTE_BINS`] at most.
+#[inline]
+pub fn byte_bin(value: f32, bins: usize) -> u8 {
+    let scale = bins as f32 / 256.0;
+    ((value * scale) as u8).min((bins - 1) as u8)
+}
+
+/// The bins that pairs of values 0 … 255 fall into, in the place of what `binned` held; for
+/// [`MOST_BYTE_BINS`] at most.
+pub fn put_into_bins(pairs: &[IntensityPair], bins: usize, binned: &mut Vec<BinPair>) {
+    binned.resize(pairs.len(), BinPair::default());
+    let level = Level::new();
+    dispatch!(level, simd => put_into_bins_by(simd, pairs, bins, binned));
+}
+
+#[inline(always)]
+fn put_into_bins_by<S: Simd>(
+    simd: S,
+    pairs: &[IntensityPair],
+    bins: usize,
+    binned: &mut [BinPair],
+) {
+    let scale = bins as f32 / 256.0;
+    let last = (bins - 1) as f32;
+    let (fours, rest) = pairs.as_chunks::<4>();
+    let (binned_fours, binned_rest) = binned.as_chunks_mut::<4>();
+    for (binned, pairs) in binned_fours.iter_mut().zip(fours) {
+        let values: [f32; 8] = std::array::from_fn(|i| match i % 2 {
+            0 => pairs[i / 2].query,
+            _ => pairs[i / 2].synthetic,
+        });
+        let values = simd.load_array_f32x8(values) * scale;
+        let values = values.max(0.0).min(last);
+        let bytes = simd.as_array_i32x8(simd.cvt_i32_f32x8(values));
+        *binned = std::array::from_fn(|i| BinPair {
+            query: bytes[2 * i] as u8,
+            synthetic: bytes[2 * i + 1] as u8,
+        });
+    }
+    for (binned, pair) in binned_rest.iter_mut().zip(rest) {
+        binned.query = byte_bin(pair.query, bins);
+        binned.synthetic = byte_bin(pair.synthetic, bins);
+    }
+}
+
 /// Counts the pairs of bins, in the place of what `counts` held: `bins` × `bins`, rows are the query's.
 pub fn count_pairs(pairs: &[BinPair], bins: usize, counts: &mut Vec<u32>) {
     // Neighbours often fall into the same cell. Counted apart, no count waits for the last one. Of
@@ -207,16 +264,24 @@ mod tests {
                 .iter()
                 .map(|&(query, synthetic)| IntensityPair { query, synthetic })
                 .collect();
-            let binned: Vec<_> = pairs
-                .iter()
-                .map(|pair| BinPair {
-                    query: bin(pair.query, bins) as u8,
-                    synthetic: bin(pair.synthetic, bins) as u8,
-                })
-                .collect();
+            let mut binned = vec![BinPair::default(); 7];
+            put_into_bins(&pairs, bins, &mut binned);
             let mut counts = vec![7; 3];
             count_pairs(&binned, bins, &mut counts);
+            let mut one_by_one = vec![0; bins * bins];
+            for pair in &pairs {
+                one_by_one[cell(pair, bins)] += 1;
+            }
+            prop_assert_eq!(&counts, &one_by_one);
             prop_assert_eq!(counts, JointHistogram::of(&pairs, bins).counts);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_bin_is_the_same_as_a_byte(bits: u32, bins in 2_usize..=256) {
+            let value = f32::from_bits(bits);
+            prop_assert_eq!(usize::from(byte_bin(value, bins)), bin(value, bins));
         }
     }
 

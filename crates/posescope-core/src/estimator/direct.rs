@@ -18,7 +18,9 @@ use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by};
+use crate::render::{
+    ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by, leave_out,
+};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
@@ -107,6 +109,9 @@ impl Direct {
         // How large a lattice is depends on no centre, so none is refused after the others were scored.
         for phase in Phase::ALL {
             Lattice::new(phase, Offset::default(), radius, &self.grid).map_err(Failure::from)?;
+        }
+        if self.cost.tallying().is_none() {
+            leave_out(self.method, "has a cost that whole numbers do not decide");
         }
         let cloud = self.colored_and_told(problem, trace)?;
         trace.checkpoint()?;

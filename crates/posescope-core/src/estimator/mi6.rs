@@ -25,7 +25,7 @@ use crate::judge::{Freedoms, Judge, JudgeParams, Refined, Shrinking, Start, shri
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, RenderParams, Score};
+use crate::render::{Comparison, RenderParams, Score, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// The estimator in the registry.
@@ -41,6 +41,9 @@ pub(super) const ENTRY: super::Entry = super::Entry {
 
 /// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\].
 const PLANE_LAST_M: f64 = 0.05;
+
+/// Why no graphics card takes what the judge scores.
+pub(super) const JUDGED: &str = "compares three channels at once";
 
 /// Starts nearer to each other than this are one, unless their headings differ.
 const SAME_M: f64 = 0.3;
@@ -344,6 +347,7 @@ impl SixFreedoms {
 
 impl Estimator for SixFreedoms {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+        leave_out(ENTRY.method, JUDGED);
         let found = trace.stage(Stage::Estimator(ENTRY.method), |trace| {
             let judge = self.judge(problem);
             self.search(problem, &judge, trace)

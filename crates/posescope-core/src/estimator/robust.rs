@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub use params::RobustParams;
 
 use super::feature::Agreed;
-use super::mi6::Found;
+use super::mi6::{Found, JUDGED};
 use super::{
     CostSummary, Estimator, Failure, FeatureBased, Guided, Halt, Outcome, SixFreedoms, own,
     separate_failure,
@@ -24,7 +24,7 @@ use crate::judge::{Judge, Refined, Start, shrink};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::Comparison;
+use crate::render::{Comparison, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// The estimator in the registry.
@@ -222,6 +222,7 @@ fn why(candidates: &[JudgedPose]) -> String {
 
 impl Estimator for Robust {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+        leave_out(ENTRY.method, JUDGED);
         trace.stage(Stage::Estimator(ENTRY.method), |trace| {
             let proposal = self.feature.propose(problem, trace)?;
             let (guided, guided_agreed) = self.guided.propose(problem, trace)?;

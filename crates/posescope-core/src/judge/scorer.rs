@@ -11,17 +11,18 @@ use super::chance::corrected_distance;
 use super::channels::ChannelImages;
 use super::params::{Channels, JudgeParams};
 use crate::camera::Intrinsics;
-use crate::cost::{Pair, bin};
+use crate::cost::{Pair, byte_bin};
 use crate::geometry::Pose;
 use crate::image::{GrayImage, cubic_interpolated};
 use crate::memo::{Exact, Remembered};
 use crate::problem::Problem;
 use crate::render::{
-    Canvas, ColoredPoint, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values, color_cloud,
+    Canvas, ColoredPoint, DepthCanvas, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values,
+    color_cloud,
 };
 
 /// Poses that a thread takes at once.
-const PER_JOB: usize = 4;
+const PER_JOB: usize = 2;
 
 /// The bins of the three channels at one place.
 type Bins = [u8; 3];
@@ -144,20 +145,31 @@ impl Judge {
     /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must
     /// beat to mean anything.
     pub fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {
-        let mut worker = Worker::new(&self.intrinsics, self.splat_px)?;
-        let mut pairs = worker.draw(self, reference_from_camera).to_vec();
+        // What is dealt to whom depends on the order of the pixels.
+        let mut canvas = Canvas::new(&self.intrinsics, self.splat_px)?;
+        let camera_from_points = reference_from_camera.inverse();
+        let positions = &self.reference.positions;
+        let drawn = canvas.draw(positions, self.values(), &camera_from_points);
+        let mut pairs = drawn.to_vec();
         let mut dealt: Vec<Bins> = pairs.iter().map(|pair| pair.synthetic).collect();
         dealt.shuffle(&mut Pcg64::seed_from_u64(seed));
         for (pair, synthetic) in pairs.iter_mut().zip(dealt) {
             pair.synthetic = synthetic;
         }
-        cost_of(&pairs, &self.params, &mut worker.counts)
+        cost_of(&pairs, &self.params, &mut Vec::new())
+    }
+
+    fn values(&self) -> Values<'_, Bins> {
+        Values {
+            query: &self.query.0,
+            points: &self.reference.bins,
+        }
     }
 
     /// How many poses to score at a time, so that a run can be stopped soon: at most
     /// [`MOST_AT_A_TIME`].
     pub fn at_a_time(&self) -> usize {
-        (32 * rayon::current_num_threads()).min(MOST_AT_A_TIME)
+        (64 * rayon::current_num_threads()).min(MOST_AT_A_TIME)
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
@@ -167,37 +179,27 @@ impl Judge {
 
 /// A canvas and the three histograms of what is drawn on it.
 struct Worker {
-    canvas: Canvas<Bins>,
+    canvas: DepthCanvas<Bins>,
     counts: Vec<u32>,
 }
 
 impl Worker {
     fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
         Some(Self {
-            canvas: Canvas::new(intrinsics, splat_px)?,
+            canvas: DepthCanvas::new(intrinsics, splat_px)?,
             counts: Vec::new(),
         })
     }
 
-    fn draw(&mut self, judge: &Judge, reference_from_camera: &Pose) -> &[Pair<Bins>] {
-        let values = Values {
-            query: &judge.query.0,
-            points: &judge.reference.bins,
-        };
+    fn score(&mut self, judge: &Judge, reference_from_camera: &Pose) -> Score {
+        let Self { canvas, counts } = self;
         let camera_from_points = reference_from_camera.inverse();
         let positions = &judge.reference.positions;
-        self.canvas.draw(positions, values, &camera_from_points)
-    }
-
-    fn score(&mut self, judge: &Judge, reference_from_camera: &Pose) -> Score {
-        let mut counts = std::mem::take(&mut self.counts);
-        let pairs = self.draw(judge, reference_from_camera);
-        let score = Score {
-            cost: cost_of(pairs, &judge.params, &mut counts),
+        let pairs = canvas.draw(positions, judge.values(), &camera_from_points);
+        Score {
+            cost: cost_of(pairs, &judge.params, counts),
             covered: pairs.len() as u32,
-        };
-        self.counts = counts;
-        score
+        }
     }
 }
 
@@ -252,7 +254,7 @@ fn count(pairs: &[Pair<Bins>], bins: usize, channels: Channels, counts: &mut Vec
 }
 
 fn binned(values: [f32; 3], bins: usize) -> Bins {
-    values.map(|value| bin(value, bins) as u8)
+    values.map(|value| byte_bin(value, bins))
 }
 
 fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> QueryBins {

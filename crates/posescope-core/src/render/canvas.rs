@@ -52,12 +52,13 @@ const PLACE_BITS: u32 = 24;
 const MOST_DRAWINGS: u32 = 1 << (u32::BITS - PLACE_BITS);
 
 /// The bits above which a pixel's row stands, and its column below.
-const ROW_BITS: u32 = 16;
+pub(super) const ROW_BITS: u32 = 16;
 /// More columns or rows than any image has that is drawn on in squares.
-const MOST_ROWS: usize = (1 << ROW_BITS) - 1;
+pub(super) const MOST_ROWS: usize = (1 << ROW_BITS) - 1;
 
 /// Draws points for one hypothesis after the other, and keeps what query and synthetic view show where
-/// both exist.
+/// both exist. Where the order of the pixels has no part in the cost, [`DepthCanvas`](super::DepthCanvas)
+/// is faster.
 ///
 /// Each pixel of the image has a slot that says where in the list of this drawing it stands. A slot also
 /// says which drawing it is of, so nothing is cleared between two drawings, and all that is read of an
@@ -75,12 +76,12 @@ pub struct Canvas<T> {
 
 /// Where the points fall.
 #[derive(Default)]
-struct Projected {
+pub(super) struct Projected {
     /// Position of the nearest pixel, or one that no image has: row-major where a point covers its own
     /// pixel alone, and otherwise the row in the upper bits and the column in the lower.
-    pixels: Vec<u32>,
+    pub(super) pixels: Vec<u32>,
     /// Depths \[m\].
-    depths: Vec<f32>,
+    pub(super) depths: Vec<f32>,
 }
 
 /// The pixels on which points fell, in that order, and room for more.
@@ -220,7 +221,12 @@ impl<T: Copy + Default> Canvas<T> {
 
 impl Projected {
     #[inline(always)]
-    fn project<S: Simd>(&mut self, simd: S, points: &PointArrays, projection: &Projection) {
+    pub(super) fn project<S: Simd>(
+        &mut self,
+        simd: S,
+        points: &PointArrays,
+        projection: &Projection,
+    ) {
         self.pixels.resize(points.len(), Eight::OUT_OF_VIEW);
         self.depths.resize(points.len(), 0.0);
         for first in (0..points.len()).step_by(LANES) {

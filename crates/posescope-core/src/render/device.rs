@@ -12,6 +12,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::{ColoredPoint, ProjectionRows, Score};
 use crate::cost::{Entropies, LesserHalf, Tallying};
+use crate::method::Method;
 
 /// What scores many hypotheses at once, beside the threads of the processor. Which results it gives must
 /// not depend on it.
@@ -26,6 +27,10 @@ pub trait Device: Send + Sync + Debug {
 
     /// The device's numbers were not those of the threads: it is not to be asked again.
     fn distrust(&self);
+
+    /// A method scores its hypotheses on the threads, whatever the device could do; `why` goes on after its
+    /// name. To be said where somebody asked for the device.
+    fn left_out(&self, method: Method, why: &str);
 }
 
 /// What all hypotheses of a query have in common, on a device.
@@ -98,4 +103,11 @@ pub fn use_device(device: Arc<dyn Device>) -> bool {
 /// The device that [`use_device`] named.
 pub(super) fn device_in_use() -> Option<Arc<dyn Device>> {
     IN_USE.get().cloned()
+}
+
+/// Tells the device in use that a method does without it.
+pub(crate) fn leave_out(method: Method, why: &str) {
+    if let Some(device) = device_in_use() {
+        device.left_out(method, why);
+    }
 }

@@ -71,13 +71,13 @@ impl Projection {
     }
 
     /// Column and row of the nearest pixel, in the image or not, and depth \[m\]; `None` behind the
-    /// camera or nearer than 10 cm.
+    /// camera, nearer than 10 cm, or where there is no number for the depth.
     #[inline]
     pub fn pixel_and_depth(&self, point: &ColoredPoint) -> Option<(i32, i32, f32)> {
         let p = &point.position;
         let along = |row: &[f32; 4]| row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3];
         let depth = along(&self.rows[2]);
-        if depth.is_nan() || depth <= NEAREST_M {
+        if !(depth > NEAREST_M && depth < f32::INFINITY) {
             return None;
         }
         let inverse = depth.recip();
@@ -101,6 +101,7 @@ impl Projection {
         let row = (along(&self.rows[1], points) * inverse + 0.5).floor();
         let reach = self.reach as f32;
         let in_view = depth.simd_gt(NEAREST_M)
+            & depth.simd_lt(f32::INFINITY)
             & column.simd_ge(-reach)
             & row.simd_ge(-reach)
             & column.simd_lt(self.width as f32 + reach)

@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{Canvas, ColoredPoint, PointArrays, Score, Values};
+use super::{Canvas, ColoredPoint, DepthCanvas, PointArrays, Score, Values};
 use crate::camera::Intrinsics;
-use crate::cost::{Cost, CostOf, Evaluator, IntensityPair, bin, count_pairs};
+use crate::cost::{Cost, CostOf, Evaluator, IntensityPair, MOST_BYTE_BINS, byte_bin, count_pairs};
 use crate::geometry::Pose;
-
-/// The most bins that a byte can tell apart.
-const MOST_BINS: usize = 256;
 
 /// What all hypotheses have in common.
 pub(super) struct Prepared {
@@ -31,8 +28,8 @@ impl Prepared {
     pub fn new(points: &[ColoredPoint], query: &[f32], cost: &dyn Cost) -> Self {
         let intensities = points.iter().map(|point| point.intensity);
         let shown = match cost.evaluator() {
-            Evaluator::Counts { bins, .. } if bins <= MOST_BINS => {
-                let bin = |value: f32| bin(value, bins) as u8;
+            Evaluator::Counts { bins, .. } if bins <= MOST_BYTE_BINS => {
+                let bin = |value: f32| byte_bin(value, bins);
                 Shown::Bins {
                     query: Arc::new(query.iter().copied().map(bin).collect()),
                     points: Arc::new(intensities.map(bin).collect()),
@@ -51,13 +48,19 @@ impl Prepared {
 
 /// A canvas, and the cost of what is drawn on it.
 pub(super) enum Worker<'a> {
-    Pairs {
+    /// A cost that may depend on the order of the pairs.
+    Ordered {
         canvas: Canvas<f32>,
         points: Arc<Vec<f32>>,
         cost: CostOf<'a, IntensityPair>,
     },
+    Pairs {
+        canvas: DepthCanvas<f32>,
+        points: Arc<Vec<f32>>,
+        cost: CostOf<'a, IntensityPair>,
+    },
     Counts {
-        canvas: Canvas<u8>,
+        canvas: DepthCanvas<u8>,
         query: Arc<Vec<u8>>,
         points: Arc<Vec<u8>>,
         bins: usize,
@@ -75,15 +78,24 @@ impl<'a> Worker<'a> {
         intrinsics: &Intrinsics,
         splat_px: usize,
     ) -> Option<Self> {
+        // Whole numbers decide it, whatever the order in which they are counted or added.
+        let knows_no_order = cost.tallying().is_some();
         match (cost.evaluator(), &prepared.shown) {
-            (Evaluator::Pairs(cost), Shown::Values(points)) => Some(Self::Pairs {
+            (Evaluator::Pairs(cost), Shown::Values(points)) if knows_no_order => {
+                Some(Self::Pairs {
+                    canvas: DepthCanvas::new(intrinsics, splat_px)?,
+                    points: Arc::clone(points),
+                    cost,
+                })
+            }
+            (Evaluator::Pairs(cost), Shown::Values(points)) => Some(Self::Ordered {
                 canvas: Canvas::new(intrinsics, splat_px)?,
                 points: Arc::clone(points),
                 cost,
             }),
             (Evaluator::Counts { bins, cost }, Shown::Bins { query, points }) => {
                 Some(Self::Counts {
-                    canvas: Canvas::new(intrinsics, splat_px)?,
+                    canvas: DepthCanvas::new(intrinsics, splat_px)?,
                     query: Arc::clone(query),
                     points: Arc::clone(points),
                     bins,
@@ -103,6 +115,15 @@ impl<'a> Worker<'a> {
         camera_from_points: &Pose,
     ) -> Score {
         let (cost, covered) = match self {
+            Self::Ordered {
+                canvas,
+                points,
+                cost,
+            } => {
+                let values = Values { query, points };
+                let pairs = canvas.draw(&prepared.positions, values, camera_from_points);
+                (cost(pairs), pairs.len())
+            }
             Self::Pairs {
                 canvas,
                 points,

@@ -147,6 +147,7 @@ mod tests {
     use super::*;
     use crate::cost::{self, JointHistogram, Tallying};
     use crate::image::FloatImage;
+    use crate::method::Method;
     use crate::render::{ColoredPoint, ProjectionRows, Rasterizer, Tally, small_camera};
 
     /// A device that draws plainly, and perhaps tells a lie.
@@ -184,6 +185,8 @@ mod tests {
         fn distrust(&self) {
             self.is_distrusted.store(true, Ordering::Relaxed);
         }
+
+        fn left_out(&self, _method: Method, _why: &str) {}
     }
 
     impl Loaded for PlainlyLoaded {
