@@ -1,10 +1,12 @@
 //! What recordings and the window show of photos, synthetic views and histograms, as pictures.
 
-use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 
 #[cfg(feature = "app")]
 use crate::cost::Explanation;
-use crate::cost::{IntensityPair, JointHistogram, PhotometricWeights};
+use crate::cost::JointHistogram;
+#[cfg(feature = "app")]
+use crate::cost::{IntensityPair, PhotometricWeights};
 use crate::image::Photo;
 use crate::palette;
 #[cfg(feature = "app")]
@@ -14,7 +16,7 @@ use crate::render::SplattedPixel;
 use crate::render::SyntheticView;
 
 /// Differences from −64 to 64 grey values have colours of their own; greater ones look like these.
-const RESIDUAL_RANGE: f64 = 64.0;
+pub(crate) const RESIDUAL_RANGE: f64 = 64.0;
 
 /// Contributions to mutual information from −2 to 2 nat have colours of their own.
 #[cfg(feature = "app")]
@@ -51,18 +53,9 @@ pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (RgbImage, u32) {
 }
 
 /// The synthetic view in its grey values.
+#[cfg(feature = "app")]
 pub(crate) fn synthetic(view: &SyntheticView) -> GrayImage {
-    let values = view
-        .pixels
-        .iter()
-        .map(|pixel| Luma([gray(pixel.intensity)]));
-    painted(view, Luma([0]), values)
-}
-
-/// Query minus synthetic view: blue where the query is darker, orange where it is brighter.
-/// Recordings have the same colours for the same differences at each step.
-pub(crate) fn residual(view: &SyntheticView, pairs: &[IntensityPair]) -> RgbImage {
-    residual_within(view, pairs, RESIDUAL_RANGE)
+    Painter::new(view).synthetic()
 }
 
 /// How far grey values differ: at most one pixel in fifty differs more. A power of two, so that views that
@@ -85,28 +78,28 @@ pub(crate) fn residual_range(pairs: &[IntensityPair]) -> f64 {
         .unwrap_or(256.0)
 }
 
-/// Query minus synthetic view in colours that end at a difference of this many grey values.
+/// Query minus synthetic view in colours that end at a difference of this many grey values: blue where the query
+/// is darker, orange where it is brighter.
+#[cfg(feature = "app")]
 pub(crate) fn residual_within(
     view: &SyntheticView,
     pairs: &[IntensityPair],
     range: f64,
 ) -> RgbImage {
-    let values = pairs.iter().map(|pair| {
-        Rgb(palette::diverging(
-            f64::from(pair.query - pair.synthetic) / range,
-        ))
-    });
-    let background = Rgb(palette::NOTHING);
-    painted(view, background, values)
+    let values = pairs
+        .iter()
+        .map(|pair| palette::diverging(f64::from(pair.query - pair.synthetic) / range));
+    in_color(view, Painter::new(view).paint(palette::NOTHING, values))
 }
 
 /// Which pixels the photometric cost counted: white; those it ignored: grey.
+#[cfg(feature = "app")]
 pub(crate) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
     let values = weights
         .counted
         .iter()
-        .map(|&counted| Luma([WEIGHT_GRAYS[usize::from(counted)]]));
-    painted(view, Luma([0]), values)
+        .map(|&counted| WEIGHT_GRAYS[usize::from(counted)]);
+    in_gray(view, Painter::new(view).paint(0, values))
 }
 
 /// What each pixel says about mutual information, in −2 … 2 nat: orange where the pair of grey values
@@ -121,8 +114,8 @@ pub(crate) fn contributions(
     let values = pairs
         .iter()
         .map(|pair| pointwise[histogram.cell(pair)] / CONTRIBUTION_RANGE)
-        .map(|share| Rgb(palette::diverging(share)));
-    painted(view, Rgb(palette::NOTHING), values)
+        .map(palette::diverging);
+    in_color(view, Painter::new(view).paint(palette::NOTHING, values))
 }
 
 /// Which parts of the query speak for one of two poses, tile by tile: orange for the first, blue for the
@@ -227,31 +220,67 @@ pub(crate) fn joint_histogram(histogram: &JointHistogram) -> RgbImage {
     })
 }
 
-/// A picture of the covered pixels' values.
+/// Paints pictures of a view's covered pixels.
 ///
 /// A view covers a few per cent of the image, and would all but vanish in a small panel. So every
 /// covered pixel also lends its value to uncovered neighbours, the nearest surface in front; the
 /// covered pixels themselves stay exact.
-fn painted<P: Pixel<Subpixel = u8>>(
-    view: &SyntheticView,
-    background: P,
-    values: impl Iterator<Item = P>,
-) -> ImageBuffer<P, Vec<u8>> {
-    let mut picture = ImageBuffer::from_pixel(view.width, view.height, background);
-    let mut covered: Vec<_> = view.pixels.iter().zip(values).collect();
-    covered.sort_by(|a, b| b.0.depth.total_cmp(&a.0.depth));
-    for (pixel, value) in &covered {
-        let (x, y) = (pixel.index % view.width, pixel.index / view.width);
-        for row in y.saturating_sub(1)..(y + 2).min(view.height) {
-            for column in x.saturating_sub(1)..(x + 2).min(view.width) {
-                picture.put_pixel(column, row, *value);
+pub(crate) struct Painter<'a> {
+    pub(crate) view: &'a SyntheticView,
+    /// Places of the covered pixels in the view's list, the nearest last.
+    order: Vec<usize>,
+}
+
+impl<'a> Painter<'a> {
+    pub(crate) fn new(view: &'a SyntheticView) -> Self {
+        let depth = |place: usize| view.pixels[place].depth;
+        let mut order: Vec<usize> = (0..view.pixels.len()).collect();
+        order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
+        Self { view, order }
+    }
+
+    /// A picture of values, one for each covered pixel, row by row.
+    pub(crate) fn paint<V: Copy>(&self, background: V, values: impl Iterator<Item = V>) -> Vec<V> {
+        let SyntheticView {
+            width,
+            height,
+            pixels,
+        } = self.view;
+        let [width, height] = [*width, *height].map(|side| side as usize);
+        let mut picture = vec![background; width * height];
+        let covered: Vec<(usize, V)> = pixels
+            .iter()
+            .map(|pixel| pixel.index as usize)
+            .zip(values)
+            .collect();
+        for (index, value) in self.order.iter().filter_map(|&place| covered.get(place)) {
+            let (x, y) = (index % width, index / width);
+            for row in y.saturating_sub(1)..(y + 2).min(height) {
+                let columns = row * width + x.saturating_sub(1)..row * width + (x + 2).min(width);
+                picture[columns].fill(*value);
             }
         }
+        for (index, value) in covered {
+            picture[index] = value;
+        }
+        picture
     }
-    for (pixel, value) in covered {
-        picture.put_pixel(pixel.index % view.width, pixel.index / view.width, value);
+
+    /// The view in its grey values.
+    pub(crate) fn synthetic(&self) -> GrayImage {
+        let values = self.view.pixels.iter().map(|pixel| gray(pixel.intensity));
+        in_gray(self.view, self.paint(0, values))
     }
-    picture
+}
+
+fn in_gray(view: &SyntheticView, values: Vec<u8>) -> GrayImage {
+    GrayImage::from_raw(view.width, view.height, values).expect("a value for each pixel")
+}
+
+#[cfg(feature = "app")]
+fn in_color(view: &SyntheticView, colors: Vec<palette::Rgb>) -> RgbImage {
+    let values = colors.into_flattened();
+    RgbImage::from_raw(view.width, view.height, values).expect("a colour for each pixel")
 }
 
 fn gray(value: f32) -> u8 {
@@ -263,6 +292,8 @@ mod tests {
     use super::*;
     #[cfg(not(feature = "app"))]
     use crate::render::SplattedPixel;
+    #[cfg(feature = "app")]
+    use image::Luma;
 
     #[test]
     fn a_covered_pixel_keeps_its_value_and_the_nearer_one_spreads_over_the_farther() {
@@ -276,9 +307,8 @@ mod tests {
             height: 1,
             pixels: vec![pixel(1, 2.0, 50.0), pixel(3, 9.0, 70.0)],
         };
-        let values = view.pixels.iter().map(|p| Luma([gray(p.intensity)]));
-        let picture = painted(&view, Luma([0]), values);
-        assert_eq!(picture.as_raw(), &[50, 50, 50, 70, 70]);
+        let values = view.pixels.iter().map(|pixel| gray(pixel.intensity));
+        assert_eq!(Painter::new(&view).paint(0, values), [50, 50, 50, 70, 70]);
     }
 
     #[cfg(feature = "app")]

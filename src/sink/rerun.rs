@@ -17,6 +17,7 @@ mod event_context;
 mod feature;
 mod file;
 mod fusion;
+mod indexed;
 mod layout;
 mod recorder;
 mod report;

@@ -47,11 +47,16 @@ pub fn record_checkup(
         let origin = *origin.get_or_insert(Origin(place));
         stream.set_query(index);
         stream.advance();
-        scene::log_reference(&mut stream, index, &tuple, &tuple.name, origin);
+        match jpeg(&picture::photo(&tuple.photo)) {
+            Ok(photo) => {
+                stream.log_image("check/photo", Ok(photo.clone()));
+                scene::log_reference(&mut stream, index, &tuple, &tuple.name, Ok(photo), origin);
+            }
+            Err(why) => stream.log_image("check/photo", Err(why)),
+        }
         let params = RenderParams::default();
         let colored = color_cloud(&tuple.cloud, &tuple.photo.gray, &tuple.intrinsics, &params);
         scene::log_cloud(&mut stream, index, &tuple, &colored, origin);
-        stream.log_image("check/photo", jpeg(&picture::photo(&tuple.photo)));
         let seen = tuple.cloud.points.iter().filter_map(|point| {
             let pixel = tuple.intrinsics.project(&point.cast())?;
             let is_in_view = tuple.intrinsics.contains(&pixel);

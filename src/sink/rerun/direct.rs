@@ -2,15 +2,16 @@
 
 use rerun::Scalars;
 
-use super::encode::png;
+use super::encode::{indexed, png};
 use super::entities;
 use super::event_context::EventContext;
+use super::indexed;
 use super::stream::Stream;
 use super::surface::{self, CostRange};
 use crate::cost::Explanation;
 use crate::event::{Event, PhaseSearched, PoseScored, ViewRendered};
 use crate::grid::{Offset, Phase};
-use crate::picture;
+use crate::picture::{self, Painter};
 use crate::render::Comparison;
 
 /// What a direct method told so far, as far as later events refer to it.
@@ -108,16 +109,26 @@ pub(super) fn log_pictures(
         explanation,
         ..
     } = comparison;
-    stream.log_image(&path("synthetic"), png(picture::synthetic(view)));
+    let painter = Painter::new(view);
+    let synthetic = || png(painter.synthetic());
     match explanation {
         Some(Explanation::Weights(weights)) => {
-            stream.log_image(&path("residual"), png(picture::residual(view, pairs)));
-            stream.log_image(&path("weights"), png(picture::weights(view, weights)));
+            // On all threads: the search waits for them.
+            let (synthetic, (residual, weights)) = rayon::join(synthetic, || {
+                rayon::join(
+                    || indexed(&indexed::residual(&painter, pairs)),
+                    || indexed(&indexed::weights(&painter, weights)),
+                )
+            });
+            stream.log_image(&path("synthetic"), synthetic);
+            stream.log_image(&path("residual"), residual);
+            stream.log_image(&path("weights"), weights);
         }
-        Some(Explanation::JointHistogram(histogram)) => stream.log_image(
-            &path("joint_histogram"),
-            png(picture::joint_histogram(histogram)),
-        ),
-        None => {}
+        Some(Explanation::JointHistogram(histogram)) => {
+            stream.log_image(&path("synthetic"), synthetic());
+            let histogram = png(picture::joint_histogram(histogram));
+            stream.log_image(&path("joint_histogram"), histogram);
+        }
+        None => stream.log_image(&path("synthetic"), synthetic()),
     }
 }

@@ -1,11 +1,19 @@
 //! Pictures as they are recorded: photos as JPEG, synthetic ones as PNG, so that a recording stays
 //! small.
+//!
+//! A search shows some forty synthetic views, and packing them took longer than the search. What is packed here
+//! is the difference from what the neighbours left, above and both would make one expect: where a covered
+//! pixel also colours its neighbours that is mostly nothing, and the fastest packer is good at nothing. For a
+//! view of 1241 × 376 px it takes 0.5 ms and makes 52 kB where the thorough one takes 5.4 ms and makes 47.
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageResult};
+use image::error::EncodingError;
+use image::{DynamicImage, ImageError, ImageFormat, ImageResult};
 use rerun::EncodedImage;
 use rerun::components::MediaType;
+
+use super::indexed::Indexed;
 
 /// An image ready to be recorded, or why there is none.
 pub(super) type Encoded = ImageResult<EncodedImage>;
@@ -23,9 +31,88 @@ pub(super) fn jpeg(image: &DynamicImage) -> Encoded {
 /// Encodes a picture without losses.
 pub(super) fn png(image: impl Into<DynamicImage>) -> Encoded {
     let mut bytes = Vec::new();
-    // Scattered pixels have no gradient that a filter could predict.
     let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::NoFilter);
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Paeth);
     image.into().write_with_encoder(encoder)?;
     Ok(EncodedImage::from_file_contents(bytes).with_media_type(MediaType::png()))
+}
+
+/// Encodes a picture of few colours without losses.
+pub(super) fn indexed(picture: &Indexed) -> Encoded {
+    let bytes = indexed_bytes(picture)
+        .map_err(|why| ImageError::Encoding(EncodingError::new(ImageFormat::Png.into(), why)))?;
+    Ok(EncodedImage::from_file_contents(bytes).with_media_type(MediaType::png()))
+}
+
+fn indexed_bytes(picture: &Indexed) -> Result<Vec<u8>, png::EncodingError> {
+    let Indexed {
+        width,
+        height,
+        palette,
+        indices,
+    } = picture;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, *width, *height);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_palette(palette.as_flattened());
+    // Differences of places in a palette mean nothing, but rows repeat: here the packer that looks for that makes
+    // 33 kB of what the fastest makes 41 of, and of three colours 14 instead of 38.
+    encoder.set_deflate_compression(png::DeflateCompression::Level(2));
+    encoder.set_filter(png::Filter::NoFilter);
+    let packed: Vec<u8>;
+    // Four pixels a byte where that is enough.
+    let rows = if palette.len() <= 4 {
+        encoder.set_depth(png::BitDepth::Two);
+        packed = indices
+            .chunks((*width).max(1) as usize)
+            .flat_map(|row| row.chunks(4).map(quarters))
+            .collect();
+        &packed
+    } else {
+        encoder.set_depth(png::BitDepth::Eight);
+        indices
+    };
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rows)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Up to four indices below 4 as one byte, the first in the upper bits.
+fn quarters(indices: &[u8]) -> u8 {
+    let places = (0..4).map(|place| 6 - 2 * place);
+    indices
+        .iter()
+        .zip(places)
+        .fold(0, |byte, (index, place)| byte | index << place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_of_few_colours_is_read_back_as_it_was() {
+        for colors in [3_u8, 200] {
+            let (width, height) = (13, 7);
+            let picture = Indexed {
+                width,
+                height,
+                palette: (0..colors)
+                    .map(|color| [color, 2 * (color / 2), 7])
+                    .collect(),
+                indices: (0..width * height)
+                    .map(|i| (i * 37) as u8 % colors)
+                    .collect(),
+            };
+            let bytes = indexed_bytes(&picture).expect("encodes");
+            let read = image::load_from_memory(&bytes).expect("a PNG").into_rgb8();
+            let shown = picture
+                .indices
+                .iter()
+                .map(|&index| picture.palette[usize::from(index)]);
+            assert_eq!(read.dimensions(), (width, height));
+            assert_eq!(read.into_raw(), shown.flatten().collect::<Vec<u8>>());
+        }
+    }
 }

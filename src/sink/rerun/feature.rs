@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use image::DynamicImage;
 use nalgebra::Point3;
 use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocument};
 
@@ -91,9 +92,16 @@ impl FeatureContext {
 
     fn canvas(&mut self, context: &EventContext<'_>, stream: &mut Stream) {
         let problem = context.problem;
-        let (canvas, top) = picture::stacked(&problem.query.photo, &problem.reference.photo);
+        let photos = [&problem.query.photo, &problem.reference.photo];
+        let (canvas, top) = picture::stacked(photos[0], photos[1]);
         self.canvas_top = top;
-        stream.log_image(&entities::matches(context.reference), jpeg(&canvas.into()));
+        let canvas = DynamicImage::from(canvas);
+        // A third of the work.
+        let canvas = match photos.iter().all(|photo| photo.color.is_none()) {
+            true => canvas.into_luma8().into(),
+            false => canvas,
+        };
+        stream.log_image(&entities::matches(context.reference), jpeg(&canvas));
     }
 
     fn undecided(&self, context: &EventContext<'_>, stream: &mut Stream) {

@@ -452,11 +452,8 @@ impl LocalizeObserver for Recorder {
             None => self.set_up(first),
         };
         let stream = &mut self.stream;
-        scene::log_query(stream, &first.query);
-        for (index, problem) in problems.iter().enumerate() {
-            let label = self.identity.reference_label(&problem.reference.name);
-            scene::log_reference(stream, index, &problem.reference, &label, origin);
-        }
+        let label = |name: &str| self.identity.reference_label(name);
+        scene::log_photos(stream, problems, label, origin);
         if let Some(truth) = truth {
             let camera = PlacedCamera {
                 owner: &entities::truth(),

@@ -1,16 +1,20 @@
 //! What is given and what comes out, in the world: clouds, cameras, photos.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 use rerun::{LineStrips3D, Pinhole, Points3D, Quaternion, Transform3D};
 
-use super::encode::jpeg;
+use super::encode::{Encoded, jpeg};
 use super::entities;
 use super::stream::Stream;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
+use crate::image::Photo;
 use crate::palette::{self, Rgb};
 use crate::picture;
-use crate::problem::{Problem, Query, ReferenceTuple};
+use crate::problem::{Problem, ReferenceTuple};
 use crate::render::ColoredCloud;
 
 /// How large cameras are drawn \[m\].
@@ -38,9 +42,27 @@ impl Origin {
     }
 }
 
-/// Records the query's photo.
-pub(super) fn log_query(stream: &mut Stream, query: &Query) {
-    stream.log_image(entities::QUERY_IMAGE, jpeg(&picture::photo(&query.photo)));
+/// Records the query's photo and, under their names, the references' cameras with theirs.
+pub(super) fn log_photos(
+    stream: &mut Stream,
+    problems: &[Problem],
+    label: impl Fn(&str) -> String,
+    origin: Origin,
+) {
+    let Some(first) = problems.first() else {
+        return;
+    };
+    let photos = problems.iter().map(|problem| &problem.reference.photo);
+    let photos: Vec<&Arc<Photo>> = std::iter::once(&first.query.photo).chain(photos).collect();
+    let encoded = photos.par_iter().map(|photo| jpeg(&picture::photo(photo)));
+    let mut encoded = encoded.collect::<Vec<_>>().into_iter();
+    if let Some(photo) = encoded.next() {
+        stream.log_image(entities::QUERY_IMAGE, photo);
+    }
+    for (index, (problem, photo)) in problems.iter().zip(encoded).enumerate() {
+        let tuple = &problem.reference;
+        log_reference(stream, index, tuple, &label(&tuple.name), photo, origin);
+    }
 }
 
 /// A reference's camera with its photo, under its name.
@@ -49,6 +71,7 @@ pub(super) fn log_reference(
     index: usize,
     tuple: &ReferenceTuple,
     label: &str,
+    photo: Encoded,
     origin: Origin,
 ) {
     let owner = entities::reference(index);
@@ -60,10 +83,7 @@ pub(super) fn log_reference(
         label: format!("reference {label}"),
     };
     camera.log(stream, origin);
-    stream.log_image(
-        &entities::camera_image(&owner),
-        jpeg(&picture::photo(&tuple.photo)),
-    );
+    stream.log_image(&entities::camera_image(&owner), photo);
 }
 
 /// A camera of the query: where it was, or where a method says that it was.
