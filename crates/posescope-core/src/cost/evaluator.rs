@@ -1,6 +1,6 @@
 //! How a cost is found for one hypothesis after another.
 
-use super::{Entropies, IntensityPair};
+use super::{Entropies, IntensityPair, JointHistogram};
 
 /// The cost of one hypothesis: of its pairs, or of their counts.
 pub type CostOf<'a, T> = Box<dyn FnMut(&[T]) -> Option<f64> + Send + 'a>;
@@ -26,6 +26,14 @@ impl Evaluator<'_> {
         Self::Counts {
             bins,
             cost: Box::new(move |counts| cost(&Entropies::of(counts, bins))),
+        }
+    }
+
+    /// The cost of pairs.
+    pub fn cost(&mut self, pairs: &[IntensityPair]) -> Option<f64> {
+        match self {
+            Self::Pairs(cost) => cost(pairs),
+            Self::Counts { bins, cost } => cost(&JointHistogram::of(pairs, *bins).counts),
         }
     }
 }

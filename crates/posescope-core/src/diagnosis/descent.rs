@@ -28,26 +28,33 @@ pub(super) fn compass_search<const N: usize>(
         cost: costs(&[start]).first().copied()??,
     };
     for _ in 0..=halvings {
+        // The way back leads to what was dearer.
+        let mut back = None;
         for _ in 0..MOST_STEPS {
-            let neighbours: Vec<[f64; N]> = (0..N)
+            let ways: Vec<(usize, f64)> = (0..N)
                 .filter(|&axis| steps[axis] > 0.0)
                 .flat_map(|axis| [(axis, steps[axis]), (axis, -steps[axis])])
-                .map(|(axis, step)| {
+                .filter(|way| back != Some(*way))
+                .collect();
+            let neighbours: Vec<[f64; N]> = ways
+                .iter()
+                .map(|&(axis, step)| {
                     let mut neighbour = best.at;
                     neighbour[axis] += step;
                     neighbour
                 })
                 .collect();
-            let mut cheaper = best;
-            for (at, cost) in neighbours.iter().zip(costs(&neighbours)) {
-                if let Some(cost) = cost.filter(|&cost| cost < cheaper.cost) {
-                    cheaper = Descended { at: *at, cost };
+            let mut cheaper = None;
+            for (place, cost) in costs(&neighbours).into_iter().enumerate() {
+                if let Some(cost) = cost.filter(|&cost| cost < best.cost) {
+                    best.cost = cost;
+                    cheaper = Some(place);
                 }
             }
-            if cheaper == best {
-                break;
-            }
-            best = cheaper;
+            let Some(place) = cheaper else { break };
+            best.at = neighbours[place];
+            let (axis, step) = ways[place];
+            back = Some((axis, -step));
         }
         steps = steps.map(|step| step / 2.0);
     }
@@ -67,6 +74,18 @@ mod tests {
     fn the_bottom_of_a_bowl_is_found_to_the_last_step() {
         let found = compass_search([0.0, 0.0], [0.5, 0.5], 6, bowl).expect("it has costs");
         assert!((found.at[0] - 0.7).abs() < 0.01 && (found.at[1] + 0.2).abs() < 0.01);
+    }
+
+    #[test]
+    fn nothing_is_asked_where_the_descent_comes_from() {
+        let mut asked = Vec::new();
+        let costs = |places: &[[f64; 1]]| -> Vec<Option<f64>> {
+            asked.extend(places.iter().map(|place| place[0]));
+            let costs = places.iter().map(|place| Some((place[0] - 2.2).powi(2)));
+            costs.collect()
+        };
+        compass_search([0.0], [0.5], 1, costs).expect("it has costs");
+        assert_eq!(asked, [0.0, 0.5, -0.5, 1.0, 1.5, 2.0, 2.5, 2.25, 1.75, 2.5]);
     }
 
     #[test]

@@ -6,6 +6,9 @@
 
 mod causes;
 
+use std::sync::Mutex;
+
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::descent::compass_search;
@@ -73,6 +76,7 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
             truth,
             summary,
             minimum,
+            shuffled: Mutex::default(),
         };
         found = search.verdicts();
     });
@@ -170,6 +174,7 @@ fn hardly_covered(summary: &CostSummary) -> Option<Diagnosis> {
 }
 
 /// What a place costs, and what shuffled pixels cost there.
+#[derive(Clone, Copy)]
 struct AgainstChance {
     /// Covered pixels.
     pixels: usize,
@@ -205,6 +210,8 @@ struct SearchedCost<'a, 'cost> {
     truth: Pose,
     summary: CostSummary,
     minimum: MinimumAssessed,
+    /// What was shuffled already: several tests ask for the same places.
+    shuffled: Mutex<Vec<(Offset, Option<AgainstChance>)>>,
 }
 
 impl SearchedCost<'_, '_> {
@@ -241,9 +248,10 @@ impl SearchedCost<'_, '_> {
             cost: self.summary.best,
         });
         causes.extend(self.too_few_pixels(&near, &winner));
-        if appearance.is_none() && self.goes_on_outside() {
+        if appearance.is_none() {
             let radius_m = self.subject.problem.uncertainty_radius_m;
-            causes.extend(on_rim(&self.minimum, radius_m, self.grid));
+            let rim = on_rim(&self.minimum, radius_m, self.grid);
+            causes.extend(rim.filter(|_| self.goes_on_outside()));
         }
         causes.extend(self.frozen_freedoms(&near, &winner));
         causes.extend(appearance);
@@ -342,11 +350,26 @@ impl SearchedCost<'_, '_> {
                 })
             })
             .reduce(|best, next| if next.cost < best.cost { next } else { best });
-        let starts = [Some(centre), best.map(|place| place.offset)];
-        starts
-            .into_iter()
+        let best = best.map(|place| place.offset);
+        let starts: Vec<Offset> = std::iter::once(centre)
+            .chain(best.filter(|best| *best != centre))
+            .collect();
+        self.deepest(&starts, &is_near)
+    }
+
+    /// The cheapest foot of the basins of some starts, of equals that of the first. They are descended at
+    /// the same time: the few steps of one leave threads idle.
+    fn deepest(
+        &self,
+        starts: &[Offset],
+        is_allowed: &(dyn Fn(&Offset) -> bool + Sync),
+    ) -> Option<Place> {
+        let feet: Vec<Option<Place>> = starts
+            .par_iter()
+            .map(|start| self.descended(*start, is_allowed))
+            .collect();
+        feet.into_iter()
             .flatten()
-            .filter_map(|start| self.descended(start, &is_near))
             .reduce(|best, next| if next.cost < best.cost { next } else { best })
     }
 
@@ -398,10 +421,8 @@ impl SearchedCost<'_, '_> {
             .filter(is_elsewhere)
             .take(OTHER_PLACES);
         let is_allowed = |offset: &Offset| self.is_reachable(offset) && is_elsewhere(offset);
-        std::iter::once(self.minimum.offset)
-            .chain(minima)
-            .filter_map(|start| self.descended(start, &is_allowed))
-            .reduce(|best, next| if next.cost < best.cost { next } else { best })
+        let starts: Vec<Offset> = std::iter::once(self.minimum.offset).chain(minima).collect();
+        self.deepest(&starts, &is_allowed)
     }
 
     fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {

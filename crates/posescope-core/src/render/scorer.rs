@@ -105,9 +105,7 @@ impl<'a> Scorer<'a> {
 
     /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
     pub(crate) fn score_on_threads(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
-        let prepared = self
-            .prepared
-            .get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)));
+        let prepared = self.prepared();
         let score = |worker: &mut Option<Worker<'_>>, pose: &Pose| match worker {
             Some(worker) => worker.score(prepared, &self.query, &pose.inverse()),
             None => self.compare(pose).score,
@@ -115,15 +113,56 @@ impl<'a> Scorer<'a> {
         reference_from_camera
             .par_chunks(PER_JOB)
             .flat_map_iter(|poses| {
-                let idle = self.idle().pop();
-                let mut worker = idle
-                    .or_else(|| Worker::new(self.cost, prepared, &self.intrinsics, self.splat_px));
-                let scores: Vec<Score> =
-                    poses.iter().map(|pose| score(&mut worker, pose)).collect();
-                self.idle().extend(worker);
-                scores
+                self.with_worker(prepared, |worker| {
+                    poses
+                        .iter()
+                        .map(|pose| score(worker, pose))
+                        .collect::<Vec<Score>>()
+                })
             })
             .collect()
+    }
+
+    /// The scores of one pose as cameras of the same size have them that are built otherwise, in their
+    /// order, on all threads.
+    pub fn score_seen_by(
+        &self,
+        cameras: &[Intrinsics],
+        reference_from_camera: &Pose,
+    ) -> Vec<Score> {
+        let prepared = self.prepared();
+        let camera_from_points = reference_from_camera.inverse();
+        let score = |camera: &Intrinsics| {
+            self.with_worker(prepared, |worker| match worker {
+                Some(worker) => {
+                    worker.look_through(camera);
+                    let score = worker.score(prepared, &self.query, &camera_from_points);
+                    worker.look_through(&self.intrinsics);
+                    score
+                }
+                None => self.seen_by(camera).compare(reference_from_camera).score,
+            })
+        };
+        cameras.par_iter().map(score).collect()
+    }
+
+    fn prepared(&self) -> &Prepared {
+        self.prepared
+            .get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)))
+    }
+
+    /// Work for an idle worker, or a new one; `None` where the plain way is the only one.
+    fn with_worker<R>(
+        &self,
+        prepared: &Prepared,
+        work: impl FnOnce(&mut Option<Worker<'a>>) -> R,
+    ) -> R {
+        let idle = self.idle().pop();
+        let mut worker =
+            idle.or_else(|| Worker::new(self.cost, prepared, &self.intrinsics, self.splat_px));
+        let done = work(&mut worker);
+        self.idle().extend(worker);
+        done
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Worker<'a>>> {
@@ -147,6 +186,13 @@ impl<'a> Scorer<'a> {
         }
     }
 
+    /// Query and view of one camera at each covered pixel, as [`Self::compare`] pairs them up.
+    pub fn pairs(&self, reference_from_camera: &Pose) -> Vec<IntensityPair> {
+        let mut rasterizer = self.rasterizer();
+        let view = rasterizer.view(self.points, &reference_from_camera.inverse());
+        self.pair_up(&view.pixels).collect()
+    }
+
     fn rasterizer(&self) -> Rasterizer {
         Rasterizer::new(&self.intrinsics, self.splat_px)
     }
@@ -160,5 +206,51 @@ impl<'a> Scorer<'a> {
             query: query[pixel.index as usize],
             synthetic: pixel.intensity,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cost;
+    use crate::render::small_camera;
+    use nalgebra::Point3;
+
+    #[test]
+    fn a_pose_costs_what_another_camera_sees_and_the_own_one_looks_on_after_it() {
+        let point = |i: u16| ColoredPoint {
+            position: Point3::new(
+                f32::from(i % 9) / 4.0 - 1.0,
+                f32::from(i % 7) / 4.0 - 0.75,
+                2.0 + f32::from(i % 3),
+            ),
+            intensity: f32::from(i * 37 % 256),
+        };
+        let points: Vec<ColoredPoint> = (0..200).map(point).collect();
+        let values = |x: u32, y: u32| image::Luma([(x * 29 + y * 31) as f32 % 256.0]);
+        let query = Arc::new(FloatImage::from_fn(9, 7, values));
+        let cameras = [0.8, 1.0, 1.3].map(|times| Intrinsics {
+            fx: 10.0 * times,
+            fy: 10.0 * times,
+            cx: 4.0 + times,
+            ..small_camera()
+        });
+        let pose = Pose::translation(0.1, 0.0, 0.3);
+        for entry in cost::ALL {
+            let cost = (entry.params)().cost();
+            let query = Arc::clone(&query);
+            let scorer = Scorer::new(&points, query, &small_camera(), 1, cost.as_ref());
+            let before = scorer.score(&[pose]);
+            let expected = cameras.map(|camera| scorer.seen_by(&camera).compare(&pose).score);
+            assert_eq!(
+                scorer.score_seen_by(&cameras, &pose),
+                expected,
+                "{}",
+                entry.name
+            );
+            assert_eq!(scorer.score(&[pose]), before, "{}", entry.name);
+            let compared = scorer.compare(&pose);
+            assert_eq!(scorer.pairs(&pose).len(), compared.pairs.len());
+        }
     }
 }

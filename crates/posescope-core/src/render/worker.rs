@@ -107,6 +107,14 @@ impl<'a> Worker<'a> {
         }
     }
 
+    /// From now on, what another camera of the same size sees.
+    pub fn look_through(&mut self, intrinsics: &Intrinsics) {
+        match self {
+            Self::Pairs { canvas, .. } => canvas.look_through(intrinsics),
+            Self::Counts { canvas, .. } => canvas.look_through(intrinsics),
+        }
+    }
+
     /// The score of a camera at `camera_from_points`. `query` is what the cost sees of the query.
     pub fn score(
         &mut self,

@@ -1,6 +1,9 @@
 //! What made a search end in the wrong place, each a test with its evidence.
 
+use std::sync::PoisonError;
+
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{
@@ -31,26 +34,24 @@ impl SearchedCost<'_, '_> {
         };
         let stated_score = self.scorer.score(&[self.truth])[0];
         let stated_cost = stated_score.eligible_cost(self.least_covered())?;
-        let cost = |at: &[f64; 3]| {
-            let scores = self.scorer.seen_by(&camera(at)).score(&[self.truth]);
-            comparable_cost(scores.first()?, &stated_score)
+        let costs = |places: &[[f64; 3]]| -> Vec<Option<f64>> {
+            let cameras: Vec<Intrinsics> = places.iter().map(camera).collect();
+            let scores = self.scorer.score_seen_by(&cameras, &self.truth);
+            let costs = scores
+                .iter()
+                .map(|score| comparable_cost(score, &stated_score));
+            costs.collect()
         };
-        let best = TIMES
-            .iter()
-            .map(|times| [times.ln(), 0.0, 0.0])
-            .filter_map(|at| {
-                Some(Descended {
-                    at,
-                    cost: cost(&at)?,
-                })
-            })
+        let focal_lengths = TIMES.map(|times| [times.ln(), 0.0, 0.0]);
+        let best = focal_lengths
+            .into_iter()
+            .zip(costs(&focal_lengths))
+            .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
             .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
         if best.cost >= stated_cost {
             return None;
         }
-        let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, |places| {
-            places.iter().map(cost).collect()
-        })?;
+        let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
         let chance = self.summary.shuffled?;
         let rival = near
             .map_or(f64::INFINITY, |near| near.cost)
@@ -93,23 +94,25 @@ impl SearchedCost<'_, '_> {
     pub(super) fn suspect_truth(&self, near: Option<&Place>) -> Option<Diagnosis> {
         const NEARLY_CERTAIN: f64 = 0.97;
         const SUPPORTED: f64 = 0.5;
+        let probability = self.subject.trust.as_ref()?.probability?;
+        // Few wrong poses are so certain, and shuffling takes its time.
+        if probability < NEARLY_CERTAIN {
+            return None;
+        }
+        let error = self.subject.error()?;
         let gain = near.and_then(|near| self.gain(&near.offset)).unwrap_or(0.0);
         if gain > SUPPORTED * self.gain(&self.minimum.offset)? {
             return None;
         }
-        let probability = self.subject.trust.as_ref()?.probability?;
-        let error = self.subject.error()?;
-        (probability >= NEARLY_CERTAIN).then(|| {
-            Diagnosis::new(
-                Code::X1,
-                format!(
-                    "poses like this one are right in {:.0} % of cases, and it is {error} from the \
-                     stated truth: the truth is suspect",
-                    100.0 * probability
-                ),
-                json!({ "probability": probability, "error": error }),
-            )
-        })
+        Some(Diagnosis::new(
+            Code::X1,
+            format!(
+                "poses like this one are right in {:.0} % of cases, and it is {error} from the \
+                 stated truth: the truth is suspect",
+                100.0 * probability
+            ),
+            json!({ "probability": probability, "error": error }),
+        ))
     }
 
     pub(super) fn outside_grid(&self) -> Option<Diagnosis> {
@@ -227,25 +230,40 @@ impl SearchedCost<'_, '_> {
 
     /// What chance gives at a pose, and what the images cost there.
     fn against_chance(&self, offset: &Offset) -> Option<AgainstChance> {
-        self.against_chance_of(self.scorer, &offset.reference_from_camera())
+        let shuffled = || self.shuffled.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = shuffled()
+            .iter()
+            .find(|(known, _)| known == offset)
+            .copied();
+        if let Some((_, against)) = known {
+            return against;
+        }
+        let against = self.against_chance_of(self.scorer, &offset.reference_from_camera());
+        shuffled().push((*offset, against));
+        against
     }
 
     fn against_chance_of(&self, scorer: &Scorer<'_>, pose: &Pose) -> Option<AgainstChance> {
-        let compared = scorer.compare(pose);
+        let pairs = scorer.pairs(pose);
         let subject = self.subject;
         let responsible = trust::responsible(subject.method, subject.outcome);
         let entry = estimator::find(responsible)?.cost()?;
         let measure = subject.params.costs.of(entry)?.cost();
         let seed = subject.problem.random_seed("shuffled truth");
-        let costs: Vec<f64> = (0..SHUFFLES)
-            .filter_map(|k| measure.evaluate(&shuffled(&compared.pairs, seed.wrapping_add(k))))
+        let costs: Vec<Option<f64>> = (0..SHUFFLES)
+            .into_par_iter()
+            .map_init(
+                || measure.evaluator(),
+                |evaluator, k| evaluator.cost(&shuffled(&pairs, seed.wrapping_add(k))),
+            )
             .collect();
+        let costs: Vec<f64> = costs.into_iter().flatten().collect();
         let count = costs.len() as f64;
         let mean = costs.iter().sum::<f64>() / count;
         let squared: f64 = costs.iter().map(|cost| (cost - mean).powi(2)).sum();
         Some(AgainstChance {
-            pixels: compared.pairs.len(),
-            cost: compared.score.cost?,
+            pixels: pairs.len(),
+            cost: measure.evaluate(&pairs)?,
             mean,
             deviation: (squared / (count - 1.0)).sqrt(),
         })
@@ -349,21 +367,22 @@ impl SearchedCost<'_, '_> {
     /// The least cost near the truth in all six freedoms.
     fn best_in_six_freedoms(&self, near: &Place) -> Option<f64> {
         const HALVINGS: usize = 2;
-        let from = |start: Pose| {
+        let from = |start: &Pose| {
             let degree = 1_f64.to_radians();
             let steps = [0.1, 0.1, 0.1, 0.5 * degree, 0.5 * degree, 0.5 * degree];
             let found = compass_search([0.0; 6], steps, HALVINGS, |places| {
-                let poses: Vec<Pose> = places.iter().map(|at| moved(&start, at)).collect();
+                let poses: Vec<Pose> = places.iter().map(|at| moved(start, at)).collect();
                 self.eligible(self.scorer.score(&poses))
             })?;
-            let error = PoseError::between(&self.truth, &moved(&start, &found.at));
+            let error = PoseError::between(&self.truth, &moved(start, &found.at));
             self.subject
                 .tolerance
                 .contains(&error)
                 .then_some(found.cost)
         };
         let starts = [self.truth, lifted_to(&near.offset, &self.truth)];
-        starts.into_iter().filter_map(from).reduce(f64::min)
+        let found: Vec<Option<f64>> = starts.par_iter().map(from).collect();
+        found.into_iter().flatten().reduce(f64::min)
     }
 
     /// The images share nothing, even at the truth.
