@@ -5,9 +5,11 @@ use posescope::cloud::Cloud;
 use posescope::diagnosis::Tolerance;
 use posescope::fusion::Fusion;
 use posescope::geometry::Pose;
+use posescope::image::Photo;
 use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, References, Request};
 use posescope::method::Method;
 use posescope::params::Params;
+use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -185,6 +187,84 @@ impl StreetPlace<'_> {
     pub fn frame_from(&self, frame: usize, world_from_camera: &Pose) -> Frame {
         frame_of(&self.drives.day, frame, world_from_camera)
     }
+}
+
+/// A query in any condition of the street, and a reference ahead of it in any other.
+pub struct Pairing {
+    /// The condition of the query, by its place in [`Condition::ALL`].
+    pub queries: usize,
+    /// The query's frame.
+    pub query: usize,
+    /// The condition of the reference.
+    pub references: usize,
+    /// The reference's frame.
+    pub reference: usize,
+}
+
+impl Pairing {
+    /// The pairing with a number: a reference 1 to 9.5 m ahead, of the query's condition alone or of
+    /// any. `drives` are those of [`Condition::ALL`].
+    pub fn numbered(
+        drives: &[Traversal; 5],
+        number: usize,
+        seed: u64,
+        is_same_condition: bool,
+    ) -> Self {
+        let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(6007).wrapping_add(number as u64));
+        let (queries, other) = (rng.random_range(0..5), rng.random_range(0..5));
+        let references = if is_same_condition { queries } else { other };
+        let query = rng.random_range(0..drives[queries].frame_count());
+        let truth = drives[queries].world_from_camera(query);
+        let apart: f64 = rng.random_range(1.0..9.5);
+        let ahead = truth * nalgebra::Point3::new(0.0, 0.0, apart);
+        let drive = &drives[references];
+        let away = |frame: &usize| {
+            (drive.world_from_camera(*frame).translation.vector - ahead.coords).norm()
+        };
+        let reference = (0..drive.frame_count())
+            .min_by(|a, b| away(a).total_cmp(&away(b)))
+            .unwrap_or(0);
+        Self {
+            queries,
+            query,
+            references,
+            reference,
+        }
+    }
+
+    /// Query and reference.
+    pub fn frames(&self, drives: &[Traversal; 5]) -> (Frame, Frame) {
+        let frame = |drive: &Traversal, frame: usize| {
+            frame_of(drive, frame, &drive.world_from_camera(frame))
+        };
+        (
+            frame(&drives[self.queries], self.query),
+            frame(&drives[self.references], self.reference),
+        )
+    }
+}
+
+/// A query localised against a reference within a radius \[m\], and the query's true pose.
+///
+/// # Panics
+/// Where a frame has no pose, no pixel or no point.
+pub fn problem_of(query: Frame, reference: Frame, radius_m: f64) -> (Problem, Pose) {
+    let (truth, pose) = (query.pose, reference.pose);
+    let photo = Photo::from_color(query.photo);
+    let query = Query::new("query", photo, query.intrinsics).expect("a whole frame");
+    let photo = Photo::from_color(reference.photo);
+    let reference = ReferenceTuple::new(
+        "reference",
+        photo,
+        reference.intrinsics,
+        pose.expect("a frame with its pose"),
+        reference.cloud,
+    );
+    let problem = Problem::new(query, reference.expect("a whole frame"), radius_m);
+    (
+        problem.expect("a radius"),
+        truth.expect("a frame with its pose"),
+    )
 }
 
 fn cloud_of(drive: &Traversal, frame: usize) -> Cloud {

@@ -15,16 +15,12 @@ use posescope::diagnosis::{Evidence, Subject, Tolerance, diagnose};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::grid::{GridParams, Offset};
-use posescope::image::Photo;
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::render::Scorer;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::trace::Trace;
-use posescope_diagnosis::places::frame_of;
-use rand::{RngExt as _, SeedableRng as _};
-use rand_pcg::Pcg64;
+use posescope_diagnosis::places::{Pairing, problem_of};
 use rayon::prelude::*;
 
 /// Coarse minima that are searched around.
@@ -120,30 +116,8 @@ fn main() -> Result<(), String> {
 }
 
 fn at(drives: &[Traversal; 5], place: usize, seed: u64, is_disc_searched: bool) -> Vec<Compared> {
-    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(6007).wrapping_add(place as u64));
-    let (queries, references) = (
-        &drives[rng.random_range(0..5)],
-        &drives[rng.random_range(0..5)],
-    );
-    let query = rng.random_range(0..queries.frame_count());
-    let truth = queries.world_from_camera(query);
-    let apart: f64 = rng.random_range(1.0..9.5);
-    let ahead = truth * nalgebra::Point3::new(0.0, 0.0, apart);
-    let away = |frame: &usize| {
-        (references.world_from_camera(*frame).translation.vector - ahead.coords).norm()
-    };
-    let reference = (0..references.frame_count())
-        .min_by(|a, b| away(a).total_cmp(&away(b)))
-        .unwrap_or(0);
-    let frame = frame_of(queries, query, &truth);
-    let query = Query::new("query", Photo::from_color(frame.photo), frame.intrinsics)
-        .expect("a whole frame");
-    let pose = references.world_from_camera(reference);
-    let frame = frame_of(references, reference, &pose);
-    let photo = Photo::from_color(frame.photo);
-    let reference = ReferenceTuple::new("reference", photo, frame.intrinsics, pose, frame.cloud);
-    let problem = Problem::new(query, reference.expect("a whole frame"), RADIUS_M);
-    let problem = problem.expect("a radius");
+    let (query, reference) = Pairing::numbered(drives, place, seed, false).frames(drives);
+    let (problem, truth) = problem_of(query, reference, RADIUS_M);
     let params = Params::default();
     let tolerance = Tolerance::default();
     let mut compared = Vec::new();
