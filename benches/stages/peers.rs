@@ -6,6 +6,7 @@
 //!
 //! The pair is that of the stages, named in the environment.
 
+mod both_costs;
 mod pair;
 mod problems;
 
@@ -27,7 +28,8 @@ use posescope::solver::{Correspondence, p3p};
 use posescope::trace::Trace;
 use serde_json::{Value, json};
 
-use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by, with_both_costs};
+use self::both_costs::with_both_costs;
+use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
 use self::problems::{Outliers, P3pProblem, p3p_problems};
 
 const P3P_PROBLEMS: usize = 20_000;

@@ -6,6 +6,7 @@
 //! street, or with `POSESCOPE_SCENE=PATH` and `POSESCOPE_PAIR=QUERY,REFERENCE`, the indices of two of its
 //! frames, one of any scene.
 
+mod both_costs;
 mod pair;
 mod problems;
 
@@ -33,7 +34,8 @@ use posescope::trace::{Cancelled, Record, Sink, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by, with_both_costs};
+use self::both_costs::with_both_costs;
+use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
 use self::problems::{Outliers, p3p_problems};
 
 fn main() {

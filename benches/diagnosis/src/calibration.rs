@@ -2,14 +2,15 @@
 //!
 //! `cargo run -p posescope-diagnosis --bin calibration -- --places 40` localises queries of every
 //! condition of the street against references of every other, fits a logistic function of each method's
-//! signals where both are overcast, sunny or at night, and prints its coefficients, as
+//! signals where both are overcast, sunny or snowy, and prints its coefficients, as
 //! `diagnosis/trust/coefficients.rs` holds them. Then it judges the probabilities that posescope has
-//! now on the other pairs, which rain or snow is part of: calibration error, area under the ROC curve,
-//! reliability by tenths.
+//! now, and those of the coefficients, on the pairs that night or rain is part of: calibration error,
+//! area under the ROC curve, reliability by tenths.
 //!
 //! Options: `--places N` (40), `--seed N` (0), `--dump FILE` to keep the signals, `--from FILE` to use
-//! those of an earlier run, `--diagrams FOLDER` for reliability and ROC as SVG, `--real yes` to judge
-//! the pairs of real photos below `POSESCOPE_DATA` and nothing else.
+//! those of an earlier run, `--judge FILE` to judge those of another run than was fitted on,
+//! `--diagrams FOLDER` for reliability and ROC as SVG, `--real yes` to judge the pairs of real photos
+//! below `POSESCOPE_DATA` and nothing else.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -54,6 +55,7 @@ struct Sample {
     /// The condition of the reference, and that of the query.
     conditions: [String; 2],
     is_near: bool,
+    /// What posescope says of such signals.
     probability: Option<f64>,
     names: Vec<String>,
     values: Vec<f64>,
@@ -71,7 +73,7 @@ impl Sample {
 fn main() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
     let (mut places, mut seed, mut dump, mut from) = (40, 0, None, None);
-    let (mut diagrams, mut is_real) = (None, false);
+    let (mut judged, mut diagrams, mut is_real) = (None, None, false);
     while let Some(argument) = arguments.next() {
         let value = arguments
             .next()
@@ -86,24 +88,32 @@ fn main() -> Result<(), String> {
             "--seed" => seed = number()? as u64,
             "--dump" => dump = Some(value),
             "--from" => from = Some(value),
+            "--judge" => judged = Some(value),
             "--diagrams" => diagrams = Some(value),
             "--real" => is_real = value == "yes",
             other => return Err(format!("unknown argument {other}")),
         }
     }
-    if is_real {
-        return judge_real_pairs();
-    }
     let samples = match from {
         Some(path) => read(&path)?,
+        None if is_real => of_real_pairs()?,
         None => collect(places, seed),
     };
     if let Some(path) = dump {
         std::fs::write(&path, written(&samples)).map_err(|error| format!("{path}: {error}"))?;
     }
+    if is_real {
+        println!("{} poses in pairs of real photos", samples.len());
+        judge("As posescope has them now", &samples, &methods_of(&samples));
+        return Ok(());
+    }
+    let judged = match judged {
+        Some(path) => read(&path)?,
+        None => samples.clone(),
+    };
     let methods = methods_of(&samples);
     println!("## Coefficients\n\n```rust");
-    let mut refitted = samples.clone();
+    let mut refitted = judged.clone();
     for method in &methods {
         let own = |s: &&Sample| s.method == *method && s.is_for_fitting();
         let fitting: Vec<&Sample> = samples.iter().filter(own).collect();
@@ -118,22 +128,16 @@ fn main() -> Result<(), String> {
         }
     }
     println!("```");
-    judge("As posescope has them now", &samples, &methods);
+    judge("As posescope has them now", &judged, &methods);
     judge("With these coefficients", &refitted, &methods);
-    diagrams.map_or(Ok(()), |folder| {
-        draw(Path::new(&folder), &samples, &methods)
-    })
+    diagrams.map_or(Ok(()), |folder| draw(Path::new(&folder), &judged, &methods))
 }
 
 /// What is said of poses in pairs of real photos, which nothing was fitted on.
-fn judge_real_pairs() -> Result<(), String> {
+fn of_real_pairs() -> Result<Vec<Sample>, String> {
     let pairs = real_pairs::all()?;
-    if pairs.is_empty() {
-        println!("skipped: no data");
-        return Ok(());
-    }
     let conditions = ["real".to_owned(), "real".to_owned()];
-    let samples: Vec<Sample> = pairs
+    Ok(pairs
         .par_iter()
         .flat_map_iter(|pair| {
             let (query, truth) = query_of(&pair.query);
@@ -141,10 +145,7 @@ fn judge_real_pairs() -> Result<(), String> {
             let problem = Problem::new(query, reference, RADIUS_M).expect("a radius");
             of_problem(&problem, Some(&truth), &conditions)
         })
-        .collect();
-    println!("{} pairs of real photos", pairs.len());
-    judge("As posescope has them now", &samples, &methods_of(&samples));
-    Ok(())
+        .collect())
 }
 
 /// The methods that gave poses, by name.
@@ -306,14 +307,13 @@ fn of_problem(problem: &Problem, truth: Option<&Pose>, conditions: &[String; 2])
         let (Ok(pose), Some(signals)) = (&outcome.pose, signals) else {
             continue;
         };
-        let trust = trust::Trust::of(problem, method, &params, &outcome, &evidence);
         let is_near = truth
             .is_some_and(|truth| PoseError::between(truth, pose).translation_m < trust::WITHIN_M);
         samples.push(Sample {
             method: method.name().to_owned(),
             conditions: conditions.clone(),
             is_near,
-            probability: trust.and_then(|trust| trust.probability),
+            probability: trust::probability(method, &signals.values),
             names: signals
                 .names
                 .iter()
@@ -327,38 +327,25 @@ fn of_problem(problem: &Problem, truth: Option<&Pose>, conditions: &[String; 2])
 
 fn written(samples: &[Sample]) -> String {
     samples.iter().fold(String::new(), |mut text, s| {
-        let line = serde_json::json!([
-            s.method,
-            s.conditions,
-            s.is_near,
-            s.probability,
-            s.names,
-            s.values
-        ]);
+        let line = serde_json::json!([s.method, s.conditions, s.is_near, s.names, s.values]);
         let _ = writeln!(text, "{line}");
         text
     })
 }
 
 fn read(path: &str) -> Result<Vec<Sample>, String> {
-    type Line = (
-        String,
-        [String; 2],
-        bool,
-        Option<f64>,
-        Vec<String>,
-        Vec<f64>,
-    );
+    type Line = (String, [String; 2], bool, Vec<String>, Vec<f64>);
     let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
     text.lines()
         .map(|line| {
             let read: Line = serde_json::from_str(line).map_err(|error| error.to_string())?;
-            let (method, conditions, is_near, probability, names, values) = read;
+            let (method, conditions, is_near, names, values) = read;
+            let known = JUDGED.iter().find(|known| known.name() == method);
             Ok(Sample {
+                probability: known.and_then(|known| trust::probability(*known, &values)),
                 method,
                 conditions,
                 is_near,
-                probability,
                 names,
                 values,
             })

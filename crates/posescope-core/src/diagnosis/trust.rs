@@ -11,10 +11,12 @@ mod coefficients;
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
+pub use coefficients::probability;
+
 use super::Evidence;
 use crate::estimator::{self, Outcome, Parts};
 use crate::features::FeatureState;
-use crate::grid::{Offset, Phase, ScoredLattice};
+use crate::grid::{Phase, ScoredLattice};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -25,7 +27,7 @@ pub const WITHIN_M: f64 = 1.0;
 
 /// A pose of less probability has low confidence: of the queries that show nothing of their place, none
 /// should be believed.
-pub const LOW_CONFIDENCE: f64 = 0.95;
+pub const LOW_CONFIDENCE: f64 = 0.975;
 
 /// A pose of less probability is more likely wrong than right, so that what speaks against it is said
 /// without knowing the truth.
@@ -74,7 +76,7 @@ impl Trust {
         outcome.pose.as_ref().ok()?;
         match estimator::find(responsible(method, outcome))?.parts {
             Parts::Features => of_features(problem, params, evidence),
-            Parts::Cost(_) => of_search(problem, method, outcome, evidence),
+            Parts::Cost(_) => of_search(method, outcome, evidence),
             Parts::Hybrid(_) | Parts::Own(_) => None,
         }
     }
@@ -118,7 +120,7 @@ pub fn signals(
             let consensus = Inliers::of(problem, params, evidence)?;
             Some(consensus.signals(problem, evidence))
         }
-        Parts::Cost(_) => Some(Minimum::of(problem, outcome, evidence)?.signals()),
+        Parts::Cost(_) => Some(Minimum::of(outcome, evidence)?.signals()),
         Parts::Hybrid(_) | Parts::Own(_) => None,
     }
 }
@@ -131,7 +133,7 @@ fn of_features(problem: &Problem, params: &Params, evidence: &Evidence) -> Optio
         covariance.map(|c| std::array::from_fn(|axis| c[(first + axis, first + axis)].sqrt()))
     };
     Some(Trust {
-        probability: coefficients::probability(Method::FB, &signals),
+        probability: probability(Method::FB, &signals.values),
         position_std_m: deviation(3),
         rotation_std_deg: deviation(0).map(|d: [f64; 3]| d.map(f64::to_degrees)),
         inlier_spread: Some(inliers.spread),
@@ -140,16 +142,11 @@ fn of_features(problem: &Problem, params: &Params, evidence: &Evidence) -> Optio
     })
 }
 
-fn of_search(
-    problem: &Problem,
-    method: Method,
-    outcome: &Outcome,
-    evidence: &Evidence,
-) -> Option<Trust> {
-    let minimum = Minimum::of(problem, outcome, evidence)?;
+fn of_search(method: Method, outcome: &Outcome, evidence: &Evidence) -> Option<Trust> {
+    let minimum = Minimum::of(outcome, evidence)?;
     let deviations = minimum.deviations(evidence);
     Some(Trust {
-        probability: coefficients::probability(responsible(method, outcome), &minimum.signals()),
+        probability: probability(responsible(method, outcome), &minimum.signals().values),
         position_std_m: deviations.map(|[right, forward, _]| [right, 0.0, forward]),
         rotation_std_deg: deviations.map(|[.., yaw]| [0.0, yaw.to_degrees(), 0.0]),
         inlier_spread: None,
@@ -262,15 +259,15 @@ struct Minimum {
     coverage: f64,
     /// Depth of the yaw that was chosen among the others, as above.
     yaw_depth: f64,
-    /// Distance from the reference over the radius.
-    distance: f64,
     /// The standard deviation that all this is measured in.
     deviation: f64,
 }
 
 impl Minimum {
-    fn of(problem: &Problem, outcome: &Outcome, evidence: &Evidence) -> Option<Self> {
-        let (summary, minimum) = (outcome.cost.as_ref()?, evidence.minimum?);
+    fn of(outcome: &Outcome, evidence: &Evidence) -> Option<Self> {
+        let summary = outcome.cost.as_ref()?;
+        // Without one there is nothing to judge.
+        evidence.minimum?;
         let coarse = surface(evidence, Phase::PositionCoarse)?;
         let mut costs = eligible_costs(coarse);
         let coarse_best = costs.iter().copied().fold(f64::INFINITY, f64::min);
@@ -284,9 +281,6 @@ impl Minimum {
             Some((centre - best) / deviation)
         });
         let shuffled = summary.shuffled.unwrap_or(1.0).max(f64::MIN_POSITIVE);
-        let Offset {
-            right_m, forward_m, ..
-        } = minimum.offset;
         Some(Self {
             depth: depth(summary.best),
             coarse_depth: depth(coarse_best),
@@ -297,11 +291,12 @@ impl Minimum {
             gain: 1.0 - summary.best / shuffled,
             coverage: summary.coverage_best / summary.coverage_reference.max(f64::MIN_POSITIVE),
             yaw_depth: yaw_depth.unwrap_or(0.0),
-            distance: right_m.hypot(forward_m) / problem.uncertainty_radius_m,
             deviation,
         })
     }
 
+    /// How far the pose is from the reference is none of them: on the street right ones are near, by how its
+    /// pairs are drawn, and on real drives they are not.
     fn signals(&self) -> Signals {
         const NAMES: &[&str] = &[
             "depth",
@@ -311,7 +306,6 @@ impl Minimum {
             "gain",
             "coverage",
             "yaw_depth",
-            "distance",
         ];
         let margin = self.runner_up_margin.unwrap_or(self.coarse_depth);
         Signals {
@@ -324,7 +318,6 @@ impl Minimum {
                 self.gain,
                 self.coverage.clamp(1e-3, 1e3).ln(),
                 tamed(self.yaw_depth),
-                self.distance,
             ],
         }
     }
@@ -396,10 +389,10 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_is_doubted_below_one_half_and_believed_from_nineteen_in_twenty_on() {
-        let doubted = [0.0, 0.49, 0.5, 0.94, 0.95, 1.0].map(|p| said(Some(p)).is_doubtful());
+    fn a_pose_is_doubted_below_one_half_and_believed_from_thirty_nine_in_forty_on() {
+        let doubted = [0.0, 0.49, 0.5, 0.97, 0.975, 1.0].map(|p| said(Some(p)).is_doubtful());
         assert_eq!(doubted, [true, true, false, false, false, false]);
-        let low = [0.0, 0.49, 0.5, 0.94, 0.95, 1.0].map(|p| said(Some(p)).is_low());
+        let low = [0.0, 0.49, 0.5, 0.97, 0.975, 1.0].map(|p| said(Some(p)).is_low());
         assert_eq!(low, [true, true, true, true, false, false]);
         // Of a method that was not calibrated nothing is known.
         assert!(!said(None).is_doubtful() && !said(None).is_low());

@@ -57,6 +57,11 @@ impl<T: Copy + Default> DepthCanvas<T> {
         })
     }
 
+    /// From now on, what another camera of the same size sees.
+    pub fn look_through(&mut self, intrinsics: &Intrinsics) {
+        self.intrinsics = *intrinsics;
+    }
+
     /// What the query and a camera at `camera_from_points` show, at each pixel on which points fall.
     pub fn draw(
         &mut self,

@@ -110,6 +110,7 @@ impl<'a> Worker<'a> {
     /// From now on, what another camera of the same size sees.
     pub fn look_through(&mut self, intrinsics: &Intrinsics) {
         match self {
+            Self::Ordered { canvas, .. } => canvas.look_through(intrinsics),
             Self::Pairs { canvas, .. } => canvas.look_through(intrinsics),
             Self::Counts { canvas, .. } => canvas.look_through(intrinsics),
         }
