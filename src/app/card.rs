@@ -190,11 +190,7 @@ fn helped(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         }
         return;
     };
-    let best = explanation.helped.iter().min_by(|a, b| {
-        let off_m = |helped: &Helped| helped.error.translation_m;
-        off_m(a).total_cmp(&off_m(b))
-    });
-    match best {
+    match explanation.best() {
         Some(Helped { args, error }) => {
             let button = ui.small_button(format!("Try {}", args.join(" ")));
             let help = "Keep this run as A and localise with this";

@@ -508,6 +508,7 @@ pub fn shortcuts() -> Vec<Shortcut> {
             "All the room for the view under the pointer",
         ),
         keys(NONE, Key::L, Command::SwitchTheme, "Light or dark"),
+        // Named by what it types, wherever it is on the keyboard: the text that comes with it says it twice.
         keys(NONE, Key::Questionmark, Command::Help, "This list"),
         keys(NONE, Key::F1, Command::Help, "This list"),
     ];
@@ -537,22 +538,6 @@ pub(super) fn read_keys(ctx: &egui::Context, queue: &Queue) {
     if ctx.egui_wants_keyboard_input() {
         return;
     }
-    // `?` is typed in another way on every keyboard; where it is no key of its own, the text says what was meant.
-    let is_only_typed = ctx.input(|input| {
-        let mut is_typed = false;
-        for event in &input.events {
-            match event {
-                egui::Event::Text(text) if text == "?" => is_typed = true,
-                egui::Event::Key {
-                    key: Key::Questionmark,
-                    pressed: true,
-                    ..
-                } => return false,
-                _ => {}
-            }
-        }
-        is_typed
-    });
     let mut shortcuts = shortcuts();
     // egui takes a key with Shift for one without: those with more modifiers are asked first.
     shortcuts.sort_by_key(|shortcut| {
@@ -568,9 +553,6 @@ pub(super) fn read_keys(ctx: &egui::Context, queue: &Queue) {
         while ctx.input_mut(|input| input.consume_shortcut(&shortcut.keys)) {
             queue.send(shortcut.command.clone());
         }
-    }
-    if is_only_typed {
-        queue.send(Command::Help);
     }
 }
 

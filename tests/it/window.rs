@@ -260,8 +260,8 @@ fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
         let result = run.results().next().expect("a result");
         result.explanation.clone()
     };
-    let helped = explanation(&window).expect("it went wrong").helped;
-    let words = helped[0].args.join(" ");
+    let helped = explanation(&window).expect("it went wrong");
+    let words = helped.best().expect("something helped").args.join(" ");
     assert!(is_said(&window, &format!("Try {words}")), "{words}");
     assert!(window.state().app_state().run().explaining.is_none());
     let line = window.state().app_state().setup.command_line();

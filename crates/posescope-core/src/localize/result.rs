@@ -91,6 +91,15 @@ pub struct Explanation {
     pub complete: bool,
 }
 
+impl Explanation {
+    /// What brought the pose nearest to the truth, the first of equal ones.
+    pub fn best(&self) -> Option<&Helped> {
+        let off_m = |helped: &&Helped| helped.error.translation_m;
+        let helped = self.helped.iter();
+        helped.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
+    }
+}
+
 /// A change that made a wrong result right.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Helped {

@@ -301,7 +301,8 @@ impl SearchedCost<'_, '_> {
             f64::from(score.covered)
         };
         let (at_truth, at_winner) = (covered(near), covered(winner));
-        if at_winner >= HARDLY_COVERED * at_truth {
+        // Where the truth covers next to nothing too, that the minimum covers less is no cause.
+        if at_winner >= HARDLY_COVERED * at_truth || at_truth < TELLING_PIXELS as f64 {
             return None;
         }
         let (gain_at_truth, gain_at_winner) =
@@ -414,11 +415,12 @@ impl SearchedCost<'_, '_> {
         Diagnosis::new(
             Code::D2,
             format!(
-                "the cost failed, not the search: {:.1} m from the truth it is {:.4}, and near the truth at \
-                 best {:.4}",
+                "the cost failed, not the search: of the poses that it can reach, one {:.1} m from the truth \
+                 costs {:.4}, and near the truth none less than {:.4}; the result costs {:.4}",
                 self.distance_from_truth(&winner.offset),
                 winner.cost,
-                near.cost
+                near.cost,
+                self.summary.best
             ),
             json!({
                 "cost_near_truth": near.cost,
