@@ -17,6 +17,7 @@ mod cost_line;
 mod deciding;
 mod dispatch;
 mod headless;
+mod keys;
 mod layout;
 mod lecture;
 mod lesson;
@@ -44,8 +45,9 @@ mod window;
 
 pub use arrangement::Arrangement;
 pub use camera::NamedPose;
-pub use command::{Command, Shortcut, shortcuts};
+pub use command::Command;
 pub use cost_line::{CostAlong, CostLine};
+pub use keys::{Shortcut, shortcuts};
 pub use run_results::results_of_run;
 pub use save_target::SaveTarget;
 pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
@@ -68,6 +70,7 @@ pub struct App {
     state: AppState,
     layout: Layout,
     timeline: timeline::Timeline,
+    card: card::Card,
     commands: command::Queue,
     help: bool,
     pictures: save::Pictures,
@@ -97,6 +100,7 @@ impl App {
             state: AppState::new(setup, ctx.clone()),
             layout: Layout::new(render_state),
             timeline: timeline::Timeline::default(),
+            card: card::Card::default(),
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
@@ -167,12 +171,13 @@ impl App {
             if let Some(lesson) = &self.lesson {
                 lesson.read_keys(ui.ctx(), &self.commands);
             }
-            command::read_keys(ui.ctx(), &self.commands);
+            keys::read_keys(ui.ctx(), &self.commands);
         }
         let Self {
             state,
             layout,
             timeline,
+            card,
             commands,
             help,
             is_bare,
@@ -198,7 +203,7 @@ impl App {
             }
             // Beside each other the methods say themselves what became of them.
             if state.options.lockstep.is_none() {
-                egui::Panel::top("verdicts").show(ui, |ui| card::ui(ui, state, commands));
+                egui::Panel::top("verdicts").show(ui, |ui| card.ui(ui, state, commands));
             }
         }
         egui::Panel::bottom("timeline").show(ui, |ui| timeline.ui(ui, state, commands));
@@ -213,7 +218,7 @@ impl App {
             *asking = None;
         }
         if *help {
-            command::help_ui(ui.ctx(), help);
+            keys::help_ui(ui.ctx(), help);
         }
         state.textures.end_frame();
         for command in self.commands.take() {

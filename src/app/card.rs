@@ -15,14 +15,33 @@ const METHOD: f32 = 64.0;
 const STANDING: f32 = 128.0;
 const ERROR: f32 = 128.0;
 
-/// One row for each method that was asked for.
-pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    let is_waiting = matches!(state.run_state(), RunState::Paused { .. });
-    if is_waiting && state.run().results().next().is_none() {
-        ui.label("Space runs the query to its end, I steps into the next event, ? lists all keys");
-    }
-    for &method in &state.setup.task.protocol.methods {
-        row(ui, state, commands, method);
+/// The card, which is never lower for a query than it was: what is below does not move while a person looks
+/// back and ahead.
+#[derive(Default)]
+pub(super) struct Card {
+    /// The query and the width that the height is of.
+    of: (usize, f32),
+    height: f32,
+}
+
+impl Card {
+    /// One row for each method that was asked for.
+    pub(super) fn ui(&mut self, ui: &mut Ui, state: &AppState, commands: &Queue) {
+        let of = (state.setup.query, ui.available_width());
+        if self.of != of {
+            *self = Self { of, height: 0.0 };
+        }
+        ui.set_min_height(self.height);
+        let is_waiting = matches!(state.run_state(), RunState::Paused { .. });
+        if is_waiting && state.run().results().next().is_none() {
+            ui.label(
+                "Space runs the query to its end, I steps into the next event, ? lists all keys",
+            );
+        }
+        for &method in &state.setup.task.protocol.methods {
+            row(ui, state, commands, method);
+        }
+        self.height = ui.min_rect().height();
     }
 }
 

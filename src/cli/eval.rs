@@ -24,6 +24,7 @@ use posescope::session::command_line;
 
 use super::args::{EvalArgs, check_known};
 use super::diff;
+use super::event_export::EventExport;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
 use super::figures;
@@ -106,28 +107,46 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     } = asked;
     let scenes = scenes.as_asked(&run.protocol)?;
     let indices = indices(args, &run, &scenes, &params)?;
-    let mut folder = if args.resume {
+    // A file of events that cannot be opened leaves no run folder behind, unless it is to lie in that.
+    let opened = |is_inside: bool| {
+        let file = args.events.as_deref();
+        let file = file.filter(|file| file.starts_with(folder) == is_inside);
+        file.map(EventExport::after).transpose()
+    };
+    let outside = opened(false)?;
+    let mut run_folder = if args.resume {
         RunFolder::resume(folder, &run)?
     } else {
         RunFolder::create(folder, &run)?
     };
+    let events = outside.map_or_else(|| opened(true), |events| Ok(Some(events)))?;
+    if let Some(events) = events.as_ref().filter(|_| !args.resume) {
+        events.clear()?;
+    }
     let bar = terminal.bar(run.items().count() as u64);
-    bar.set_position(folder.done() as u64);
+    bar.set_position(run_folder.done() as u64);
     let interrupt = Interrupt::listen();
-    let mut observer =
-        FailureRecordings::new(args, &folder, &run, &params, bar.clone(), interrupt.clone())?;
+    let mut observer = FailureRecordings::new(
+        args,
+        &run_folder,
+        &run,
+        &params,
+        bar.clone(),
+        interrupt.clone(),
+        events,
+    )?;
     let execution = Execution {
         run: &run,
         scenes: &scenes,
         params: &params,
         indices: &indices,
     };
-    let outcome = execution.run_remaining(&mut folder, &mut observer);
+    let outcome = execution.run_remaining(&mut run_folder, &mut observer);
     bar.finish_and_clear();
     let told = observer.close();
     match outcome {
         Err(RunError::Cancelled(_)) if interrupt.is_raised() => {
-            let (done, all) = (folder.done(), run.items().count());
+            let (done, all) = (run_folder.done(), run.items().count());
             Err(CliError::Interrupted(format!(
                 "{done} of {all} queries are done; go on with: {}",
                 resuming()

@@ -1,6 +1,6 @@
 //! Writing every event of a run.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -25,16 +25,14 @@ pub struct EventExport {
 impl EventExport {
     /// Opens the file before anything is computed; what it had is gone.
     pub fn to(path: &Path) -> Result<Self, CliError> {
-        Self::opened(path, File::create(path))
+        let export = Self::after(path)?;
+        export.clear()?;
+        Ok(export)
     }
 
     /// Goes on behind what the file has.
     pub fn after(path: &Path) -> Result<Self, CliError> {
         let file = OpenOptions::new().create(true).append(true).open(path);
-        Self::opened(path, file)
-    }
-
-    fn opened(path: &Path, file: io::Result<File>) -> Result<Self, CliError> {
         Ok(Self {
             path: path.to_owned(),
             file: file.map_err(CliError::io(path))?,
@@ -42,6 +40,15 @@ impl EventExport {
             lines: EventLines::to(Vec::new()),
             broken: None,
         })
+    }
+
+    /// What the file had is gone. A file that cannot be cut, a pipe say, has nothing before it is written.
+    pub fn clear(&self) -> Result<(), CliError> {
+        let is_file = |meta: fs::Metadata| meta.is_file();
+        match self.file.metadata().is_ok_and(is_file) {
+            true => self.file.set_len(0).map_err(CliError::io(&self.path)),
+            false => Ok(()),
+        }
     }
 
     /// What comes is of frames of these scenes.

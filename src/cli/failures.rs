@@ -82,6 +82,7 @@ impl<'a> FailureRecordings<'a> {
         params: &'a Params,
         bar: indicatif::ProgressBar,
         interrupt: Interrupt,
+        events: Option<EventExport>,
     ) -> Result<Self, CliError> {
         let path = folder.path().join(FAILURES);
         fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
@@ -107,11 +108,7 @@ impl<'a> FailureRecordings<'a> {
             fs::write(&list, &still_dropped).map_err(FolderError::io(&list))?;
         }
         let mut observer = CliObserver::new(indicatif::ProgressBar::hidden(), None, interrupt);
-        observer.events = match &args.events {
-            Some(events) if args.resume => Some(EventExport::after(events)?),
-            Some(events) => Some(EventExport::to(events)?),
-            None => None,
-        };
+        observer.events = events;
         Ok(Self {
             folder: path,
             budget,

@@ -51,6 +51,21 @@ fn the_card_says_what_each_answer_is_worth_and_why() {
 }
 
 #[test]
+fn what_is_below_the_card_stays_where_it_is_while_a_person_looks_back() {
+    let mut window = finished(Setup {
+        query: GREY,
+        ..setup()
+    });
+    let top = |window: &Harness<'_, App>| window.get_by_label("Run all").rect().top();
+    let at_end = top(&window);
+    for command in [Command::First, Command::Forward(40), Command::Last] {
+        window.state_mut().send(command.clone());
+        window.run_steps(3);
+        assert_eq!(top(&window), at_end, "{command:?}");
+    }
+}
+
+#[test]
 fn without_the_truth_the_card_tells_no_error() {
     let mut window = finished(setup());
     let error = results(&window)[0].error.expect("the truth is known");

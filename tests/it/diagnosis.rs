@@ -21,6 +21,13 @@ use crate::binary::posescope;
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;
 
+/// The methods that search from many starts, match again, and judge between both.
+const BESIDE_THE_PAPER: [Method; 3] = [
+    Method::named("mi6"),
+    Method::named("fb2"),
+    Method::named("robust"),
+];
+
 /// Where the query really is: 1 m ahead of the reference.
 fn truth(problem: &Problem) -> Pose {
     problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0)
@@ -62,7 +69,7 @@ fn primary(found: &[Diagnosis]) -> Option<Code> {
 #[test]
 fn a_pose_that_is_right_carries_at_most_low_confidence() {
     let problem = solvable();
-    for method in Method::PAPER {
+    for method in Method::PAPER.into_iter().chain(BESIDE_THE_PAPER) {
         let found = verdicts(&problem, method, &Params::default(), Some(&truth(&problem)));
         assert!(
             codes(&found).iter().all(|code| !code.is_failure()),
@@ -196,6 +203,66 @@ fn a_search_in_steps_over_the_truth_failed_and_not_the_cost() {
     let evidence = &found[0].evidence;
     assert!(evidence["cost_near_truth"].as_f64() < evidence["cost_at_result"].as_f64());
     assert_eq!(evidence["lost_in"], "position, coarse");
+}
+
+#[test]
+fn a_search_from_one_start_that_hardly_moves_failed_and_not_the_cost() {
+    let problem = solvable();
+    let params = with(&[
+        "grid.coarse_step=20",
+        "mi6.yaws=1",
+        "mi6.coarse_shrink=1",
+        "mi6.first_step=0.01",
+        "mi6.six_step=0.001",
+        "mi6.last_step=0.001",
+    ]);
+    let mi6 = Method::named("mi6");
+    let found = verdicts(&problem, mi6, &params, Some(&truth(&problem)));
+    assert_eq!(primary(&found), Some(Code::D3), "{found:?}");
+    let cost = |name: &str| found[0].evidence[name].as_f64().expect("a cost");
+    assert!(cost("cost_near_truth") < cost("cost_at_result"));
+}
+
+#[test]
+fn where_the_truth_leads_away_from_itself_the_cost_failed() {
+    let problem = solvable();
+    let wrong = truth(&problem) * Pose::translation(2.0, 0.0, 0.0);
+    for method in ["mi6", "robust"].map(Method::named) {
+        let found = verdicts(&problem, method, &Params::default(), Some(&wrong));
+        assert!(codes(&found).contains(&Code::D2), "{method}: {found:?}");
+        assert!(!codes(&found).contains(&Code::D3), "{method}: {found:?}");
+        let outside = truth(&problem) * Pose::translation(0.0, 0.0, 60.0);
+        let found = verdicts(&problem, method, &Params::default(), Some(&outside));
+        assert!(codes(&found).contains(&Code::D4), "{method}: {found:?}");
+    }
+    let found = verdicts(
+        &problem,
+        BESIDE_THE_PAPER[1],
+        &Params::default(),
+        Some(&wrong),
+    );
+    assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
+}
+
+#[test]
+fn a_judge_that_passes_over_what_is_right_answers_for_it() {
+    let problem = solvable();
+    let params = Params::default();
+    let robust = Method::named("robust");
+    let mut evidence = Evidence::default();
+    let mut trace = Trace::to(&mut evidence);
+    let mut outcome =
+        localize_traced(&problem, robust, &params, &mut trace).expect("nobody cancels");
+    let candidates = evidence.candidates.clone().expect("several poses");
+    let mut taken = candidates[0].clone();
+    taken.refined.pose = taken.refined.pose * Pose::translation(3.0, 0.0, 0.0);
+    outcome.pose = Ok(problem.world_from_query(&taken.refined.pose));
+    let all = [taken].into_iter().chain(candidates.iter().cloned());
+    evidence.candidates = Some(all.collect());
+    let truth = truth(&problem);
+    let subject = Subject::new(&problem, robust, &params, &outcome, &evidence);
+    let found = diagnose(&subject.against(Some(&truth), Tolerance::default()));
+    assert_eq!(primary(&found), Some(Code::H1), "{found:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! `--events`: every event as data.
 
 use std::fs;
+use std::path::Path;
 
 use serde_json::Value as Json;
 
@@ -172,4 +173,37 @@ fn a_file_that_cannot_be_written_is_told_before_anything_is_run() {
     assert_eq!(output.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&output.stderr).contains("/no/such/folder/e.jsonl: "));
     assert!(output.stdout.is_empty());
+
+    let folder = sequence.path().join("run");
+    let eval = |events: &Path| {
+        posescope()
+            .arg("eval")
+            .arg(sequence.folder())
+            .args(["--only", "5", "--method", "fb", "-q", "--out"])
+            .arg(&folder)
+            .arg("--events")
+            .arg(events)
+            .output()
+            .expect("the binary starts")
+    };
+    let refused = eval(Path::new("/no/such/folder/e.jsonl"));
+    assert_eq!(refused.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("/no/such/folder/e.jsonl: "));
+    assert!(
+        !folder.exists(),
+        "a run folder that the same command refuses"
+    );
+
+    // The same again with a file in the folder of the run, then with one that has something in it.
+    let inside = folder.join("events.jsonl");
+    assert_eq!(eval(&inside).status.code(), Some(0));
+    let told = fs::read(&inside).expect("events");
+    assert!(!told.is_empty());
+    let refused = eval(&inside);
+    assert_eq!(
+        refused.status.code(),
+        Some(2),
+        "the folder is there already"
+    );
+    assert_eq!(fs::read(&inside).expect("events"), told);
 }

@@ -2,7 +2,9 @@
 
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
-use posescope::app::{App, Command};
+use egui_kittest::kittest::Queryable as _;
+use posescope::app::{App, Command, shortcuts};
+use posescope::geometry::Pose;
 
 use crate::window::{is_said, press, run_until_idle, setup, wait, window};
 
@@ -26,6 +28,45 @@ fn the_list_of_keys_opens_with_a_question_mark_and_closes_with_escape() {
     press(&mut window, Modifiers::NONE, Key::Escape);
     window.run_steps(4);
     assert!(!is_open(&window));
+}
+
+/// All keys of the window are seen at once where it is as high as it is first.
+#[test]
+fn the_list_of_keys_is_seen_whole() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    window.state_mut().send(Command::Help);
+    window.run_steps(4);
+    let seen = window.ctx.content_rect();
+    for shortcut in shortcuts() {
+        let words = window.query_all_by_label_contains(shortcut.help);
+        let rects: Vec<_> = words.map(|node| node.rect()).collect();
+        assert!(!rects.is_empty(), "{}", shortcut.help);
+        assert!(
+            rects.iter().any(|rect| seen.contains_rect(*rect)),
+            "{} at {rects:?}",
+            shortcut.help
+        );
+    }
+}
+
+#[test]
+fn a_menu_closes_with_escape_and_the_camera_stays() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    let pose = Pose::identity();
+    window.state_mut().send(Command::TakeCamera(Some(pose)));
+    window.run_steps(2);
+    window.get_by_label("Views").click();
+    window.run_steps(2);
+    assert!(is_said(&window, "Layout: Teach"));
+    press(&mut window, Modifiers::NONE, Key::Escape);
+    window.run_steps(2);
+    assert!(!is_said(&window, "Layout: Teach"));
+    assert_eq!(window.state().app_state().camera, Some(pose));
+    press(&mut window, Modifiers::NONE, Key::Escape);
+    window.run_steps(2);
+    assert_eq!(window.state().app_state().camera, None);
 }
 
 #[test]

@@ -7,8 +7,8 @@
 //! now, and those of the coefficients, on the pairs that night or rain is part of: calibration error,
 //! area under the ROC curve, reliability by tenths.
 //!
-//! Options: `--places N` (40), `--seed N` (0), `--dump FILE` to keep the signals, `--from FILE` to use
-//! those of an earlier run, `--judge FILE` to judge those of another run than was fitted on,
+//! Options: `--places N` (40), `--seed N` (0), `--methods fb2,mi6` (all that have a probability),
+//! `--dump FILE` to keep the signals, `--from FILE` to use those of an earlier run, `--judge FILE` to judge those of another run than was fitted on,
 //! `--diagrams FOLDER` for reliability and ROC as SVG, `--real yes` to judge the pairs of real photos
 //! below `POSESCOPE_DATA` and nothing else.
 
@@ -40,7 +40,15 @@ use rayon::prelude::*;
 const FITTED_ON: [Condition; 3] = [Condition::Overcast, Condition::Sun, Condition::Snow];
 
 /// The methods whose poses have a probability of their own.
-const JUDGED: [Method; 4] = [Method::FB, Method::PM, Method::MI, Method::named("nid")];
+const JUDGED: [Method; 7] = [
+    Method::FB,
+    Method::PM,
+    Method::MI,
+    Method::named("nid"),
+    Method::named("fb2"),
+    Method::named("mi6"),
+    Method::named("robust"),
+];
 
 /// Uncertainty of the reference's position [m].
 const RADIUS_M: f64 = 10.0;
@@ -74,6 +82,7 @@ fn main() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
     let (mut places, mut seed, mut dump, mut from) = (40, 0, None, None);
     let (mut judged, mut diagrams, mut is_real) = (None, None, false);
+    let mut methods = JUDGED.to_vec();
     while let Some(argument) = arguments.next() {
         let value = arguments
             .next()
@@ -86,6 +95,7 @@ fn main() -> Result<(), String> {
         match argument.as_str() {
             "--places" => places = number()?,
             "--seed" => seed = number()? as u64,
+            "--methods" => methods = named(&value)?,
             "--dump" => dump = Some(value),
             "--from" => from = Some(value),
             "--judge" => judged = Some(value),
@@ -96,8 +106,8 @@ fn main() -> Result<(), String> {
     }
     let samples = match from {
         Some(path) => read(&path)?,
-        None if is_real => of_real_pairs()?,
-        None => collect(places, seed),
+        None if is_real => of_real_pairs(&methods)?,
+        None => collect(places, seed, &methods),
     };
     if let Some(path) = dump {
         std::fs::write(&path, written(&samples)).map_err(|error| format!("{path}: {error}"))?;
@@ -133,8 +143,16 @@ fn main() -> Result<(), String> {
     diagrams.map_or(Ok(()), |folder| draw(Path::new(&folder), &judged, &methods))
 }
 
+/// The methods of these names, behind commas.
+fn named(names: &str) -> Result<Vec<Method>, String> {
+    let find = |name: &str| JUDGED.into_iter().find(|method| method.name() == name);
+    let found = names.split(',').map(|name| find(name).ok_or(name));
+    let found: Result<_, _> = found.collect();
+    found.map_err(|name| format!("{name} has no probability"))
+}
+
 /// What is said of poses in pairs of real photos, which nothing was fitted on.
-fn of_real_pairs() -> Result<Vec<Sample>, String> {
+fn of_real_pairs(methods: &[Method]) -> Result<Vec<Sample>, String> {
     let pairs = real_pairs::all()?;
     let conditions = ["real".to_owned(), "real".to_owned()];
     Ok(pairs
@@ -143,7 +161,7 @@ fn of_real_pairs() -> Result<Vec<Sample>, String> {
             let (query, truth) = query_of(&pair.query);
             let reference = reference_of("reference", &pair.reference);
             let problem = Problem::new(query, reference, RADIUS_M).expect("a radius");
-            of_problem(&problem, Some(&truth), &conditions)
+            of_problem(&problem, Some(&truth), &conditions, methods)
         })
         .collect())
 }
@@ -188,14 +206,14 @@ fn scored(samples: &[Sample], method: &str, is_for_fitting: bool) -> Vec<Scored>
         .collect()
 }
 
-fn collect(places: usize, seed: u64) -> Vec<Sample> {
+fn collect(places: usize, seed: u64, methods: &[Method]) -> Vec<Sample> {
     let drives = Condition::ALL
         .map(|condition| (condition, Traversal::new(WORLD_SEED, condition, Size::Full)));
     let done = AtomicUsize::new(0);
     (0..places)
         .into_par_iter()
         .flat_map_iter(|place| {
-            let samples = at(&drives, place, seed);
+            let samples = at(&drives, place, seed, methods);
             let count = done.fetch_add(1, Ordering::Relaxed) + 1;
             eprintln!("{count} of {places} places");
             samples
@@ -204,7 +222,12 @@ fn collect(places: usize, seed: u64) -> Vec<Sample> {
 }
 
 /// All pairs of conditions at one place.
-fn at(drives: &[(Condition, Traversal)], place: usize, seed: u64) -> Vec<Sample> {
+fn at(
+    drives: &[(Condition, Traversal)],
+    place: usize,
+    seed: u64,
+    methods: &[Method],
+) -> Vec<Sample> {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(7919).wrapping_add(place as u64));
     let share: f64 = rng.random();
     let apart: f64 = rng.random_range(-9.0..9.0);
@@ -245,11 +268,11 @@ fn at(drives: &[(Condition, Traversal)], place: usize, seed: u64) -> Vec<Sample>
             let problem =
                 Problem::new(query.clone(), reference.clone(), RADIUS_M).expect("a radius");
             let conditions = [reference_condition, query_condition].map(|c| c.name().to_owned());
-            samples.extend(of_problem(&problem, Some(truth), &conditions));
+            samples.extend(of_problem(&problem, Some(truth), &conditions, methods));
         }
     }
     let (_, query, _, reference) = &problems[0];
-    samples.extend(unknowable(query, reference, place));
+    samples.extend(unknowable(query, reference, place, methods));
     samples
 }
 
@@ -268,7 +291,12 @@ fn reference_of(name: &str, frame: &Frame) -> Arc<ReferenceTuple> {
 
 /// The place of a query that does not show it: mirrored, or of another town. Every other place is for
 /// fitting.
-fn unknowable(query: &Arc<Query>, reference: &Arc<ReferenceTuple>, place: usize) -> Vec<Sample> {
+fn unknowable(
+    query: &Arc<Query>,
+    reference: &Arc<ReferenceTuple>,
+    place: usize,
+    methods: &[Method],
+) -> Vec<Sample> {
     let Some(color) = &query.photo.color else {
         return Vec::new();
     };
@@ -288,16 +316,26 @@ fn unknowable(query: &Arc<Query>, reference: &Arc<ReferenceTuple>, place: usize)
             let query = Query::new("unknowable", Photo::from_color(photo), query.intrinsics);
             let query = query.expect("a photo of the same size");
             let problem = Problem::new(query, reference.clone(), RADIUS_M).expect("a radius");
-            of_problem(&problem, None, &[use_of.to_owned(), use_of.to_owned()])
+            of_problem(
+                &problem,
+                None,
+                &[use_of.to_owned(), use_of.to_owned()],
+                methods,
+            )
         })
         .collect()
 }
 
 /// A sample of every method that gives a pose. Without a truth no pose is near.
-fn of_problem(problem: &Problem, truth: Option<&Pose>, conditions: &[String; 2]) -> Vec<Sample> {
+fn of_problem(
+    problem: &Problem,
+    truth: Option<&Pose>,
+    conditions: &[String; 2],
+    methods: &[Method],
+) -> Vec<Sample> {
     let params = Params::default();
     let mut samples = Vec::new();
-    for method in JUDGED {
+    for &method in methods {
         let mut evidence = Evidence::default();
         let estimator = estimator::entry(method).make(&params);
         let outcome = estimator

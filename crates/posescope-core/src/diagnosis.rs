@@ -9,7 +9,8 @@
 //! |---|---|
 //! | `suspicion` | X1: the truth, a calibration or the units cannot be right |
 //! | `direct` | D1 to D8: the search, the cost, or what it was not allowed to move |
-//! | `feature` | R1 to R9: where the true matches went |
+//! | `settled` | D2, D3, D4, H1 of methods that search from many starts |
+//! | `feature`, `guided` | R1 to R9: where the true matches went |
 //! | `foreign` | those of a direct method that need a pose alone, for poses of other systems |
 //! | `combined` | H1, F1, V1: hybrids, fusions, retrieval |
 //! | `trust` | L1: how far a pose is to be believed without knowing the truth |
@@ -22,8 +23,10 @@ mod direct;
 mod evidence;
 mod feature;
 mod foreign;
+mod guided;
 mod matches;
 pub mod remedies;
+mod settled;
 mod suspicion;
 mod tolerance;
 pub mod trust;
@@ -148,6 +151,8 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         let of_method = match estimator::find(responsible).map(|entry| &entry.parts) {
             Some(Parts::Features) => feature::diagnose(subject),
             Some(Parts::Cost(_)) => direct::diagnose(subject),
+            Some(Parts::Own(own)) if own.shows.is_some() => settled::diagnose(subject),
+            Some(Parts::Own(own)) if own.has_features => guided::diagnose(subject),
             None => foreign::diagnose(subject),
             _ => failure_alone(subject),
         };

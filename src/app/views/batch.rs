@@ -19,7 +19,7 @@ const COLUMNS: [(&str, f32); 10] = [
     ("is", 104.0),
     ("error", 60.0),
     ("code", 48.0),
-    ("cause", 330.0),
+    ("cause", *CAUSE.start()),
     ("rotation", 64.0),
     ("start", 60.0),
     ("confidence", 76.0),
@@ -28,6 +28,9 @@ const COLUMNS: [(&str, f32); 10] = [
 
 /// Width of the column with the verdicts of the results A \[points\].
 const WAS: f32 = 40.0;
+
+/// The widest that causes are shown, and the narrowest before the table is moved sideways \[points\].
+const CAUSE: std::ops::RangeInclusive<f32> = 120.0..=900.0;
 
 /// The results of all queries that were run.
 #[derive(Default)]
@@ -89,13 +92,14 @@ impl View for BatchView {
         let height = ui.spacing().interact_size.y;
         // The names of the columns move sideways with the rows, and stay above them.
         let sideways = ScrollArea::horizontal().auto_shrink(false);
+        let columns = columns(ui, context);
         sideways.show(ui, |ui| {
-            header(ui, context, &mut self.order);
+            header(ui, context, &columns, &mut self.order);
             let area = ScrollArea::vertical().auto_shrink(false);
             area.show_rows(ui, height, rows.len(), |ui, range| {
                 for row in &rows[range] {
                     if let Some(result) = context.result(*row) {
-                        draw(ui, context, *row, result, right);
+                        draw(ui, context, &columns, *row, result);
                     }
                 }
             });
@@ -179,10 +183,30 @@ fn words(context: &ViewContext<'_>, rows: &[ResultRow], right: Tolerance) -> Str
     )
 }
 
+/// The columns with their widths: causes have what the others leave.
+fn columns(ui: &Ui, context: &ViewContext<'_>) -> [(&'static str, f32); COLUMNS.len()] {
+    let spacing = ui.spacing().item_spacing.x;
+    let own = COLUMNS.iter().filter(|(name, _)| *name != "cause");
+    let mut others: f32 = own.map(|(_, width)| width + spacing).sum();
+    if context.has_results_before() {
+        others += WAS + spacing;
+    }
+    let room = ui.available_width() - others - ui.spacing().scroll.allocated_width();
+    COLUMNS.map(|(name, width)| match name {
+        "cause" => (name, room.clamp(*CAUSE.start(), *CAUSE.end())),
+        _ => (name, width),
+    })
+}
+
 /// The names of the columns. A click sorts, another one the other way round, a third not at all.
-fn header(ui: &mut Ui, context: &ViewContext<'_>, order: &mut Option<Order>) {
+fn header(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    columns: &[(&str, f32)],
+    order: &mut Option<Order>,
+) {
     ui.horizontal(|ui| {
-        for (name, width) in COLUMNS {
+        for &(name, width) in columns {
             let Ok(field) = Field::find(name) else {
                 continue;
             };
@@ -224,15 +248,16 @@ fn header(ui: &mut Ui, context: &ViewContext<'_>, order: &mut Option<Order>) {
 fn draw(
     ui: &mut Ui,
     context: &ViewContext<'_>,
+    columns: &[(&str, f32)],
     at: ResultRow,
     result: &QueryResult,
-    right: Tolerance,
 ) {
+    let right = context.setup.task.protocol.right;
     let ResultRow { query, place } = at;
     let standing = result.standing(right, true);
     let is_here = query == context.setup.query;
     let row = ui.horizontal(|ui| {
-        for (name, width) in COLUMNS {
+        for &(name, width) in columns {
             let Ok(field) = Field::find(name) else {
                 continue;
             };

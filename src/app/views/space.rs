@@ -440,7 +440,7 @@ impl SpaceView {
         let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
         let tint = Color32::WHITE.gamma_multiply(self.layers.photo);
         painter.image(texture.id(), image, uv, tint);
-        let border = Stroke::new(2.0, camera.kind.color());
+        let border = Stroke::new(2.0, camera.color);
         painter.rect_stroke(image, 0.0, border, StrokeKind::Outside);
     }
 

@@ -23,8 +23,9 @@ use search::Search;
 /// What could be done with the map.
 const HELP: &str = "Click, drag: camera; wheel: zoom; Shift+drag: pan";
 
-/// Room for the legend beside the map \[points\].
-const LEGEND: f32 = 200.0;
+/// The least room for the legend beside the map, and the most that it takes \[points\].
+const LEGEND: f32 = 132.0;
+const WIDE_LEGEND: f32 = 260.0;
 
 /// The map of a direct method's search, and slices through its minimum.
 #[derive(Default)]
@@ -125,9 +126,10 @@ impl SurfaceView {
                 has_legend = width - map_width > LEGEND;
                 if has_legend {
                     ui.vertical(|ui| {
-                        self.map
-                            .colours(ui, &scale, ui.available_width().min(LEGEND));
-                        pointed_at = legend(ui, context, &marks);
+                        let room = ui.available_width().min(WIDE_LEGEND);
+                        ui.set_max_width(room);
+                        self.map.colours(ui, &scale, room);
+                        pointed_at = legend(ui, context, &marks, egui::TextWrapMode::Wrap);
                     });
                 }
                 told
@@ -137,7 +139,7 @@ impl SurfaceView {
         readout.say(ui, words, HELP);
         if !has_legend {
             self.map.colours(ui, &scale, width);
-            pointed_at = legend(ui, context, &marks);
+            pointed_at = legend(ui, context, &marks, egui::TextWrapMode::Extend);
         }
         self.floor_ui(ui, context, search, run_floor);
         ui.separator();

@@ -103,7 +103,7 @@ fn without_truth(subject: &Subject<'_>) -> Vec<Diagnosis> {
 }
 
 /// A query that is the same everywhere: costs may differ, but by nothing that it shows.
-fn textureless(subject: &Subject<'_>) -> Option<Diagnosis> {
+pub(super) fn textureless(subject: &Subject<'_>) -> Option<Diagnosis> {
     const STRIDE: usize = 7;
     subject.outcome.pose.as_ref().ok()?;
     let photo = &subject.problem.query.photo.gray;

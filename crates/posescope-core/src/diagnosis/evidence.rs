@@ -3,9 +3,12 @@
 use std::sync::Arc;
 
 use crate::depth::LiftedMatch;
-use crate::event::{ConsensusJudged, Event, Kind, KindSet, MinimumAssessed, PoseRefined, Side};
+use crate::event::{
+    ConsensusJudged, Event, JudgedPose, Kind, KindSet, MinimumAssessed, PoseRefined, Side,
+};
 use crate::features::{FeatureState, Features, Match};
 use crate::grid::{Phase, ScoredLattice};
+use crate::judge::{Freedoms, Refined};
 use crate::trace::{Cancelled, Record, Sink};
 
 /// The events of one method on one problem that verdicts are drawn from. Their payloads are shared, so
@@ -30,6 +33,10 @@ pub struct Evidence {
     pub surfaces: Vec<Arc<ScoredLattice>>,
     /// The minimum that the search ended in.
     pub minimum: Option<MinimumAssessed>,
+    /// Where the best starts of a search in six freedoms ended, the least cost first.
+    pub settled: Option<Arc<[Refined]>>,
+    /// The poses of several methods under one cost, the answer first.
+    pub candidates: Option<Arc<[JudgedPose]>>,
 }
 
 impl Evidence {
@@ -46,6 +53,8 @@ impl Evidence {
         Self {
             surfaces: second.surfaces.clone(),
             minimum: second.minimum,
+            settled: second.settled.clone(),
+            candidates: second.candidates.clone(),
             ..self.clone()
         }
     }
@@ -62,6 +71,8 @@ impl Sink for Evidence {
             Kind::FeaturesClassified,
             Kind::PhaseSearched,
             Kind::MinimumAssessed,
+            Kind::StartsRefined,
+            Kind::CandidatesJudged,
         ])
     }
 
@@ -85,6 +96,12 @@ impl Sink for Evidence {
             }
             Event::PhaseSearched(searched) => self.surfaces.push(Arc::clone(&searched.surface)),
             Event::MinimumAssessed(minimum) => self.minimum = Some(*minimum),
+            Event::StartsRefined(starts) if starts.freedoms == Freedoms::Six => {
+                self.settled = Some(Arc::clone(&starts.refinements));
+            }
+            Event::CandidatesJudged(judged) => {
+                self.candidates = Some(Arc::clone(&judged.candidates))
+            }
             _ => {}
         }
         Ok(())

@@ -10,6 +10,7 @@
 //! 3. the best of those are refined in all six freedoms,
 //! 4. and the cost is that of the [judge](crate::judge): three channels, less what chance gives.
 
+mod basin;
 mod params;
 
 use std::sync::Arc;

@@ -20,7 +20,6 @@ use super::{
 };
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
 use crate::geometry::Pose;
-use crate::judge::{Judge, Refined, Start, shrink};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -64,37 +63,6 @@ impl Robust {
         }
     }
 
-    /// Refines the features' pose under the judge; `None` where it lies outside the disc, or covers too
-    /// little to have a cost.
-    fn refined(
-        &self,
-        problem: &Problem,
-        judge: &Judge,
-        agreed: &Agreed,
-        trace: &mut Trace<'_>,
-    ) -> Result<Option<Refined>, Cancelled> {
-        let pose = agreed.reference_from_query;
-        let reach = self.six.reach(problem);
-        if pose.translation.vector.norm() > reach {
-            return Ok(None);
-        }
-        let scores = judge.score(&[Pose::identity(), pose]);
-        let least_covered = self.six.least_covered(scores[0]);
-        let Some(cost) = scores[1].eligible_cost(least_covered) else {
-            return Ok(None);
-        };
-        let start = [Start { pose, cost }];
-        let plan = self.six.in_six();
-        let refined = shrink(&start, &plan, |poses| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(judge.costs(poses, least_covered))
-        })?;
-        let inside = refined
-            .first()
-            .filter(|one| one.pose.translation.vector.norm() <= reach);
-        Ok(inside.copied())
-    }
-
     fn decide(
         &self,
         problem: &Problem,
@@ -125,7 +93,9 @@ impl Robust {
                 })
                 .collect();
             for proposed in proposed {
-                if let Some(refined) = self.refined(problem, &judge, &proposed.agreed, trace)? {
+                let pose = proposed.agreed.reference_from_query;
+                let checkpoint = || trace.checkpoint();
+                if let Some(refined) = self.six.refined(problem, &judge, pose, checkpoint)? {
                     candidates.push(JudgedPose {
                         method: proposed.method,
                         refined,

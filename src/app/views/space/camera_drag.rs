@@ -155,6 +155,7 @@ mod tests {
             },
             depth_m: 1.0,
             about: String::new(),
+            color: egui::Color32::WHITE,
         }
     }
 

@@ -64,7 +64,7 @@ impl CameraKind {
         }
     }
 
-    pub(super) fn color(self) -> Color32 {
+    fn color(self) -> Color32 {
         match self {
             Self::Reference => theme::REFERENCE,
             Self::Truth => theme::TRUTH,
@@ -115,6 +115,8 @@ pub(super) struct SceneCamera {
     pub(super) depth_m: f64,
     /// Where it is and how good, in words.
     pub(super) about: String,
+    /// An estimate that is known to be right is not in the colour of wrong ones.
+    pub(super) color: Color32,
 }
 
 impl SceneCamera {
@@ -143,7 +145,7 @@ impl SceneCamera {
         let roof = middle + up;
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
             ends: [spot(&from), spot(&to)],
-            color: self.kind.color(),
+            color: self.color,
             width: self.kind.stroke_width(),
         };
         let mut lines = Vec::with_capacity(10);
@@ -168,14 +170,19 @@ pub(super) fn cameras(
         return Vec::new();
     };
     let truth = context.truth();
+    let right = context.setup.task.protocol.right;
     let camera = |kind: CameraKind, world: Pose| {
         let reference_from_camera = geometry.reference_from(&world);
         let mut about = format!("from the reference: {}", place(&reference_from_camera));
+        let mut color = kind.color();
         if let Some(truth) = truth
             && kind != CameraKind::Truth
         {
             let error = PoseError::between(truth, &world);
             about.push_str(&format!("; from the truth {error}"));
+            if matches!(kind, CameraKind::Estimate(_)) && right.contains(&error) {
+                color = theme::TRUTH;
+            }
         }
         SceneCamera {
             kind,
@@ -187,6 +194,7 @@ pub(super) fn cameras(
             },
             depth_m: kind.size() * geometry.camera_m(),
             about,
+            color,
         }
     };
     let mut all = vec![camera(

@@ -47,7 +47,7 @@ pub(super) fn cameras(
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &words));
         let visuals = ui.visuals();
         let painter = ui.painter_at(pane);
-        let color = camera.kind.color();
+        let color = camera.color;
         painter.line_segment([at, place.left_center()], Stroke::new(1.0, color));
         painter.circle_filled(at, 2.5, color);
         let fill = visuals.window_fill.gamma_multiply(0.85);
@@ -75,7 +75,7 @@ fn name(ui: &Ui, camera: &SceneCamera) -> LayoutJob {
     let format = |color| TextFormat::simple(theme::label(), color);
     let mut job = LayoutJob::default();
     let shape = camera.kind.shape();
-    let own = theme::text(ui.visuals(), camera.kind.color());
+    let own = theme::text(ui.visuals(), camera.color);
     job.append(shape, 0.0, format(own));
     let color = ui.visuals().strong_text_color();
     job.append(&camera.kind.name(), 4.0, format(color));

@@ -289,11 +289,16 @@ impl MarkKind {
     }
 }
 
-/// The marks in words. Pointing at one looks at its pose, which is answered; a click takes the
-/// camera there.
-pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) -> Option<Pose> {
+/// The marks in words, which are broken where a mark has a line of its own. Pointing at one looks at its
+/// pose, which is answered; a click takes the camera there.
+pub(super) fn legend(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    marks: &[MapMark],
+    wrap_mode: egui::TextWrapMode,
+) -> Option<Pose> {
     let mut pointed_at = None;
-    ui.horizontal_wrapped(|ui| {
+    let rows = |ui: &mut Ui| {
         // The room for the mark is part of the button, so that both wrap together.
         let icon = ui.spacing().icon_width;
         ui.spacing_mut().button_padding = vec2(0.5 * icon + 4.0, 1.0);
@@ -302,7 +307,7 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
             let button = egui::Button::new(egui::RichText::new(&mark.words).small())
                 .fill(Color32::TRANSPARENT)
                 .stroke(Stroke::NONE)
-                .wrap_mode(egui::TextWrapMode::Extend);
+                .wrap_mode(wrap_mode);
             let response = ui.add(button.sense(Sense::click()));
             let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
             // The cross has longer arms than its room here.
@@ -318,7 +323,11 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
                 context.send(Command::TakeCamera(Some(mark.pose)));
             }
         }
-    });
+    };
+    match wrap_mode {
+        egui::TextWrapMode::Wrap => ui.vertical(rows),
+        _ => ui.horizontal_wrapped(rows),
+    };
     pointed_at
 }
 

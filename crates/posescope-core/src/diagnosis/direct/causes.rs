@@ -298,11 +298,10 @@ impl SearchedCost<'_, '_> {
     pub(super) fn too_few_pixels(&self, near: &Place, winner: &Place) -> Option<Diagnosis> {
         let covered = |place: &Place| {
             let score = self.scorer.score(&[place.offset.reference_from_camera()])[0];
-            f64::from(score.covered)
+            score.covered as usize
         };
         let (at_truth, at_winner) = (covered(near), covered(winner));
-        // Where the truth covers next to nothing too, that the minimum covers less is no cause.
-        if at_winner >= HARDLY_COVERED * at_truth || at_truth < TELLING_PIXELS as f64 {
+        if !is_hardly_covered(at_winner, at_truth) {
             return None;
         }
         let (gain_at_truth, gain_at_winner) =
@@ -311,7 +310,7 @@ impl SearchedCost<'_, '_> {
             Diagnosis::new(
                 Code::D1,
                 format!(
-                    "the minimum covers {at_winner:.0} px and the truth {at_truth:.0}: so few cost little \
+                    "the minimum covers {at_winner} px and the truth {at_truth}: so few cost little \
                      by chance, {:.1} % less than shuffled, and at the truth they save {:.1} %",
                     100.0 * gain_at_winner,
                     100.0 * gain_at_truth
@@ -439,6 +438,12 @@ fn comparable_cost(other: &Score, stated: &Score) -> Option<f64> {
     other.eligible_cost(stated.covered / 2)
 }
 
+/// Whether a minimum covers so few pixels beside the truth that this is a cause. Where the truth covers
+/// next to nothing too, that the minimum covers less is none.
+fn is_hardly_covered(at_winner: usize, at_truth: usize) -> bool {
+    (at_winner as f64) < HARDLY_COVERED * at_truth as f64 && at_truth >= TELLING_PIXELS
+}
+
 /// Where the search turned away from the truth.
 #[derive(Default)]
 struct Loss {
@@ -520,5 +525,19 @@ mod tests {
         let stated = score(1000);
         assert_eq!(comparable_cost(&score(499), &stated), None);
         assert_eq!(comparable_cost(&score(500), &stated), Some(0.1));
+    }
+
+    #[test]
+    fn a_minimum_is_hardly_covered_beside_a_truth_that_tells_something() {
+        assert!(is_hardly_covered(249, 500));
+        assert!(
+            !is_hardly_covered(250, 500),
+            "half of what the truth covers"
+        );
+        assert!(
+            !is_hardly_covered(10, 499),
+            "nothing to be told at the truth"
+        );
+        assert!(is_hardly_covered(4_999, 10_000));
     }
 }
