@@ -6,6 +6,7 @@ use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
 use super::command::{Command, Queue};
 use super::save_target::SaveTarget;
+use crate::method::Method;
 
 /// What a key is for: the list of keys is in these groups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -209,7 +209,7 @@ fn a_search_in_steps_over_the_truth_failed_and_not_the_cost() {
 fn a_search_from_one_start_that_hardly_moves_failed_and_not_the_cost() {
     let problem = solvable();
     let params = with(&[
-        "grid.coarse_step=20",
+        "grid.coarse_step=10",
         "mi6.yaws=1",
         "mi6.coarse_shrink=1",
         "mi6.first_step=0.01",
