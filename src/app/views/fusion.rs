@@ -37,6 +37,7 @@ impl View for FusionView {
                     .strong(),
             );
             table(ui, context, method, &fused);
+            refused(ui, context, method);
             map(ui, context, method, &fused);
         });
     }
@@ -106,6 +107,19 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Refer
         }
         ui.end_row();
     });
+}
+
+/// Why there is no fused pose.
+fn refused(ui: &mut Ui, context: &ViewContext<'_>, method: Method) {
+    let spans = context.run.spans().iter();
+    let results = spans
+        .filter(|span| span.part == Part::Fusion(method) && context.cursor + 1 >= span.records.end)
+        .filter_map(|span| span.result.as_ref());
+    for result in results {
+        if let (None, Some(reason)) = (&result.pose, &result.reason) {
+            ui.label(format!("× {} {}", reason.code, reason.text));
+        }
+    }
 }
 
 /// A bar as long as the weight; what has none says why.
@@ -183,7 +197,7 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
                 let at = place(&problem.reference.world_from_camera);
                 mark(
                     plot,
-                    "references",
+                    "□ references",
                     at,
                     theme::REFERENCE,
                     MarkerShape::Square,
@@ -193,12 +207,12 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
             for share in present.shares.iter() {
                 let Some(pose) = &share.pose else { continue };
                 let (name, shape) = match share.outcome {
-                    ShareOutcome::Kept => ("alone, kept", MarkerShape::Circle),
-                    ShareOutcome::Outvoted => ("alone, outvoted", MarkerShape::Cross),
+                    ShareOutcome::Kept => ("○ alone, kept", MarkerShape::Circle),
+                    ShareOutcome::Outvoted => ("× alone, outvoted", MarkerShape::Cross),
                     ShareOutcome::Dropped
                     | ShareOutcome::Failed
                     | ShareOutcome::FallbackUnneeded
-                    | ShareOutcome::Unsupportive => ("alone, left out", MarkerShape::Cross),
+                    | ShareOutcome::Unsupportive => ("+ alone, left out", MarkerShape::Plus),
                 };
                 let radius = 3.0 + 6.0 * share.weight.sqrt() as f32;
                 mark(
@@ -214,7 +228,7 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
                 let shape = MarkerShape::Diamond;
                 mark(
                     plot,
-                    present.fusion,
+                    &format!("◇ {}", present.fusion),
                     place(pose),
                     theme::ESTIMATE,
                     shape,
@@ -224,7 +238,7 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, method: Method, fused: &[&Referen
             if let Some(truth) = context.truth() {
                 mark(
                     plot,
-                    "truth",
+                    "△ truth",
                     place(truth),
                     theme::TRUTH,
                     MarkerShape::Up,

@@ -107,10 +107,12 @@ fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
         if let Some(method) = span.part.method().filter(|method| *method != Method::FB) {
             ui.weak(format!("inside {}", method.label()));
         }
-        let needed = trials
-            .needed()
-            .unwrap_or(context.run.params.fb.mlesac.max_trials);
-        ui.label(format!("{} trials made, {needed} needed", trials.made()));
+        let most = context.run.params.fb.mlesac.max_trials;
+        let made = trials.made();
+        ui.label(match trials.needed().filter(|needed| *needed < most) {
+            Some(needed) => format!("{made} trials made, {needed} needed"),
+            None => format!("{made} trials made of the {most} allowed, more are needed"),
+        });
         if trials.without_pose > 0 {
             ui.weak(format!("{} samples have no pose", trials.without_pose));
         }

@@ -252,7 +252,7 @@ pub fn diagnose_ranking(
         return None;
     }
     let best = ranking.frames.first()?;
-    let away = distance(best).map_or(String::new(), |m| format!(", {m:.1} m away"));
+    let away = distance(best).map_or(String::new(), |m| format!(", {m:.2} m away"));
     let right = match first {
         Some(rank) => format!(
             "the first frame of the right place, {}, came at rank {}, and {} were taken",

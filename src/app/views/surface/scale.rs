@@ -8,6 +8,9 @@ use crate::event::Event;
 use crate::render::Score;
 use crate::session::Run;
 
+/// Costs that differ by less are equal: the search calls them flat.
+pub(super) const LEAST_DIFFERENCE: f64 = 1e-9;
+
 /// What has no colour of the scale: a cell that may not win.
 pub(super) const NO_SAY: Color32 = Color32::from_gray(110);
 
@@ -83,9 +86,9 @@ impl Scale {
     }
 }
 
-/// 1 for the least cost, 0 for the greatest.
+/// 1 for the least cost, 0 for the greatest; what differs by rounding alone has one colour.
 fn merit(least: f64, greatest: f64, cost: f64) -> f64 {
-    match greatest > least {
+    match greatest - least > LEAST_DIFFERENCE {
         true => (greatest - cost) / (greatest - least),
         false => 1.0,
     }
@@ -166,6 +169,7 @@ mod tests {
             [1.0, 0.5, 0.0]
         );
         assert_eq!(merit(3.0, 3.0, 3.0), 1.0);
+        assert_eq!(merit(1.0, 1.0 + 4e-16, 1.0 + 4e-16), 1.0);
         let scale = Scale {
             costs: Some((2.0, 6.0)),
             coverage: 1.0,

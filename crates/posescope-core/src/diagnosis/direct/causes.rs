@@ -73,15 +73,9 @@ impl SearchedCost<'_, '_> {
                 Code::X1,
                 format!(
                     "at the true pose the cost is {stated_cost:.4} with the stated camera and {:.4} with \
-                     a focal length of {:.0} px instead of {:.0} and its centre at ({:.0}, {:.0}) instead \
-                     of ({:.0}, {:.0}); the result costs {:.4}",
+                     {}; the result costs {:.4}",
                     best.cost,
-                    camera.fx,
-                    stated.fx,
-                    camera.cx,
-                    camera.cy,
-                    stated.cx,
-                    stated.cy,
+                    otherwise_stated(&camera, &stated),
                     self.summary.best,
                 ),
                 json!({ "cost_at_truth": stated_cost, "cost_otherwise": best.cost, "camera": camera }),
@@ -429,6 +423,23 @@ impl SearchedCost<'_, '_> {
                 "elsewhere": offset_evidence(&winner.offset),
             }),
         )
+    }
+}
+
+/// In what a camera differs from the stated one, to the pixel.
+fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
+    let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
+    let focal_length = format!(
+        "a focal length of {:.0} px instead of {:.0}",
+        camera.fx, stated.fx
+    );
+    match centre(camera) == centre(stated) {
+        true => focal_length,
+        false => format!(
+            "{focal_length} and its centre at {} instead of {}",
+            centre(camera),
+            centre(stated)
+        ),
     }
 }
 
