@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p posescope-diagnosis --bin verdict_cost -- --cases 40` localises queries in all conditions
 //! of the street, and says for each method which share of that time the verdicts take, without the truth
-//! and with it, of all results and of the wrong ones. Both times are taken one after the other on the same
+//! and with it, of all results and of the wrong ones, and so for a query that asks all four. Both times are taken one after the other on the same
 //! pair, so that what else the machine does stands in both; nothing is remembered from one pair to the
 //! next.
 //!
@@ -69,11 +69,14 @@ fn main() -> Result<(), String> {
         "| method | results | without the truth | with it | wrong | … with the truth, of the wrong |\n\
          |---|---|---|---|---|---|"
     );
-    for method in Method::PAPER {
-        let of_method: Vec<&Timed> = timed.iter().filter(|t| t.method == method).collect();
+    let methods = Method::PAPER.map(Some).into_iter();
+    for method in methods.chain([None]) {
+        let is_of = |t: &&Timed| method.is_none_or(|method| t.method == method);
+        let of_method: Vec<&Timed> = timed.iter().filter(is_of).collect();
+        let name = method.map_or("all four", |method| method.name());
         let wrong: Vec<&Timed> = of_method.iter().copied().filter(|t| !t.is_right).collect();
         println!(
-            "| {method} | {} | {:.1} % | {:.1} % | {} | {:.1} % |",
+            "| {name} | {} | {:.1} % | {:.1} % | {} | {:.1} % |",
             of_method.len(),
             share(&of_method, |t| t.withheld),
             share(&of_method, |t| t.known),
