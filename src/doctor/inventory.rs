@@ -73,9 +73,8 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     }
     steps(&poses, &mut inventory, &mut remarks);
     times(scene, &mut remarks);
-    for at in 0..CLOUDS.min(references.len()) {
-        let frame = references[at * (references.len() - 1) / CLOUDS.min(references.len()).max(1)];
-        cloud(scene, frame, &mut inventory, &mut remarks);
+    for at in spread(references.len(), CLOUDS) {
+        cloud(scene, references[at], &mut inventory, &mut remarks);
     }
     for &frame in [references.first(), references.last()]
         .iter()
@@ -88,6 +87,13 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     }
     remarks.dedup();
     (inventory, remarks)
+}
+
+/// As many of `count` positions as are wanted, evenly from the first to the last.
+fn spread(count: usize, wanted: usize) -> impl Iterator<Item = usize> {
+    let taken = wanted.min(count);
+    let steps = taken.saturating_sub(1).max(1);
+    (0..taken).map(move |step| step * (count - 1) / steps)
 }
 
 fn cameras(scene: &dyn Scene) -> Vec<String> {
@@ -183,4 +189,20 @@ fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &m
         )));
     }
     inventory.clouds.push((name.clone(), cloud.len(), median));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_looked_at_reaches_from_the_first_to_the_last() {
+        let of = |count, wanted| spread(count, wanted).collect::<Vec<_>>();
+        assert_eq!(of(0, 3), [0; 0]);
+        assert_eq!(of(1, 3), [0]);
+        assert_eq!(of(2, 3), [0, 1]);
+        assert_eq!(of(3, 3), [0, 1, 2]);
+        assert_eq!(of(101, 3), [0, 50, 100]);
+        assert_eq!(of(9, 1), [0]);
+    }
 }
