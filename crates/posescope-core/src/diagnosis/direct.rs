@@ -231,12 +231,8 @@ impl SearchedCost<'_, '_> {
         };
         let mut causes = Vec::new();
         let is_cheaper = near.cost < self.summary.best;
-        let elsewhere = if is_cheaper {
-            self.cheapest_elsewhere()
-        } else {
-            None
-        };
-        let elsewhere = elsewhere.filter(|place| place.cost < near.cost);
+        let elsewhere = is_cheaper.then(|| self.cheaper_elsewhere(near.cost));
+        let elsewhere = elsewhere.flatten();
         let appearance = self.changed_appearance(&near);
         let can_win = self.can_be_right(&near.offset) && appearance.is_none();
         if is_cheaper && elsewhere.is_none() && can_win {
@@ -410,19 +406,26 @@ impl SearchedCost<'_, '_> {
         })
     }
 
-    /// The cheapest place away from the truth, from the result and the best coarse minima.
-    fn cheapest_elsewhere(&self) -> Option<Place> {
-        let coarse = self.surface(Phase::PositionCoarse)?;
+    /// A place away from the truth that is cheaper than this: the foot of the result's own basin, or, where
+    /// that is not, the cheapest of those of the best coarse minima.
+    fn cheaper_elsewhere(&self, than: f64) -> Option<Place> {
         let is_elsewhere = |offset: &Offset| !self.can_be_right(offset);
-        let minima = coarse
-            .local_minima()
-            .into_iter()
-            .filter_map(|(cell, _)| coarse.lattice.offset(cell))
-            .filter(is_elsewhere)
-            .take(OTHER_PLACES);
         let is_allowed = |offset: &Offset| self.is_reachable(offset) && is_elsewhere(offset);
-        let starts: Vec<Offset> = std::iter::once(self.minimum.offset).chain(minima).collect();
-        self.deepest(&starts, &is_allowed)
+        let cheaper = |starts: &[Offset]| {
+            let foot = self.deepest(starts, &is_allowed);
+            foot.filter(|place| place.cost < than)
+        };
+        cheaper(&[self.minimum.offset]).or_else(|| {
+            let coarse = self.surface(Phase::PositionCoarse)?;
+            let minima: Vec<Offset> = coarse
+                .local_minima()
+                .into_iter()
+                .filter_map(|(cell, _)| coarse.lattice.offset(cell))
+                .filter(is_elsewhere)
+                .take(OTHER_PLACES)
+                .collect();
+            cheaper(&minima)
+        })
     }
 
     fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {
