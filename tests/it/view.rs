@@ -39,10 +39,11 @@ impl Drop for KilledOnDrop {
     }
 }
 
-/// A display of its own, and its number; none where there is no Xvfb.
+/// A display of its own, and its number; none where there is no Xvfb. It stays as it is when a client leaves: while
+/// it started anew it would refuse the next one.
 fn virtual_display() -> Option<(KilledOnDrop, String)> {
     let mut server = Process::new("Xvfb")
-        .args(["-displayfd", "1", "-nolisten", "tcp"])
+        .args(["-displayfd", "1", "-nolisten", "tcp", "-noreset"])
         .args(["-screen", "0", "1600x1000x24"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
