@@ -10,7 +10,7 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
     let own = &subject.params.fb2;
     let params = Params {
         fb: FeatureParams {
-            mlesac: own.mlesac.clone(),
+            mlesac: own.mlesac,
             depth_radius_px: own.depth_radius_px,
             visible: true,
             ..subject.params.fb.clone()

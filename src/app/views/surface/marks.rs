@@ -172,7 +172,8 @@ fn ranked(search: &Search<'_>, least_covered: u32) -> Vec<(usize, Minimum, f64)>
     let Some(searched) = search.last(Phase::PositionCoarse) else {
         return Vec::new();
     };
-    if !searched.is_complete {
+    // What is equally cheap everywhere has no minima.
+    if !searched.is_complete || searched.surface.flat_cost().is_some() {
         return Vec::new();
     }
     let minima = searched.surface.local_minima_with(least_covered);
