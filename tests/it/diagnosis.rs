@@ -255,7 +255,7 @@ fn a_judge_that_passes_over_what_is_right_answers_for_it() {
         localize_traced(&problem, robust, &params, &mut trace).expect("nobody cancels");
     let candidates = evidence.candidates.clone().expect("several poses");
     let mut taken = candidates[0].clone();
-    taken.refined.pose = taken.refined.pose * Pose::translation(3.0, 0.0, 0.0);
+    taken.refined.pose *= Pose::translation(3.0, 0.0, 0.0);
     outcome.pose = Ok(problem.world_from_query(&taken.refined.pose));
     let all = [taken].into_iter().chain(candidates.iter().cloned());
     evidence.candidates = Some(all.collect());
