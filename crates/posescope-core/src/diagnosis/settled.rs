@@ -17,9 +17,11 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
     if let Some(finding) = textureless(subject) {
         return vec![finding];
     }
-    let (Some(truth), Some(summary), Ok(_)) = (
+    // Of another estimator that draws views nobody knows what its cost is.
+    let (Some(truth), Some(summary), Some(_), Ok(_)) = (
         subject.reference_from_truth(),
         subject.outcome.cost,
+        &subject.evidence.settled,
         &subject.outcome.pose,
     ) else {
         return failure_alone(subject);
