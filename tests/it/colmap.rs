@@ -329,6 +329,21 @@ fn a_binary_model_that_promises_more_than_it_has_is_refused_before_anything_is_m
     }
 }
 
+#[test]
+fn a_name_that_would_break_a_line_is_refused_in_one() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path(), Form::Binary);
+    let path = folder.path().join("sparse/0/images.bin");
+    let mut bytes = fs::read(&path).expect("just written");
+    // After the count, the number, seven of the pose, and the camera.
+    let name = 8 + 4 + 7 * 8 + 4;
+    bytes[name] = b'\n';
+    fs::write(&path, bytes).expect("writable");
+    let error = error_of(folder.path());
+    assert!(error.contains("the name of an image expected"), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+}
+
 /// What `images.txt` says of the features of an image: pixel and point.
 fn features(model: &Path, name: &str) -> Vec<(Point2<f64>, u64)> {
     let text = fs::read_to_string(model.join("images.txt")).expect("readable");

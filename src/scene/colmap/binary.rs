@@ -190,19 +190,24 @@ impl BinaryFile {
         Ok(())
     }
 
-    /// A text up to a zero byte.
+    /// A text up to a zero byte. It goes into messages and tables, whose lines it must not break.
     fn name(&mut self) -> Result<String, SceneError> {
         let mut bytes = Vec::new();
         let limited = &mut (&mut self.reader).take(LONGEST_NAME);
         let read = limited.read_until(0, &mut bytes);
         let is_ended = read.is_ok() && bytes.pop() == Some(0);
         match String::from_utf8(bytes) {
-            Ok(name) if is_ended && self.left > name.len() as u64 => {
+            Ok(name)
+                if is_ended
+                    && self.left > name.len() as u64
+                    && !name.contains(char::is_control) =>
+            {
                 self.left -= name.len() as u64 + 1;
                 Ok(name)
             }
             _ => Err(self.error(format!(
-                "the name of an image expected, at most {LONGEST_NAME} bytes and a zero"
+                "the name of an image expected, at most {LONGEST_NAME} bytes without control \
+                 characters, and a zero"
             ))),
         }
     }
