@@ -249,7 +249,11 @@ impl SearchedCost<'_, '_> {
             let rim = on_rim(&self.minimum, radius_m, self.grid);
             causes.extend(rim.filter(|_| self.goes_on_outside()));
         }
-        causes.extend(self.frozen_freedoms(&near, &winner));
+        // Where photos share nothing, a pose that is off the plane could win by chance alone.
+        causes.extend(match appearance {
+            None => self.frozen_freedoms(&near, &winner),
+            Some(_) => self.out_of_the_plane(&near),
+        });
         causes.extend(appearance);
         causes.push(self.cost_failed(&near, &winner));
         found.extend(causes);

@@ -48,14 +48,15 @@ impl SearchedCost<'_, '_> {
             .zip(costs(&focal_lengths))
             .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
             .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
-        if best.cost >= stated_cost {
-            return None;
-        }
-        let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
         let chance = self.summary.shuffled?;
         let rival = near
             .map_or(f64::INFINITY, |near| near.cost)
             .min(self.summary.best);
+        // What is far behind is not caught up by going down from there.
+        if best.cost >= stated_cost || best.cost > rival + TELLING_GAIN * chance {
+            return None;
+        }
+        let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
         let camera = camera(&best.at);
         // A cost can also fall because dark falls on dark: pixels must go together better than the same
         // pixels shuffled do, and by more than they do with the stated camera.
@@ -319,26 +320,26 @@ impl SearchedCost<'_, '_> {
         })
     }
 
-    /// With height, pitch and roll free, the truth would win; or none of what is searched is right.
-    pub(super) fn frozen_freedoms(&self, near: &Place, winner: &Place) -> Option<Diagnosis> {
-        let frozen = PoseError::between(&self.truth, &self.truth_offset().reference_from_camera());
-        let evidence = |cost: Option<f64>| {
-            json!({
-                "height_m": -self.truth.translation.y,
-                "frozen_error": frozen,
-                "cost_in_six_freedoms": cost,
-                "cost_near_truth": near.cost,
-            })
-        };
-        if !self.subject.tolerance.contains(&frozen) {
-            return Some(Diagnosis::new(
+    /// None of what is searched is right, because the truth is too far off the plane of the search.
+    pub(super) fn out_of_the_plane(&self, near: &Place) -> Option<Diagnosis> {
+        let frozen = self.off_the_plane();
+        (!self.subject.tolerance.contains(&frozen)).then(|| {
+            Diagnosis::new(
                 Code::D7,
                 format!(
                     "no pose that is searched is right: the truth is {frozen} off the plane of the search, \
                      in height, pitch and roll"
                 ),
-                evidence(None),
-            ));
+                self.frozen_evidence(&frozen, near, None),
+            )
+        })
+    }
+
+    /// With height, pitch and roll free, the truth would win; or none of what is searched is right.
+    pub(super) fn frozen_freedoms(&self, near: &Place, winner: &Place) -> Option<Diagnosis> {
+        let frozen = self.off_the_plane();
+        if !self.subject.tolerance.contains(&frozen) {
+            return self.out_of_the_plane(near);
         }
         // What is on the plane of the search has nothing to win by leaving it.
         if frozen.translation_m < OFF_PLANE_M && frozen.rotation_deg < OFF_PLANE_DEG {
@@ -353,8 +354,22 @@ impl SearchedCost<'_, '_> {
                      below the {:.4} elsewhere; the truth is {frozen} off the plane of the search",
                     near.cost, winner.cost
                 ),
-                evidence(Some(best)),
+                self.frozen_evidence(&frozen, near, Some(best)),
             )
+        })
+    }
+
+    /// How far the truth is from the searched pose that is at its place, with its heading.
+    fn off_the_plane(&self) -> PoseError {
+        PoseError::between(&self.truth, &self.truth_offset().reference_from_camera())
+    }
+
+    fn frozen_evidence(&self, frozen: &PoseError, near: &Place, in_six: Option<f64>) -> Value {
+        json!({
+            "height_m": -self.truth.translation.y,
+            "frozen_error": frozen,
+            "cost_in_six_freedoms": in_six,
+            "cost_near_truth": near.cost,
         })
     }
 
