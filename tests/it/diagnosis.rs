@@ -473,6 +473,43 @@ fn a_pose_that_is_less_certain_than_asked_for_is_refused() {
 }
 
 #[test]
+fn a_method_may_ask_for_more_certainty_than_nobody_does() {
+    let (scene, request) = (
+        Walls::new(),
+        Request {
+            radius_m: 3.0,
+            references: vec![0].into(),
+            fusions: Vec::new(),
+            setting: None,
+        },
+    );
+    let fb2 = Method::named("fb2");
+    let answered = |least_probability: f64| {
+        let mut params = Params::default();
+        params.fb2.least_probability = least_probability;
+        let mut results = Vec::new();
+        let keep = |result: QueryResult, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        };
+        let requests = std::slice::from_ref(&request);
+        Localizer::new(&scene, &scene, &params, 7)
+            .localize(0, 1, requests, &[fb2], &mut NoObserver, keep)
+            .expect("good data");
+        results.pop().expect("one method")
+    };
+    let (always, never) = (answered(0.0), answered(1.0));
+    assert!(always.pose.is_some(), "{:?}", always.reason);
+    assert_eq!(never.pose, None);
+    let reason = never.reason.expect("no pose is that certain");
+    assert_eq!(reason.code, Code::L1);
+    assert_eq!(
+        always.trust, never.trust,
+        "how certain it is, it says all the same"
+    );
+}
+
+#[test]
 fn every_code_is_explained() {
     let page = include_str!("../../docs/diagnosis.md");
     for code in Code::ALL {

@@ -2,7 +2,8 @@
 //!
 //! `cargo run -p posescope-diagnosis --bin calibration -- --places 40` localises queries of every
 //! condition of the street against references of every other, fits a logistic function of each method's
-//! signals where both are overcast, sunny or snowy, and prints its coefficients, as
+//! signals where both are overcast, sunny or snowy, and on queries that do not show their place (mirrored, of another
+//! town, of another street of this one), and prints its coefficients, as
 //! `diagnosis/trust/coefficients.rs` holds them. Then it judges the probabilities that posescope has
 //! now, and those of the coefficients, on the pairs that night or rain is part of: calibration error,
 //! area under the ROC curve, reliability by tenths.
@@ -55,6 +56,17 @@ const RADIUS_M: f64 = 10.0;
 
 /// Queries that do not show their place are fitted on too.
 const UNKNOWABLE: &str = "unknowable";
+
+/// What one of them counts beside a query that does: there are more of them than anybody would ask.
+const UNKNOWABLE_COUNTS: f64 = 0.25;
+
+/// References of other streets at each place.
+const OTHER_STREETS: usize = 3;
+
+/// How far another street is at least [m], and how far turned against the query's its cameras are [°]:
+/// cameras on one street look along it.
+const OTHER_STREET_M: f64 = 60.0;
+const OTHER_STREET_DEG: f64 = 60.0;
 
 /// One pose with its signals.
 #[derive(Clone, Debug)]
@@ -271,9 +283,43 @@ fn at(
             samples.extend(of_problem(&problem, Some(truth), &conditions, methods));
         }
     }
-    let (_, query, _, reference) = &problems[0];
+    let (_, query, truth, reference) = &problems[0];
     samples.extend(unknowable(query, reference, place, methods));
+    let use_of = use_of(place);
+    for reference in other_streets(day, truth, &mut rng) {
+        let problem = Problem::new(query.clone(), reference, RADIUS_M).expect("a radius");
+        samples.extend(of_problem(&problem, None, &use_of, methods));
+    }
     samples
+}
+
+/// References of the same town and condition that show nothing of what a query shows.
+fn other_streets(drive: &Traversal, truth: &Pose, rng: &mut Pcg64) -> Vec<Arc<ReferenceTuple>> {
+    let is_other = |frame: &usize| {
+        let between = PoseError::between(truth, &drive.world_from_camera(*frame));
+        between.translation_m >= OTHER_STREET_M && between.rotation_deg >= OTHER_STREET_DEG
+    };
+    let others: Vec<usize> = (0..drive.frame_count()).filter(is_other).collect();
+    (0..OTHER_STREETS)
+        .filter_map(|_| {
+            let frame = *others.get(rng.random_range(0..others.len().max(1)))?;
+            let pose = drive.world_from_camera(frame);
+            Some(reference_of(
+                &format!("{frame:06}"),
+                &frame_of(drive, frame, &pose),
+            ))
+        })
+        .collect()
+}
+
+/// Every other place of queries that do not show it is for fitting.
+fn use_of(place: usize) -> [String; 2] {
+    let name = if place.is_multiple_of(2) {
+        UNKNOWABLE
+    } else {
+        "unknowable, set aside"
+    };
+    [name.to_owned(), name.to_owned()]
 }
 
 fn query_of(frame: &Frame) -> (Arc<Query>, Pose) {
@@ -289,8 +335,7 @@ fn reference_of(name: &str, frame: &Frame) -> Arc<ReferenceTuple> {
     Arc::new(tuple.expect("a whole frame"))
 }
 
-/// The place of a query that does not show it: mirrored, or of another town. Every other place is for
-/// fitting.
+/// The place of a query that does not show it: mirrored, or of another town.
 fn unknowable(
     query: &Arc<Query>,
     reference: &Arc<ReferenceTuple>,
@@ -305,23 +350,13 @@ fn unknowable(
         image::imageops::flip_horizontal(color),
         drive.image(7 * place % drive.frame_count()),
     ];
-    let use_of = if place.is_multiple_of(2) {
-        UNKNOWABLE
-    } else {
-        "unknowable, set aside"
-    };
     photos
         .into_iter()
         .flat_map(|photo| {
             let query = Query::new("unknowable", Photo::from_color(photo), query.intrinsics);
             let query = query.expect("a photo of the same size");
             let problem = Problem::new(query, reference.clone(), RADIUS_M).expect("a radius");
-            of_problem(
-                &problem,
-                None,
-                &[use_of.to_owned(), use_of.to_owned()],
-                methods,
-            )
+            of_problem(&problem, None, &use_of(place), methods)
         })
         .collect()
 }
@@ -399,7 +434,7 @@ fn logistic(weights: &[f64], values: &[f64]) -> f64 {
 /// Logistic regression by iteratively reweighted least squares, on standardised signals and with a
 /// ridge, so that signals that tell little keep small weights. The constant first.
 fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
-    const RIDGE: f64 = 2.0;
+    const RIDGE: f64 = 1.0;
     let columns = samples.first()?.values.len();
     let count = samples.len() as f64;
     let column = |k: usize| samples.iter().map(move |s| s.values[k]);
@@ -419,12 +454,20 @@ fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
     let labels = DVector::from_fn(samples.len(), |row, _| {
         f64::from(u8::from(samples[row].is_near))
     });
+    let counts = DVector::from_fn(samples.len(), |row, _| {
+        match samples[row].conditions[0] == UNKNOWABLE {
+            true => UNKNOWABLE_COUNTS,
+            false => 1.0,
+        }
+    });
     let mut weights = DVector::zeros(columns + 1);
     for _ in 0..50 {
         let predicted = (&design * &weights).map(|x: f64| 1.0 / (1.0 + (-x).exp()));
-        let spread = predicted.map(|p| (p * (1.0 - p)).max(1e-6));
+        let spread = predicted
+            .map(|p| (p * (1.0 - p)).max(1e-6))
+            .component_mul(&counts);
         let mut hessian = design.transpose() * DMatrix::from_diagonal(&spread) * &design;
-        let mut gradient = design.transpose() * (&labels - &predicted);
+        let mut gradient = design.transpose() * (&labels - &predicted).component_mul(&counts);
         for k in 1..=columns {
             hessian[(k, k)] += RIDGE;
             gradient[k] -= RIDGE * weights[k];

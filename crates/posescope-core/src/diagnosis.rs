@@ -195,7 +195,8 @@ fn low_confidence(trust: &Trust) -> Option<Diagnosis> {
             format!(
                 "low confidence: poses like this one are within {} m in {:.0} % of cases",
                 trust::WITHIN_M,
-                100.0 * probability
+                // Rounded down, so that nobody reads the limit where it was missed.
+                (100.0 * probability).floor()
             ),
             json!({
                 "probability": probability,

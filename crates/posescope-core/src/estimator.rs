@@ -174,6 +174,15 @@ impl Entry {
         }
     }
 
+    /// The least probability of being within 1 m with which it lets a pose pass; 0 for those that judge
+    /// their poses by nothing else than what they are found by, as the paper's do.
+    pub fn least_probability(&self, params: &Params) -> f64 {
+        match self.parts {
+            Parts::Own(own) => (own.least_probability)(params).unwrap_or(0.0),
+            Parts::Features | Parts::Cost(_) | Parts::Hybrid(_) => 0.0,
+        }
+    }
+
     /// The methods that it runs inside, if it is made of others.
     pub fn hybrid(&self) -> Option<HybridParts> {
         match self.parts {

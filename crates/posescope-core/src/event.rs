@@ -421,7 +421,8 @@ pub struct DescentStepped {
 pub struct StartsRefined {
     /// The directions in which they moved.
     pub freedoms: Freedoms,
-    /// Where each started and ended, the least cost first.
+    /// Where each started and ended, the best first: that of least cost, where none of those that cost
+    /// about as little is likelier.
     pub refinements: Arc<[Refined]>,
 }
 

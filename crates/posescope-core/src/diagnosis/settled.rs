@@ -18,7 +18,7 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         return vec![finding];
     }
     // Of another estimator that draws views nobody knows what its cost is.
-    let (Some(truth), Some(summary), Some(_), Ok(_)) = (
+    let (Some(truth), Some(summary), Some(_), Ok(pose)) = (
         subject.reference_from_truth(),
         subject.outcome.cost,
         &subject.evidence.settled,
@@ -28,9 +28,19 @@ pub(super) fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
     };
     let mut found: Vec<Diagnosis> = suspicion::of_poses(subject).into_iter().collect();
     found.extend(passed_over(subject, &truth));
-    let near = SixFreedoms::new(subject.params).basin_of(subject.problem, &truth);
-    found.push(match near {
-        Some(near) => search_or_cost(subject, &truth, &near, summary.best),
+    let six = SixFreedoms::new(subject.params);
+    found.push(match six.basin_of(subject.problem, &truth) {
+        Some(near) => {
+            let dearer = |pose: &Pose| six.dearer(&subject.evidence.surfaces, pose);
+            let result = subject.problem.reference_from_query(pose);
+            let rivals = Rivals {
+                near_dearer: dearer(&near.pose),
+                near,
+                result_cost: summary.best,
+                result_dearer: dearer(&result),
+            };
+            search_or_cost(subject, &truth, &rivals)
+        }
         None => no_say(subject, &truth),
     });
     found
@@ -63,32 +73,61 @@ fn passed_over(subject: &Subject<'_>, truth: &Pose) -> Option<Diagnosis> {
     ))
 }
 
-fn search_or_cost(subject: &Subject<'_>, truth: &Pose, near: &Refined, best: f64) -> Diagnosis {
+/// Where the truth leads, and the result.
+struct Rivals {
+    near: Refined,
+    /// How much dearer the pose near the truth is for being unlikely, and so the result.
+    near_dearer: f64,
+    result_cost: f64,
+    result_dearer: f64,
+}
+
+fn search_or_cost(subject: &Subject<'_>, truth: &Pose, rivals: &Rivals) -> Diagnosis {
+    let &Rivals {
+        near,
+        near_dearer,
+        result_cost,
+        result_dearer,
+    } = rivals;
     let error = PoseError::between(truth, &near.pose);
     let is_there = subject.tolerance.contains(&error);
+    let is_cheaper = near.cost + near_dearer < result_cost + result_dearer;
+    // The cost alone may say otherwise than with what is known of poses.
+    let likeliness = match (near.cost < result_cost, is_cheaper) {
+        (true, false) => ", which is the likelier pose by heading, height and tilt",
+        (false, true) => ", which is the less likely pose by heading, height and tilt",
+        _ => "",
+    };
     let evidence = json!({
         "cost_near_truth": near.cost,
-        "cost_at_result": best,
+        "cost_at_result": result_cost,
+        "dearer_near_truth": near_dearer,
+        "dearer_at_result": result_dearer,
         "near_truth_error": error,
     });
-    if is_there && near.cost < best {
-        let text = format!(
-            "the search failed, not the cost: refined from the truth it is {:.4}, {error} from it, and \
-             {best:.4} at the result",
-            near.cost
-        );
-        return Diagnosis::new(Code::D3, text, evidence);
+    let costs = format!(
+        "refined from the truth it is {:.4}, {error} from it, and {result_cost:.4} at the result{likeliness}",
+        near.cost
+    );
+    match (is_there, is_cheaper) {
+        (true, true) => Diagnosis::new(
+            Code::D3,
+            format!("the search failed, not the cost: {costs}"),
+            evidence,
+        ),
+        (true, false) => Diagnosis::new(
+            Code::D2,
+            format!("the cost failed, not the search: {costs}"),
+            evidence,
+        ),
+        (false, _) => Diagnosis::new(
+            Code::D2,
+            format!(
+                "the cost failed, not the search: refined from the truth it leads {error} away from it"
+            ),
+            evidence,
+        ),
     }
-    let text = match is_there {
-        true => format!(
-            "the cost failed, not the search: refined from the truth it is {:.4}, and {best:.4} at the result",
-            near.cost
-        ),
-        false => format!(
-            "the cost failed, not the search: refined from the truth it leads {error} away from it"
-        ),
-    };
-    Diagnosis::new(Code::D2, text, evidence)
 }
 
 /// The truth lies outside the disc, or hardly a point of the cloud is seen from there.

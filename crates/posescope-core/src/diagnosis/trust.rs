@@ -1,12 +1,13 @@
 //! How far an accepted pose is to be believed, without knowing the truth.
 //!
 //! Of what an estimator leaves behind, a few signals say how far its pose stands out from what chance
-//! would give: for methods of features the inliers beyond chance and how well they fix the pose, for a
-//! direct method how deep its minimum is beside the other hypotheses, the runner-up and shuffled pixels, for a
+//! would give: for methods of features the inliers beyond chance, how well they fix the pose, and whether
+//! the photos go together there better than elsewhere, for a direct method how deep its minimum is beside the other hypotheses, the runner-up and shuffled pixels, for a
 //! search from many starts how many of them end at it, and whether features lead there too. A logistic
 //! function of them is the probability of being within [`WITHIN_M`]; its coefficients were fitted on
 //! some conditions of the street and are judged on others (`docs/diagnosis.md`).
 
+mod appearance;
 mod coefficients;
 mod inliers;
 mod minimum;
@@ -16,8 +17,8 @@ use serde::{Deserialize, Serialize};
 
 pub use coefficients::probability;
 
-use super::Evidence;
-use crate::estimator::{self, Outcome, Parts};
+use super::{Evidence, Subject};
+use crate::estimator::{self, Failure, Outcome, Parts};
 use crate::grid::{Phase, ScoredLattice};
 use crate::method::Method;
 use crate::params::Params;
@@ -111,6 +112,25 @@ pub(super) fn responsible(method: Method, outcome: &Outcome) -> Method {
     }
 }
 
+/// The outcome, without its pose where that is less probably right than its method lets pass, or than
+/// `asked` for.
+pub fn accepted(subject: &Subject<'_>, asked: Option<f64>) -> Outcome {
+    let of_method = estimator::find(subject.method)
+        .map_or(0.0, |entry| entry.least_probability(subject.params));
+    let needed = asked.unwrap_or(0.0).max(of_method);
+    let trust = subject.trust.as_ref();
+    match trust.and_then(|trust| trust.probability) {
+        Some(probability) if probability < needed => Outcome {
+            pose: Err(Failure::LowConfidence {
+                probability,
+                needed,
+            }),
+            ..subject.outcome.clone()
+        },
+        _ => subject.outcome.clone(),
+    }
+}
+
 /// The signals of an outcome with a pose, as the probability takes them.
 pub fn signals(
     problem: &Problem,
@@ -124,7 +144,7 @@ pub fn signals(
     match Family::of(method)? {
         Family::Features => {
             let consensus = Inliers::of(problem, params, evidence)?;
-            Some(consensus.signals(problem, method, evidence))
+            Some(consensus.signals(evidence))
         }
         Family::Search => Some(Minimum::of(outcome, evidence)?.signals()),
         Family::Settled => Some(Settled::of(outcome, evidence)?.signals()),
@@ -161,7 +181,7 @@ fn of_features(
     evidence: &Evidence,
 ) -> Option<Trust> {
     let inliers = Inliers::of(problem, params, evidence)?;
-    let signals = inliers.signals(problem, method, evidence);
+    let signals = inliers.signals(evidence);
     let covariance = inliers.covariance;
     let deviation = |first: usize| {
         covariance.map(|c| std::array::from_fn(|axis| c[(first + axis, first + axis)].sqrt()))

@@ -53,6 +53,7 @@ pub(super) const ENTRY: super::Entry = super::Entry {
         make: |params| Box::new(Guided::new(params)),
         shows: None,
         has_features: true,
+        least_probability: |params| Some(params.fb2.least_probability),
     }),
 };
 

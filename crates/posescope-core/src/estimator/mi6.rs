@@ -8,10 +8,12 @@
 //! 1. coarse positions are scored at several yaws, at once and not one after the other,
 //! 2. many of their minima are starts, each refined in right, forward and yaw,
 //! 3. the best of those are refined in all six freedoms,
-//! 4. and the cost is that of the [judge](crate::judge): three channels, less what chance gives.
+//! 4. the cost is that of the [judge](crate::judge): three channels, less what chance gives,
+//! 5. and of minima that cost about the same the likelier pose stands.
 
 mod basin;
 mod params;
+mod prior;
 
 use std::sync::Arc;
 
@@ -37,6 +39,7 @@ pub(super) const ENTRY: super::Entry = super::Entry {
         make: |params| Box::new(SixFreedoms::new(params)),
         shows: Some("mi"),
         has_features: false,
+        least_probability: |_| None,
     }),
 };
 
@@ -64,7 +67,7 @@ pub struct SixFreedoms {
 
 /// What the search found, in the frame of the reference camera.
 pub(super) struct Found {
-    /// The refined minima, the least cost first; at least one.
+    /// The refined minima, the answer first; at least one.
     pub(super) refined: Vec<Refined>,
     /// What the least is worth.
     pub(super) summary: CostSummary,
@@ -81,7 +84,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    fn of(surfaces: &[Arc<ScoredLattice>]) -> Self {
+    pub(super) fn of(surfaces: &[Arc<ScoredLattice>]) -> Self {
         let cells = surfaces
             .iter()
             .flat_map(|surface| (0..surface.scores.len()).map(move |cell| (surface, cell)));
@@ -98,7 +101,12 @@ impl Spread {
 
     /// How far a cost is below the middle, in standard deviations.
     pub(super) fn deviations(&self, cost: f64) -> f64 {
-        (self.median - cost) / self.deviation.max(1e-9)
+        (self.median - cost) / self.deviation()
+    }
+
+    /// The standard deviation, which is never nothing.
+    pub(super) fn deviation(&self) -> f64 {
+        self.deviation.max(1e-9)
     }
 }
 
@@ -181,7 +189,9 @@ impl SixFreedoms {
             }
             Ok::<_, Halt>(surfaces)
         })?;
-        let starts = starts(&surfaces, self.params.starts);
+        let spread = Spread::of(&surfaces);
+        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
+        let starts = starts(&surfaces, self.params.starts, price);
         if starts.is_empty() {
             return Err(Halt::from(Failure::NothingComparable {
                 hypotheses: search.evaluations as usize,
@@ -194,9 +204,9 @@ impl SixFreedoms {
             return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
         }
         let refined = trace.stage(Stage::RefinePlane, |trace| {
-            search.refine(&starts, &self.in_the_plane(), trace)
+            search.refine(&starts, &self.in_the_plane(), price, trace)
         })?;
-        let mut finalists = apart(refined, self.params.finalists);
+        let mut finalists = apart(refined, self.params.finalists, price);
         if self.params.coarse_shrink > 1 {
             let more = trace.stage(Stage::SearchCoarse, |trace| {
                 self.coarse_poses(problem, trace)
@@ -207,7 +217,7 @@ impl SixFreedoms {
             finalists.extend(more.filter_map(|(pose, cost)| Some(Start { pose, cost: cost? })));
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            search.refine(&finalists, &self.in_six(), trace)
+            search.refine(&finalists, &self.in_six(), price, trace)
         })?;
         // A walk may leave the disc, where no query can be.
         let reach = self.reach(problem);
@@ -255,7 +265,7 @@ impl SixFreedoms {
             Ok(Found {
                 refined,
                 summary,
-                spread: Spread::of(&surfaces),
+                spread,
             })
         })
     }
@@ -310,7 +320,9 @@ impl SixFreedoms {
             trace.checkpoint()?;
             Ok::<_, Cancelled>(judge.costs(poses, least_covered))
         };
-        let starts = starts(&surfaces, 2 * self.params.starts);
+        let spread = Spread::of(&surfaces);
+        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
+        let starts = starts(&surfaces, 2 * self.params.starts, price);
         let plan = Shrinking {
             last_m: 0.1,
             ..self.in_the_plane()
@@ -322,7 +334,7 @@ impl SixFreedoms {
             last_m: 0.05,
             ..plan
         };
-        let six = shrink(&apart(plane, self.params.starts), &plan, &mut costs)?;
+        let six = shrink(&apart(plane, self.params.starts, price), &plan, &mut costs)?;
 
         let judge = Judge::new(problem, &self.render, &self.judge, shrink_by.div_ceil(2));
         let least_covered = self.least_covered(judge.score(&[Pose::identity()])[0]);
@@ -341,7 +353,7 @@ impl SixFreedoms {
             ..plan
         };
         let refined = shrink(&starts, &plan, &mut costs)?;
-        let best = apart(refined, self.params.finalists);
+        let best = apart(refined, self.params.finalists, price);
         Ok(best.into_iter().map(|start| start.pose).collect())
     }
 }
@@ -428,11 +440,12 @@ impl Search<'_> {
         Ok(surface)
     }
 
-    /// Refines the starts and tells where they came; the least cost is first.
+    /// Refines the starts and tells where they came; the least price is first.
     fn refine(
         &mut self,
         starts: &[Start],
         plan: &Shrinking,
+        price: impl Fn(&Pose, f64) -> f64,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Refined>, Cancelled> {
         let costs = |poses: &[Pose]| {
@@ -441,7 +454,7 @@ impl Search<'_> {
         };
         let mut refined = shrink(starts, plan, costs)?;
         self.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
-        refined.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
         trace.emit(|| StartsRefined {
             freedoms: plan.freedoms,
             refinements: refined.as_slice().into(),
@@ -451,7 +464,11 @@ impl Search<'_> {
 }
 
 /// The best minima of all lattices, no two of them at one place with one heading.
-fn starts(surfaces: &[Arc<ScoredLattice>], most: usize) -> Vec<Start> {
+fn starts(
+    surfaces: &[Arc<ScoredLattice>],
+    most: usize,
+    price: impl Fn(&Pose, f64) -> f64,
+) -> Vec<Start> {
     let mut minima: Vec<Start> = surfaces
         .iter()
         .flat_map(|surface| {
@@ -465,14 +482,14 @@ fn starts(surfaces: &[Arc<ScoredLattice>], most: usize) -> Vec<Start> {
             })
         })
         .collect();
-    minima.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    minima.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
     minima.truncate(most);
     minima
 }
 
 /// The best of those that are refined, each at a place of its own.
-fn apart(mut refined: Vec<Refined>, most: usize) -> Vec<Start> {
-    refined.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+fn apart(mut refined: Vec<Refined>, most: usize, price: impl Fn(&Pose, f64) -> f64) -> Vec<Start> {
+    refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
     let mut kept: Vec<Start> = Vec::new();
     for one in refined {
         if kept.len() < most && kept.iter().all(|known| is_apart(&known.pose, &one.pose)) {

@@ -23,6 +23,8 @@ pub struct Own {
     pub shows: Option<&'static str>,
     /// Whether it matches features and tells so.
     pub has_features: bool,
+    /// The least probability of being within 1 m with which its pose is accepted, if it asks for one.
+    pub least_probability: fn(&Params) -> Option<f64>,
 }
 
 impl Own {

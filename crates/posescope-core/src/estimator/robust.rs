@@ -4,7 +4,7 @@
 //! on a wrong pose, and drops a right one that too few matches support. Here the poses of both families
 //! are refined in six freedoms under one cost, that of the [judge](crate::judge), and the cheapest is
 //! the answer. That features agree beyond chance earns their pose a small credit; that they do not costs
-//! it nothing.
+//! it nothing. An unlikely pose is dearer, as `mi6` has it.
 
 mod params;
 
@@ -20,6 +20,7 @@ use super::{
 };
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
 use crate::geometry::Pose;
+use crate::judge::Refined;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -34,6 +35,7 @@ pub(super) const ENTRY: super::Entry = super::Entry {
         make: |params| Box::new(Robust::new(params)),
         shows: Some("mi"),
         has_features: true,
+        least_probability: |params| Some(params.robust.least_probability),
     }),
 };
 
@@ -109,7 +111,8 @@ impl Robust {
             let price = |candidate: &JudgedPose| {
                 let is_agreed = candidate.log_likelihood.is_some() && candidate.accepted;
                 let credit = if is_agreed { self.params.credit } else { 0.0 };
-                -spread.deviations(candidate.refined.cost) - credit
+                let Refined { pose, cost, .. } = candidate.refined;
+                -spread.deviations(self.six.price(&spread, &pose, cost)) - credit
             };
             candidates.sort_by(|a, b| price(a).total_cmp(&price(b)));
             let best = candidates[0].clone();

@@ -17,10 +17,10 @@ pub fn probability(method: Method, signals: &[f64]) -> Option<f64> {
 /// By method: the constant, then one weight per signal in their order.
 #[rustfmt::skip]
 const FITTED: &[(&str, &[f64])] = &[
-    // constant, inliers, inlier_share, beyond_chance, spread, deviation, residual, distance
-    ("fb", &[-4.6589, 0.2906, 7.7375, 0.4399, 4.6002, -0.3532, -0.7431, 2.1287]),
-    // constant, inliers, inlier_share, beyond_chance, spread, deviation, residual
-    ("fb2", &[-4.2539, 1.0520, -2.5614, 0.7270, -1.7487, -0.4098, -0.0080]),
+    // constant, inliers, inlier_share, beyond_chance, spread, deviation, residual,
+    // seen_depth, seen_margin, seen_rise, seen_rise_farther, seen_above_start, seen_gain
+    ("fb", &[3.6239, -0.3059, 3.0852, 0.1270, 11.3324, 0.4606, -0.5786, -0.5996, 0.5833, 0.6771, 0.3436, 0.5552, 1.5098]),
+    ("fb2", &[-1.9328, 0.6896, -4.0353, 0.3781, 3.7045, 0.4104, -0.4568, -0.2895, 0.7448, 0.4407, 0.3515, 1.1839, 0.3380]),
     // constant, depth, refined_by, margin, above_start, gain, coverage, yaw_depth
     ("mi", &[-6.6958, 0.5146, 0.3756, 1.1216, -0.2002, 4.2765, 0.7650, 3.3455]),
     ("nid", &[-10.1176, 0.6680, -0.4161, 0.9769, 1.4828, 0.2423, 1.1824, 3.1252]),

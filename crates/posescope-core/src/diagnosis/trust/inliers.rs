@@ -1,14 +1,30 @@
-//! What the inliers of a consensus say about its pose.
+//! What the inliers of a consensus say about its pose, and both photos with them.
 
 use nalgebra::Matrix6;
 
+use super::appearance::Appearance;
 use super::{Signals, median};
 use crate::diagnosis::Evidence;
 use crate::features::FeatureState;
-use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::solver::{Correspondence, pose_covariance};
+
+/// What a probability is made of.
+const NAMES: &[&str] = &[
+    "inliers",
+    "inlier_share",
+    "beyond_chance",
+    "spread",
+    "deviation",
+    "residual",
+    "seen_depth",
+    "seen_margin",
+    "seen_rise",
+    "seen_rise_farther",
+    "seen_above_start",
+    "seen_gain",
+];
 
 /// What inliers say.
 pub(super) struct Inliers {
@@ -19,6 +35,8 @@ pub(super) struct Inliers {
     median_residual_px: f64,
     /// Of rotation and position, along the camera's axes.
     pub(super) covariance: Option<Matrix6<f64>>,
+    /// What the photos show at the pose.
+    appearance: Appearance,
 }
 
 impl Inliers {
@@ -51,53 +69,33 @@ impl Inliers {
             spread: root_mean_square_distance(&inliers) / width.hypot(height),
             median_residual_px,
             covariance: pose_covariance(&inliers, intrinsics, &camera_from_reference, sigma_px),
+            appearance: Appearance::of(problem, params, &refined.reference_from_query),
         })
     }
 
-    /// How far FB's pose is from the reference is one of them; that of other methods is not, for on the
-    /// street right poses are near, by how its pairs are drawn, and on real drives they are not.
-    pub(super) fn signals(
-        &self,
-        problem: &Problem,
-        method: Method,
-        evidence: &Evidence,
-    ) -> Signals {
-        const NAMES: &[&str] = &[
-            "inliers",
-            "inlier_share",
-            "beyond_chance",
-            "spread",
-            "deviation",
-            "residual",
-            "distance",
-        ];
+    /// How far the pose is from the reference is none of them: on the street right poses are near, by how its
+    /// pairs are drawn, and on real drives they are not.
+    pub(super) fn signals(&self, evidence: &Evidence) -> Signals {
         let log10_nfa = evidence
             .judged
             .as_ref()
             .map_or(0.0, |judged| judged.acceptance.log10_nfa);
-        let distance_m = evidence.judged.as_ref().map_or(0.0, |j| j.distance_m);
         let deviation_m = self.covariance.map_or(1e3, |c| {
             (c[(3, 3)] + c[(4, 4)] + c[(5, 5)]).sqrt().clamp(1e-4, 1e3)
         });
-        let asked = if method == Method::FB {
-            NAMES.len()
-        } else {
-            NAMES.len() - 1
-        };
-        let mut signals = Signals {
-            names: &NAMES[..asked],
-            values: vec![
-                (self.count as f64).ln_1p(),
-                self.count as f64 / self.correspondences.max(1) as f64,
-                (-log10_nfa).max(0.0).ln_1p(),
-                self.spread,
-                deviation_m.ln(),
-                self.median_residual_px,
-                distance_m / problem.believed_within_m(),
-            ],
-        };
-        signals.values.truncate(asked);
-        signals
+        let mut values = vec![
+            (self.count as f64).ln_1p(),
+            self.count as f64 / self.correspondences.max(1) as f64,
+            (-log10_nfa).max(0.0).ln_1p(),
+            self.spread,
+            deviation_m.ln(),
+            self.median_residual_px,
+        ];
+        values.extend(self.appearance.signals());
+        Signals {
+            names: NAMES,
+            values,
+        }
     }
 }
 

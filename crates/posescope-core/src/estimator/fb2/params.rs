@@ -29,6 +29,9 @@ parameters! {
         pub mlesac: MlesacParams = group(),
         /// How far outside the uncertainty radius a pose is still accepted, as a share of it.
         pub radius_slack: f64 = number("radius_slack", "", 0.0..=100.0),
+        /// The least probability of being within 1 m with which a pose is accepted: streets that look alike
+        /// agree on poses beyond chance. 0 accepts what chance does not explain.
+        pub least_probability: f64 = number("least_probability", "", 0.0..=1.0),
     }
 }
 
@@ -45,6 +48,7 @@ impl Default for GuidedParams {
             scale_ratio: 1.6,
             mlesac: MlesacParams::default(),
             radius_slack: 0.1,
+            least_probability: 0.95,
         }
     }
 }

@@ -28,6 +28,15 @@ parameters! {
         pub coarse_shrink: usize = count("coarse_shrink", "", 1..=16),
         /// Lattices of the coarse level, each at a yaw of its own.
         pub coarse_yaws: usize = count("coarse_yaws", "", 1..=61),
+        /// Turn against the reference's heading that makes a pose dearer by a standard deviation of the coarse
+        /// costs; four times as dear at twice the turn.
+        pub usual_yaw_deg: f64 = number("usual_yaw", "°", 0.1..=1000.0),
+        /// Height above or below the reference that does so.
+        pub usual_height_m: f64 = number("usual_height", "m", 0.01..=1000.0),
+        /// Tilt against the reference, of pitch and roll together, that does so.
+        pub usual_tilt_deg: f64 = number("usual_tilt", "°", 0.1..=1000.0),
+        /// How many standard deviations dearer an unlikely pose is at most; 0 takes all for equally likely.
+        pub unlikely: f64 = number("unlikely", "", 0.0..=100.0),
     }
 }
 
@@ -44,6 +53,10 @@ impl Default for SixParams {
             deg_per_m: 3.0,
             coarse_shrink: 3,
             coarse_yaws: 11,
+            usual_yaw_deg: 8.0,
+            usual_height_m: 0.5,
+            usual_tilt_deg: 1.5,
+            unlikely: 4.0,
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
-use crate::diagnosis::{Evidence, Subject, diagnose_ranking};
-use crate::estimator::{Failure, Outcome};
+use crate::diagnosis::{Evidence, Subject, diagnose_ranking, trust};
+use crate::estimator::Outcome;
 use crate::geometry::Pose;
 use crate::localize::{QueryResult, StageTimes, evaluate};
 use crate::method::Method;
@@ -43,7 +43,7 @@ impl Localizer<'_> {
     ) -> MethodOutcome {
         let solved = &work.problems[problem];
         let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
-        let outcome = self.accepted(&subject);
+        let outcome = trust::accepted(&subject, self.least_probability);
         let subject = Subject {
             outcome: &outcome,
             ..subject
@@ -59,22 +59,6 @@ impl Localizer<'_> {
             evidence,
             result,
             times,
-        }
-    }
-
-    /// The outcome, without its pose where that is less certain than asked for.
-    fn accepted(&self, subject: &Subject<'_>) -> Outcome {
-        let trust = subject.trust.as_ref();
-        let probability = trust.and_then(|trust| trust.probability);
-        match (self.least_probability, probability) {
-            (Some(needed), Some(probability)) if probability < needed => Outcome {
-                pose: Err(Failure::LowConfidence {
-                    probability,
-                    needed,
-                }),
-                ..subject.outcome.clone()
-            },
-            _ => subject.outcome.clone(),
         }
     }
 }

@@ -1,0 +1,208 @@
+//! What both photos say about a pose that features led to.
+//!
+//! Features that repeat, the windows of one house and of another, agree on a pose as well as those of one
+//! place do. The photos as a whole do not: drawn at a right pose the reference's cloud goes with the query
+//! far better than at poses beside it, or elsewhere around the reference. The cost is that of the
+//! [judge](crate::judge), on photos of half the size.
+
+use super::{centre_and_deviation, tamed};
+use crate::geometry::{Pose, yaw};
+use crate::judge::{Judge, moved};
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::render::Score;
+
+/// How many times smaller the photos are: as telling as they are whole, at a fifth of the time.
+const SHRINK: u32 = 2;
+
+/// Poses around the reference that a pose is held against, and how far they go \[m\].
+const AROUND: usize = 64;
+const AROUND_M: f64 = 8.0;
+
+/// Poses around the reference are turned by up to twice this to both sides \[°\].
+const TURN_DEG: f64 = 5.0;
+
+/// The golden angle, by which neighbours on a spiral that fills a disc evenly are turned \[rad\].
+const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
+
+/// How far the neighbours of the pose are, in two rings \[m\], and what turn goes with a metre \[°\].
+const RINGS_M: [f64; 2] = [0.5, 1.0];
+const DEG_PER_M: f64 = 2.0;
+
+/// A pose that covers less of what the reference pose covers has no say.
+const LEAST_COVERED: f64 = 0.25;
+
+/// The cost at a pose among the costs of others; all but the last in robust standard deviations of the
+/// costs around the reference.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Appearance {
+    /// How far below the median of those around the reference.
+    depth: f64,
+    /// How far below the least of them.
+    margin: f64,
+    /// How far below the mean of its neighbours in the nearer ring and in the farther.
+    rises: [f64; 2],
+    /// How far below the reference pose.
+    below_start: f64,
+    /// Share of the cost of independent photos that is saved.
+    gain: f64,
+}
+
+impl Appearance {
+    /// What is seen at a pose of the query's camera in the reference camera's frame. Where nothing can be
+    /// compared, nothing speaks for the pose.
+    pub(super) fn of(problem: &Problem, params: &Params, reference_from_query: &Pose) -> Self {
+        let judge = Judge::new(problem, &params.render, &params.judge, SHRINK);
+        let mut poses = vec![*reference_from_query, Pose::identity()];
+        poses.extend(neighbours(reference_from_query));
+        let first_around = poses.len();
+        poses.extend(around());
+        let scores = judge.score(&poses);
+        Self::among(&scores, first_around).unwrap_or_default()
+    }
+
+    /// From the scores of the pose, the reference pose, both rings, and those around the reference.
+    fn among(scores: &[Score], first_around: usize) -> Option<Self> {
+        let (of_poses, around) = scores.split_at(first_around);
+        let [pose, start, beside @ ..] = of_poses else {
+            return None;
+        };
+        let least_covered = (LEAST_COVERED * f64::from(start.covered)) as u32;
+        let mut around: Vec<f64> = around
+            .iter()
+            .filter_map(|score| score.eligible_cost(least_covered))
+            .collect();
+        let least = around.iter().copied().reduce(f64::min)?;
+        let (centre, deviation) = centre_and_deviation(&mut around)?;
+        let cost = pose.cost?;
+        let above = |other: f64| (other - cost) / deviation;
+        // Neighbours that show nothing are no better than the pose.
+        let mean = |ring: &[Score]| {
+            let costs = ring.iter().map(|score| score.cost.unwrap_or(cost));
+            costs.sum::<f64>() / ring.len().max(1) as f64
+        };
+        let (nearer, farther) = beside.split_at(beside.len() / 2);
+        Some(Self {
+            depth: above(centre),
+            margin: above(least),
+            rises: [above(mean(nearer)), above(mean(farther))],
+            below_start: above(start.cost.unwrap_or(1.0)),
+            gain: 1.0 - cost,
+        })
+    }
+
+    /// The signals: depth, margin, both rises, above the start, gain.
+    pub(super) fn signals(&self) -> [f64; 6] {
+        /// Below this the logarithm tells nothing but how small it is.
+        const LEAST_GAIN: f64 = 1e-3;
+        [
+            tamed(self.depth),
+            tamed(self.margin),
+            tamed(self.rises[0]),
+            tamed(self.rises[1]),
+            tamed(self.below_start),
+            self.gain.max(LEAST_GAIN).ln(),
+        ]
+    }
+}
+
+/// The pose moved along and turned about each of its axes, to both sides, by the step of each ring.
+fn neighbours(pose: &Pose) -> impl Iterator<Item = Pose> + '_ {
+    RINGS_M.into_iter().flat_map(move |step_m| {
+        let step_rad = (DEG_PER_M * step_m).to_radians();
+        let steps = [step_m, step_m, step_m, step_rad, step_rad, step_rad];
+        let both = |axis: usize| [(axis, 1.0), (axis, -1.0)];
+        (0..steps.len()).flat_map(both).map(move |(axis, sign)| {
+            let mut by = [0.0; 6];
+            by[axis] = sign * steps[axis];
+            moved(pose, &by)
+        })
+    })
+}
+
+/// Poses on a spiral around the reference, in its plane.
+fn around() -> impl Iterator<Item = Pose> {
+    (0..AROUND).map(|k| {
+        let distance_m = AROUND_M * ((k as f64 + 0.5) / AROUND as f64).sqrt();
+        let angle = GOLDEN_RAD * k as f64;
+        let turn = TURN_DEG.to_radians() * ((k % 5) as f64 - 2.0);
+        let mut pose = Pose::translation(distance_m * angle.sin(), 0.0, distance_m * angle.cos());
+        pose.rotation = yaw(turn);
+        pose
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn score(cost: f64, covered: u32) -> Score {
+        Score {
+            cost: Some(cost),
+            covered,
+        }
+    }
+
+    #[test]
+    fn a_pose_that_is_cheaper_than_all_others_stands_out_and_one_among_them_does_not() {
+        let around = [0.96, 0.97, 0.98, 0.99, 1.0].map(|cost| score(cost, 100));
+        let seen = |cost: f64| {
+            let mut scores = vec![score(cost, 100), score(0.97, 100)];
+            scores.extend([score(0.9, 100), score(0.94, 100)]);
+            scores.extend(around);
+            Appearance::among(&scores, 4).expect("costs")
+        };
+        // Their median is 0.98, and so are they spread by 1.4826 times 0.01.
+        let (deviation, seen, among) = (0.014_826, seen(0.8), seen(0.98));
+        assert!((seen.depth - 0.18 / deviation).abs() < 1e-9);
+        assert!((seen.margin - 0.16 / deviation).abs() < 1e-9);
+        assert!((seen.rises[0] - 0.1 / deviation).abs() < 1e-9);
+        assert!((seen.rises[1] - 0.14 / deviation).abs() < 1e-9);
+        assert!((seen.below_start - 0.17 / deviation).abs() < 1e-9);
+        assert!(among.depth.abs() < 1e-9 && among.margin < 0.0);
+    }
+
+    #[test]
+    fn what_covers_too_little_has_no_say_and_without_costs_nothing_speaks_for_a_pose() {
+        let mut scores = vec![
+            score(0.8, 100),
+            score(0.97, 100),
+            score(0.9, 100),
+            score(0.9, 100),
+        ];
+        scores.extend([
+            score(0.1, 24),
+            score(0.95, 25),
+            score(0.97, 100),
+            score(0.99, 100),
+        ]);
+        let seen = Appearance::among(&scores, 4).expect("costs");
+        // The cheap one covers less than a quarter of what the reference pose covers.
+        assert!(seen.margin > 0.0);
+        let nothing = Score {
+            cost: None,
+            covered: 0,
+        };
+        assert!(Appearance::among(&[nothing; 6], 4).is_none());
+        assert!(
+            Appearance::default()
+                .signals()
+                .iter()
+                .all(|s| s.is_finite())
+        );
+    }
+
+    #[test]
+    fn the_poses_around_a_reference_fill_its_disc_to_all_sides() {
+        let poses: Vec<Pose> = around().collect();
+        assert_eq!(poses.len(), AROUND);
+        let mut quarters = [0; 4];
+        for pose in &poses {
+            let at = pose.translation.vector;
+            assert!(at.norm() < AROUND_M && at.y == 0.0);
+            quarters[usize::from(at.x > 0.0) + 2 * usize::from(at.z > 0.0)] += 1;
+        }
+        assert!(quarters.iter().all(|&count| count >= 14), "{quarters:?}");
+        assert_eq!(neighbours(&Pose::identity()).count(), 24);
+    }
+}
