@@ -23,6 +23,7 @@ use crate::grid::{Phase, ScoredLattice};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
+use appearance::Look;
 use inliers::Inliers;
 use minimum::Minimum;
 use settled::Settled;
@@ -81,7 +82,7 @@ impl Trust {
         outcome.pose.as_ref().ok()?;
         let method = responsible(method, outcome);
         match Family::of(method)? {
-            Family::Features => of_features(problem, method, params, evidence),
+            Family::Features(look) => of_features(problem, method, params, evidence, look),
             Family::Search => of_search(method, outcome, evidence),
             Family::Settled => of_settled(method, outcome, evidence),
         }
@@ -142,8 +143,8 @@ pub fn signals(
     outcome.pose.as_ref().ok()?;
     let method = responsible(method, outcome);
     match Family::of(method)? {
-        Family::Features => {
-            let consensus = Inliers::of(problem, params, evidence)?;
+        Family::Features(look) => {
+            let consensus = Inliers::of(problem, params, evidence, look)?;
             Some(consensus.signals(evidence))
         }
         Family::Search => Some(Minimum::of(outcome, evidence)?.signals()),
@@ -153,8 +154,8 @@ pub fn signals(
 
 /// What the poses of a method are judged by.
 enum Family {
-    /// The inliers of a consensus.
-    Features,
+    /// The inliers of a consensus, and what is seen at its pose.
+    Features(Look),
     /// The lattices of a search, one after the other.
     Search,
     /// Where many starts of a search settled.
@@ -165,10 +166,10 @@ impl Family {
     /// `None` for hybrids, which have none of their own, and for other systems.
     fn of(method: Method) -> Option<Self> {
         match &estimator::find(method)?.parts {
-            Parts::Features => Some(Self::Features),
+            Parts::Features => Some(Self::Features(Look::QUICK)),
             Parts::Cost(_) => Some(Self::Search),
             Parts::Own(own) if own.shows.is_some() => Some(Self::Settled),
-            Parts::Own(_) => Some(Self::Features),
+            Parts::Own(_) => Some(Self::Features(Look::THOROUGH)),
             Parts::Hybrid(_) => None,
         }
     }
@@ -179,8 +180,9 @@ fn of_features(
     method: Method,
     params: &Params,
     evidence: &Evidence,
+    look: Look,
 ) -> Option<Trust> {
-    let inliers = Inliers::of(problem, params, evidence)?;
+    let inliers = Inliers::of(problem, params, evidence, look)?;
     let signals = inliers.signals(evidence);
     let covariance = inliers.covariance;
     let deviation = |first: usize| {

@@ -308,13 +308,19 @@ fn shrunk(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> (GrayImage, J
         return (photo.clone(), params.clone());
     }
     let (width, height) = (photo.width() / shrink, photo.height() / shrink);
+    let row_of = |row: u32| {
+        let start = (row * photo.width()) as usize;
+        &photo.as_raw()[start..start + photo.width() as usize]
+    };
     let smaller = GrayImage::from_fn(width.max(1), height.max(1), |x, y| {
-        let columns = x * shrink..((x + 1) * shrink).min(photo.width());
+        let columns = (x * shrink) as usize..((x + 1) * shrink).min(photo.width()) as usize;
         let rows = y * shrink..((y + 1) * shrink).min(photo.height());
         let count = (columns.len() * rows.len()).max(1) as u32;
         let sum: u32 = rows
-            .flat_map(|row| columns.clone().map(move |column| (column, row)))
-            .map(|(column, row)| u32::from(photo.get_pixel(column, row).0[0]))
+            .map(|row| {
+                let values = &row_of(row)[columns.clone()];
+                values.iter().map(|&value| u32::from(value)).sum::<u32>()
+            })
             .sum();
         image::Luma([((sum + count / 2) / count) as u8])
     });

@@ -3,7 +3,7 @@
 //! Features that repeat, the windows of one house and of another, agree on a pose as well as those of one
 //! place do. The photos as a whole do not: drawn at a right pose the reference's cloud goes with the query
 //! far better than at poses beside it, or elsewhere around the reference. The cost is that of the
-//! [judge](crate::judge), on photos of half the size.
+//! [judge](crate::judge), on smaller photos.
 
 use super::{centre_and_deviation, tamed};
 use crate::geometry::{Pose, yaw};
@@ -12,11 +12,29 @@ use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::Score;
 
-/// How many times smaller the photos are: as telling as they are whole, at a fifth of the time.
-const SHRINK: u32 = 2;
+/// How closely one looks. A method's coefficients belong to its look.
+#[derive(Clone, Copy)]
+pub(super) struct Look {
+    /// How many times smaller the photos are.
+    shrink: u32,
+    /// Poses around the reference that a pose is held against.
+    around: usize,
+}
 
-/// Poses around the reference that a pose is held against, and how far they go \[m\].
-const AROUND: usize = 64;
+impl Look {
+    /// For a method that takes a tenth of a second.
+    pub(super) const QUICK: Self = Self {
+        shrink: 4,
+        around: 48,
+    };
+    /// For one that takes its time: it doubts two right poses where a quick look doubts three.
+    pub(super) const THOROUGH: Self = Self {
+        shrink: 2,
+        around: 64,
+    };
+}
+
+/// How far the poses around the reference go \[m\].
 const AROUND_M: f64 = 8.0;
 
 /// Poses around the reference are turned by up to twice this to both sides \[°\].
@@ -51,12 +69,17 @@ pub(super) struct Appearance {
 impl Appearance {
     /// What is seen at a pose of the query's camera in the reference camera's frame. Where nothing can be
     /// compared, nothing speaks for the pose.
-    pub(super) fn of(problem: &Problem, params: &Params, reference_from_query: &Pose) -> Self {
-        let judge = Judge::new(problem, &params.render, &params.judge, SHRINK);
+    pub(super) fn of(
+        problem: &Problem,
+        params: &Params,
+        reference_from_query: &Pose,
+        look: Look,
+    ) -> Self {
+        let judge = Judge::new(problem, &params.render, &params.judge, look.shrink);
         let mut poses = vec![*reference_from_query, Pose::identity()];
         poses.extend(neighbours(reference_from_query));
         let first_around = poses.len();
-        poses.extend(around());
+        poses.extend(around(look.around));
         let scores = judge.score(&poses);
         Self::among(&scores, first_around).unwrap_or_default()
     }
@@ -121,9 +144,9 @@ fn neighbours(pose: &Pose) -> impl Iterator<Item = Pose> + '_ {
 }
 
 /// Poses on a spiral around the reference, in its plane.
-fn around() -> impl Iterator<Item = Pose> {
-    (0..AROUND).map(|k| {
-        let distance_m = AROUND_M * ((k as f64 + 0.5) / AROUND as f64).sqrt();
+fn around(count: usize) -> impl Iterator<Item = Pose> {
+    (0..count).map(move |k| {
+        let distance_m = AROUND_M * ((k as f64 + 0.5) / count as f64).sqrt();
         let angle = GOLDEN_RAD * k as f64;
         let turn = TURN_DEG.to_radians() * ((k % 5) as f64 - 2.0);
         let mut pose = Pose::translation(distance_m * angle.sin(), 0.0, distance_m * angle.cos());
@@ -194,15 +217,15 @@ mod tests {
 
     #[test]
     fn the_poses_around_a_reference_fill_its_disc_to_all_sides() {
-        let poses: Vec<Pose> = around().collect();
-        assert_eq!(poses.len(), AROUND);
+        let poses: Vec<Pose> = around(48).collect();
+        assert_eq!(poses.len(), 48);
         let mut quarters = [0; 4];
         for pose in &poses {
             let at = pose.translation.vector;
             assert!(at.norm() < AROUND_M && at.y == 0.0);
             quarters[usize::from(at.x > 0.0) + 2 * usize::from(at.z > 0.0)] += 1;
         }
-        assert!(quarters.iter().all(|&count| count >= 14), "{quarters:?}");
+        assert!(quarters.iter().all(|&count| count >= 10), "{quarters:?}");
         assert_eq!(neighbours(&Pose::identity()).count(), 24);
     }
 }

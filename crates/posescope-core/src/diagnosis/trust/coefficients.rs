@@ -19,7 +19,7 @@ pub fn probability(method: Method, signals: &[f64]) -> Option<f64> {
 const FITTED: &[(&str, &[f64])] = &[
     // constant, inliers, inlier_share, beyond_chance, spread, deviation, residual,
     // seen_depth, seen_margin, seen_rise, seen_rise_farther, seen_above_start, seen_gain
-    ("fb", &[3.6239, -0.3059, 3.0852, 0.1270, 11.3324, 0.4606, -0.5786, -0.5996, 0.5833, 0.6771, 0.3436, 0.5552, 1.5098]),
+    ("fb", &[2.7052, 0.0420, 2.0218, 0.3721, 11.1678, 0.5541, -0.3955, -0.6804, 0.3102, 0.9499, 0.1482, 0.6220, 1.4363]),
     ("fb2", &[-1.9328, 0.6896, -4.0353, 0.3781, 3.7045, 0.4104, -0.4568, -0.2895, 0.7448, 0.4407, 0.3515, 1.1839, 0.3380]),
     // constant, depth, refined_by, margin, above_start, gain, coverage, yaw_depth
     ("mi", &[-6.6958, 0.5146, 0.3756, 1.1216, -0.2002, 4.2765, 0.7650, 3.3455]),

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix6;
 
-use super::appearance::Appearance;
+use super::appearance::{Appearance, Look};
 use super::{Signals, median};
 use crate::diagnosis::Evidence;
 use crate::features::FeatureState;
@@ -40,7 +40,12 @@ pub(super) struct Inliers {
 }
 
 impl Inliers {
-    pub(super) fn of(problem: &Problem, params: &Params, evidence: &Evidence) -> Option<Self> {
+    pub(super) fn of(
+        problem: &Problem,
+        params: &Params,
+        evidence: &Evidence,
+        look: Look,
+    ) -> Option<Self> {
         let features = evidence.query.as_ref()?;
         let (states, lifted) = (evidence.states.as_ref()?, evidence.lifted.as_ref()?);
         let refined = evidence.refined.as_ref()?;
@@ -69,7 +74,7 @@ impl Inliers {
             spread: root_mean_square_distance(&inliers) / width.hypot(height),
             median_residual_px,
             covariance: pose_covariance(&inliers, intrinsics, &camera_from_reference, sigma_px),
-            appearance: Appearance::of(problem, params, &refined.reference_from_query),
+            appearance: Appearance::of(problem, params, &refined.reference_from_query, look),
         })
     }
 
