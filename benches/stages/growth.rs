@@ -5,6 +5,7 @@
 //! the environment.
 
 mod pair;
+mod table;
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -13,7 +14,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use cpu_time::ProcessTime;
-use plotters::prelude::*;
 use posescope::camera::Intrinsics;
 use posescope::cost::{Cost, MutualInformation, MutualInformationParams};
 use posescope::features::{Descriptor, Features, SurfParams, nearest_neighbours, surf};
@@ -23,6 +23,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use self::pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
+use self::table::Table;
 
 const POINTS: [usize; 8] = [
     2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000,
@@ -47,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::create_dir_all(folder)?;
     let mut text = String::new();
     for table in [by_points(), by_size(), by_bins(), by_keypoints()] {
-        table.write(&mut text)?;
+        write(&table, &mut text)?;
         table.draw(&folder.join(table.name).with_extension("svg"))?;
     }
     print!("{text}");
@@ -55,90 +56,26 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Times over a quantity.
-struct Table {
-    name: &'static str,
-    quantity: &'static str,
-    unit: &'static str,
-    columns: Vec<&'static str>,
-    /// The quantity, and the times in `unit`.
-    rows: Vec<(f64, Vec<f64>)>,
-}
-
-impl Table {
-    fn write(&self, text: &mut String) -> std::fmt::Result {
-        let Self {
-            quantity,
-            unit,
-            columns,
-            ..
-        } = self;
-        write!(text, "\n| {quantity} |")?;
-        for column in columns {
-            write!(text, " {column} ({unit}) |")?;
-        }
-        writeln!(text, "\n|--:|{}", "--:|".repeat(columns.len()))?;
-        for (at, times) in &self.rows {
-            write!(text, "| {at} |")?;
-            for time in times {
-                write!(text, " {time:.4} |")?;
-            }
-            writeln!(text)?;
-        }
-        Ok(())
+fn write(table: &Table, text: &mut String) -> std::fmt::Result {
+    let Table {
+        quantity,
+        unit,
+        columns,
+        ..
+    } = table;
+    write!(text, "\n| {quantity} |")?;
+    for column in columns {
+        write!(text, " {column} ({unit}) |")?;
     }
-
-    /// Both axes are logarithmic: a straight line is a power.
-    fn draw(&self, path: &Path) -> Result<(), Box<dyn Error>> {
-        /// Okabe and Ito's colours, which colour-blind readers tell apart.
-        const COLORS: [RGBColor; 3] = [
-            RGBColor(0x00, 0x72, 0xB2),
-            RGBColor(0xD5, 0x5E, 0x00),
-            RGBColor(0x00, 0x9E, 0x73),
-        ];
-        let all = || {
-            self.rows
-                .iter()
-                .flat_map(|(_, times)| times.iter().copied())
-        };
-        let least = all().fold(f64::INFINITY, f64::min) * 0.7;
-        let most = all().fold(0.0, f64::max) * 1.4;
-        let (Some(first), Some(last)) = (self.rows.first(), self.rows.last()) else {
-            return Ok(());
-        };
-        let area = SVGBackend::new(path, (640, 400)).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(40)
-            .y_label_area_size(60)
-            .build_cartesian_2d((first.0..last.0).log_scale(), (least..most).log_scale())?;
-        chart
-            .configure_mesh()
-            .x_desc(self.quantity)
-            .y_desc(format!("time ({})", self.unit))
-            .draw()?;
-        for (index, name) in self.columns.iter().enumerate() {
-            let color = COLORS[index % COLORS.len()];
-            let line = self.rows.iter().map(|(at, times)| (*at, times[index]));
-            let corners = line
-                .clone()
-                .map(|corner| Circle::new(corner, 3, color.filled()));
-            chart
-                .draw_series(LineSeries::new(line, color.stroke_width(2)))?
-                .label(*name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], color));
-            chart.draw_series(corners)?;
+    writeln!(text, "\n|--:|{}", "--:|".repeat(columns.len()))?;
+    for (at, times) in &table.rows {
+        write!(text, "| {at} |")?;
+        for time in times {
+            write!(text, " {time:.4} |")?;
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .border_style(BLACK)
-            .background_style(WHITE)
-            .draw()?;
-        area.present()?;
-        Ok(())
+        writeln!(text)?;
     }
+    Ok(())
 }
 
 /// A hypothesis of PM and of MI over the points of the cloud.
@@ -251,7 +188,8 @@ fn by_bins() -> Table {
 
 /// Finding, describing and matching features over their number.
 ///
-/// The photos are enlarged twice, and nearly everything counts as a feature, so that there are enough.
+/// The photos are enlarged twice and made grainy, and nearly everything counts as a feature, so that there are
+/// enough.
 fn by_keypoints() -> Table {
     let photos = [&PAIR.query.photo.gray, &PAIR.reference.photo.gray];
     let [query, reference] = photos.map(enlarged);
@@ -312,8 +250,10 @@ fn median<T>(mut work: impl FnMut() -> T) -> f64 {
     times[ROUNDS / 2]
 }
 
-/// Twice as wide and high, a pixel between two their mean.
+/// Twice as wide and high, a pixel between two their mean, with grain: enlarging alone adds no blobs.
 fn enlarged(photo: &GrayImage) -> GrayImage {
+    const GRAIN: i32 = 24;
+    let mut rng = Pcg64::seed_from_u64(5);
     let (width, height) = (photo.width(), photo.height());
     let value = |x: u32, y: u32| {
         let at =
@@ -322,5 +262,8 @@ fn enlarged(photo: &GrayImage) -> GrayImage {
         let [top, bottom] = [y / 2, y.div_ceil(2)];
         (at(left, top) + at(right, top) + at(left, bottom) + at(right, bottom)) / 4
     };
-    GrayImage::from_fn(2 * width, 2 * height, |x, y| [value(x, y) as u8].into())
+    GrayImage::from_fn(2 * width, 2 * height, |x, y| {
+        let grainy = value(x, y) as i32 + rng.random_range(-GRAIN..=GRAIN);
+        [grainy.clamp(0, 255) as u8].into()
+    })
 }
