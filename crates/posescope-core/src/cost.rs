@@ -10,6 +10,7 @@
 
 mod evaluator;
 mod joint_histogram;
+mod lesser_half;
 mod median;
 mod mutual_information;
 mod orientation;

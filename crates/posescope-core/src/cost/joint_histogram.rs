@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use fearless_simd::{Level, Simd, SimdFloat as _, dispatch};
+use fearless_simd::{Level, Simd, SimdBase as _, SimdFloat as _, dispatch, u8x32};
 
 use super::{BinPair, IntensityPair};
 
@@ -162,20 +162,26 @@ fn put_into_bins_by<S: Simd>(
 ) {
     let scale = bins as f32 / 256.0;
     let last = (bins - 1) as f32;
-    let (fours, rest) = pairs.as_chunks::<4>();
-    let (binned_fours, binned_rest) = binned.as_chunks_mut::<4>();
-    for (binned, pairs) in binned_fours.iter_mut().zip(fours) {
-        let values: [f32; 8] = std::array::from_fn(|i| match i % 2 {
-            0 => pairs[i / 2].query,
-            _ => pairs[i / 2].synthetic,
-        });
-        let values = simd.load_array_f32x8(values) * scale;
-        let values = values.max(0.0).min(last);
-        let bytes = simd.as_array_i32x8(simd.cvt_i32_f32x8(values));
-        *binned = std::array::from_fn(|i| BinPair {
-            query: bytes[2 * i] as u8,
-            synthetic: bytes[2 * i + 1] as u8,
-        });
+    let (groups, rest) = pairs.as_chunks::<16>();
+    let (binned_groups, binned_rest) = binned.as_chunks_mut::<16>();
+    for (binned, pairs) in binned_groups.iter_mut().zip(groups) {
+        let mut wide = [u8x32::splat(simd, 0); 4];
+        for (wide, four) in wide.iter_mut().zip(pairs.as_chunks::<4>().0) {
+            let values: [f32; 8] = std::array::from_fn(|i| match i % 2 {
+                0 => four[i / 2].query,
+                _ => four[i / 2].synthetic,
+            });
+            let values = simd.load_array_f32x8(values) * scale;
+            let values = simd.cvt_i32_f32x8(values.max(0.0).min(last));
+            *wide = simd.reinterpret_u8_i32x8(values);
+        }
+        // Of four bytes of a number, the first is the bin.
+        let [a, b, c, d] = wide;
+        let [ab, cd] = [simd.unzip_low_u8x32(a, b), simd.unzip_low_u8x32(c, d)];
+        let bytes = simd.as_array_u8x32(simd.unzip_low_u8x32(ab, cd));
+        for (binned, &[query, synthetic]) in binned.iter_mut().zip(bytes.as_chunks::<2>().0) {
+            *binned = BinPair { query, synthetic };
+        }
     }
     for (binned, pair) in binned_rest.iter_mut().zip(rest) {
         binned.query = byte_bin(pair.query, bins);
@@ -185,40 +191,79 @@ fn put_into_bins_by<S: Simd>(
 
 /// Counts the pairs of bins, in the place of what `counts` held: `bins` × `bins`, rows are the query's.
 pub fn count_pairs(pairs: &[BinPair], bins: usize, counts: &mut Vec<u32>) {
-    // Neighbours often fall into the same cell. Counted apart, no count waits for the last one. Of
-    // large tables, adding up several would take longer than that saves.
-    const TABLES: usize = 4;
-    const MOST_CELLS_COUNTED_APART: usize = 1024;
     let cells = bins * bins;
-    let apart = cells <= MOST_CELLS_COUNTED_APART;
     counts.clear();
-    counts.resize(if apart { TABLES * cells } else { cells }, 0);
-    let cell = |pair: &BinPair| usize::from(pair.query) * bins + usize::from(pair.synthetic);
-    if !apart {
-        for pair in pairs {
-            counts[cell(pair)] += 1;
-        }
-        return;
-    }
-    let (first, others) = counts.split_at_mut(cells);
-    let (second, others) = others.split_at_mut(cells);
-    let (third, fourth) = others.split_at_mut(cells);
-    let fours = pairs.chunks_exact(TABLES);
-    for pair in fours.remainder() {
-        first[cell(pair)] += 1;
-    }
-    for four in fours {
-        first[cell(&four[0])] += 1;
-        second[cell(&four[1])] += 1;
-        third[cell(&four[2])] += 1;
-        fourth[cell(&four[3])] += 1;
-    }
-    for table in [second, third, fourth] {
-        for (sum, count) in first.iter_mut().zip(table) {
-            *sum += *count;
+    counts.resize(cells, 0);
+    let level = Level::new();
+    match cells {
+        ..=256 => dispatch!(level, _simd => count_apart::<u8, 256>(pairs, bins, counts)),
+        ..=1024 => dispatch!(level, _simd => count_apart::<u16, 1024>(pairs, bins, counts)),
+        // Of large tables, adding up several would take longer than that saves.
+        _ => {
+            for pair in pairs {
+                counts[usize::from(pair.query) * bins + usize::from(pair.synthetic)] += 1;
+            }
         }
     }
-    counts.truncate(cells);
+}
+
+/// Counts pairs in several tables of `CELLS` cells: neighbours often fall into the same cell, and counted apart, no
+/// count waits for the last one. Cells are numbers of a `Cell`, many of which are made at once.
+#[inline(always)]
+fn count_apart<Cell: CellNumber, const CELLS: usize>(
+    pairs: &[BinPair],
+    bins: usize,
+    counts: &mut [u32],
+) {
+    const AT_A_TIME: usize = 512;
+    let mut tables = [[0_u32; CELLS]; 4];
+    let mut cells = [Cell::default(); AT_A_TIME];
+    for pairs in pairs.chunks(AT_A_TIME) {
+        for (cell, pair) in cells.iter_mut().zip(pairs) {
+            *cell = Cell::of(pair, bins);
+        }
+        let [a, b, c, d] = &mut tables;
+        // A view has no 2³² pixels, and checks would cost a tenth of the time.
+        let put = |table: &mut [u32; CELLS], cell: Cell| {
+            let count = &mut table[cell.into()];
+            *count = count.wrapping_add(1);
+        };
+        let (fours, rest) = cells[..pairs.len()].as_chunks::<4>();
+        for &[first, second, third, fourth] in fours {
+            put(a, first);
+            put(b, second);
+            put(c, third);
+            put(d, fourth);
+        }
+        for &cell in rest {
+            put(a, cell);
+        }
+    }
+    let [a, b, c, d] = &tables;
+    for (cell, count) in counts.iter_mut().enumerate() {
+        *count = a[cell] + b[cell] + c[cell] + d[cell];
+    }
+}
+
+/// The number of a cell of a joint histogram that has no more cells than there are numbers.
+trait CellNumber: Copy + Default + Into<usize> {
+    fn of(pair: &BinPair, bins: usize) -> Self;
+}
+
+impl CellNumber for u8 {
+    #[inline(always)]
+    fn of(pair: &BinPair, bins: usize) -> Self {
+        let row = pair.query.wrapping_mul(bins as Self);
+        row.wrapping_add(pair.synthetic)
+    }
+}
+
+impl CellNumber for u16 {
+    #[inline(always)]
+    fn of(pair: &BinPair, bins: usize) -> Self {
+        let row = Self::from(pair.query).wrapping_mul(bins as Self);
+        row.wrapping_add(pair.synthetic.into())
+    }
 }
 
 fn cell(pair: &IntensityPair, bins: usize) -> usize {

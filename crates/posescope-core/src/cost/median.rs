@@ -6,7 +6,8 @@ use fearless_simd::{Level, dispatch};
 const IGNORED_BITS: u32 = 18;
 /// All numbers below have one bin. Of squared differences of grey values such are few.
 const LEAST: f32 = 1.0 / 256.0;
-const BINS: usize = 32 * 24 + 2;
+const FIRST: u32 = LEAST.to_bits() >> IGNORED_BITS;
+pub(super) const BINS: usize = 32 * 24 + 2;
 
 /// Counts are kept in so many tables: neighbours often fall into the same bin, and a count that was just
 /// written would have to be waited for.
@@ -110,10 +111,17 @@ fn take_of(wanted: u16, bins: &[u16], values: &[f32], taken: &mut Vec<f32>) {
 
 /// The bin of a number ≥ 0. The bits of such numbers are in the order of the numbers.
 #[inline(always)]
-fn bin(value: f32) -> u16 {
-    let first = LEAST.to_bits() >> IGNORED_BITS;
-    let octaves = (value.to_bits() >> IGNORED_BITS).saturating_sub(first);
+pub(super) fn bin(value: f32) -> u16 {
+    let octaves = (value.to_bits() >> IGNORED_BITS).saturating_sub(FIRST);
     octaves.min(BINS as u32 - 1) as u16
+}
+
+/// The least number of a bin; of the first, 0.
+pub(super) fn least_of_bin(bin: u16) -> f32 {
+    match bin {
+        0 => 0.0,
+        _ => f32::from_bits((u32::from(bin) + FIRST) << IGNORED_BITS),
+    }
 }
 
 #[cfg(test)]

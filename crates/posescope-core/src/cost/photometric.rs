@@ -2,6 +2,7 @@
 
 use fearless_simd::{Level, dispatch};
 
+use super::lesser_half::LesserHalfFinder;
 use super::median::MedianFinder;
 use super::{
     Cost, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, LesserHalf, MakesCost,
@@ -148,8 +149,13 @@ impl Cost for Photometric {
         let level = Level::new();
         let mut errors = Vec::new();
         let mut medians = MedianFinder::new();
+        let mut halves = LesserHalfFinder::new();
+        let is_squared_again = self.params.power == 2;
         Evaluator::Pairs(Box::new(move |pairs| {
             dispatch!(level, _simd => squared_differences(pairs, &mut errors));
+            if !is_squared_again && let Some((counted, sum)) = halves.find(&errors) {
+                return Some(sum / f64::from(counted));
+            }
             let threshold = medians.lower_median(&errors)?;
             Some(dispatch!(level, _simd => self.mean_up_to(threshold, &errors)))
         }))

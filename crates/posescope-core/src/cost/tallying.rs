@@ -41,6 +41,11 @@ impl LesserHalf {
         (error + ROUNDING) - ROUNDING
     }
 
+    /// Whether errors that are rounded to units and have this sum were added exactly.
+    pub(super) fn is_exact(sum: f64) -> bool {
+        sum < Self::MOST_UNITS as f64 / UNITS
+    }
+
     /// The mean of the errors that count; `None` where none does.
     pub fn mean(&self) -> Option<f64> {
         (self.counted > 0).then(|| self.sum as f64 / UNITS / f64::from(self.counted))

@@ -1,0 +1,238 @@
+//! The lesser half of many numbers: how many they are, and their sum.
+
+use fearless_simd::{Level, Simd, SimdBase as _, SimdFloat as _, dispatch, f32x8, i32x8};
+
+use super::LesserHalf;
+use super::median::{BINS, bin, least_of_bin};
+
+/// Numbers that are looked at to guess the median, about.
+const SAMPLE: usize = 1024;
+/// Bins of the sample that tell how close the numbers lie, on each side of the median's.
+const BINS_BESIDE: usize = 2;
+/// The guess is corrected by counting what lies below it so many times.
+const CORRECTIONS: usize = 2;
+/// Numbers around the last guess that are compared with each other: a share of all, and some more.
+const SHARE_AROUND: f32 = 0.0015;
+const MORE_AROUND: f32 = 16.0;
+
+/// Finds number and sum of the numbers up to their lower median, one set after another.
+///
+/// The median is guessed from a sample, and the guess corrected by counting what lies below. Then what lies clearly
+/// below is added, and what lies around, a few numbers in a thousand, is put in order. That reads all numbers three
+/// times, some eight at a time, and is exact however good the guess.
+pub(super) struct LesserHalfFinder {
+    level: Level,
+    sampled: [u16; BINS],
+    around: Vec<f32>,
+}
+
+impl LesserHalfFinder {
+    pub fn new() -> Self {
+        Self {
+            level: Level::new(),
+            sampled: [0; BINS],
+            around: Vec::new(),
+        }
+    }
+
+    /// How many of some numbers ≥ 0 are no greater than their lower median, and the sum of these, each
+    /// [rounded](LesserHalf::rounded) to a unit: exact, so that no order has a part in it. `None` where the guess was
+    /// bad, the sum is too large to be exact, or there are no numbers.
+    pub fn find(&mut self, values: &[f32]) -> Option<(u32, f64)> {
+        let middle = values.len().checked_sub(1)? / 2;
+        let Guess {
+            mut median,
+            mut density,
+        } = self.guess(values, middle);
+        let level = self.level;
+        let mut last: Option<(f32, f32)> = None;
+        for _ in 0..CORRECTIONS {
+            let below = dispatch!(level, simd => count_below(simd, values, median)) as f32;
+            if let Some((value, before)) = last {
+                let measured = (below - before) / (median - value);
+                if measured > 0.0 && measured.is_finite() {
+                    density = measured;
+                }
+            }
+            last = Some((median, below));
+            median = (median + (middle as f32 - below) / density).max(0.0);
+        }
+        let reach = (SHARE_AROUND * values.len() as f32 + MORE_AROUND) / density;
+        let range = [median - reach, median + reach];
+        let around = &mut self.around;
+        around.clear();
+        let (below, sum) = dispatch!(level, _simd => add_below(values, range, around));
+        let place = middle.checked_sub(below as usize)?;
+        if place >= around.len() {
+            return None;
+        }
+        let (lesser, median, equal) = around.select_nth_unstable_by(place, f32::total_cmp);
+        let median = *median;
+        let equal = equal.iter().filter(|&&value| value <= median).count();
+        let units = |value: f32| LesserHalf::rounded(f64::from(value));
+        let sum = sum
+            + lesser.iter().map(|&value| units(value)).sum::<f64>()
+            + units(median) * (1 + equal) as f64;
+        let counted = below + (lesser.len() + 1 + equal) as u32;
+        LesserHalf::is_exact(sum).then_some((counted, sum))
+    }
+
+    /// What a sample tells.
+    fn guess(&mut self, values: &[f32], middle: usize) -> Guess {
+        let sampled = &mut self.sampled;
+        sampled.fill(0);
+        let step = values.len().div_ceil(SAMPLE);
+        for &value in values.iter().step_by(step) {
+            sampled[usize::from(bin(value))] += 1;
+        }
+        let size = values.len().div_ceil(step) as f32;
+        let all = values.len() as f32;
+        let place = middle as f32 / all * size;
+        let mut before = 0.0;
+        let of_median = sampled.iter().position(|&count| {
+            let within = place < before + f32::from(count);
+            before += if within { 0.0 } else { f32::from(count) };
+            within
+        });
+        let of_median = of_median.unwrap_or(BINS - 1);
+        let edge = |bin: usize| least_of_bin(bin as u16);
+        let within = (place - before) / f32::from(sampled[of_median].max(1));
+        let [low, high] = [edge(of_median), edge(of_median + 1)];
+        let beside = of_median.saturating_sub(BINS_BESIDE)..(of_median + 1 + BINS_BESIDE).min(BINS);
+        let [begin, end] = [beside.start, beside.end].map(edge);
+        let there: u16 = sampled[beside].iter().sum();
+        Guess {
+            median: low + (high - low) * within.clamp(0.0, 1.0),
+            density: f32::from(there) / size * all / (end - begin),
+        }
+    }
+}
+
+/// Where the median may be.
+struct Guess {
+    median: f32,
+    /// Numbers in an interval around it, over its length.
+    density: f32,
+}
+
+#[inline(always)]
+fn count_below<S: Simd>(simd: S, values: &[f32], limit: f32) -> u32 {
+    const SUMS: usize = 4;
+    let (groups, rest) = values.as_chunks::<{ 8 * SUMS }>();
+    let all_below = f32x8::splat(simd, limit);
+    let [one, none] = [1, 0].map(|number| i32x8::splat(simd, number));
+    let mut sums = [none; SUMS];
+    for group in groups {
+        for (sum, eight) in sums.iter_mut().zip(group.as_chunks::<8>().0) {
+            let is_below = f32x8::from_slice(simd, eight).simd_lt(all_below);
+            *sum += simd.select_i32x8(is_below, one, none);
+        }
+    }
+    let [a, b, c, d] = sums;
+    let sums = simd.as_array_i32x8((a + b) + (c + d));
+    let rest = rest.iter().filter(|&&value| value < limit);
+    sums.iter().sum::<i32>() as u32 + rest.count() as u32
+}
+
+/// Number and sum of what is less than the first limit; takes what is not and is less than the second.
+#[inline(always)]
+fn add_below(values: &[f32], limits: [f32; 2], around: &mut Vec<f32>) -> (u32, f64) {
+    const SUMS: usize = 16;
+    let [low, high] = limits;
+    let mut sums = [0.0_f64; SUMS];
+    let mut counted = [0_u32; SUMS];
+    let (groups, rest) = values.as_chunks::<SUMS>();
+    for group in groups {
+        for ((&value, sum), counted) in group.iter().zip(&mut sums).zip(&mut counted) {
+            let is_below = value < low;
+            *sum += LesserHalf::rounded(f64::from(if is_below { value } else { 0.0 }));
+            // There are no 2³² numbers; a check would keep several from being added at once.
+            *counted = counted.wrapping_add(u32::from(is_below));
+        }
+        // Not `any`, which would stop early and so compare one by one.
+        let is_near = group.iter().fold(false, |found, &value| {
+            found | ((value >= low) & (value < high))
+        });
+        if is_near {
+            take_between(group, limits, around);
+        }
+    }
+    take_between(rest, limits, around);
+    let below = || rest.iter().filter(|&&value| value < low);
+    let sum = below()
+        .map(|&value| LesserHalf::rounded(f64::from(value)))
+        .sum::<f64>();
+    (
+        counted.iter().sum::<u32>() + below().count() as u32,
+        sums.iter().sum::<f64>() + sum,
+    )
+}
+
+#[inline(never)]
+fn take_between(values: &[f32], [low, high]: [f32; 2], taken: &mut Vec<f32>) {
+    let between = values.iter().filter(|&&value| value >= low && value < high);
+    taken.extend(between);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn by_sorting(values: &[f32]) -> (u32, f64) {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f32::total_cmp);
+        let median = sorted[(values.len() - 1) / 2];
+        let lesser = sorted.iter().filter(|&&value| value <= median);
+        let sum = lesser
+            .clone()
+            .map(|&value| LesserHalf::rounded(f64::from(value)));
+        (lesser.count() as u32, sum.sum())
+    }
+
+    proptest! {
+        #[test]
+        fn number_and_sum_are_those_of_the_sorted_numbers(
+            sets in prop::collection::vec(
+                prop::collection::vec(
+                    prop_oneof![0.0_f32..1e-3, 0.0_f32..300.0, 0.0_f32..65_025.0, Just(0.0), Just(49.0)],
+                    1..3000,
+                ),
+                1..3,
+            ),
+            baseline: bool,
+        ) {
+            let level = if baseline { Level::baseline() } else { Level::new() };
+            let mut finder = LesserHalfFinder { level, ..LesserHalfFinder::new() };
+            for values in sets {
+                if let Some((counted, sum)) = finder.find(&values) {
+                    let expected = by_sorting(&values);
+                    prop_assert_eq!((counted, sum.to_bits()), (expected.0, expected.1.to_bits()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn it_hardly_ever_guesses_badly() {
+        let mut finder = LesserHalfFinder::new();
+        let found = (0..200_u32).filter(|&set| {
+            let number = |i: u32| {
+                let hashed = (i + 7919 * set).wrapping_mul(2_654_435_761);
+                let difference = (hashed >> 8) as f32 / 65_536.0;
+                difference * difference
+            };
+            let values: Vec<f32> = (0..2000 + 300 * set).map(number).collect();
+            let found = finder.find(&values);
+            found.is_none_or(|found| found == by_sorting(&values)) && found.is_some()
+        });
+        assert!(found.count() >= 190);
+    }
+
+    #[test]
+    fn what_cannot_be_added_exactly_is_not_added() {
+        assert_eq!(LesserHalfFinder::new().find(&[]), None);
+        assert_eq!(LesserHalfFinder::new().find(&[1e30; 100]), None);
+        assert_eq!(LesserHalfFinder::new().find(&[f32::NAN; 100]), None);
+    }
+}
