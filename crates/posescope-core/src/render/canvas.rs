@@ -1,9 +1,11 @@
 //! Drawing one hypothesis after the other, fast: what the direct methods spend their time on.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use fearless_simd::{Level, Simd, dispatch};
 
 use super::ColoredPoint;
-use super::projection::{Eight, Projection};
+use super::projection::{Eight, Projection, Turn, loaded};
 use crate::camera::Intrinsics;
 use crate::cost::Pair;
 use crate::geometry::Pose;
@@ -13,6 +15,8 @@ const LANES: usize = 8;
 
 /// Positions of points as a structure of arrays, so that several are projected at once.
 pub struct PointArrays {
+    /// No other points have it.
+    number: u64,
     /// Coordinates along x, y and z \[m\], filled up to whole vectors with points that no camera sees.
     coordinates: [Vec<f32>; 3],
 }
@@ -27,7 +31,9 @@ impl PointArrays {
                 .chain(std::iter::repeat_n(f32::NAN, padding))
                 .collect()
         };
+        static COUNT: AtomicU64 = AtomicU64::new(0);
         Self {
+            number: COUNT.fetch_add(1, Ordering::Relaxed),
             coordinates: [along(0), along(1), along(2)],
         }
     }
@@ -37,12 +43,10 @@ impl PointArrays {
         self.coordinates[0].len()
     }
 
-    /// Coordinates of the eight points from a place on.
+    /// Coordinates along x, y and z, eight points at a time.
     #[inline(always)]
-    fn eight(&self, first: usize) -> [&[f32]; 3] {
-        let eight = first..first + LANES;
-        let [x, y, z] = &self.coordinates;
-        [&x[eight.clone()], &y[eight.clone()], &z[eight]]
+    fn eights(&self) -> [&[[f32; LANES]]; 3] {
+        self.coordinates.each_ref().map(|axis| axis.as_chunks().0)
     }
 }
 
@@ -82,6 +86,10 @@ pub(super) struct Projected {
     pub(super) pixels: Vec<u32>,
     /// Depths \[m\].
     pub(super) depths: Vec<f32>,
+    /// What points were projected last, and how the camera was turned.
+    last: Option<(u64, Turn)>,
+    /// What the turn alone makes of them. A search moves the camera more often than it turns it.
+    turned: [Vec<[f32; LANES]>; 3],
 }
 
 /// The pixels on which points fell, in that order, and room for more.
@@ -168,7 +176,7 @@ impl<T: Copy + Default> Canvas<T> {
         let slots = self.slots.as_mut_slice();
         // Of equal lengths, as the compiler sees, so that one comparison serves both.
         let query = &values.query[..slots.len()];
-        let Projected { pixels, depths } = &self.projected;
+        let Projected { pixels, depths, .. } = &self.projected;
         for ((&pixel, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             let pixel = pixel as usize;
             if pixel < slots.len() {
@@ -189,7 +197,7 @@ impl<T: Copy + Default> Canvas<T> {
             [self.intrinsics.width, self.intrinsics.height].map(|side| side as i32);
         let slots = self.slots.as_mut_slice();
         let query = &values.query[..slots.len()];
-        let Projected { pixels, depths } = &self.projected;
+        let Projected { pixels, depths, .. } = &self.projected;
         for ((&pixel, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             if pixel == Eight::OUT_OF_VIEW {
                 continue;
@@ -234,10 +242,35 @@ impl Projected {
     ) {
         self.pixels.resize(points.len(), Eight::OUT_OF_VIEW);
         self.depths.resize(points.len(), 0.0);
-        for first in (0..points.len()).step_by(LANES) {
-            let eight = projection.eight(simd, points.eight(first));
-            self.pixels[first..first + LANES].copy_from_slice(&eight.pixels);
-            self.depths[first..first + LANES].copy_from_slice(&eight.depths);
+        let (pixels, _) = self.pixels.as_chunks_mut::<LANES>();
+        let (depths, _) = self.depths.as_chunks_mut::<LANES>();
+        let places = pixels.iter_mut().zip(depths);
+        let of_eight = projection.of_eight(simd);
+        let turn = Some((points.number, projection.turn()));
+        let is_known = self.last == turn;
+        self.last = turn;
+        if is_known {
+            let [a, b, c] = self.turned.each_ref().map(Vec::as_slice);
+            for ((((pixels, depths), a), b), c) in places.zip(a).zip(b).zip(c) {
+                let eight = of_eight.project(loaded(simd, [a, b, c]));
+                (*pixels, *depths) = (eight.pixels, eight.depths);
+            }
+            return;
+        }
+        let [x, y, z] = points.eights();
+        let [a, b, c] = self.turned.each_mut().map(|turned| {
+            turned.resize(x.len(), [0.0; LANES]);
+            turned.as_mut_slice()
+        });
+        let coordinates = x.iter().zip(y).zip(z);
+        let kept = a.iter_mut().zip(b).zip(c);
+        for (((pixels, depths), ((x, y), z)), ((a, b), c)) in places.zip(coordinates).zip(kept) {
+            let turned = of_eight.turned([x, y, z]);
+            *a = simd.as_array_f32x8(turned[0]);
+            *b = simd.as_array_f32x8(turned[1]);
+            *c = simd.as_array_f32x8(turned[2]);
+            let eight = of_eight.project(turned);
+            (*pixels, *depths) = (eight.pixels, eight.depths);
         }
     }
 }

@@ -92,7 +92,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
 
     #[inline(always)]
     fn draw_points(&mut self, values: Values<'_, T>) -> usize {
-        let Projected { pixels, depths } = &self.projected;
+        let Projected { pixels, depths, .. } = &self.projected;
         let nearest = &mut self.nearest[..values.query.len()];
         for (&pixel, &depth) in pixels.iter().zip(depths) {
             if let Some(there) = nearest.get_mut(pixel as usize) {
@@ -122,7 +122,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
             [self.intrinsics.width, self.intrinsics.height].map(|side| side as usize);
         let margin = 2 * self.reach;
         let stride = width + 2 * margin;
-        let Projected { pixels, depths } = &self.projected;
+        let Projected { pixels, depths, .. } = &self.projected;
         let nearest = self.nearest.as_mut_slice();
 
         let stream = pixels.len().div_ceil(STREAMS);

@@ -86,26 +86,72 @@ impl Projection {
         Some((floor(u + 0.5), floor(v + 0.5), depth))
     }
 
-    /// As [`Self::pixel_and_depth`] for eight points at once, by the same operations in the same order
-    /// and so with the same result.
+    /// What of it all cameras that look one way have in common: what coordinates are multiplied by.
+    pub fn turn(&self) -> Turn {
+        Turn(self.rows.map(|[x, y, z, _]| [x, y, z].map(f32::to_bits)))
+    }
+
+    /// The same for several points at once.
     #[inline(always)]
-    pub fn eight<S: Simd>(&self, simd: S, [x, y, z]: [&[f32]; 3]) -> Eight {
-        let points = [
-            f32x8::from_slice(simd, x),
-            f32x8::from_slice(simd, y),
-            f32x8::from_slice(simd, z),
-        ];
-        let depth = along(&self.rows[2], points);
-        let inverse = f32x8::splat(simd, 1.0) / depth;
-        let column = (along(&self.rows[0], points) * inverse + 0.5).floor();
-        let row = (along(&self.rows[1], points) * inverse + 0.5).floor();
+    pub fn of_eight<S: Simd>(&self, simd: S) -> ProjectionOfEight<S> {
+        let number = |value: f32| f32x8::splat(simd, value);
         let reach = self.reach as f32;
+        ProjectionOfEight {
+            simd,
+            factors: self.rows.map(|[x, y, z, _]| [x, y, z].map(number)),
+            added: self.rows.map(|[.., added]| number(added)),
+            first: number(-reach),
+            ends: [self.width, self.height].map(|side| number(side as f32 + reach)),
+            reach: self.reach,
+            stride: self.stride,
+        }
+    }
+}
+
+/// The part of a projection that is the same for all cameras that look one way; it compares by bits.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) struct Turn([[u32; 3]; 3]);
+
+/// A projection of eight points at once. Its numbers stay in registers, wherever results are written.
+#[derive(Clone, Copy)]
+pub(super) struct ProjectionOfEight<S: Simd> {
+    simd: S,
+    factors: [[f32x8<S>; 3]; 3],
+    added: [f32x8<S>; 3],
+    first: f32x8<S>,
+    ends: [f32x8<S>; 2],
+    reach: i32,
+    stride: i32,
+}
+
+impl<S: Simd> ProjectionOfEight<S> {
+    /// What the turn alone makes of eight points.
+    #[inline(always)]
+    pub fn turned(&self, coordinates: [&[f32; 8]; 3]) -> [f32x8<S>; 3] {
+        let [a, b, c] = &self.factors;
+        let [x, y, z] = loaded(self.simd, coordinates);
+        [
+            x * a[0] + y * a[1] + z * a[2],
+            x * b[0] + y * b[1] + z * b[2],
+            x * c[0] + y * c[1] + z * c[2],
+        ]
+    }
+
+    /// As [`Projection::pixel_and_depth`] for eight points that were turned before, by the same operations in
+    /// the same order and so with the same result.
+    #[inline(always)]
+    pub fn project(&self, turned: [f32x8<S>; 3]) -> Eight {
+        let simd = self.simd;
+        let depth = turned[2] + self.added[2];
+        let inverse = f32x8::splat(simd, 1.0) / depth;
+        let column = ((turned[0] + self.added[0]) * inverse + 0.5).floor();
+        let row = ((turned[1] + self.added[1]) * inverse + 0.5).floor();
         let in_view = depth.simd_gt(NEAREST_M)
             & depth.simd_lt(f32::INFINITY)
-            & column.simd_ge(-reach)
-            & row.simd_ge(-reach)
-            & column.simd_lt(self.width as f32 + reach)
-            & row.simd_lt(self.height as f32 + reach);
+            & column.simd_ge(self.first)
+            & row.simd_ge(self.first)
+            & column.simd_lt(self.ends[0])
+            & row.simd_lt(self.ends[1]);
         let [column, row] = [simd.cvt_i32_f32x8(column), simd.cvt_i32_f32x8(row)];
         let pixels = (row + self.reach) * self.stride + (column + self.reach);
         let pixels = simd.reinterpret_u32_i32x8(pixels);
@@ -117,10 +163,14 @@ impl Projection {
     }
 }
 
-/// One row of the projection applied to eight points.
+/// Three times eight numbers.
 #[inline(always)]
-fn along<S: Simd>(row: &[f32; 4], [x, y, z]: [f32x8<S>; 3]) -> f32x8<S> {
-    x * row[0] + y * row[1] + z * row[2] + row[3]
+pub(super) fn loaded<S: Simd>(simd: S, [a, b, c]: [&[f32; 8]; 3]) -> [f32x8<S>; 3] {
+    [
+        simd.load_array_ref_f32x8(a),
+        simd.load_array_ref_f32x8(b),
+        simd.load_array_ref_f32x8(c),
+    ]
 }
 
 /// [`f32::floor`] as a whole number. That of the standard library is a call for every point, unless
