@@ -249,14 +249,14 @@ fn growth(folder: &Path, road: &Road) -> Result<(), Failure> {
     let [building, asking] = rows;
     let tables = [
         Table {
-            name: "index",
+            name: "retrieval-index",
             quantity: "frames",
             unit: "s",
             columns: vec!["vocabulary", "words of all frames", "lists"],
             rows: building,
         },
         Table {
-            name: "query",
+            name: "retrieval-query",
             quantity: "frames",
             unit: "ms",
             columns: vec!["query, by scores", "… verified"],

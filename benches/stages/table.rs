@@ -38,6 +38,7 @@ impl Table {
         area.fill(&WHITE)?;
         let mut chart = ChartBuilder::on(&area)
             .margin(12)
+            .margin_right(24)
             .x_label_area_size(40)
             .y_label_area_size(60)
             .build_cartesian_2d((first.0..last.0).log_scale(), (least..most).log_scale())?;

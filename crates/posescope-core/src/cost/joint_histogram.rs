@@ -197,7 +197,7 @@ pub fn count_pairs(pairs: &[BinPair], bins: usize, counts: &mut Vec<u32>) {
     let level = Level::new();
     match cells {
         ..=256 => dispatch!(level, _simd => count_apart::<u8, 256>(pairs, bins, counts)),
-        ..=1024 => dispatch!(level, _simd => count_apart::<u16, 1024>(pairs, bins, counts)),
+        257..=1024 => dispatch!(level, _simd => count_apart::<u16, 1024>(pairs, bins, counts)),
         // Of large tables, adding up several would take longer than that saves.
         _ => {
             for pair in pairs {

@@ -232,14 +232,21 @@ impl Layer {
     /// The same responses at every `step`-th pixel, a multiple of this layer's step.
     pub(super) fn decimated(&self, step: usize) -> Self {
         let stride = step / self.step;
-        let rows = self.responses.chunks_exact(self.columns).step_by(stride);
+        let columns = self.columns.div_ceil(stride);
+        let rows = (self.responses.len() / self.columns.max(1)).div_ceil(stride);
+        let mut responses = vec![0.0; rows * columns];
+        let decimated = responses.par_chunks_exact_mut(columns.max(1)).enumerate();
+        decimated.for_each(|(row, samples)| {
+            let kept = self.row(row * stride).iter().step_by(stride);
+            for (sample, &response) in samples.iter_mut().zip(kept) {
+                *sample = response;
+            }
+        });
         Self {
             filter: self.filter,
             step,
-            columns: self.columns.div_ceil(stride),
-            responses: rows
-                .flat_map(|row| row.iter().step_by(stride).copied())
-                .collect(),
+            columns,
+            responses,
         }
     }
 

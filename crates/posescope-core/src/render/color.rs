@@ -1,6 +1,7 @@
 //! Colouring the cloud by the reference photo.
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use super::RenderParams;
 use crate::camera::Intrinsics;
@@ -63,18 +64,18 @@ pub fn color_cloud_by(
     cloud: &Cloud,
     intrinsics: &Intrinsics,
     params: &RenderParams,
-    value: impl Fn(f32, f32) -> f32,
+    value: impl Fn(f32, f32) -> f32 + Sync,
 ) -> ColoredCloud {
     let in_view: Vec<Projected> = cloud
         .points
-        .iter()
+        .par_iter()
         .filter_map(|&position| Projected::new(position, intrinsics))
         .collect();
     let hidden_beyond = params
         .visibility
         .then(|| HorizonMap::new(&in_view, intrinsics, params));
     let points: Vec<ColoredPoint> = in_view
-        .iter()
+        .par_iter()
         .filter(|point| hidden_beyond.as_ref().is_none_or(|map| map.shows(point)))
         .map(|point| ColoredPoint {
             position: point.position,
@@ -119,19 +120,29 @@ impl HorizonMap {
         let mut map = Self {
             width: intrinsics.width as usize,
             height: intrinsics.height as usize,
-            hidden_beyond: vec![f32::INFINITY; (intrinsics.width * intrinsics.height) as usize],
+            hidden_beyond: Vec::new(),
         };
+        let (width, height) = (map.width, map.height);
+        let mut hidden_beyond = vec![f32::INFINITY; width * height];
         let reach = params.visibility_window_px / 2;
-        for point in points {
-            let horizon = point.position.z * (1.0 + params.visibility_margin as f32);
-            let (x, y) = map.nearest_pixel(point);
-            for row in y.saturating_sub(reach)..(y + reach + 1).min(map.height) {
-                for column in x.saturating_sub(reach)..(x + reach + 1).min(map.width) {
-                    let cell = &mut map.hidden_beyond[row * map.width + column];
-                    *cell = cell.min(horizon);
+        // Each thread has rows of its own, and goes through all points.
+        let band = height.div_ceil(rayon::current_num_threads()).max(1);
+        let bands = hidden_beyond.par_chunks_mut((band * width).max(1));
+        bands.enumerate().for_each(|(index, cells)| {
+            let first = index * band;
+            let end = (first + band).min(height);
+            for point in points {
+                let horizon = point.position.z * (1.0 + params.visibility_margin as f32);
+                let (x, y) = map.nearest_pixel(point);
+                for row in y.saturating_sub(reach).max(first)..(y + reach + 1).min(end) {
+                    let row = &mut cells[(row - first) * width..][..width];
+                    for cell in &mut row[x.saturating_sub(reach)..(x + reach + 1).min(width)] {
+                        *cell = cell.min(horizon);
+                    }
                 }
             }
-        }
+        });
+        map.hidden_beyond = hidden_beyond;
         map
     }
 
