@@ -44,6 +44,8 @@ impl Table {
             .build_cartesian_2d((first.0..last.0).log_scale(), (least..most).log_scale())?;
         chart
             .configure_mesh()
+            .x_labels(4)
+            .x_label_formatter(&|quantity| format!("{quantity}"))
             .x_desc(self.quantity)
             .y_desc(format!("time ({})", self.unit))
             .draw()?;
