@@ -51,7 +51,7 @@ const JUDGED: [Method; 7] = [
     Method::named("robust"),
 ];
 
-/// Uncertainty of the reference's position [m].
+/// Uncertainty of the reference's position \[m\].
 const RADIUS_M: f64 = 10.0;
 
 /// Queries that do not show their place are fitted on too.
@@ -63,7 +63,7 @@ const UNKNOWABLE_COUNTS: f64 = 0.25;
 /// References of other streets at each place.
 const OTHER_STREETS: usize = 3;
 
-/// How far another street is at least [m], and how far turned against the query's its cameras are [°]:
+/// How far another street is at least \[m\], and how far turned against the query's its cameras are \[°\]:
 /// cameras on one street look along it.
 const OTHER_STREET_M: f64 = 60.0;
 const OTHER_STREET_DEG: f64 = 60.0;

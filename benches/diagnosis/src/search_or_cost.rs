@@ -26,7 +26,7 @@ use rayon::prelude::*;
 /// Coarse minima that are searched around.
 const MINIMA: usize = 8;
 
-/// Uncertainty of the reference's position [m].
+/// Uncertainty of the reference's position \[m\].
 const RADIUS_M: f64 = 10.0;
 
 /// Places that are looked at in parallel.

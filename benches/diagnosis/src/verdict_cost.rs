@@ -20,7 +20,7 @@ use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::trace::Trace;
 use posescope_diagnosis::places::{Pairing, problem_of};
 
-/// Uncertainty of the reference's position [m].
+/// Uncertainty of the reference's position \[m\].
 const RADIUS_M: f64 = 10.0;
 
 /// Times of one result.
