@@ -52,8 +52,8 @@ impl SearchedCost<'_, '_> {
         let rival = near
             .map_or(f64::INFINITY, |near| near.cost)
             .min(self.summary.best);
-        // What is far behind is not caught up by going down from there.
-        if best.cost >= stated_cost || best.cost > rival + TELLING_GAIN * chance {
+        // Far behind is no reason to stop: only with its own centre does another camera catch up.
+        if best.cost >= stated_cost {
             return None;
         }
         let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
