@@ -2,9 +2,9 @@
 //!
 //! Of what an estimator leaves behind, a few signals say how far its pose stands out from what chance
 //! would give: for methods of features the inliers beyond chance, how well they fix the pose, and whether
-//! the photos go together there better than elsewhere, for a direct method how deep its minimum is beside the other hypotheses, the runner-up and shuffled pixels, for a
-//! search from many starts how many of them end at it, and whether features lead there too. A logistic
-//! function of them is the probability of being within [`WITHIN_M`]; its coefficients were fitted on
+//! the photos go together there better than elsewhere, for a direct method how deep its minimum is beside
+//! the other hypotheses, the runner-up and shuffled pixels, for a search from many starts how many of them
+//! end at it, and whether features lead there too. A logistic function of them is the probability of being within [`WITHIN_M`]; its coefficients were fitted on
 //! some conditions of the street and are judged on others (`docs/diagnosis.md`).
 
 mod appearance;

@@ -44,7 +44,10 @@ fn unlikeliness(params: &SixParams, pose: &Pose) -> f64 {
 mod tests {
     use nalgebra::UnitQuaternion;
 
+    use super::super::apart;
     use super::*;
+    use crate::judge::{Refined, Start};
+    use crate::params::Params;
 
     #[test]
     fn a_level_pose_that_looks_the_same_way_is_likely_wherever_it_stands() {
@@ -70,6 +73,31 @@ mod tests {
         let lifted = Pose::translation(0.0, -params.usual_height_m, 0.0);
         assert!(is_one(unlikeliness(&params, &lifted)));
         assert_eq!(turned(Vector3::x(), 60.0), params.unlikely);
+    }
+
+    #[test]
+    fn of_refined_poses_the_likelier_comes_first_where_the_other_is_hardly_cheaper() {
+        let six = SixFreedoms::new(&Params::default());
+        let spread = Spread {
+            median: 1.0,
+            deviation: 0.01,
+        };
+        let lifted = Pose::translation(5.0, -six.params.usual_height_m, 0.0);
+        let refined = |pose: Pose, cost: f64| Refined {
+            start: Start { pose, cost },
+            pose,
+            cost,
+            evaluations: 1,
+        };
+        let first = |cost_of_lifted: f64| {
+            let both = vec![
+                refined(lifted, cost_of_lifted),
+                refined(Pose::identity(), 0.9),
+            ];
+            apart(both, 2, |pose, cost| six.price(&spread, pose, cost))[0].pose
+        };
+        assert_eq!(first(0.895), Pose::identity());
+        assert_eq!(first(0.885), lifted);
     }
 
     #[test]
