@@ -9,7 +9,7 @@ use posescope::grid::{GridParams, Lattice, Offset, Phase};
 use posescope::image::FloatImage;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::render::{ColoredCloud, color_cloud_by};
+use posescope::render::ColoredCloud;
 use posescope::scene;
 
 /// Two frames of the street, 8 m apart, or those that the environment names.
@@ -59,12 +59,8 @@ pub fn registered_cost(name: &str) -> Box<dyn Cost> {
 /// The query of the pair and the cloud of its reference, as a cost looks at them.
 pub fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, ColoredCloud) {
     let (query, reference) = (&PAIR.query, &PAIR.reference);
-    let cloud = color_cloud_by(
-        &reference.cloud,
-        &reference.intrinsics,
-        &Params::default().render,
-        cost.reference_channel(&reference.photo.gray),
-    );
+    let visible = reference.visible_cloud(&Params::default().render);
+    let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
     (Arc::new(cost.query_channel(&query.photo.gray)), cloud)
 }
 

@@ -24,7 +24,7 @@ use posescope::memo::{Key, Memo};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::render::{Scorer, color_cloud, color_cloud_by};
+use posescope::render::{Scorer, color_cloud};
 use posescope::trace::{Cancelled, Record, Sink, Trace};
 use proptest::prelude::*;
 
@@ -391,12 +391,8 @@ fn what_the_search_scores_is_what_the_view_shows() {
         .map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i)))
         .collect();
     for cost in registered.chain(own) {
-        let cloud = color_cloud_by(
-            &reference.cloud,
-            &reference.intrinsics,
-            &Params::default().render,
-            cost.reference_channel(&reference.photo.gray),
-        );
+        let visible = reference.visible_cloud(&Params::default().render);
+        let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
         let query = Arc::new(cost.query_channel(&problem.query.photo.gray));
         for splat_px in [1, 3] {
             let query = Arc::clone(&query);

@@ -2,17 +2,22 @@
 //!
 //! `cargo run -p posescope-diagnosis --bin verdict_cost -- --cases 40` localises queries in all conditions
 //! of the street, and says for each method which share of that time the verdicts take, without the truth
-//! and with it, of all results and of the wrong ones, and so for a query that asks all four. Both times are taken one after the other on the same
-//! pair, so that what else the machine does stands in both; nothing is remembered from one pair to the
-//! next.
+//! and with it, of all results and of the wrong ones, and so for a query
+//! that asks all four. Both times are taken one after the other on the same pair, so that what else the
+//! machine does stands in both; nothing is remembered from one pair to the next.
 //!
-//! Options: `--cases N` (40), `--seed N` (0), `--same yes` for queries and references of one condition.
+//! Options: `--cases N` (40), `--seed N` (0), `--same yes` for queries and references of one condition,
+//! `--together yes` for methods that share what is remembered of the photos, as those of one run do: without
+//! it each is asked alone.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use posescope::diagnosis::{Evidence, Subject, Tolerance, diagnose};
+use posescope::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope::estimator::Outcome;
 use posescope::geometry::{Pose, PoseError};
 use posescope::localize::localize_traced;
+use posescope::memo::Memo;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
@@ -22,6 +27,9 @@ use posescope_diagnosis::places::{Pairing, problem_of};
 
 /// Uncertainty of the reference's position \[m\].
 const RADIUS_M: f64 = 10.0;
+
+/// What is remembered of a photo, at most, as of a frame of a scene that is read once.
+const REMEMBERED: usize = 64;
 
 /// Times of one result.
 struct Timed {
@@ -35,7 +43,7 @@ struct Timed {
 }
 
 fn main() -> Result<(), String> {
-    let (mut cases, mut seed, mut is_same_condition) = (40, 0, false);
+    let (mut cases, mut seed, mut is_same_condition, mut is_together) = (40, 0, false, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let value = arguments
@@ -50,6 +58,7 @@ fn main() -> Result<(), String> {
             "--cases" => cases = number()?,
             "--seed" => seed = number()? as u64,
             "--same" => is_same_condition = value == "yes",
+            "--together" => is_together = value == "yes",
             other => return Err(format!("unknown argument {other}")),
         }
     }
@@ -58,11 +67,33 @@ fn main() -> Result<(), String> {
     for number in 0..cases {
         let pairing = Pairing::numbered(&drives, number, seed, is_same_condition);
         let (query, reference) = pairing.frames(&drives);
-        for method in Method::PAPER {
-            // A new problem each time: the one before remembers what was found in its photos.
-            let (problem, truth) = problem_of(query.clone(), reference.clone(), RADIUS_M);
-            timed.push(time(&problem, &truth, method));
-        }
+        let (mut problem, truth) = problem_of(query, reference, RADIUS_M);
+        // Twice, so that neither finds what the other left behind.
+        let [withheld, known] = [None, Some(&truth)].map(|truth| {
+            let mut judged = Vec::new();
+            for (number, method) in Method::PAPER.into_iter().enumerate() {
+                if number == 0 || !is_together {
+                    Arc::make_mut(&mut problem.query).memo = Memo::of(REMEMBERED);
+                    Arc::make_mut(&mut problem.reference).memo = Memo::of(REMEMBERED);
+                }
+                judged.push(judged_by(&problem, truth, method));
+            }
+            judged
+        });
+        let both = withheld.into_iter().zip(known);
+        timed.extend(both.zip(Method::PAPER).map(|((withheld, known), method)| {
+            let pose = known.outcome.pose.as_ref();
+            let error = |pose| PoseError::between(&truth, pose);
+            let primary = known.found.first();
+            Timed {
+                method,
+                is_right: pose.is_ok_and(|pose| Tolerance::default().contains(&error(pose))),
+                verdict: primary.map_or("none".to_owned(), |primary| primary.code.to_string()),
+                localized: (withheld.localized + known.localized) / 2,
+                withheld: withheld.judging,
+                known: known.judging,
+            }
+        }));
         eprintln!("{} of {cases}", number + 1);
     }
     println!(
@@ -104,33 +135,29 @@ fn share(timed: &[&Timed], part: impl Fn(&Timed) -> Duration) -> f64 {
     100.0 * sum(&part) / sum(&|t| t.localized).max(f64::MIN_POSITIVE)
 }
 
-fn time(problem: &Problem, truth: &Pose, method: Method) -> Timed {
+/// A result, its verdicts, and the times of both.
+struct Judged {
+    outcome: Outcome,
+    found: Vec<Diagnosis>,
+    localized: Duration,
+    judging: Duration,
+}
+
+fn judged_by(problem: &Problem, truth: Option<&Pose>, method: Method) -> Judged {
     let params = Params::default();
     let mut evidence = Evidence::default();
     let started = Instant::now();
     let outcome = localize_traced(problem, method, &params, &mut Trace::to(&mut evidence))
         .expect("nobody cancels");
     let localized = started.elapsed();
-    let tolerance = Tolerance::default();
-    let verdicts = |truth| {
-        let started = Instant::now();
-        let subject = Subject::new(problem, method, &params, &outcome, &evidence);
-        let found = diagnose(&subject.against(truth, tolerance));
-        (found, started.elapsed())
-    };
-    let (_, withheld) = verdicts(None);
-    let (found, known) = verdicts(Some(truth));
-    let is_right = outcome
-        .pose
-        .as_ref()
-        .is_ok_and(|pose| tolerance.contains(&PoseError::between(truth, pose)));
-    let primary = found.first();
-    Timed {
-        method,
-        is_right,
-        verdict: primary.map_or("none".to_owned(), |primary| primary.code.to_string()),
+    let started = Instant::now();
+    let subject = Subject::new(problem, method, &params, &outcome, &evidence);
+    let found = diagnose(&subject.against(truth, Tolerance::default()));
+    let judging = started.elapsed();
+    Judged {
+        outcome,
+        found,
         localized,
-        withheld,
-        known,
+        judging,
     }
 }

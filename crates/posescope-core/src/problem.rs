@@ -8,7 +8,8 @@ use crate::features::PairMatches;
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::input::InputError;
-use crate::memo::Memo;
+use crate::memo::{Exact, Memo};
+use crate::render::{RenderParams, VisibleCloud};
 
 /// The photo whose pose is sought.
 #[derive(Clone, Debug)]
@@ -91,6 +92,12 @@ impl ReferenceTuple {
             cloud,
             memo: Memo::off(),
         })
+    }
+
+    /// What the reference camera sees of the cloud, remembered: all methods ask for it.
+    pub fn visible_cloud(&self, render: &RenderParams) -> Arc<VisibleCloud> {
+        let visible = || VisibleCloud::new(&self.cloud, &self.intrinsics, render);
+        self.memo.recall(Exact::of(render), visible).value
     }
 }
 

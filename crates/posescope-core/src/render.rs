@@ -12,7 +12,7 @@ mod splat;
 mod worker;
 
 pub use canvas::{Canvas, PointArrays, Values};
-pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, color_cloud, color_cloud_by};
+pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, VisibleCloud, color_cloud};
 pub use depth_canvas::DepthCanvas;
 pub(crate) use device::leave_out;
 pub use device::{Device, Loaded, Tally, Workload, use_device};

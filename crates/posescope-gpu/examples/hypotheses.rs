@@ -17,7 +17,7 @@ use posescope_core::cost;
 use posescope_core::geometry::Pose;
 use posescope_core::grid::{GridParams, Lattice, Offset, Phase};
 use posescope_core::params::Params;
-use posescope_core::render::{ColoredPoint, Device, Scorer, color_cloud_by};
+use posescope_core::render::{ColoredPoint, Device, Scorer};
 use posescope_core::scene::Scene as _;
 use posescope_gpu::Gpu;
 use posescope_street::Street;
@@ -50,8 +50,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             let entry = entry.ok_or("a registered cost")?;
             let cost = params.costs.of(entry).ok_or("its parameters")?.cost();
             let channel = cost.reference_channel(&reference.photo.gray);
-            let (cloud, camera) = (&reference.cloud, &reference.intrinsics);
-            let colored = color_cloud_by(cloud, camera, &params.render, channel);
+            let visible = reference.visible_cloud(&params.render);
+            let colored = visible.colored_by(channel);
             let points = resized(&colored.points, count);
             let channel = Arc::new(cost.query_channel(&query.photo.gray));
             let scorer = || {

@@ -5,6 +5,7 @@
 //! near the truth that the search could have reached, and with the best in all six freedoms.
 
 mod causes;
+mod findings;
 
 use std::sync::Mutex;
 
@@ -18,6 +19,7 @@ use crate::event::MinimumAssessed;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{GridParams, Offset, Phase, ScoredLattice};
 use crate::render::{Score, Scorer};
+use findings::Findings;
 
 /// Coarse minima beside the result from which the cost is descended, to see whether a better search
 /// would have found the truth or only another wrong place.
@@ -216,18 +218,34 @@ struct SearchedCost<'a, 'cost> {
 
 impl SearchedCost<'_, '_> {
     fn verdicts(&self) -> Vec<Diagnosis> {
+        let findings = self.recalled(|| {
+            let near = self.best_near_truth();
+            Findings {
+                near,
+                camera: self.suspect_camera(near.as_ref()),
+                causes: self.causes(near),
+            }
+        });
+        let Findings {
+            near,
+            camera,
+            causes,
+        } = findings.as_ref();
         let mut found = Vec::new();
         found.extend(suspicion::of_poses(self.subject));
-        let near = self.best_near_truth();
-        found.extend(self.suspect_camera(near.as_ref()));
+        found.extend(camera.clone());
         found.extend(self.suspect_truth(near.as_ref()));
+        found.extend_from_slice(causes);
+        found
+    }
+
+    /// What made the search end in the wrong place, in the order in which it is tried.
+    fn causes(&self, near: Option<Place>) -> Vec<Diagnosis> {
         if let Some(outside) = self.outside_grid() {
-            found.push(outside);
-            return found;
+            return vec![outside];
         }
         let Some(near) = near else {
-            found.push(self.truth_has_no_say());
-            return found;
+            return vec![self.truth_has_no_say()];
         };
         let mut causes = Vec::new();
         let is_cheaper = near.cost < self.summary.best;
@@ -236,8 +254,7 @@ impl SearchedCost<'_, '_> {
         let appearance = self.changed_appearance(&near);
         let can_win = self.can_be_right(&near.offset) && appearance.is_none();
         if is_cheaper && elsewhere.is_none() && can_win {
-            found.push(self.search_failed(&near));
-            return found;
+            return vec![self.search_failed(&near)];
         }
         let winner = elsewhere.unwrap_or(Place {
             offset: self.minimum.offset,
@@ -256,8 +273,7 @@ impl SearchedCost<'_, '_> {
         });
         causes.extend(appearance);
         causes.push(self.cost_failed(&near, &winner));
-        found.extend(causes);
-        found
+        causes
     }
 
     fn least_covered(&self) -> u32 {
@@ -311,11 +327,10 @@ impl SearchedCost<'_, '_> {
     }
 
     /// The cheapest pose near the truth that the search could have reached, of those that have a say:
-    /// from the best of a small lattice around it, and from the nearest reachable pose itself, as far
-    /// as the fine steps go.
+    /// from the best of a small lattice of positions around it, and from the nearest reachable pose
+    /// itself, as far as the fine steps go.
     fn best_near_truth(&self) -> Option<Place> {
         const AROUND: [f64; 5] = [-0.8, -0.4, 0.0, 0.4, 0.8];
-        const TURNS: [f64; 3] = [-1.0, 0.0, 1.0];
         let centre = self.nearest_reachable();
         let within_m = self.subject.tolerance.translation_m;
         let within_rad = self.subject.tolerance.rotation_deg.to_radians();
@@ -328,14 +343,13 @@ impl SearchedCost<'_, '_> {
                 && (offset.yaw_rad - centre.yaw_rad).abs() <= within_rad
                 && self.is_reachable(offset)
         };
-        let lattice: Vec<Offset> = TURNS
+        let lattice: Vec<Offset> = AROUND
             .iter()
-            .flat_map(|turn| AROUND.iter().map(move |forward| (turn, forward)))
-            .flat_map(|(turn, forward)| AROUND.iter().map(move |right| (turn, forward, right)))
-            .map(|(turn, forward, right)| Offset {
+            .flat_map(|forward| AROUND.iter().map(move |right| (forward, right)))
+            .map(|(forward, right)| Offset {
                 right_m: centre.right_m + right * within_m,
                 forward_m: centre.forward_m + forward * within_m,
-                yaw_rad: centre.yaw_rad + turn.to_radians(),
+                ..centre
             })
             .filter(is_near)
             .collect();

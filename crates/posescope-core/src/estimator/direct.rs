@@ -18,9 +18,7 @@ use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{
-    ColoredCloud, Comparison, RenderParams, Score, Scorer, color_cloud_by, leave_out,
-};
+use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
@@ -218,12 +216,8 @@ impl Direct {
             channel: self.cost.reference_channel_key(),
         };
         reference.memo.recall(key, || {
-            color_cloud_by(
-                &reference.cloud,
-                &reference.intrinsics,
-                &self.render,
-                self.cost.reference_channel(&reference.photo.gray),
-            )
+            let value = self.cost.reference_channel(&reference.photo.gray);
+            reference.visible_cloud(&self.render).colored_by(value)
         })
     }
 

@@ -38,7 +38,7 @@ use crate::memo::{Exact, Memo, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
-use crate::render::{RenderParams, color_cloud_by};
+use crate::render::RenderParams;
 use crate::robust::{
     Acceptance, Counted, MlesacError, effective_area_px, inliers_beyond_chance, mlesac,
 };
@@ -210,9 +210,8 @@ impl Guided {
             spread: Exact::of(depth_spread),
         };
         let lifted = tuple.memo.recall(key, || {
-            let visible = color_cloud_by(&tuple.cloud, &tuple.intrinsics, &self.render, |_, _| 0.0);
             let visible = Cloud {
-                points: visible.points.iter().map(|point| point.position).collect(),
+                points: tuple.visible_cloud(&self.render).positions().collect(),
             };
             let index = ProjectedCloudIndex::new(&visible, &tuple.intrinsics);
             let lift = |(number, keypoint): (usize, &Keypoint)| {

@@ -29,7 +29,7 @@ use crate::memo::{Exact, MemoId, Recalled, Remembered};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
-use crate::render::{RenderParams, color_cloud_by};
+use crate::render::RenderParams;
 use crate::robust::{
     Acceptance, AcceptanceRule, Consensus, Counted, MlesacError, MlesacParams, Places, Trial,
     mlesac, places_beyond_chance,
@@ -627,8 +627,7 @@ pub fn projected_cloud(
     let cloud = tuple.memo.recall(key, || match &visible {
         None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
         Some(render) => {
-            let seen = color_cloud_by(&tuple.cloud, &tuple.intrinsics, render, |_, _| 0.0);
-            let points = seen.points.iter().map(|point| point.position).collect();
+            let points = tuple.visible_cloud(render).positions().collect();
             ProjectedCloudIndex::new(&Cloud { points }, &tuple.intrinsics)
         }
     });

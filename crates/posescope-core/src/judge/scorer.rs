@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use nalgebra::Point3;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
@@ -17,8 +18,7 @@ use crate::image::{GrayImage, cubic_interpolated};
 use crate::memo::{Exact, Remembered};
 use crate::problem::Problem;
 use crate::render::{
-    Canvas, ColoredPoint, DepthCanvas, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values,
-    color_cloud,
+    Canvas, DepthCanvas, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values,
 };
 
 /// Poses that a thread takes at once.
@@ -280,14 +280,14 @@ fn reference_points(
 ) -> ReferencePoints {
     let reference = &problem.reference;
     let photo = &reference.photo.gray;
-    let cloud = color_cloud(&reference.cloud, photo, &reference.intrinsics, render);
     let (photo, params) = shrunk(photo, params, shrink);
     let camera = shrunk_camera(&reference.intrinsics, shrink);
     let channels = ChannelImages::of(&photo, params.reference_sigma_px, &params);
     // A view that is smaller is covered by fewer points.
-    let points: Vec<ColoredPoint> = cloud.points.into_iter().step_by(shrink as usize).collect();
+    let visible = reference.visible_cloud(render);
+    let points: Vec<Point3<f32>> = visible.positions().step_by(shrink as usize).collect();
     let bins = points.iter().map(|point| {
-        let pixel = camera.project(&point.position.cast()).unwrap_or_default();
+        let pixel = camera.project(&point.cast()).unwrap_or_default();
         let (x, y) = (pixel.x as f32, pixel.y as f32);
         let intensity = match shrink {
             1 if params.reference_sigma_px == 0.0 => cubic_interpolated(&photo, x, y),
@@ -298,7 +298,7 @@ fn reference_points(
     });
     ReferencePoints {
         bins: bins.collect(),
-        positions: PointArrays::new(&points),
+        positions: PointArrays::new(points.iter().copied()),
     }
 }
 

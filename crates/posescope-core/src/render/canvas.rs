@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use fearless_simd::{Level, Simd, dispatch};
+use nalgebra::Point3;
 
-use super::ColoredPoint;
 use super::projection::{Eight, Projection, Turn, loaded};
 use crate::camera::Intrinsics;
 use crate::cost::Pair;
@@ -23,10 +23,10 @@ pub struct PointArrays {
 
 impl PointArrays {
     /// The positions of the points, in their order.
-    pub fn new(points: &[ColoredPoint]) -> Self {
+    pub fn new(points: impl ExactSizeIterator<Item = Point3<f32>> + Clone) -> Self {
         let padding = points.len().next_multiple_of(LANES) - points.len();
         let along = |axis: usize| {
-            let coordinates = points.iter().map(|point| point.position[axis]);
+            let coordinates = points.clone().map(|point| point[axis]);
             coordinates
                 .chain(std::iter::repeat_n(f32::NAN, padding))
                 .collect()
@@ -307,8 +307,7 @@ impl<T: Copy + Default> Covered<T> {
 mod tests {
     use super::*;
     use crate::render::small_camera;
-    use crate::render::{Rasterizer, SplattedPixel};
-    use nalgebra::Point3;
+    use crate::render::{ColoredPoint, Rasterizer, SplattedPixel};
     use proptest::prelude::*;
 
     /// Points before, beside and behind the camera, some of them exactly behind each other and some at
@@ -352,7 +351,7 @@ mod tests {
             splat_px in prop_oneof![Just(1_usize), Just(3), Just(5), Just(15)],
             baseline: bool,
         ) {
-            let arrays = PointArrays::new(&points);
+            let arrays = PointArrays::new(points.iter().map(|point| point.position));
             let mut canvas = Canvas {
                 level: level(baseline),
                 ..Canvas::new(&small_camera(), splat_px).expect("a small image")
@@ -388,7 +387,8 @@ mod tests {
             query: &[0; 63],
             points: &[0; 9],
         };
-        let [all, one, none] = [9, 1, 0].map(|count| PointArrays::new(&points[..count]));
+        let [all, one, none] = [9, 1, 0]
+            .map(|count| PointArrays::new(points[..count].iter().map(|point| point.position)));
         let mut canvas = Canvas::new(&small_camera(), 1).expect("a small image");
         let mut covered = |points| canvas.draw(points, values, &Pose::identity()).len();
         assert_eq!(covered(&all), 9);

@@ -56,41 +56,68 @@ pub fn color_cloud(
     params: &RenderParams,
 ) -> ColoredCloud {
     let value = |u, v| cubic_interpolated(photo, u, v);
-    color_cloud_by(cloud, intrinsics, params, value)
+    VisibleCloud::new(cloud, intrinsics, params).colored_by(value)
 }
 
-/// As [`color_cloud`], with any value 0 … 255 at the projection \[px\] in the place of the grey value.
-pub fn color_cloud_by(
-    cloud: &Cloud,
-    intrinsics: &Intrinsics,
-    params: &RenderParams,
-    value: impl Fn(f32, f32) -> f32 + Sync,
-) -> ColoredCloud {
-    let in_view: Vec<Projected> = cloud
-        .points
-        .par_iter()
-        .filter_map(|&position| Projected::new(position, intrinsics))
-        .collect();
-    let hidden_beyond = params
-        .visibility
-        .then(|| HorizonMap::new(&in_view, intrinsics, params));
-    let points: Vec<ColoredPoint> = in_view
-        .par_iter()
-        .filter(|point| hidden_beyond.as_ref().is_none_or(|map| map.shows(point)))
-        .map(|point| ColoredPoint {
+/// The points of a cloud that a camera sees, and where in its image.
+#[derive(Clone, Debug, Default)]
+pub struct VisibleCloud {
+    points: Vec<Projected>,
+    counts: ColoringCounts,
+}
+
+impl Remembered for VisibleCloud {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.points.as_slice())
+    }
+}
+
+impl VisibleCloud {
+    /// What the camera sees of the cloud, which is in its frame.
+    pub fn new(cloud: &Cloud, intrinsics: &Intrinsics, params: &RenderParams) -> Self {
+        let in_view: Vec<Projected> = cloud
+            .points
+            .par_iter()
+            .filter_map(|&position| Projected::new(position, intrinsics))
+            .collect();
+        let outside = cloud.len() - in_view.len();
+        let projected = in_view.len();
+        let points = match params.visibility {
+            false => in_view,
+            true => {
+                let hidden_beyond = HorizonMap::new(&in_view, intrinsics, params);
+                let is_seen = |point: &Projected| hidden_beyond.shows(point);
+                in_view.into_par_iter().filter(is_seen).collect()
+            }
+        };
+        let counts = ColoringCounts {
+            colored: points.len(),
+            outside,
+            occluded: projected - points.len(),
+        };
+        Self { points, counts }
+    }
+
+    /// The points alone \[m\], in the order of the scan.
+    pub fn positions(&self) -> impl ExactSizeIterator<Item = Point3<f32>> + '_ {
+        self.points.iter().map(|point| point.position)
+    }
+
+    /// The points with any value 0 … 255 at their projections \[px\].
+    pub fn colored_by(&self, value: impl Fn(f32, f32) -> f32 + Sync) -> ColoredCloud {
+        let colored = |point: &Projected| ColoredPoint {
             position: point.position,
             intensity: value(point.u, point.v),
-        })
-        .collect();
-    let counts = ColoringCounts {
-        colored: points.len(),
-        outside: cloud.len() - in_view.len(),
-        occluded: in_view.len() - points.len(),
-    };
-    ColoredCloud { points, counts }
+        };
+        ColoredCloud {
+            points: self.points.par_iter().map(colored).collect(),
+            counts: self.counts,
+        }
+    }
 }
 
 /// A point that projects into the image.
+#[derive(Clone, Copy, Debug)]
 struct Projected {
     position: Point3<f32>,
     u: f32,

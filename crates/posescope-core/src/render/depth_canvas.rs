@@ -274,7 +274,7 @@ mod tests {
             splat_px in prop_oneof![Just(1_usize), Just(3), Just(5), Just(15)],
             baseline: bool,
         ) {
-            let arrays = PointArrays::new(&points);
+            let arrays = PointArrays::new(points.iter().map(|point| point.position));
             let level = if baseline { Level::baseline() } else { Level::new() };
             let mut canvas = DepthCanvas {
                 level,
@@ -309,7 +309,7 @@ mod tests {
             intensity: 7.0,
         };
         let twice_as_far = Pose::translation(0.0, 0.0, f64::from(f32::MAX));
-        let arrays = PointArrays::new(&[point]);
+        let arrays = PointArrays::new([point.position].into_iter());
         let values = Values {
             query: &[0.0; 63],
             points: &[7.0],

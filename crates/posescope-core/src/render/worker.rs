@@ -40,7 +40,7 @@ impl Prepared {
             }
         };
         Self {
-            positions: PointArrays::new(points),
+            positions: PointArrays::new(points.iter().map(|point| point.position)),
             shown,
         }
     }

@@ -57,6 +57,9 @@ impl SearchedCost<'_, '_> {
             return None;
         }
         let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
+        if rival - best.cost <= TELLING_GAIN * chance {
+            return None;
+        }
         let camera = camera(&best.at);
         // A cost can also fall because dark falls on dark: pixels must go together better than the same
         // pixels shuffled do, and by more than they do with the stated camera.
@@ -69,19 +72,17 @@ impl SearchedCost<'_, '_> {
         if otherwise.deviations() < BEYOND_CHANCE || otherwise.gain() < stated_gain + TELLING_GAIN {
             return None;
         }
-        (rival - best.cost > TELLING_GAIN * chance).then(|| {
-            Diagnosis::new(
-                Code::X1,
-                format!(
-                    "at the true pose the cost is {stated_cost:.4} with the stated camera and {:.4} with \
-                     {}; the result costs {:.4}",
-                    best.cost,
-                    otherwise_stated(&camera, &stated),
-                    self.summary.best,
-                ),
-                json!({ "cost_at_truth": stated_cost, "cost_otherwise": best.cost, "camera": camera }),
-            )
-        })
+        Some(Diagnosis::new(
+            Code::X1,
+            format!(
+                "at the true pose the cost is {stated_cost:.4} with the stated camera and {:.4} with {}; \
+                 the result costs {:.4}",
+                best.cost,
+                otherwise_stated(&camera, &stated),
+                self.summary.best,
+            ),
+            json!({ "cost_at_truth": stated_cost, "cost_otherwise": best.cost, "camera": camera }),
+        ))
     }
 
     /// The result is as certain as results ever are, and it is not the stated truth.

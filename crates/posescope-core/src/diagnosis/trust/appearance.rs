@@ -7,13 +7,14 @@
 
 use super::{centre_and_deviation, tamed};
 use crate::geometry::{Pose, yaw};
-use crate::judge::{Judge, moved};
+use crate::judge::{Judge, JudgeParams, moved};
+use crate::memo::{Exact, MemoId, Remembered};
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::Score;
+use crate::render::{RenderParams, Score};
 
 /// How closely one looks. A method's coefficients belong to its look.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Look {
     /// How many times smaller the photos are.
     shrink: u32,
@@ -66,15 +67,54 @@ pub(super) struct Appearance {
     gain: f64,
 }
 
+impl Remembered for Appearance {
+    fn heap_bytes(&self) -> usize {
+        0
+    }
+}
+
+/// What the appearance of a pose depends on beside the query.
+#[derive(PartialEq, Eq, Hash)]
+struct AppearanceKey {
+    reference: MemoId,
+    judge: Exact<JudgeParams>,
+    render: Exact<RenderParams>,
+    look: Look,
+    pose: Exact<[f64]>,
+}
+
 impl Appearance {
-    /// What is seen at a pose of the query's camera in the reference camera's frame. Where nothing can be
-    /// compared, nothing speaks for the pose.
+    /// What is seen at a pose of the query's camera in the reference camera's frame, remembered with the
+    /// query: a method and the hybrid that keeps its pose ask the same. Where nothing can be compared,
+    /// nothing speaks for the pose.
     pub(super) fn of(
         problem: &Problem,
         params: &Params,
         reference_from_query: &Pose,
         look: Look,
     ) -> Self {
+        let seen = || Self::seen(problem, params, reference_from_query, look);
+        let Some(reference) = problem.reference.memo.id() else {
+            return seen();
+        };
+        let at = reference_from_query;
+        let numbers = at
+            .translation
+            .vector
+            .iter()
+            .chain(at.rotation.coords.iter());
+        let numbers: Vec<f64> = numbers.copied().collect();
+        let key = AppearanceKey {
+            reference,
+            judge: Exact::of(&params.judge),
+            render: Exact::of(&params.render),
+            look,
+            pose: Exact::of(numbers.as_slice()),
+        };
+        *problem.query.memo.recall(key, seen).value
+    }
+
+    fn seen(problem: &Problem, params: &Params, reference_from_query: &Pose, look: Look) -> Self {
         let judge = Judge::new(problem, &params.render, &params.judge, look.shrink);
         let mut poses = vec![*reference_from_query, Pose::identity()];
         poses.extend(neighbours(reference_from_query));
