@@ -10,7 +10,7 @@
 //! street at least so far away, `--queries PATH` queries of another scene that shows another place, `--cells LIST`: `equal`, `other`,
 //! `all` or `overcast-night,…` (reference-query); `--truth FILE` poses that are better than the scene's,
 //! lines of a frame's name and a 3 × 4 matrix; `--seeds N` (1) asks every pair so often; `--details`
-//! prints each query.
+//! prints each query, `--from-truth` also what a pose refined from the truth costs.
 
 mod cases;
 mod truth;
@@ -56,6 +56,7 @@ struct Options {
     cells: String,
     truth: Option<String>,
     details: bool,
+    from_truth: bool,
     methods: Vec<Asked>,
 }
 
@@ -133,8 +134,9 @@ impl Options {
             text.parse().map_err(|_| format!("{text} is no number"))
         }
         while let Some(argument) = arguments.next() {
-            if argument == "--details" {
+            if argument == "--details" || argument == "--from-truth" {
                 options.details = true;
+                options.from_truth |= argument == "--from-truth";
                 continue;
             }
             let value = arguments
@@ -228,11 +230,21 @@ fn measure(cases: &[Case], options: &Options) -> Vec<Measured> {
                         (Err(failure), _) => failure.to_string(),
                         _ => String::new(),
                     };
-                    let from_truth = refined_truth(case, asked, &problem);
+                    let probability = subject.trust.as_ref().and_then(|trust| trust.probability);
                     let cost = outcome.cost.map_or(f64::NAN, |cost| cost.best);
+                    let from_truth = match options.from_truth {
+                        true => {
+                            format!(", {} from the truth", refined_truth(case, asked, &problem))
+                        }
+                        false => String::new(),
+                    };
                     println!(
-                        "{} {} at {at}: {}: {said}; cost {cost:.4}, {from_truth} from the truth{}",
-                        case.cell, problem.query.name, asked.label, judged.0
+                        "{} {} at {at}: {}: {said}; probability {:.3}; cost {cost:.4}{from_truth}{}",
+                        case.cell,
+                        problem.query.name,
+                        asked.label,
+                        probability.unwrap_or(f64::NAN),
+                        judged.0
                     );
                 }
                 measured.push(Measured {

@@ -1,6 +1,8 @@
 //! FB, the indirect feature-based method (paper, section 2.1 and appendix A).
 
 mod params;
+mod remembered;
+mod several;
 mod states;
 
 use std::convert::Infallible;
@@ -9,10 +11,11 @@ use std::sync::Arc;
 use nalgebra::Point2;
 
 pub use self::params::{DepthRule, FeatureParams};
+pub(super) use self::several::Gathered;
+use self::remembered::{ConsensusKey, Decisions, MatchesKey, Solved};
 use self::states::FeatureStates;
 use super::consensus::FoundConsensus;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
-use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::depth::LiftedMatch;
 use crate::depth::{DepthReading, ProjectedCloudIndex};
@@ -25,15 +28,12 @@ use crate::features::{
     best_matches_interruptible, remembered_interruptible,
 };
 use crate::geometry::Pose;
-use crate::memo::{Exact, MemoId, Recalled, Remembered};
+use crate::memo::{Exact, Recalled};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::RenderParams;
-use crate::robust::{
-    Acceptance, AcceptanceRule, Consensus, Counted, MlesacError, MlesacParams, Places, Trial,
-    mlesac, places_beyond_chance,
-};
+use crate::robust::{Consensus, Trial, mlesac};
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
 
@@ -46,52 +46,6 @@ const REMEMBERED_TRIALS: usize = 20_000;
 
 /// Matches lifted between two checkpoints.
 const LIFTED_AT_A_TIME: usize = 256;
-
-/// What the matches of two photos depend on beside the query's photo.
-#[derive(PartialEq, Eq, Hash)]
-struct MatchesKey {
-    reference: MemoId,
-    surf: Exact<SurfParams>,
-    ratio: Exact<f64>,
-    unique: bool,
-}
-
-/// Remembered matches.
-struct Decisions(Arc<[Option<Match>]>);
-
-impl Remembered for Decisions {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(&*self.0)
-    }
-}
-
-/// All that a consensus depends on.
-#[derive(PartialEq, Eq, Hash)]
-struct ConsensusKey {
-    camera: Exact<Intrinsics>,
-    params: Exact<MlesacParams>,
-    seed: u64,
-    correspondences: Exact<[Correspondence]>,
-    /// Whether the trials are kept.
-    is_heard: bool,
-}
-
-/// What MLESAC found.
-struct Solved {
-    outcome: Result<Consensus, Failure>,
-    /// All it tried on the way, if somebody wanted to hear it and it is not too much.
-    trials: Option<Vec<Trial>>,
-}
-
-impl Remembered for Solved {
-    fn heap_bytes(&self) -> usize {
-        let found = self.outcome.as_ref().map_or(0, |consensus| {
-            size_of_val(consensus.inliers.as_slice())
-                + size_of_val(consensus.residuals_px.as_slice())
-        });
-        self.trials.as_deref().map_or(0, size_of_val) + found
-    }
-}
 
 /// The feature-based estimator.
 pub struct FeatureBased {
@@ -448,132 +402,6 @@ impl FeatureBased {
             slack: self.slack(),
         };
         found.judged(problem, trace)
-    }
-}
-
-/// What speaks for a consensus.
-pub(super) struct BeyondChance {
-    pub(super) acceptance: Acceptance,
-    /// How many the inliers are of.
-    pub(super) tested: usize,
-    /// What was counted.
-    pub(super) counted: Counted,
-}
-
-/// The correspondences with one reference.
-pub(super) struct Gathered {
-    /// Pixels of the query, and points in the frame of the reference camera.
-    pub(super) correspondences: Vec<Correspondence>,
-    /// The matches that they are of, before any depth is looked up.
-    pub(super) unique: usize,
-    /// Keypoints of the query photo.
-    pub(super) query_keypoints: usize,
-}
-
-/// What an estimate from several references has in common with that from one.
-impl FeatureBased {
-    /// The correspondences of a problem, as [`Estimator::estimate`] comes to them. Nothing is told of the
-    /// way: a run on the problem alone has done so.
-    pub(super) fn gather(&self, problem: &Problem) -> Result<Gathered, Failure> {
-        let gathered = || {
-            let trace = &mut Trace::off();
-            let query = self.detect(Side::Query, problem, trace)?.value;
-            let reference = self.detect(Side::Reference, problem, trace)?.value;
-            let mut states = FeatureStates::new(query.keypoints.len());
-            let matches = match query.keypoints.len().min(reference.keypoints.len()) {
-                0..MINIMUM => Vec::new(),
-                _ => {
-                    let decisions = self.best_matches(problem, &query, &reference, trace)?;
-                    states.after_matching(&decisions.value.0)
-                }
-            };
-            let lifted = self.lift(&matches, &reference, &problem.reference, trace)?;
-            let correspondence = |lifted: &LiftedMatch| {
-                let pixel = query.keypoints[lifted.query].pixel();
-                let point = lifted.point?;
-                Some(Correspondence { pixel, point })
-            };
-            Ok::<_, Halt>(Gathered {
-                correspondences: lifted.iter().filter_map(correspondence).collect(),
-                unique: matches.len(),
-                query_keypoints: query.keypoints.len(),
-            })
-        };
-        gathered().map_err(|halt| match halt {
-            Halt::Failed(failure) => failure,
-            Halt::Cancelled => unreachable!("a trace that is off cancels nothing"),
-        })
-    }
-
-    /// What MLESAC is told.
-    pub(super) fn mlesac(&self) -> &MlesacParams {
-        &self.params.mlesac
-    }
-
-    /// Why MLESAC has no consensus of so many correspondences.
-    pub(super) fn halt(error: MlesacError<Cancelled>, correspondences: usize) -> Halt {
-        match error {
-            MlesacError::TooFewCorrespondences { found, .. } => {
-                Halt::Failed(Failure::NoConsensus {
-                    correspondences: found,
-                    best_inliers: 0,
-                    trials: 0,
-                })
-            }
-            MlesacError::NoModel {
-                trials,
-                best_inliers,
-            } => Halt::Failed(Failure::NoConsensus {
-                correspondences,
-                best_inliers,
-                trials,
-            }),
-            MlesacError::Cancelled(Cancelled) => Halt::Cancelled,
-        }
-    }
-
-    /// Whether the inliers of a consensus are more than chance gives: pixels of the query
-    /// that are at one place count once where `fb.once` says so, and in any case those that are at most
-    /// `least_reach_px` apart.
-    pub(super) fn beyond_chance(
-        &self,
-        correspondences: &[Correspondence],
-        consensus: &Consensus,
-        intrinsics: &Intrinsics,
-        least_reach_px: f64,
-    ) -> BeyondChance {
-        let threshold_px = self.params.mlesac.inlier_threshold_px;
-        // The paper's rule counts whatever there is.
-        let is_once = self.params.once && self.params.accept == AcceptanceRule::Consensus;
-        let reach_px = if is_once {
-            threshold_px
-        } else {
-            least_reach_px
-        };
-        let places = Places::of(correspondences.iter().map(|c| c.pixel), reach_px);
-        let area_px = intrinsics.area();
-        // False matches gather where the texture is, so chance has less room than the whole image.
-        let acceptance = places_beyond_chance(&consensus.inliers, &places, threshold_px, area_px);
-        BeyondChance {
-            acceptance,
-            tested: places.count(),
-            counted: match reach_px >= 0.0 {
-                true => Counted::Places,
-                false => Counted::Correspondences,
-            },
-        }
-    }
-
-    /// Whether the rule accepts a verdict.
-    pub(super) fn accepts(&self, acceptance: &Acceptance) -> bool {
-        self.params.accept.accepts(acceptance)
-    }
-
-    /// How far outside the prior a pose may be, as a share of that; `None` for anywhere. The paper's rule
-    /// asks for inliers alone.
-    pub(super) fn slack(&self) -> Option<f64> {
-        let is_asked = self.params.accept == AcceptanceRule::Consensus;
-        is_asked.then_some(self.params.radius_slack)
     }
 }
 

@@ -1,0 +1,143 @@
+//! What an estimate from several references has in common with that from one.
+
+use super::states::FeatureStates;
+use super::{FeatureBased, MINIMUM};
+use crate::camera::Intrinsics;
+use crate::depth::LiftedMatch;
+use crate::estimator::{Failure, Halt};
+use crate::event::Side;
+use crate::problem::Problem;
+use crate::robust::{
+    Acceptance, AcceptanceRule, Consensus, Counted, MlesacError, MlesacParams, Places,
+    places_beyond_chance,
+};
+use crate::solver::Correspondence;
+use crate::trace::{Cancelled, Trace};
+
+/// What speaks for a consensus.
+pub(in crate::estimator) struct BeyondChance {
+    pub(in crate::estimator) acceptance: Acceptance,
+    /// How many the inliers are of.
+    pub(in crate::estimator) tested: usize,
+    /// What was counted.
+    pub(in crate::estimator) counted: Counted,
+}
+
+/// The correspondences with one reference.
+pub(in crate::estimator) struct Gathered {
+    /// Pixels of the query, and points in the frame of the reference camera.
+    pub(in crate::estimator) correspondences: Vec<Correspondence>,
+    /// The matches that they are of, before any depth is looked up.
+    pub(in crate::estimator) unique: usize,
+    /// Keypoints of the query photo.
+    pub(in crate::estimator) query_keypoints: usize,
+}
+
+impl FeatureBased {
+    /// The correspondences of a problem, as [`Estimator::estimate`] comes to them. Nothing is told of the
+    /// way: a run on the problem alone has done so.
+    pub(in crate::estimator) fn gather(&self, problem: &Problem) -> Result<Gathered, Failure> {
+        let gathered = || {
+            let trace = &mut Trace::off();
+            let query = self.detect(Side::Query, problem, trace)?.value;
+            let reference = self.detect(Side::Reference, problem, trace)?.value;
+            let mut states = FeatureStates::new(query.keypoints.len());
+            let matches = match query.keypoints.len().min(reference.keypoints.len()) {
+                0..MINIMUM => Vec::new(),
+                _ => {
+                    let decisions = self.best_matches(problem, &query, &reference, trace)?;
+                    states.after_matching(&decisions.value.0)
+                }
+            };
+            let lifted = self.lift(&matches, &reference, &problem.reference, trace)?;
+            let correspondence = |lifted: &LiftedMatch| {
+                let pixel = query.keypoints[lifted.query].pixel();
+                let point = lifted.point?;
+                Some(Correspondence { pixel, point })
+            };
+            Ok::<_, Halt>(Gathered {
+                correspondences: lifted.iter().filter_map(correspondence).collect(),
+                unique: matches.len(),
+                query_keypoints: query.keypoints.len(),
+            })
+        };
+        gathered().map_err(|halt| match halt {
+            Halt::Failed(failure) => failure,
+            Halt::Cancelled => unreachable!("a trace that is off cancels nothing"),
+        })
+    }
+
+    /// What MLESAC is told.
+    pub(in crate::estimator) fn mlesac(&self) -> &MlesacParams {
+        &self.params.mlesac
+    }
+
+    /// Why MLESAC has no consensus of so many correspondences.
+    pub(in crate::estimator) fn halt(
+        error: MlesacError<Cancelled>,
+        correspondences: usize,
+    ) -> Halt {
+        match error {
+            MlesacError::TooFewCorrespondences { found, .. } => {
+                Halt::Failed(Failure::NoConsensus {
+                    correspondences: found,
+                    best_inliers: 0,
+                    trials: 0,
+                })
+            }
+            MlesacError::NoModel {
+                trials,
+                best_inliers,
+            } => Halt::Failed(Failure::NoConsensus {
+                correspondences,
+                best_inliers,
+                trials,
+            }),
+            MlesacError::Cancelled(Cancelled) => Halt::Cancelled,
+        }
+    }
+
+    /// Whether the inliers of a consensus are more than chance gives: pixels of the query
+    /// that are at one place count once where `fb.once` says so, and in any case those that are at most
+    /// `least_reach_px` apart.
+    pub(in crate::estimator) fn beyond_chance(
+        &self,
+        correspondences: &[Correspondence],
+        consensus: &Consensus,
+        intrinsics: &Intrinsics,
+        least_reach_px: f64,
+    ) -> BeyondChance {
+        let threshold_px = self.params.mlesac.inlier_threshold_px;
+        // The paper's rule counts whatever there is.
+        let is_once = self.params.once && self.params.accept == AcceptanceRule::Consensus;
+        let reach_px = if is_once {
+            threshold_px
+        } else {
+            least_reach_px
+        };
+        let places = Places::of(correspondences.iter().map(|c| c.pixel), reach_px);
+        let area_px = intrinsics.area();
+        // False matches gather where the texture is, so chance has less room than the whole image.
+        let acceptance = places_beyond_chance(&consensus.inliers, &places, threshold_px, area_px);
+        BeyondChance {
+            acceptance,
+            tested: places.count(),
+            counted: match reach_px >= 0.0 {
+                true => Counted::Places,
+                false => Counted::Correspondences,
+            },
+        }
+    }
+
+    /// Whether the rule accepts a verdict.
+    pub(in crate::estimator) fn accepts(&self, acceptance: &Acceptance) -> bool {
+        self.params.accept.accepts(acceptance)
+    }
+
+    /// How far outside the prior a pose may be, as a share of that; `None` for anywhere. The paper's rule
+    /// asks for inliers alone.
+    pub(in crate::estimator) fn slack(&self) -> Option<f64> {
+        let is_asked = self.params.accept == AcceptanceRule::Consensus;
+        is_asked.then_some(self.params.radius_slack)
+    }
+}
