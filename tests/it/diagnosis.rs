@@ -12,6 +12,7 @@ use posescope::localize::{
     LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request, StageTimes,
     localize_traced,
 };
+use posescope::memo::Memo;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query};
@@ -137,6 +138,47 @@ fn a_truth_beyond_the_disc_is_outside_the_grid() {
         .find(|finding| finding.code == Code::D4)
         .expect("D4");
     assert_eq!(outside.evidence["distance_m"], 9.0);
+}
+
+#[test]
+fn what_is_remembered_of_a_search_is_said_of_no_other() {
+    let problem = solvable();
+    let mut remembering = problem.clone();
+    Arc::make_mut(&mut remembering.query).memo = Memo::of(256);
+    Arc::make_mut(&mut remembering.reference).memo = Memo::of(256);
+    let at =
+        |right, ahead| problem.reference.world_from_camera * Pose::translation(right, 0.0, ahead);
+    let truths = [
+        None,
+        Some(at(0.0, 1.0)),
+        Some(at(2.0, 1.0)),
+        Some(at(0.0, 9.0)),
+    ];
+    let settings = [
+        with(&[]),
+        with(&["grid.coarse_step=3", "grid.fine_range=0"]),
+        with(&[
+            "mi.bins=8",
+            "render.splat_px=3",
+            "fb.accept=consensus",
+            "fb.radius_slack=0",
+        ]),
+    ];
+    let mut failures = 0;
+    // The second time all is at hand.
+    for _ in 0..2 {
+        for (params, truth) in settings
+            .iter()
+            .flat_map(|params| truths.iter().map(move |truth| (params, truth.as_ref())))
+        {
+            for method in Method::PAPER {
+                let found = verdicts(&remembering, method, params, truth);
+                assert_eq!(found, verdicts(&problem, method, params, truth), "{method}");
+                failures += usize::from(found.iter().any(|finding| finding.code.is_failure()));
+            }
+        }
+    }
+    assert!(failures > 20, "{failures}");
 }
 
 #[test]

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use nalgebra::Point2;
 
 pub use self::params::{DepthRule, FeatureParams};
-pub(super) use self::several::Gathered;
 use self::remembered::{ConsensusKey, Decisions, MatchesKey, Solved};
+pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
 use super::consensus::FoundConsensus;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
