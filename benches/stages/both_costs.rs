@@ -29,7 +29,7 @@ pub fn with_both_costs<R>(
         query: &query,
         points: &of_points,
     };
-    let points = PointArrays::new(&cloud.points);
+    let points = PointArrays::new(cloud.points.iter().map(|point| point.position));
     let mut canvas = DepthCanvas::new(&PAIR.query.intrinsics, splat_px).expect("a usual photo");
     let (mut bin_pairs, mut counts) = (Vec::new(), Vec::new());
     work(&mut |poses| {

@@ -1,13 +1,14 @@
 //! The methods beside the paper's: what they say of their decisions, and what they keep.
 
 use image::{GrayImage, Luma};
-use posescope::estimator::{self, Outcome};
+use posescope::code::Code;
+use posescope::estimator::{self, Failure, Outcome};
 use posescope::event::{
     CandidatesJudged, DescentStepped, Moment, PhaseSearched, StartsRefined, ViewRendered,
 };
 use posescope::geometry::{Pose, PoseError};
 use posescope::history::History;
-use posescope::judge::{Channels, Judge, JudgeParams};
+use posescope::judge::{Channels, Judge, JudgeParams, Refined};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
@@ -110,6 +111,34 @@ fn six_freedoms_are_searched_at_several_yaws_and_end_below_every_lattice() {
             assert!(one.cost <= one.start.cost);
         }
     }
+}
+
+#[test]
+fn a_search_whose_minima_all_lead_out_of_the_disc_says_so() {
+    let mut problem = solvable();
+    // The query is 1 m away.
+    problem.uncertainty_radius_m = 0.05;
+    let (outcome, _) = told("mi6", &problem, &Params::default());
+    let failure = outcome.pose.expect_err("its basin has its foot outside");
+    assert!(
+        matches!(failure, Failure::LedOutside { minima, .. } if minima > 1),
+        "{failure}"
+    );
+    assert_eq!(failure.code(), Code::D8);
+}
+
+#[test]
+fn refinements_take_no_steps_beyond_the_next_coarse_position() {
+    let mut problem = solvable();
+    problem.uncertainty_radius_m = 1.25;
+    let (outcome, history) = told("mi6", &problem, &params(&["grid.coarse_step=0.25"]));
+    assert!(error(&problem, &outcome).translation_m < 0.1);
+    let (_, refined) = history.all::<StartsRefined>().next().expect("in the plane");
+    let moved = |one: &Refined| PoseError::between(&one.start.pose, &one.pose).translation_m;
+    let usual = told("mi6", &problem, &Params::default()).1;
+    let (_, usual) = usual.all::<StartsRefined>().next().expect("in the plane");
+    let farthest = |of: &StartsRefined| of.refinements.iter().map(moved).fold(0.0, f64::max);
+    assert!(farthest(refined) < farthest(usual));
 }
 
 #[test]

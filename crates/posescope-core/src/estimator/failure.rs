@@ -96,6 +96,16 @@ pub enum Failure {
         /// Hypotheses that could be compared with the query.
         hypotheses: usize,
     },
+    /// Wherever the search went down, it left the disc.
+    #[error(
+        "all of {minima} minima that were refined lead out of the disc, more than {reach_m:.2} m from the reference"
+    )]
+    LedOutside {
+        /// Minima that were refined.
+        minima: usize,
+        /// How far from the reference an answer may be \[m\].
+        reach_m: f64,
+    },
     /// The least cost is one that wrong poses have as well.
     #[error(
         "the least cost, {cost:.4}, is {deviations:.1} standard deviations below those of other poses, \
@@ -177,6 +187,7 @@ impl Failure {
             Self::TooFewDepths { .. } => Code::R4,
             Self::OutsideRadius { .. } => Code::R9,
             Self::NothingComparable { .. } | Self::FlatCost { .. } => Code::D5,
+            Self::LedOutside { .. } => Code::D8,
             Self::ChanceMinimum { .. } => Code::D6,
             Self::LatticeTooLarge(_) => Code::D9,
             Self::NoReferenceSucceeded { failure, .. } => failure.code(),

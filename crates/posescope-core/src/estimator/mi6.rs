@@ -132,7 +132,7 @@ impl SixFreedoms {
     pub(super) fn in_six(&self) -> Shrinking {
         Shrinking {
             freedoms: Freedoms::Six,
-            first_m: self.params.six_step_m,
+            first_m: self.params.six_step_m.min(self.most_m()),
             last_m: self.params.last_step_m,
             rad_per_m: self.params.deg_per_m.to_radians(),
         }
@@ -141,10 +141,16 @@ impl SixFreedoms {
     fn in_the_plane(&self) -> Shrinking {
         Shrinking {
             freedoms: Freedoms::Plane,
-            first_m: self.params.first_step_m,
-            last_m: PLANE_LAST_M,
+            first_m: self.params.first_step_m.min(self.most_m()),
+            last_m: PLANE_LAST_M.min(self.most_m()),
             rad_per_m: self.params.deg_per_m.to_radians(),
         }
+    }
+
+    /// No step is longer than half of one between coarse positions \[m\]: it would only lead to where
+    /// another start is.
+    fn most_m(&self) -> f64 {
+        0.5 * self.grid.coarse_step_m
     }
 
     /// The judge of a problem, with the parameters of this estimator.
@@ -220,12 +226,11 @@ impl SixFreedoms {
             search.refine(&finalists, &self.in_six(), price, trace)
         })?;
         // A walk may leave the disc, where no query can be.
-        let reach = self.reach(problem);
-        refined.retain(|one| one.pose.translation.vector.norm() <= reach);
+        let reach_m = self.reach(problem);
+        let minima = refined.len();
+        refined.retain(|one| one.pose.translation.vector.norm() <= reach_m);
         if refined.is_empty() {
-            return Err(Halt::from(Failure::NothingComparable {
-                hypotheses: search.evaluations as usize,
-            }));
+            return Err(Halt::from(Failure::LedOutside { minima, reach_m }));
         }
         trace.stage(Stage::Assess, |trace| {
             let best = refined[0];
@@ -323,15 +328,16 @@ impl SixFreedoms {
         let spread = Spread::of(&surfaces);
         let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
         let starts = starts(&surfaces, 2 * self.params.starts, price);
+        let most_m = self.most_m();
         let plan = Shrinking {
-            last_m: 0.1,
+            last_m: most_m.min(0.1),
             ..self.in_the_plane()
         };
         let plane = shrink(&starts, &plan, &mut costs)?;
         let plan = Shrinking {
             freedoms: Freedoms::Six,
-            first_m: 0.2,
-            last_m: 0.05,
+            first_m: most_m.min(0.2),
+            last_m: most_m.min(0.05),
             ..plan
         };
         let six = shrink(&apart(plane, self.params.starts, price), &plan, &mut costs)?;
@@ -349,7 +355,7 @@ impl SixFreedoms {
             .filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? }))
             .collect();
         let plan = Shrinking {
-            last_m: 0.025,
+            last_m: most_m.min(0.025),
             ..plan
         };
         let refined = shrink(&starts, &plan, &mut costs)?;

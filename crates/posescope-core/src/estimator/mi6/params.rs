@@ -15,14 +15,15 @@ parameters! {
         pub starts: usize = count("starts", "", 1..=200),
         /// The best of those, which are refined in all six freedoms.
         pub finalists: usize = count("finalists", "", 1..=100),
-        /// First step of the refinement in right, forward and yaw.
+        /// First step of the refinement in right, forward and yaw; at most half a step between coarse positions.
         pub first_step_m: f64 = number("first_step", "m", 0.01..=5.0),
-        /// First step of the refinement in six freedoms.
+        /// First step of the refinement in six freedoms; at most half a step between coarse positions.
         pub six_step_m: f64 = number("six_step", "m", 0.001..=2.0),
         /// Steps below this are the last.
         pub last_step_m: f64 = number("last_step", "m", 0.0005..=0.5),
-        /// Turn that goes with a step of one metre: what moves a view by as much.
-        pub deg_per_m: f64 = number("deg_per_m", "°", 0.1..=20.0),
+        /// Turn that goes with a step of one metre: what moves a view by as much. A room, where things are ten
+        /// times nearer than on a street, needs ten times as much.
+        pub deg_per_m: f64 = number("deg_per_m", "°", 0.1..=90.0),
         /// How many times smaller photos are for the coarse level, whose minima are finalists beside those
         /// of the fine one; 1 leaves it out.
         pub coarse_shrink: usize = count("coarse_shrink", "", 1..=16),
