@@ -182,6 +182,31 @@ fn what_is_remembered_of_a_search_is_said_of_no_other() {
 }
 
 #[test]
+fn the_look_of_one_pose_is_not_taken_for_that_of_another() {
+    let problem = solvable();
+    let mut remembering = problem.clone();
+    Arc::make_mut(&mut remembering.query).memo = Memo::of(256);
+    Arc::make_mut(&mut remembering.reference).memo = Memo::of(256);
+    let believed = |problem: &Problem, params: &Params| {
+        let mut evidence = Evidence::default();
+        let mut trace = Trace::to(&mut evidence);
+        let outcome = localize_traced(problem, Method::FB, params, &mut trace);
+        let outcome = outcome.expect("nobody cancels");
+        let subject = Subject::new(problem, Method::FB, params, &outcome, &evidence);
+        let trust = subject.trust.expect("of a pose");
+        (outcome.pose.expect("a pose"), trust)
+    };
+    let settings = ["fb.ratio=0.8", "fb.ratio=0.5"].map(|setting| with(&[setting]));
+    let told = settings
+        .each_ref()
+        .map(|params| believed(&remembering, params));
+    assert_ne!(told[0].0, told[1].0);
+    for (params, told) in settings.iter().zip(told) {
+        assert_eq!(told, believed(&problem, params));
+    }
+}
+
+#[test]
 fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
     let mut problem = solvable();
     problem.uncertainty_radius_m = 3.0;

@@ -8,6 +8,8 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3};
 
+use crate::geometry::Pose;
+
 /// A key of any type. Keys are equal where their types and values are.
 #[derive(Clone)]
 pub struct Key {
@@ -154,6 +156,17 @@ impl Bits for Point2<f64> {
 impl Bits for Point3<f64> {
     fn write(&self, words: &mut Vec<u64>) {
         words.extend(self.iter().map(|value| value.to_bits()));
+    }
+}
+
+impl Bits for Pose {
+    fn write(&self, words: &mut Vec<u64>) {
+        let numbers = self
+            .translation
+            .vector
+            .iter()
+            .chain(self.rotation.coords.iter());
+        words.extend(numbers.map(|value| value.to_bits()));
     }
 }
 

@@ -7,6 +7,7 @@ use super::{Place, SearchedCost};
 use crate::descent::DescentParams;
 use crate::diagnosis::{Diagnosis, trust};
 use crate::estimator;
+use crate::geometry::Pose;
 use crate::grid::{GridParams, Offset};
 use crate::memo::{Exact, Key, MemoId, Remembered};
 use crate::render::RenderParams;
@@ -37,8 +38,9 @@ struct FindingsKey {
     render: Exact<RenderParams>,
     grid: Exact<GridParams>,
     descent: Exact<DescentParams>,
-    /// Radius, tolerance, least coverage, costs of the result, and the truth.
+    /// Radius, tolerance, least coverage, and costs of the result.
     numbers: Exact<[f64]>,
+    truth: Exact<Pose>,
     /// The result.
     place: Exact<Offset>,
     seed: u64,
@@ -59,7 +61,7 @@ impl SearchedCost<'_, '_> {
         let (problem, params) = (subject.problem, subject.params);
         let responsible = trust::responsible(subject.method, subject.outcome);
         let entry = estimator::find(responsible)?.cost()?;
-        let mut numbers = vec![
+        let numbers = [
             problem.uncertainty_radius_m,
             subject.tolerance.translation_m,
             subject.tolerance.rotation_deg,
@@ -67,8 +69,6 @@ impl SearchedCost<'_, '_> {
             self.summary.best,
             self.summary.shuffled.unwrap_or(f64::NAN),
         ];
-        numbers.extend(self.truth.translation.vector.iter());
-        numbers.extend(self.truth.rotation.coords.iter());
         Some(FindingsKey {
             reference: problem.reference.memo.id()?,
             cost: Key::new((entry.name, params.costs.of(entry)?.key())),
@@ -76,6 +76,7 @@ impl SearchedCost<'_, '_> {
             grid: Exact::of(&params.grid),
             descent: Exact::of(&params.descent),
             numbers: Exact::of(numbers.as_slice()),
+            truth: Exact::of(&self.truth),
             place: Exact::of(&self.minimum.offset),
             seed: problem.random_seed("shuffled truth"),
         })

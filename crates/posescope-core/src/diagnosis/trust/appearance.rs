@@ -80,7 +80,7 @@ struct AppearanceKey {
     judge: Exact<JudgeParams>,
     render: Exact<RenderParams>,
     look: Look,
-    pose: Exact<[f64]>,
+    pose: Exact<Pose>,
 }
 
 impl Appearance {
@@ -97,19 +97,12 @@ impl Appearance {
         let Some(reference) = problem.reference.memo.id() else {
             return seen();
         };
-        let at = reference_from_query;
-        let numbers = at
-            .translation
-            .vector
-            .iter()
-            .chain(at.rotation.coords.iter());
-        let numbers: Vec<f64> = numbers.copied().collect();
         let key = AppearanceKey {
             reference,
             judge: Exact::of(&params.judge),
             render: Exact::of(&params.render),
             look,
-            pose: Exact::of(numbers.as_slice()),
+            pose: Exact::of(reference_from_query),
         };
         *problem.query.memo.recall(key, seen).value
     }
