@@ -5,8 +5,8 @@
 //! from front to back:
 //!
 //! 1. `integral` sums the image so that the sum over any box takes four look-ups (3.1),
-//! 2. `hessian` and `detector` find blobs, the maxima of the determinant of a box-filter Hessian
-//!    over position and scale (3.2 to 3.4),
+//! 2. `detector` finds blobs octave by octave, the maxima (`blob`) of the determinant of a box-filter
+//!    Hessian (`hessian`) over position and scale (3.2 to 3.4),
 //! 3. `orientation` turns each blob to its dominant gradient (4.1), unless the camera is known to
 //!    stay upright,
 //! 4. `descriptor` summarises the gradients around it in 64 numbers (4.2).
@@ -21,6 +21,7 @@
 //! on any number of them. [`surf_interruptible`] and [`nearest_neighbours_interruptible`] can be
 //! stopped on the way.
 
+mod blob;
 mod boxes;
 mod descriptor;
 mod detector;
@@ -29,9 +30,11 @@ mod hessian;
 mod integral;
 mod matching;
 mod nearest;
+mod octave;
 mod orientation;
 mod params;
 mod remembered;
+mod responses;
 mod sift;
 mod state;
 mod surf;

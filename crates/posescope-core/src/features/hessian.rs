@@ -1,7 +1,6 @@
 //! Responses of the box-filter Hessian (sections 3.2 and 3.3).
 
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::integral::IntegralImage;
 
@@ -68,13 +67,46 @@ impl BoxFilter {
         dxx + dyy
     }
 
+    /// The determinants of the Hessian along row `y` of the image, at every `step`-th pixel from the first;
+    /// 0 where the filter leaves the image.
+    pub(super) fn respond(
+        &self,
+        integral: &IntegralImage,
+        y: usize,
+        step: usize,
+        room: &mut Room,
+        samples: &mut [f32],
+    ) {
+        let margin = self.margin();
+        let count = integral.width().saturating_sub(2 * margin);
+        let rows = margin..integral.height().saturating_sub(margin);
+        samples.fill(0.0);
+        if count == 0 || !rows.contains(&y) {
+            return;
+        }
+        let Room { level, sums, dense } = room;
+        if step == 1 {
+            let inside = &mut samples[margin..][..count];
+            dispatch!(*level, _simd => self.determinants(integral, y, sums, inside));
+            return;
+        }
+        // Every pixel of the row, even if few are kept: vectors make up for it.
+        dense.resize(count, 0.0);
+        dispatch!(*level, _simd => self.determinants(integral, y, sums, dense));
+        let first = margin.next_multiple_of(step);
+        let kept = dense.iter().skip(first - margin).step_by(step);
+        for (sample, &determinant) in samples[first / step..].iter_mut().zip(kept) {
+            *sample = determinant;
+        }
+    }
+
     /// The determinants of the Hessians along row `y`, from the first pixel where the filter fits.
     #[inline(always)]
     fn determinants(
         &self,
         integral: &IntegralImage,
         y: usize,
-        buffers: &mut Buffers,
+        sums: &mut [Vec<i32>; 3],
         determinants: &mut [f32],
     ) {
         let count = determinants.len();
@@ -82,7 +114,10 @@ impl BoxFilter {
         // Table entries `offset` pixels before and after the central pixel, for the whole row.
         let before = |row: usize, offset: usize| &integral.row(row)[x - offset..][..count];
         let after = |row: usize, offset: usize| &integral.row(row)[x + 1 + offset..][..count];
-        let [dxx, dyy, dxy] = buffers.resized(count);
+        let [dxx, dyy, dxy] = sums.each_mut().map(|sums| {
+            sums.resize(count, 0);
+            sums.as_mut_slice()
+        });
 
         let (length, middle, whole) = (self.half_length, self.lobe / 2, self.margin());
         let edges = |row: usize| {
@@ -120,18 +155,22 @@ impl BoxFilter {
     }
 }
 
-/// Box sums of one row of pixels, kept from row to row for their memory.
-#[derive(Default)]
-struct Buffers {
+/// What a row of responses takes, kept from row to row for its memory.
+pub(super) struct Room {
+    level: Level,
+    /// Box sums of each pixel.
     sums: [Vec<i32>; 3],
+    /// The responses at every pixel where fewer are kept.
+    dense: Vec<f32>,
 }
 
-impl Buffers {
-    fn resized(&mut self, count: usize) -> [&mut [i32]; 3] {
-        self.sums.each_mut().map(|sums| {
-            sums.resize(count, 0);
-            sums.as_mut_slice()
-        })
+impl Default for Room {
+    fn default() -> Self {
+        Self {
+            level: Level::new(),
+            sums: Default::default(),
+            dense: Vec::new(),
+        }
     }
 }
 
@@ -177,91 +216,6 @@ fn mixed_difference(
     }
 }
 
-/// The responses of one filter, sampled on a grid whose first sample is pixel (0, 0).
-pub(super) struct Layer {
-    /// The filter.
-    pub(super) filter: BoxFilter,
-    /// Distance between samples \[px\].
-    pub(super) step: usize,
-    columns: usize,
-    /// Row by row; 0 where the filter leaves the image.
-    responses: Vec<f32>,
-}
-
-impl Layer {
-    pub(super) fn new(integral: &IntegralImage, filter: BoxFilter, step: usize) -> Self {
-        let (width, height) = (integral.width(), integral.height());
-        let columns = width.div_ceil(step);
-        let mut responses = vec![0.0; columns * height.div_ceil(step)];
-        let margin = filter.margin();
-        let first = margin.next_multiple_of(step);
-        let dense_count = width.saturating_sub(2 * margin);
-        let rows = if dense_count > 0 {
-            margin..height.saturating_sub(margin)
-        } else {
-            0..0
-        };
-        let level = Level::new();
-        responses
-            .par_chunks_exact_mut(columns)
-            .enumerate()
-            .map(|(row, samples)| (row * step, samples))
-            .filter(|(y, _)| rows.contains(y))
-            .for_each_init(
-                || (Buffers::default(), vec![0.0; dense_count]),
-                |(buffers, dense), (y, samples)| {
-                    // Every pixel of the row, even if few are kept: vectors make up for it.
-                    dispatch!(
-                        level,
-                        _simd => filter.determinants(integral, y, buffers, dense)
-                    );
-                    let kept = dense.iter().skip(first - margin).step_by(step);
-                    for (sample, &determinant) in samples[first / step..].iter_mut().zip(kept) {
-                        *sample = determinant;
-                    }
-                },
-            );
-        Self {
-            filter,
-            step,
-            columns,
-            responses,
-        }
-    }
-
-    /// The same responses at every `step`-th pixel, a multiple of this layer's step.
-    pub(super) fn decimated(&self, step: usize) -> Self {
-        let stride = step / self.step;
-        let columns = self.columns.div_ceil(stride);
-        let rows = (self.responses.len() / self.columns.max(1)).div_ceil(stride);
-        let mut responses = vec![0.0; rows * columns];
-        let decimated = responses.par_chunks_exact_mut(columns.max(1)).enumerate();
-        decimated.for_each(|(row, samples)| {
-            let kept = self.row(row * stride).iter().step_by(stride);
-            for (sample, &response) in samples.iter_mut().zip(kept) {
-                *sample = response;
-            }
-        });
-        Self {
-            filter: self.filter,
-            step,
-            columns,
-            responses,
-        }
-    }
-
-    /// The determinants along a row of samples.
-    pub(super) fn row(&self, row: usize) -> &[f32] {
-        &self.responses[row * self.columns..][..self.columns]
-    }
-
-    /// The determinant of the Hessian at a sample.
-    #[inline]
-    pub(super) fn at(&self, column: usize, row: usize) -> f32 {
-        self.responses[row * self.columns + column]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use image::{GrayImage, Luma};
@@ -269,13 +223,19 @@ mod tests {
 
     use super::*;
 
-    /// The responses to `value(x, y)`, taken about the middle of a 99 × 99 image.
-    fn layer(lobe: usize, value: impl Fn(i32, i32) -> i32) -> Layer {
+    /// Row 49 of the responses to `value(x, y)`, taken about the middle of a 99 × 99 image.
+    fn responses(lobe: usize, value: impl Fn(i32, i32) -> i32) -> Vec<f32> {
         let image = GrayImage::from_fn(99, 99, |x, y| {
             let value = value(x as i32 - 49, y as i32 - 49);
             Luma([u8::try_from(value).expect("a grey value")])
         });
-        Layer::new(&IntegralImage::new(&image), BoxFilter::new(lobe), 1)
+        row(&IntegralImage::new(&image), BoxFilter::new(lobe), 49, 1)
+    }
+
+    fn row(integral: &IntegralImage, filter: BoxFilter, y: usize, step: usize) -> Vec<f32> {
+        let mut samples = vec![f32::NAN; integral.width().div_ceil(step)];
+        filter.respond(integral, y, step, &mut Room::default(), &mut samples);
+        samples
     }
 
     #[test]
@@ -293,20 +253,20 @@ mod tests {
         let saddle = |x: i32, y: i32| (128 + x * y).clamp(0, 255);
         for lobe in [3, 5, 7, 9] {
             let squared = (lobe * lobe) as f32;
-            let determinant = layer(lobe, bowl).at(49, 49);
+            let determinant = responses(lobe, bowl)[49];
             assert!((determinant / (2.0 * squared).powi(2) - 1.0).abs() < 1e-5);
-            let determinant = layer(lobe, saddle).at(49, 49);
+            let determinant = responses(lobe, saddle)[49];
             assert!((determinant / (MIXED_WEIGHT * squared).powi(2) + 1.0).abs() < 1e-5);
         }
     }
 
     #[test]
     fn slopes_and_straight_edges_have_no_response() {
-        let slope = layer(5, |x, y| 128 + x + y);
-        let edge = layer(5, |x, _| if x > 3 { 200 } else { 20 });
+        let slope = responses(5, |x, y| 128 + x + y);
+        let edge = responses(5, |x, _| if x > 3 { 200 } else { 20 });
         for at in 30..70 {
-            assert_eq!(slope.at(at, 49), 0.0);
-            assert_eq!(edge.at(at, 49), 0.0);
+            assert_eq!(slope[at], 0.0);
+            assert_eq!(edge[at], 0.0);
         }
     }
 
@@ -331,14 +291,14 @@ mod tests {
         ) {
             let image = GrayImage::from_raw(40, 31, pixels).expect("a full image");
             let integral = IntegralImage::new(&image);
-            let dense = Layer::new(&integral, BoxFilter::new(5), 1);
-            let direct = Layer::new(&integral, BoxFilter::new(5), step);
-            let decimated = dense.decimated(step);
-            prop_assert_eq!(&direct.responses, &decimated.responses);
-            for row in 0..31usize.div_ceil(step) {
-                for column in 0..40usize.div_ceil(step) {
-                    prop_assert_eq!(direct.at(column, row), dense.at(column * step, row * step));
-                }
+            let filter = BoxFilter::new(5);
+            let margin = filter.margin();
+            for y in 0..31 {
+                let dense = row(&integral, filter, y, 1);
+                let fits = |x: usize| (margin..40 - margin).contains(&x) && (margin..31 - margin).contains(&y);
+                prop_assert!((0..40).all(|x| fits(x) || dense[x] == 0.0));
+                let kept: Vec<f32> = dense.into_iter().step_by(step).collect();
+                prop_assert_eq!(row(&integral, filter, y, step), kept);
             }
         }
     }

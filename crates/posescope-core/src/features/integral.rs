@@ -1,6 +1,10 @@
 //! Integral images: the sum over a box of any size from a fixed number of look-ups.
 
 use image::GrayImage;
+use rayon::prelude::*;
+
+/// Fewer rows are not worth a thread.
+const LEAST_BAND: usize = 64;
 
 /// The integral image of a grey image (section 3.1, equation 1).
 ///
@@ -19,15 +23,27 @@ impl IntegralImage {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let stride = width + 1;
         let mut sums = vec![0u32; stride * (height + 1)];
-        for y in 0..height {
-            let pixels = &image.as_raw()[y * width..][..width];
-            let (above, below) = sums[y * stride..][..2 * stride].split_at_mut(stride);
-            let mut row_sum = 0u32;
-            for x in 0..width {
-                row_sum = row_sum.wrapping_add(u32::from(pixels[x]));
-                below[x + 1] = above[x + 1].wrapping_add(row_sum);
-            }
+        // A band of rows for each thread, as if nothing were above it; then what is above it is added.
+        let rows = height
+            .div_ceil(rayon::current_num_threads())
+            .max(LEAST_BAND);
+        let (_, table) = sums.split_at_mut(stride);
+        let pixels = image.as_raw().par_chunks((rows * width).max(1));
+        let bands = table.par_chunks_mut(rows * stride).zip(pixels);
+        bands.for_each(|(band, pixels)| sum_up(band, pixels, width));
+        let mut above = vec![0u32; stride];
+        let mut incomplete = Vec::new();
+        for band in table.chunks_mut(rows * stride) {
+            let mut next = above.clone();
+            add(&mut next, &band[band.len() - stride..]);
+            incomplete.push((above, band));
+            above = next;
         }
+        let below_the_first = incomplete.into_par_iter().skip(1);
+        below_the_first.for_each(|(above, band)| {
+            let rows = band.chunks_exact_mut(stride);
+            rows.for_each(|row| add(row, &above));
+        });
         Self {
             width,
             height,
@@ -84,6 +100,31 @@ impl IntegralImage {
         let first = &self.sums[row + columns.first..][..2];
         let last = &self.sums[row + columns.last..][..2];
         [first[0], first[1], last[0], last[1]]
+    }
+}
+
+/// The rows of the table below some rows of pixels, as if nothing were above them. The table's rows are zero
+/// before.
+fn sum_up(sums: &mut [u32], pixels: &[u8], width: usize) {
+    let stride = width + 1;
+    let mut above: &[u32] = &vec![0; stride];
+    for (row, pixels) in sums
+        .chunks_exact_mut(stride)
+        .zip(pixels.chunks_exact(width.max(1)))
+    {
+        let mut row_sum = 0u32;
+        for x in 0..width {
+            row_sum = row_sum.wrapping_add(u32::from(pixels[x]));
+            row[x + 1] = above[x + 1].wrapping_add(row_sum);
+        }
+        above = row;
+    }
+}
+
+/// Adds one row of the table to another.
+fn add(row: &mut [u32], other: &[u32]) {
+    for (sum, other) in row.iter_mut().zip(other) {
+        *sum = sum.wrapping_add(*other);
     }
 }
 
@@ -203,6 +244,21 @@ mod tests {
             let integral = IntegralImage::new(&image);
             let area = integral.area(Span::new(x, side, w), Span::new(y, side, h));
             prop_assert!((area - expected).abs() < 0.05, "{area} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn sums_are_those_of_one_thread() {
+        for (width, height) in [(0, 0), (3, 0), (0, 300), (31, 300), (5, 64)] {
+            let image = GrayImage::from_fn(width, height, |x, y| {
+                image::Luma([(31 * x + 7 * y * (x + 1)) as u8])
+            });
+            let on = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+                let pool = pool.expect("a thread pool");
+                pool.install(|| IntegralImage::new(&image)).sums
+            };
+            assert!([2, 3, 7].map(on).iter().all(|sums| *sums == on(1)));
         }
     }
 
