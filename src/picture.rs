@@ -1,6 +1,6 @@
 //! What recordings and the window show of photos, synthetic views and histograms, as pictures.
 
-use image::{DynamicImage, GrayImage, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 
 #[cfg(feature = "app")]
 use crate::cost::Explanation;
@@ -11,9 +11,7 @@ use crate::image::Photo;
 use crate::palette;
 #[cfg(feature = "app")]
 use crate::render::Comparison;
-#[cfg(feature = "app")]
-use crate::render::SplattedPixel;
-use crate::render::SyntheticView;
+use crate::render::{SplattedPixel, SyntheticView};
 
 /// Differences from −64 to 64 grey values have colours of their own; greater ones look like these.
 pub(crate) const RESIDUAL_RANGE: f64 = 64.0;
@@ -37,19 +35,34 @@ pub(crate) fn photo(photo: &Photo) -> DynamicImage {
 }
 
 /// Both photos on one canvas, the query above the reference, with the row at which the reference
-/// begins.
+/// begins. In colour where one of them is.
 ///
 /// Above each other, because photos of cars are wide: beside each other they would be 2482 pixels
 /// wide for KITTI, and half as large in the same view. A camera that moves ahead also shifts
 /// features more sideways than up, so that true matches are nearly upright lines.
-pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (RgbImage, u32) {
-    let (query, reference) = (photo(query).into_rgb8(), photo(reference).into_rgb8());
-    let top = query.height() + 4;
-    let width = query.width().max(reference.width());
-    let mut canvas = RgbImage::from_pixel(width, top + reference.height(), Rgb([255; 3]));
-    image::imageops::replace(&mut canvas, &query, 0, 0);
-    image::imageops::replace(&mut canvas, &reference, 0, i64::from(top));
+pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (DynamicImage, u32) {
+    let top = query.gray.height() + 4;
+    let canvas = match (&query.color, &reference.color) {
+        (None, None) => one_above_the_other(&query.gray, &reference.gray, top, Luma([255])).into(),
+        _ => {
+            let [query, reference] = [query, reference].map(|photo_of| photo(photo_of).into_rgb8());
+            one_above_the_other(&query, &reference, top, Rgb([255; 3])).into()
+        }
+    };
     (canvas, top)
+}
+
+fn one_above_the_other<P: Pixel>(
+    upper: &ImageBuffer<P, Vec<P::Subpixel>>,
+    lower: &ImageBuffer<P, Vec<P::Subpixel>>,
+    top: u32,
+    ground: P,
+) -> ImageBuffer<P, Vec<P::Subpixel>> {
+    let width = upper.width().max(lower.width());
+    let mut canvas = ImageBuffer::from_pixel(width, top + lower.height(), ground);
+    image::imageops::replace(&mut canvas, upper, 0, 0);
+    image::imageops::replace(&mut canvas, lower, 0, i64::from(top));
+    canvas
 }
 
 /// The synthetic view in its grey values.
@@ -233,9 +246,13 @@ pub(crate) struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     pub(crate) fn new(view: &'a SyntheticView) -> Self {
-        let depth = |place: usize| view.pixels[place].depth;
-        let mut order: Vec<usize> = (0..view.pixels.len()).collect();
-        order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
+        // Positive numbers are ordered like their bits.
+        let farthest_first =
+            |(place, pixel): (usize, &SplattedPixel)| (!pixel.depth.to_bits(), place as u32);
+        let mut order: Vec<(u32, u32)> =
+            view.pixels.iter().enumerate().map(farthest_first).collect();
+        order.sort_unstable();
+        let order = order.into_iter().map(|(_, place)| place as usize).collect();
         Self { view, order }
     }
 
@@ -290,10 +307,6 @@ fn gray(value: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    #[cfg(not(feature = "app"))]
-    use crate::render::SplattedPixel;
-    #[cfg(feature = "app")]
-    use image::Luma;
 
     #[test]
     fn a_covered_pixel_keeps_its_value_and_the_nearer_one_spreads_over_the_farther() {
@@ -380,6 +393,6 @@ mod tests {
     fn the_canvas_stacks_photos_of_different_sizes() {
         let photo = |w, h| Photo::from_gray(GrayImage::new(w, h));
         let (canvas, top) = stacked(&photo(20, 10), &photo(30, 8));
-        assert_eq!((canvas.dimensions(), top), ((30, 22), 14));
+        assert_eq!((canvas.width(), canvas.height(), top), (30, 22, 14));
     }
 }

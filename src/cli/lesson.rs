@@ -10,7 +10,7 @@ use posescope::lesson::{Lesson, OpenSetting, Page, PageTurner};
 use posescope::method::Method;
 use posescope::run::default_failure_radius_m;
 use posescope::scene::Scene;
-use posescope::sink::rerun::{Identity, Recorder, Targets};
+use posescope::sink::rerun::{Identity, Recorder, Targets, Views};
 
 use super::args::LessonArgs;
 use super::demo_settings;
@@ -171,6 +171,8 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
     };
     let targets = Targets {
         save: Some(path.to_owned()),
+        // A page may speak of any of them.
+        views: Views::All,
         ..Targets::default()
     };
     let asked = settings

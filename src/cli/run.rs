@@ -283,6 +283,7 @@ impl Plan<'_> {
             connect: recording.connect.clone(),
             spawn: recording.spawn,
             serve: recording.serve,
+            views: recording.views.into(),
         };
         if targets.is_none() {
             return Ok(None);

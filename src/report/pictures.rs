@@ -129,7 +129,7 @@ impl Witness {
             f64::from(canvas.width()) * scale,
             f64::from(canvas.height()) * scale,
         );
-        let photos = jpeg(&DynamicImage::ImageRgb8(canvas), CANVAS_WIDTH, 60)?;
+        let photos = jpeg(&canvas, CANVAS_WIDTH, 60)?;
         let mut svg = String::new();
         let mut counts = [0; FeatureState::NAMES.len()];
         // Inliers come last, so that no outlier hides one.

@@ -19,7 +19,9 @@ mod file;
 mod fusion;
 mod indexed;
 mod layout;
+mod recorded;
 mod recorder;
+mod recording;
 mod report;
 mod retrieval;
 mod scene;
@@ -33,7 +35,7 @@ pub use checkup::{CheckupError, record_checkup};
 pub use comparison::{ComparisonError, record_comparison};
 pub use error::RecordError;
 pub use recorder::Recorder;
-pub use targets::{Identity, Targets};
+pub use targets::{Identity, Targets, Views};
 
 use crate::palette::Rgb;
 

@@ -16,7 +16,7 @@ use posescope::localize::{LocalizeObserver as _, StageTimes, evaluate, localize_
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
-use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
+use posescope::sink::rerun::{Identity, Recorder, Targets, Views, entities};
 use posescope::trace::{Cancelled, Fanout, Sink as _, Trace};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
@@ -426,7 +426,7 @@ fn a_process_that_is_killed_leaves_what_it_told() {
         .env("POSESCOPE_CACHE", crate::binary::CACHE)
         .spawn()
         .expect("the binary starts");
-    // Long enough for the matches and some views, far from the end of some 5 MB.
+    // Long enough for the matches and some views, far from the end of some 4 MB.
     let size = || std::fs::metadata(&path).map_or(0, |file| file.len());
     while size() < 2_000_000 && process.try_wait().expect("a child").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(5));
@@ -455,6 +455,49 @@ fn a_whole_recording_wants_every_kind_and_a_repeating_hybrid_hardly_any() {
     run(&mut recorder, &Method::PAPER, &Params::default());
     assert!(!recorder.wanted().contains(Kind::ViewRendered));
     assert!(recorder.wanted().contains(Kind::BranchTaken));
+}
+
+#[test]
+fn views_of_bests_that_last_are_shown_or_all_if_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let evals_of = |views, name| {
+        let path = folder.path().join(name);
+        let targets = Targets {
+            save: Some(path.clone()),
+            views,
+            ..Targets::default()
+        };
+        let opened = Recorder::open(&targets, &identity(), &[Method::PM]);
+        let mut recorder = opened.expect("a writable file");
+        run(&mut recorder, &[Method::PM], &Params::default());
+        recorder.close().expect("a whole recording");
+        let chunks = chunks(&path);
+        ["pm/synthetic", "pm/best"].map(|entity| {
+            let of_entity =
+                |chunk: &&Chunk| chunk.entity_path().to_string().trim_start_matches('/') == entity;
+            let columns = chunks.iter().filter(of_entity);
+            let columns = columns.flat_map(|chunk| chunk.timelines().values());
+            let evals = columns.filter(|column| column.timeline().name().as_str() == EVAL);
+            let evals: BTreeSet<i64> = evals
+                .flat_map(|column| column.times_raw().to_vec())
+                .collect();
+            evals
+        })
+    };
+    let [all, bests] = evals_of(Views::All, "all.rrd");
+    let [lasting, bests_told] = evals_of(Views::Lasting, "lasting.rrd");
+    assert_eq!(all, bests, "each best has its view");
+    assert_eq!(bests_told, bests, "a curve leaves nothing out");
+    assert!(lasting.is_subset(&all));
+    assert!(2 * lasting.len() < all.len(), "{lasting:?} of {all:?}");
+    // The first and the last one, and each that nothing better followed for a while.
+    assert!(lasting.contains(&0) && lasting.last() == all.last());
+    for (&best, &next) in all.iter().zip(all.iter().skip(1)) {
+        assert!(
+            next - best < 8 || lasting.contains(&best),
+            "{best}, then {next}"
+        );
+    }
 }
 
 #[cfg(target_os = "linux")]

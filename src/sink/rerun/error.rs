@@ -41,6 +41,9 @@ pub enum RecordError {
         /// What the system said.
         source: io::Error,
     },
+    /// Nothing can be recorded beside the run.
+    #[error("cannot start the thread that records: {0}")]
+    Thread(#[source] io::Error),
     /// A viewer did not take the recording.
     #[error("the viewer did not receive the whole recording: {0}")]
     Viewer(String),

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use image::DynamicImage;
 use nalgebra::Point3;
 use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocument};
 
@@ -95,12 +94,6 @@ impl FeatureContext {
         let photos = [&problem.query.photo, &problem.reference.photo];
         let (canvas, top) = picture::stacked(photos[0], photos[1]);
         self.canvas_top = top;
-        let canvas = DynamicImage::from(canvas);
-        // A third of the work.
-        let canvas = match photos.iter().all(|photo| photo.color.is_none()) {
-            true => canvas.into_luma8().into(),
-            false => canvas,
-        };
         stream.log_image(&entities::matches(context.reference), jpeg(&canvas));
     }
 

@@ -1,4 +1,4 @@
-//! The recorder: a sink that puts a run into a recording.
+//! A recording as it grows: what a run tells becomes rows of entities.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -10,27 +10,26 @@ use super::direct::DirectContext;
 use super::event_context::EventContext;
 use super::feature::FeatureContext;
 use super::fusion::FusionTables;
+use super::recorded::Recorded;
 use super::scene::{self, Origin, PlacedCamera};
 use super::story::{self, BesideTruth};
 use super::stream::Stream;
-use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
-use crate::estimator;
-use crate::event::{Event, Kind, KindSet, ReferencesFused, ReferencesRanked, Stage};
+use super::{Identity, RecordError, Targets, Views, blueprint, entities, report, retrieval};
+use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
-use crate::localize::{LocalizeObserver, PoseReport, QueryResult, StageTimes};
+use crate::localize::{PoseReport, QueryResult};
 use crate::method::Method;
 use crate::narration;
 use crate::palette;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::{ColoredCloud, color_cloud};
-use crate::trace::{Cancelled, Record, Sink};
 
-/// Puts runs into a Rerun recording, one query after the other.
+/// A recording into which runs are put, one query after the other.
 ///
-/// A recording that breaks does not break the run: the recorder remembers its first error, wants no
-/// more events and reports the error when it is closed.
-pub struct Recorder {
+/// A recording that breaks does not break the run: it remembers its first error, takes nothing more and reports
+/// the error when it is closed.
+pub(super) struct Recording {
     stream: Stream,
     identity: Identity,
     params: Params,
@@ -40,6 +39,7 @@ pub struct Recorder {
     is_laid_out: bool,
     /// Whether the pages of a lesson are shown.
     has_pages: bool,
+    views: Views,
     query: CurrentQuery,
     /// Hypotheses of each method in earlier runs: `eval` goes on where the last run ended.
     evals: BTreeMap<Method, i64>,
@@ -53,10 +53,8 @@ struct CurrentQuery {
     results: Vec<QueryResult>,
     reference: usize,
     method: Option<Method>,
-    /// Estimators that were recorded, by reference: the hybrid repeats what FB and MI did.
-    recorded: BTreeSet<(usize, Method)>,
-    /// Whether the method at work can only repeat what was recorded before.
-    is_repetition: bool,
+    /// Estimators that were recorded.
+    recorded: Recorded,
     clouds: BTreeSet<usize>,
     stages: Vec<Stage>,
     estimators: Vec<ActiveEstimator>,
@@ -83,12 +81,12 @@ struct ActiveEstimator {
     direct: DirectContext,
 }
 
-impl Recorder {
+impl Recording {
     /// Opens the targets of a run with these methods.
     ///
     /// # Errors
     /// [`RecordError`] names the target that cannot be opened.
-    pub fn open(
+    pub(super) fn open(
         targets: &Targets,
         identity: &Identity,
         methods: &[Method],
@@ -104,19 +102,24 @@ impl Recorder {
             origin: None,
             is_laid_out: false,
             has_pages: false,
+            views: targets.views,
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
     }
 
-    /// With the pages of a lesson, which the layout leaves room for.
-    pub fn with_pages(mut self) -> Self {
+    /// Leaves room in the layout for the pages of a lesson.
+    pub(super) fn leave_room_for_pages(&mut self) {
         self.has_pages = true;
-        self
+    }
+
+    /// Whether nothing more is taken.
+    pub(super) fn is_broken(&self) -> bool {
+        self.stream.is_broken()
     }
 
     /// Shows a page of a lesson, as Markdown, from here on.
-    pub fn show_page(&mut self, markdown: &str) {
+    pub(super) fn show_page(&mut self, markdown: &str) {
         self.stream.advance();
         let page = TextDocument::from_markdown(markdown);
         self.stream.log(entities::LESSON, &page);
@@ -126,7 +129,11 @@ impl Recorder {
     ///
     /// # Errors
     /// The first error of the whole run.
-    pub fn close(mut self) -> Result<(), RecordError> {
+    pub(super) fn close(mut self) -> Result<(), RecordError> {
+        // A run that was stopped ends no stage.
+        for estimator in &mut self.query.estimators {
+            estimator.direct.show(estimator.method, &mut self.stream);
+        }
         self.lay_out_story();
         self.stream.close()
     }
@@ -269,14 +276,14 @@ impl Recorder {
 
     fn stage_started(&mut self, stage: Stage) {
         if let Stage::Estimator(method) = stage {
-            let is_first = self.query.recorded.insert((self.query.reference, method));
+            let is_first = self.query.recorded.insert(self.query.reference, method);
             self.query.estimators.push(ActiveEstimator {
                 method,
                 is_repetition: !is_first,
                 began: self.query.told - 1,
                 hypotheses: 0,
                 feature: FeatureContext::default(),
-                direct: DirectContext::default(),
+                direct: DirectContext::new(self.views),
             });
         }
         self.query.stages.push(stage);
@@ -291,8 +298,9 @@ impl Recorder {
             estimator.feature.tell_trials(&mut self.stream);
         }
         if matches!(stage, Stage::Estimator(_))
-            && let Some(estimator) = self.query.estimators.pop()
+            && let Some(mut estimator) = self.query.estimators.pop()
         {
+            estimator.direct.show(estimator.method, &mut self.stream);
             let key = (self.query.reference, estimator.method);
             let told = self.query.told - estimator.began;
             if estimator.is_repetition {
@@ -309,7 +317,10 @@ impl Recorder {
             self.say(&format!("{path} stopped here"), TextLogLevel::WARN);
         }
         self.show_stage();
-        self.stream.flush();
+        // A file is smaller and sooner written in larger pieces.
+        if self.stream.is_live() || matches!(stage, Stage::Estimator(_)) {
+            self.stream.flush();
+        }
     }
 
     /// The lane of the method that was asked for shows all stages, those inside the hybrid too.
@@ -410,9 +421,6 @@ impl Recorder {
                 .direct
                 .tell(event, evals, &context, &mut self.stream);
         }
-        if matches!(event, Event::ViewRendered(_)) {
-            self.stream.flush();
-        }
     }
 }
 
@@ -420,24 +428,22 @@ impl CurrentQuery {
     fn problem(&self) -> Option<&Problem> {
         self.problems.get(self.reference)
     }
-
-    /// Whether the method that begins now is a hybrid of which both parts were recorded before.
-    fn is_repeated_hybrid(&self) -> bool {
-        let was_recorded = |method| self.recorded.contains(&(self.reference, method));
-        let here = self.method.and_then(estimator::find);
-        let parts = here.and_then(|entry| entry.hybrid());
-        parts.is_some_and(|parts| was_recorded(parts.first) && was_recorded(parts.second))
-    }
 }
 
-impl LocalizeObserver for Recorder {
-    fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
+/// What a run tells, as its observer hears it.
+impl Recording {
+    pub(super) fn begin_query(
+        &mut self,
+        query_index: usize,
+        problems: Vec<Problem>,
+        truth: Option<Pose>,
+    ) {
         self.query = CurrentQuery {
-            problems: problems.to_vec(),
-            truth: truth.copied(),
+            problems,
+            truth,
             ..CurrentQuery::default()
         };
-        let Some(first) = problems.first() else {
+        let Some(first) = self.query.problems.first().cloned() else {
             return;
         };
         self.stream.set_query(query_index);
@@ -449,12 +455,12 @@ impl LocalizeObserver for Recorder {
                 self.wipe();
                 origin
             }
-            None => self.set_up(first),
+            None => self.set_up(&first),
         };
         let stream = &mut self.stream;
         let label = |name: &str| self.identity.reference_label(name);
-        scene::log_photos(stream, problems, label, origin);
-        if let Some(truth) = truth {
+        scene::log_photos(stream, &self.query.problems, label, origin);
+        if let Some(truth) = &self.query.truth {
             let camera = PlacedCamera {
                 owner: &entities::truth(),
                 world_from_camera: truth,
@@ -468,18 +474,16 @@ impl LocalizeObserver for Recorder {
         self.stream.flush();
     }
 
-    fn begin_method(&mut self, reference_index: usize, method: Method) {
+    pub(super) fn begin_method(&mut self, reference_index: usize, method: Method) {
         self.lay_out(0);
         self.query.reference = reference_index;
         self.query.method = Some(method);
         self.query.told = 0;
-        // Decided once: while a hybrid runs, its own parts are recorded one after the other.
-        self.query.is_repetition = self.query.is_repeated_hybrid();
         self.query.stages.clear();
         self.query.estimators.clear();
     }
 
-    fn end_method(&mut self, result: &QueryResult, _times: &StageTimes) {
+    pub(super) fn end_method(&mut self, result: &QueryResult) {
         self.stream.advance();
         self.result_in_words(result);
         self.estimate(result);
@@ -489,7 +493,7 @@ impl LocalizeObserver for Recorder {
         self.stream.flush_blocking();
     }
 
-    fn explained(&mut self, explained: &QueryResult) {
+    pub(super) fn explained(&mut self, explained: &QueryResult) {
         let is_same = |result: &&mut QueryResult| {
             result.method == explained.method
                 && result.fusion == explained.fusion
@@ -502,39 +506,18 @@ impl LocalizeObserver for Recorder {
         self.stream.flush_blocking();
     }
 
-    fn begin_fusion(&mut self, method: Method) {
-        self.begin_method(0, method);
-    }
-
-    fn end_fusion(&mut self, result: &QueryResult) {
-        self.end_method(result, &StageTimes::default());
-    }
-}
-
-impl Sink for Recorder {
-    fn wanted(&self) -> KindSet {
+    pub(super) fn accept(&mut self, event: &Event) {
         if self.stream.is_broken() {
-            KindSet::NONE
-        } else if self.query.is_repetition {
-            KindSet::of(&[Kind::BranchTaken])
-        } else {
-            KindSet::ALL
-        }
-    }
-
-    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        if self.stream.is_broken() {
-            return Ok(());
+            return;
         }
         self.stream.set_lockstep(Some(self.query.told));
         self.query.told += 1;
-        match &record.event {
+        match event {
             Event::StageStarted(started) => self.stage_started(started.stage),
             Event::StageEnded(ended) => self.stage_ended(ended.stage, ended.succeeded),
             Event::ReferencesFused(event) => self.fused(event),
             Event::ReferencesRanked(event) => self.ranked(event),
             event => self.tell(event),
         }
-        Ok(())
     }
 }

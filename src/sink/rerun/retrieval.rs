@@ -65,6 +65,7 @@ struct PhotoPair {
 impl PhotoPair {
     fn of(query: &Photo, reference: &Photo) -> Self {
         let (stacked, top) = picture::stacked(query, reference);
+        let stacked = stacked.into_rgb8();
         let (width, height) = stacked.dimensions();
         let shrink = f64::from(CANVAS_WIDTH) / f64::from(width.max(CANVAS_WIDTH));
         let small = |length: u32| ((f64::from(length) * shrink).round() as u32).max(1);

@@ -1,7 +1,7 @@
 //! What a recording leads the eye to: what went wrong, and what it looks like beside the truth.
 
 use super::blueprint::Focus;
-use super::direct::log_pictures;
+use super::direct;
 use super::entities;
 use super::stream::Stream;
 use crate::estimator::{self, Entry};
@@ -83,8 +83,10 @@ impl BesideTruth<'_> {
         ];
         for (place, world_from_query) in places {
             if let Some(comparison) = estimator.compare_at(self.problem, world_from_query) {
-                let path = |part: &str| entities::direct(method, &format!("{place}/{part}"));
-                log_pictures(stream, &comparison, &path);
+                for (part, picture) in direct::packed(&comparison) {
+                    let part = format!("{place}/{part}");
+                    stream.log_image(&entities::direct(method, &part), picture);
+                }
             }
         }
         true

@@ -32,12 +32,20 @@ pub(super) struct Stream {
     /// A viewer went away while the file is well: what is left goes to the file.
     viewer_lost: bool,
     serves: bool,
+    /// Whether somebody looks on while it grows.
+    is_live: bool,
+    now: Now,
+    /// Layouts that were sent.
+    layouts: i64,
+}
+
+/// Where a row stands on each timeline.
+#[derive(Clone, Copy)]
+pub(super) struct Now {
     query: i64,
     step: i64,
     eval: Option<i64>,
     lockstep: Option<i64>,
-    /// Layouts that were sent.
-    layouts: i64,
 }
 
 impl Stream {
@@ -60,10 +68,13 @@ impl Stream {
             error: None,
             viewer_lost: false,
             serves: targets.serve.is_some(),
-            query: 0,
-            step: -1,
-            eval: None,
-            lockstep: None,
+            is_live: targets.connect.is_some() || targets.spawn || targets.serve.is_some(),
+            now: Now {
+                query: 0,
+                step: -1,
+                eval: None,
+                lockstep: None,
+            },
             layouts: 0,
         })
     }
@@ -75,6 +86,11 @@ impl Stream {
         self.keep(sent.map_err(|error| unrecordable("the layout", &error)));
     }
 
+    /// Whether somebody looks on while it grows.
+    pub(super) fn is_live(&self) -> bool {
+        self.is_live
+    }
+
     /// Whether recording on makes sense.
     pub(super) fn is_broken(&self) -> bool {
         self.error.is_some() && !self.viewer_lost
@@ -82,22 +98,34 @@ impl Stream {
 
     /// From here on the rows belong to this query.
     pub(super) fn set_query(&mut self, index: usize) {
-        self.query = index as i64;
+        self.now.query = index as i64;
     }
 
     /// From here on the rows belong to this hypothesis, or to none.
     pub(super) fn set_eval(&mut self, eval: Option<i64>) {
-        self.eval = eval;
+        self.now.eval = eval;
     }
 
     /// From here on the rows belong to this event of its estimator, or to none.
     pub(super) fn set_lockstep(&mut self, event: Option<i64>) {
-        self.lockstep = event;
+        self.now.lockstep = event;
     }
 
     /// Goes on to the next decision of the timeline.
     pub(super) fn advance(&mut self) {
-        self.step += 1;
+        self.now.step += 1;
+    }
+
+    /// Where rows stand that are recorded now.
+    pub(super) fn now(&self) -> Now {
+        self.now
+    }
+
+    /// Records as of an earlier time.
+    pub(super) fn as_of(&mut self, then: Now, record: impl FnOnce(&mut Self)) {
+        let now = std::mem::replace(&mut self.now, then);
+        record(self);
+        self.now = now;
     }
 
     /// Records something as of now.
@@ -106,11 +134,13 @@ impl Stream {
             return;
         }
         // Rerun keeps the time per thread, and a run may move to another one.
-        self.recording.set_time_sequence(QUERY_TIMELINE, self.query);
-        self.recording.set_time_sequence(STEP_TIMELINE, self.step);
+        self.recording
+            .set_time_sequence(QUERY_TIMELINE, self.now.query);
+        self.recording
+            .set_time_sequence(STEP_TIMELINE, self.now.step);
         for (timeline, time) in [
-            (EVAL_TIMELINE, self.eval),
-            (LOCKSTEP_TIMELINE, self.lockstep),
+            (EVAL_TIMELINE, self.now.eval),
+            (LOCKSTEP_TIMELINE, self.now.lockstep),
         ] {
             match time {
                 Some(time) => self.recording.set_time_sequence(timeline, time),
@@ -142,7 +172,7 @@ impl Stream {
             return;
         }
         let times = [
-            TimeColumn::new_sequence(QUERY_TIMELINE, rows.iter().map(|_| self.query)),
+            TimeColumn::new_sequence(QUERY_TIMELINE, rows.iter().map(|_| self.now.query)),
             TimeColumn::new_sequence(EVAL_TIMELINE, rows.iter().map(|row| row.0)),
         ];
         let told = rerun::Scalars::new(rows.iter().map(|row| row.1))

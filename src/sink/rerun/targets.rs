@@ -1,4 +1,4 @@
-//! Where a recording goes, and what it is known by.
+//! Where a recording goes, what of it, and what it is known by.
 
 use std::io;
 use std::net::{IpAddr, TcpListener};
@@ -26,6 +26,20 @@ pub struct Targets {
     pub spawn: bool,
     /// The address at which the recording is served to viewers that connect to this process.
     pub serve: Option<IpAddr>,
+    /// Which synthetic views go there.
+    pub views: Views,
+}
+
+/// Which of the poses that were the best of a search so far are shown by their synthetic views. The start and the
+/// result are in any case, and so is what every hypothesis costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Views {
+    /// Those that stayed the best for the next seven hypotheses or to the end of a phase. Of a search that goes
+    /// down a slope, every second hypothesis is better than all before.
+    #[default]
+    Lasting,
+    /// All of them.
+    All,
 }
 
 /// What the stable id of a recording follows from.
