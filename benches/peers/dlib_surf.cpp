@@ -1,6 +1,6 @@
-// SURF of dlib, where its headers are installed (Debian: libdlib-dev).
+// SURF of dlib, where its headers are installed (Debian: libdlib-dev, libblas-dev).
 //
-//   c++ -O3 -march=native -DNDEBUG -std=c++17 dlib_surf.cpp -ldlib -o dlib_surf && ./dlib_surf FILE WIDTH HEIGHT THRESHOLD
+//   c++ -O3 -march=native -DNDEBUG -std=c++17 dlib_surf.cpp -ldlib -lblas -o dlib_surf && ./dlib_surf FILE WIDTH HEIGHT THRESHOLD
 //
 // answers each line of its input with a line of JSON, as the bench `peers` does.
 #include <dlib/array2d.h>

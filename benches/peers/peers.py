@@ -208,7 +208,7 @@ def measure(program, environment, folder, only, rounds):
     if built := compiled("loops", folder):
         loops = Server([built, folder, width, height, *map(str, meta["camera"])])
         servers.append(loops)
-    if built := compiled("dlib_surf", folder, "-ldlib"):
+    if built := compiled("dlib_surf", folder, "-ldlib", "-lblas"):
         dlib = Server([built, folder / "reference.u8", width, height, "30"])
         servers.append(dlib)
 
