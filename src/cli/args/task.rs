@@ -161,7 +161,7 @@ pub enum ViewsArg {
     /// Those that stayed the best for a while
     #[default]
     Lasting,
-    /// All, in a recording twice as large
+    /// All, in a recording half as large again
     All,
 }
 
