@@ -680,3 +680,22 @@ fn frames_of_two_scenes_are_told_apart_in_a_recording() {
         assert!(told.contains(words), "{words}");
     }
 }
+
+#[test]
+fn the_command_line_says_which_views_are_shown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [usual, lasting, all] = [None, Some("lasting"), Some("all")].map(|views| {
+        let path = folder.path().join("run.rrd");
+        let mut command = crate::binary::posescope();
+        command.args(["run", "street", "--query", "70", "--reference", "62", "-q"]);
+        command.args(["--method", "mi", "--radius", "5"]);
+        command.args(views.into_iter().flat_map(|views| ["--views", views]));
+        command.arg("--save").arg(&path).assert().success();
+        let chunks = chunks(&path);
+        let synthetic = |chunk: &&Chunk| chunk.entity_path().to_string() == "/mi/synthetic";
+        let views = chunks.iter().filter(synthetic).map(Chunk::num_rows);
+        views.sum::<usize>()
+    });
+    assert_eq!(usual, lasting);
+    assert!(2 <= lasting && 3 * lasting < 2 * all, "{lasting} of {all}");
+}
