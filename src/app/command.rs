@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
 use super::cost_line::CostLine;
+use super::dense_map::DenseAsk;
 use super::save_target::SaveTarget;
 use super::selection::VerdictChange;
 use super::setup::ReferencePick;
@@ -64,6 +65,10 @@ pub enum Command {
     LookBeside([NamedPose; 2]),
     /// Work out the cost along a line between two poses.
     TraceLine(CostLine),
+    /// Show or hide the map of every position with every heading.
+    ShowDenseMap,
+    /// Have that map filled, as long as this is sent in each frame.
+    FillDenseMap(DenseAsk),
     /// Localise the next query, or the one before.
     NextQuery {
         /// Whether the one before is meant.

@@ -71,6 +71,10 @@ impl App {
             Command::ForgetResults => state.set_results_before(None),
             Command::LookBeside(poses) => state.options.beside = Some(poses),
             Command::TraceLine(line) => state.trace_line(line),
+            Command::ShowDenseMap => {
+                state.options.shows_dense_map = !state.options.shows_dense_map;
+            }
+            Command::FillDenseMap(ask) => state.fill_dense_map(ask),
             Command::SelectQuery(query) => state.select_query(query),
             Command::NextQuery { back } => state.next_query(back, |_, _| true),
             Command::NextFailure { back } => state.next_failure(back),

@@ -206,6 +206,12 @@ pub fn shortcuts() -> Vec<Shortcut> {
         ),
         keys(NONE, Key::D, Command::OnlyDifferences, "Differences only"),
         keys(NONE, Key::G, Command::ShowTruth, "Ground truth on or off"),
+        keys(
+            NONE,
+            Key::F,
+            Command::ShowDenseMap,
+            "Dense map of all positions and headings",
+        ),
         keys(NONE, Key::P, Command::Pin, "Keep this run as A"),
         keys(NONE, Key::X, Command::Flip, "Swap A and B"),
         keys(NONE, Key::Slash, Command::Filter, "Filter"),
@@ -375,16 +381,20 @@ pub(super) fn help_ui(ctx: &egui::Context, open: &mut bool) {
     /// What the title and the margins take \[points\].
     const AROUND: f32 = 90.0;
     let all = shortcuts();
+    // Two keys that do the same share a row.
     let of = |task: Task| {
-        let of_task = move |one: &&Shortcut| Task::of(&one.command) == task;
-        all.iter().filter(of_task)
+        let rows = all.chunk_by(|a, b| a.help == b.help);
+        rows.filter(move |row| Task::of(&row[0].command) == task)
     };
-    let mut columns = [Vec::new(), Vec::new()];
-    let mut rows = 0;
-    for task in Task::ALL {
-        columns[usize::from(2 * rows >= all.len())].push(task);
-        rows += of(task).count();
-    }
+    // Where the higher of the two columns is lowest; a title takes about a row.
+    let rows = |tasks: &[Task]| -> usize { tasks.iter().map(|task| 1 + of(*task).count()).sum() };
+    let highest = |split: &usize| {
+        let (left, right) = Task::ALL.split_at(*split);
+        rows(left).max(rows(right))
+    };
+    let split = (0..Task::ALL.len()).min_by_key(highest).unwrap_or(0);
+    let (left, right) = Task::ALL.split_at(split);
+    let columns = [left, right];
     let window = egui::Window::new("Keys").open(open).resizable(false);
     window.show(ctx, |ui| {
         let height = ctx.content_rect().height() - AROUND;
@@ -393,12 +403,15 @@ pub(super) fn help_ui(ctx: &egui::Context, open: &mut bool) {
             ui.horizontal_top(|ui| {
                 for tasks in columns {
                     ui.vertical(|ui| {
-                        for task in tasks {
+                        for &task in tasks {
                             ui.strong(task.title());
                             egui::Grid::new(task.title()).striped(true).show(ui, |ui| {
-                                for shortcut in of(task) {
-                                    ui.monospace(ui.ctx().format_shortcut(&shortcut.keys));
-                                    ui.label(shortcut.help);
+                                for row in of(task) {
+                                    let keys =
+                                        row.iter().map(|one| ui.ctx().format_shortcut(&one.keys));
+                                    let keys: Vec<String> = keys.collect();
+                                    ui.monospace(keys.join(", "));
+                                    ui.label(row[0].help);
                                     ui.end_row();
                                 }
                             });

@@ -30,6 +30,8 @@ pub struct Shot {
     pub lockstep: Option<usize>,
     /// A pose to take the camera to.
     pub camera: Option<NamedPose>,
+    /// Whether the cost surface shows every position with every heading.
+    pub is_dense: bool,
     /// Size of the picture \[px\].
     pub size_px: [u32; 2],
     /// Pixels per point: how large words and marks are.
@@ -180,6 +182,9 @@ impl<'a> Window<'a> {
         }
         if let Some(pose) = shot.camera {
             self.app.send(Command::JumpCamera(pose));
+        }
+        if shot.is_dense {
+            self.app.send(Command::ShowDenseMap);
         }
         self.app.send(Command::Arrange(shot.arrangement));
         if view.is_some() {

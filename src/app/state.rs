@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::cost_line::{CostAlong, CostLine, LineTracer};
+use super::dense_map::{DenseAsk, DenseFiller, DenseMap};
 use super::navigation::Navigation;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
@@ -65,6 +66,8 @@ pub struct AppState {
     pub(super) beside: [Prober; 2],
     /// For the cost along the line from a result to the truth.
     pub(super) line_tracer: LineTracer,
+    /// For the map of every position with every heading.
+    dense_filler: DenseFiller,
     /// The queries, what is known of them.
     pub queries: Queries,
     /// The latest notes, the newest last.
@@ -92,6 +95,7 @@ impl AppState {
             prober: Prober::new(ctx.clone()),
             beside: [(); 2].map(|()| Prober::new(ctx.clone())),
             line_tracer: LineTracer::new(ctx.clone()),
+            dense_filler: DenseFiller::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
             frames,
             session,
@@ -238,6 +242,9 @@ impl AppState {
         if let Err(why) = self.line_tracer.poll() {
             self.note(why, true);
         }
+        if let Err(why) = self.dense_filler.poll() {
+            self.note(why, true);
+        }
     }
 
     /// Whether the answer for one of the two poses is still worked out.
@@ -250,6 +257,7 @@ impl AppState {
         self.is_probing()
             || [0, 1].into_iter().any(|side| self.is_looking_beside(side))
             || self.is_tracing_line()
+            || self.dense_filler.is_busy()
             || self.queries.is_painting()
     }
 
@@ -267,6 +275,24 @@ impl AppState {
     pub(super) fn trace_line(&mut self, line: CostLine) {
         if let Some(problem) = self.problem().cloned() {
             self.line_tracer.ask(&problem, &self.params, line);
+        }
+    }
+
+    /// The dense map of a method that was asked for last.
+    pub fn dense_map(&self, method: Method) -> Option<&DenseMap> {
+        self.dense_filler.map(method)
+    }
+
+    /// Whether a dense map is being filled.
+    pub fn is_filling_dense_map(&self) -> bool {
+        self.dense_filler.is_busy()
+    }
+
+    /// Has a dense map filled, as long as somebody looks at it.
+    pub(super) fn fill_dense_map(&mut self, ask: DenseAsk) {
+        let loaded = self.session.run().loaded.as_deref();
+        if let Some(problem) = loaded.and_then(|loaded| loaded.problems.get(ask.reference)) {
+            self.dense_filler.ask(problem, &self.params, ask);
         }
     }
 
@@ -333,6 +359,7 @@ impl AppState {
         self.prober.forget();
         self.beside.iter_mut().for_each(Prober::forget);
         self.line_tracer.forget();
+        self.dense_filler.forget();
     }
 
     /// Explains the results that are wrong, or no longer; what was computed is at hand.

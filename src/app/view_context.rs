@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::camera::NamedPose;
 use super::command::{Command, Queue};
 use super::cost_line::CostAlong;
+use super::dense_map::DenseMap;
 use super::lecture;
 use super::prober::Probe;
 use super::queries::Queries;
@@ -221,6 +222,11 @@ impl<'a> ViewContext<'a> {
     /// What is known of a method's cost along the line that was asked for last, of the present run.
     pub fn cost_along(&self, method: Method) -> Option<&'a CostAlong> {
         self.state.cost_along(method)
+    }
+
+    /// The dense map of a method that was asked for last, of the present run.
+    pub fn dense_map(&self, method: Method) -> Option<&'a DenseMap> {
+        self.state.dense_map(method)
     }
 
     /// The part of the run that the cursor is in.

@@ -34,6 +34,8 @@ pub struct ViewOptions {
     pub verdict_change: Option<VerdictChange>,
     /// Whether only what differs is shown.
     pub only_differences: bool,
+    /// Whether the cost surface shows every position with every heading.
+    pub shows_dense_map: bool,
     /// Whether query and synthetic view are shown in turn.
     pub blinking: bool,
     /// Whether the keyboard is wanted by the filter.
@@ -53,6 +55,7 @@ impl Default for ViewOptions {
             results_filter: String::new(),
             verdict_change: None,
             only_differences: false,
+            shows_dense_map: false,
             blinking: false,
             wants_filter: false,
             selected_feature: None,

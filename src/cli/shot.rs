@@ -18,6 +18,7 @@ pub fn shot(args: &ShotArgs, terminal: &Terminal) -> Result<(), CliError> {
         moment: args.at,
         lockstep: args.lockstep,
         camera: args.pose,
+        is_dense: args.dense,
         size_px: args.size,
         scale: args.scale,
         theme: match args.light {

@@ -7,7 +7,7 @@ use posescope::cost::Explanation;
 use posescope::event::{
     ConsensusJudged, DebugEvent, HypothesisTried, Moment, PhaseSearched, PoseScored, ViewRendered,
 };
-use posescope::grid::{Phase, least_covered};
+use posescope::grid::{DenseSurface, GridParams, Offset, Phase, least_covered};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState, Span};
 
@@ -482,6 +482,177 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     window.run_steps(3);
     assert!(texts(&window, "Cost from the result").is_empty());
     assert!(!texts(&window, "The truth is hidden (G shows it)").is_empty());
+}
+
+/// The dense map of MI with steps that a test has time for, filled.
+fn filled_densely() -> Harness<'static, App> {
+    let mut window = finished();
+    move_to_end(&mut window, Method::MI);
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.key_press(egui::Key::F);
+    window.run_steps(2);
+    for (name, value) in [("Positions each", "0.25"), ("headings each", "2.5")] {
+        let field = window.get_by_role_and_label(egui::accesskit::Role::SpinButton, name);
+        field.click();
+        window.run_steps(2);
+        window.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
+        window.event(egui::Event::Text(value.to_owned()));
+        window.run_steps(2);
+        window.key_press(egui::Key::Enter);
+        window.run_steps(2);
+    }
+    wait(&mut window, |app| {
+        app.app_state().dense_map(Method::MI).is_some() && !app.app_state().is_filling_dense_map()
+    });
+    window.run_steps(2);
+    window
+}
+
+/// What is known of the dense map of MI.
+fn dense(window: &Harness<'_, App>) -> DenseSurface {
+    let map = window.state().app_state().dense_map(Method::MI);
+    map.expect("asked for").surface().expect("small").clone()
+}
+
+#[test]
+fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_there() {
+    let mut window = filled_densely();
+    let state = window.state().app_state();
+    let problem = state.run().loaded.as_ref().expect("loaded").problems[0].clone();
+    let params = state.setup.task.params.clone();
+    let filled = dense(&window);
+    // Every quarter of a metre within 3 m, every 2.5° within 10°.
+    let positions =
+        (-12..=12_i32).flat_map(|right| (-12..=12_i32).map(move |ahead| (right, ahead)));
+    let inside = positions.filter(|(right, ahead)| right * right + ahead * ahead <= 144);
+    assert_eq!(filled.hypotheses(), 9 * inside.count());
+    assert!(filled.is_complete());
+    let words = text(&window, "Cost map above the floor: dense, ");
+    let all = filled.hypotheses();
+    assert!(words.ends_with(&format!("{all} of {all} tried")), "{words}");
+
+    // What it says of a place is what the estimator says there.
+    let estimator = posescope::estimator::entry(Method::MI).make(&params);
+    let score = |offset: &Offset| {
+        let pose = problem.world_from_query(&offset.reference_from_camera());
+        estimator.score_at(&problem, &pose)
+    };
+    let (cells, least_covered) = (
+        filled.cheapest().scores.len(),
+        filled.cheapest().least_covered,
+    );
+    let mut turned = 0;
+    for (offset, best) in (0..cells).step_by(7).filter_map(|cell| filled.at(cell)) {
+        assert_eq!(score(&offset), Some(best), "{offset:?}");
+        turned += usize::from(offset.yaw_rad != 0.0);
+        for heading in -4..=4_i32 {
+            let yaw_rad = (2.5 * f64::from(heading)).to_radians();
+            let other = score(&Offset { yaw_rad, ..offset }).expect("compared");
+            let cost = best.eligible_cost(least_covered);
+            let is_cheaper = other.eligible_cost(least_covered).is_some_and(|other| {
+                // Angles that are worked out otherwise differ in the last bit.
+                cost.is_none_or(|cost| other < cost - 1e-6)
+            });
+            assert!(!is_cheaper, "{offset:?}: {other:?}");
+        }
+    }
+    assert!(turned > 3, "nowhere is another heading cheaper");
+    let (least, best) = filled.minimum().expect("textured walls");
+    let words = text(&window, "Least of all: cost ");
+    assert!(
+        words.contains(&format!("{:.4}", best.cost.expect("covered"))),
+        "{words}"
+    );
+    assert!(
+        words.contains("from the truth; the search ended"),
+        "{words}"
+    );
+
+    // A click on its mark in the legend takes the camera there, heading and all.
+    click(&window, "least of all ");
+    window.run_steps(2);
+    let camera = window.state().app_state().camera.expect("taken");
+    let found = Offset::of(&problem.reference_from_query(&camera));
+    let off = [
+        found.right_m - least.right_m,
+        found.forward_m - least.forward_m,
+        found.yaw_rad - least.yaw_rad,
+    ];
+    assert!(off.iter().all(|off| off.abs() < 1e-9), "{off:?}");
+    let readout = hover(&mut window, "Cost map", 0.5, 0.5).expect("a cell");
+    let has_heading = ["straight ahead", "left", "right"].map(|word| readout.contains(word));
+    assert!(has_heading.contains(&true), "{readout}");
+
+    // Without it the search's own map is back, and the filled one is kept.
+    window.key_press(egui::Key::F);
+    window.run_steps(3);
+    assert!(text(&window, "Cost map").contains("position, coarse"));
+    window.key_press(egui::Key::F);
+    window.run_steps(3);
+    assert!(!window.state().app_state().is_filling_dense_map());
+    assert!(text(&window, "Cost map").contains(&format!("{all} of {all}")));
+}
+
+#[test]
+fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
+    let mut window = finished();
+    move_to_end(&mut window, Method::MI);
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    // Many more hypotheses than can be scored between two frames.
+    window.key_press(egui::Key::F);
+    let has_begun = |app: &App| {
+        let map = app.app_state().dense_map(Method::MI);
+        map.is_some_and(|map| map.surface().expect("small").tried() > 0)
+    };
+    wait(&mut window, has_begun);
+    window.state_mut().send(Command::Maximize(Some("report")));
+    window.run_steps(4);
+    assert!(!window.state().app_state().is_filling_dense_map());
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    window.run_steps(2);
+    let stood = dense(&window);
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    window.run_steps(2);
+    assert_eq!(dense(&window).tried(), stood.tried());
+    assert!(!stood.is_complete());
+    window.state_mut().send(Command::Maximize(Some("surface")));
+    let is_done = |app: &App| {
+        let map = app.app_state().dense_map(Method::MI);
+        map.is_some_and(|map| map.surface().expect("small").is_complete())
+    };
+    wait(&mut window, is_done);
+    let whole = dense(&window);
+    // What was scored twice or not at all would show in one that is filled in one go.
+    let state = window.state().app_state();
+    let params = &state.setup.task.params;
+    let problem = &state.run().loaded.as_ref().expect("loaded").problems[0];
+    let grid = GridParams {
+        coarse_step_m: 0.1,
+        yaw_step_deg: 0.5,
+        ..params.grid.clone()
+    };
+    let least_covered = whole.cheapest().least_covered;
+    let mut at_once = DenseSurface::new(3.0, &grid, least_covered).expect("small");
+    let estimator = posescope::estimator::entry(Method::MI).make(params);
+    estimator.with_scorer(problem, &mut |scorer| {
+        while !at_once.is_complete() {
+            at_once.score_next(scorer);
+        }
+    });
+    assert_eq!(whole.tried(), at_once.tried());
+    for cell in 0..whole.cheapest().scores.len() {
+        assert_eq!(whole.at(cell), at_once.at(cell));
+    }
+
+    // Other parameters make it another map.
+    window.state_mut().send(Command::SetParam {
+        key: "grid.yaw_range".to_owned(),
+        value: "1".to_owned(),
+    });
+    wait(&mut window, |app| {
+        let map = app.app_state().dense_map(Method::MI);
+        map.is_none_or(|map| map.surface().expect("small").hypotheses() != whole.hypotheses())
+    });
 }
 
 fn along_from(window: &Harness<'_, App>) -> nalgebra::Vector3<f64> {

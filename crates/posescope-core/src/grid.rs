@@ -5,11 +5,13 @@
 //! yaw about its up axis (−y). Height, pitch and roll stay the reference's.
 
 mod basin;
+mod dense;
 mod lattice;
 mod scored;
 mod settle;
 
 pub use basin::Basin;
+pub use dense::DenseSurface;
 pub use lattice::{Lattice, LatticeTooLarge, MOST_CELLS};
 pub use scored::ScoredLattice;
 

@@ -1,5 +1,6 @@
 //! The cost surface: where the search has been, what it found there, and where it went.
 
+mod dense;
 mod line;
 mod maps;
 mod marks;
@@ -13,8 +14,10 @@ use super::View;
 use super::readout::Readout;
 use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
+use crate::grid::DenseSurface;
 use crate::method::Method;
 
+use dense::DenseSteps;
 use maps::{CostMap, MapContent, progress};
 use marks::{MapMark, legend, moved, place};
 use scale::{NO_SAY, Scale, number, swatch};
@@ -37,6 +40,7 @@ pub struct SurfaceView {
     /// The coverage floor that is tried; the run's own otherwise.
     floor: Option<f64>,
     map: CostMap,
+    dense: DenseSteps,
     /// Whether this view has said that the pointer is over a pose.
     is_hovering: bool,
 }
@@ -87,6 +91,7 @@ impl SurfaceView {
             ui.separator();
             let run_floor = context.run.params.grid.coverage_floor;
             self.map.switches(ui, self.floor.unwrap_or(run_floor));
+            dense::switch(ui, context);
             if let Some(around) = search.span.part.method().filter(|around| *around != shown) {
                 ui.weak(format!("inside {}", around.label()));
             }
@@ -106,10 +111,16 @@ impl SurfaceView {
         let run_floor = context.run.params.grid.coverage_floor;
         let floor = self.floor.unwrap_or(run_floor);
         let width = ui.available_width();
-        let scale = Scale::of(context.run, search);
-        let marks = MapMark::all(context, search, floor);
+        self.dense.ui(ui, context, search);
+        let dense = self.dense(context, search, floor);
+        let scale = match dense {
+            Some(dense) => Scale::of_dense(dense, search),
+            None => Scale::of(context.run, search),
+        };
+        let marks = MapMark::all(context, search, floor, dense);
         let shown = MapContent {
             search,
+            dense,
             scale: &scale,
             marks: &marks,
             floor,
@@ -148,6 +159,21 @@ impl SurfaceView {
         slices::ui(ui, context, search, floor, width);
         let on_map = under_pointer.map(|(pose, _)| pose);
         on_map.or(pointed_at).or(on_line)
+    }
+
+    /// The dense map under a floor, if one is shown; it is asked for in each frame.
+    fn dense<'a>(
+        &self,
+        context: &ViewContext<'a>,
+        search: &Search<'_>,
+        floor: f64,
+    ) -> Option<&'a DenseSurface> {
+        let floor = if self.map.is_floored() { floor } else { 0.0 };
+        let least_covered = search.least_covered(floor);
+        let wanted = self.dense.wanted(context, search, least_covered)?;
+        context.send(Command::FillDenseMap(wanted));
+        let map = context.dense_map(search.method)?;
+        map.surface().ok().filter(|_| *map.ask() == wanted)
     }
 
     /// The floor and what it would change.

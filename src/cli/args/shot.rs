@@ -42,6 +42,9 @@ pub struct ShotArgs {
             .try_map(|name: String| NamedPose::from_word(&name).ok_or("a pose expected"))
     )]
     pub pose: Option<NamedPose>,
+    /// Fill the cost surface with every position and heading first
+    #[arg(long)]
+    pub dense: bool,
     /// Size of the picture [px]
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1500x950", value_parser = size)]
     pub size: [u32; 2],

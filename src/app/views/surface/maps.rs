@@ -3,12 +3,12 @@
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
-use super::marks::{MapMark, MarkKind, place};
+use super::marks::{MapMark, MarkKind, heading, place};
 use super::scale::{NO_SAY, Scale, bar, number};
 use super::search::{Search, Searched, cell_of};
 use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset};
+use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
 use crate::render::Score;
 
 /// What the map shows.
@@ -59,8 +59,8 @@ impl Default for CostMap {
 /// A cell of a lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cell {
-    /// Position among the lattices of positions.
-    lattice: usize,
+    /// Position among the layers.
+    layer: usize,
     cell: usize,
     offset: Offset,
 }
@@ -68,6 +68,8 @@ struct Cell {
 /// What the map is drawn from.
 pub(super) struct MapContent<'a> {
     pub(super) search: &'a Search<'a>,
+    /// What is shown instead of the search's own lattices.
+    pub(super) dense: Option<&'a DenseSurface>,
     pub(super) scale: &'a Scale,
     pub(super) marks: &'a [MapMark],
     /// The floor of the slider.
@@ -76,7 +78,43 @@ pub(super) struct MapContent<'a> {
     pub(super) line: Option<[Offset; 2]>,
 }
 
+impl MapContent<'_> {
+    /// The lattices that are drawn, each upon those before it.
+    fn layers(&self) -> Vec<&ScoredLattice> {
+        match self.dense {
+            Some(dense) => vec![dense.cheapest().as_ref()],
+            None => {
+                let positions = self.search.positions();
+                positions
+                    .map(|searched| searched.surface.as_ref())
+                    .collect()
+            }
+        }
+    }
+
+    /// The hypothesis that a cell of a layer shows; of a dense map, with the heading.
+    fn offset(&self, layer: &ScoredLattice, cell: usize) -> Option<Offset> {
+        let cheapest = self.dense.and_then(|dense| dense.at(cell));
+        let offset = cheapest.map(|(offset, _)| offset);
+        offset.or_else(|| layer.lattice.offset(cell))
+    }
+
+    /// How much is tried, in words.
+    fn progress(&self) -> String {
+        if let Some(dense) = self.dense {
+            return format!("dense, {} of {} tried", dense.tried(), dense.hypotheses());
+        }
+        let tried: Vec<String> = self.search.positions().map(progress).collect();
+        tried.join("; ")
+    }
+}
+
 impl CostMap {
+    /// Whether cells that may not win have no colour.
+    pub(super) fn is_floored(&self) -> bool {
+        self.is_floored
+    }
+
     fn map(&self) -> Map {
         match (self.shows_coverage, self.is_floored) {
             (true, _) => Map::Coverage,
@@ -117,26 +155,18 @@ impl CostMap {
         let at = answer.response.hover_pos().or(at);
         let pointed_at = at
             .filter(|at| answer.transform.frame().contains(*at))
-            .and_then(|at| cell_at(shown.search, &answer.transform, at));
+            .and_then(|at| cell_at(shown, &answer.transform, at));
         let is_panning = ui.input(|input| input.modifiers.shift);
         let takes_camera = !is_panning
             && (answer.response.clicked() || answer.response.dragged_by(PointerButton::Primary));
         overlay(ui, shown, &answer.transform, pointed_at);
-        let told = pointed_at.and_then(|cell| {
+        let told = pointed_at.map(|cell| {
             let pose = shown.search.pose(&cell.offset);
             if takes_camera && context.camera() != Some(pose) {
                 context.send(Command::TakeCamera(Some(pose)));
             }
-            let searched = shown.search.positions().nth(cell.lattice)?;
-            let least_covered = shown.search.least_covered(shown.floor);
-            let words = readout(
-                shown.search,
-                searched,
-                cell.cell,
-                least_covered,
-                &cell.offset,
-            );
-            Some((pose, words))
+            let score = shown.layers()[cell.layer].scores[cell.cell];
+            (pose, readout(shown, score, &cell.offset))
         });
         (told, side + LEFT_AXIS)
     }
@@ -163,8 +193,8 @@ impl CostMap {
                 .map_or(NO_SAY, |cost| shown.scale.cost(cost)),
         };
         let mut images = Vec::new();
-        for (index, searched) in shown.search.positions().enumerate() {
-            let image = picture(searched, color);
+        for (index, layer) in shown.layers().into_iter().enumerate() {
+            let image = picture(layer, color);
             let id = self.paint(ui, index, image);
             let Lattice {
                 columns,
@@ -172,7 +202,7 @@ impl CostMap {
                 step,
                 centre,
                 ..
-            } = &searched.surface.lattice;
+            } = &layer.lattice;
             let size = [*columns, *rows].map(|count| (count as f64 * step) as f32);
             let middle = PlotPoint::new(centre.right_m, centre.forward_m);
             images.push(PlotImage::new(format!("{index}"), id, middle, size));
@@ -201,13 +231,13 @@ impl CostMap {
 }
 
 /// One pixel per cell, the row farthest ahead first; what is not tried is left out.
-fn picture(searched: &Searched, color: impl Fn(&Score) -> Color32) -> ColorImage {
-    let Lattice { columns, rows, .. } = searched.surface.lattice;
+fn picture(layer: &ScoredLattice, color: impl Fn(&Score) -> Color32) -> ColorImage {
+    let Lattice { columns, rows, .. } = layer.lattice;
     let cells = (0..rows)
         .rev()
         .flat_map(|row| (0..columns).map(move |column| row * columns + column));
     let pixels = cells.map(|cell| {
-        let score = searched.surface.scores[cell].as_ref();
+        let score = layer.scores[cell].as_ref();
         score.map_or(Color32::TRANSPARENT, &color)
     });
     ColorImage::new([columns, rows], pixels.collect())
@@ -235,7 +265,7 @@ fn plot(
     };
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
     let forward = narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, "forward [m]"));
-    let bounds = whole(shown.search);
+    let bounds = whole(shown);
     // Another extent, as the search goes on, is another plot: one that is there keeps its bounds.
     let extent = bounds.width().to_bits();
     let answer = Plot::new(("cost map", extent))
@@ -266,8 +296,7 @@ fn plot(
             }
         });
     answer.response.widget_info(|| {
-        let tried: Vec<String> = shown.search.positions().map(progress).collect();
-        let name = format!("{}: {}", map.name(), tried.join("; "));
+        let name = format!("{}: {}", map.name(), shown.progress());
         egui::WidgetInfo::labeled(egui::Role::Image, true, name)
     });
     answer
@@ -290,17 +319,17 @@ pub(super) fn progress(searched: &Searched) -> String {
 }
 
 /// All lattices with a margin.
-fn whole(search: &Search<'_>) -> PlotBounds {
+fn whole(shown: &MapContent<'_>) -> PlotBounds {
     const MARGIN: f64 = 1.04;
-    let radius = search.problem.uncertainty_radius_m;
-    let half = search.positions().fold(radius, |half, searched| {
+    let radius = shown.search.problem.uncertainty_radius_m;
+    let half = shown.layers().into_iter().fold(radius, |half, layer| {
         let Lattice {
             columns,
             rows,
             step,
             centre,
             ..
-        } = &searched.surface.lattice;
+        } = &layer.lattice;
         let reach = |middle: f64, count: usize| middle.abs() + 0.5 * count as f64 * step;
         half.max(reach(centre.right_m, *columns))
             .max(reach(centre.forward_m, *rows))
@@ -309,44 +338,37 @@ fn whole(search: &Search<'_>) -> PlotBounds {
 }
 
 /// The cell at a place of the screen, of the lattice that lies on top there.
-fn cell_at(search: &Search<'_>, transform: &PlotTransform, at: Pos2) -> Option<Cell> {
+fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Option<Cell> {
     let point = transform.value_from_position(at);
-    let lattices: Vec<&Searched> = search.positions().collect();
-    lattices
-        .iter()
-        .enumerate()
-        .rev()
-        .find_map(|(index, searched)| {
-            let lattice = &searched.surface.lattice;
-            let cell = cell_of(lattice, point.x, point.y)?;
-            // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
-            let is_seen = index == 0 || searched.surface.scores[cell].is_some();
-            let offset = lattice.offset(cell).filter(|_| is_seen)?;
-            Some(Cell {
-                lattice: index,
-                cell,
-                offset,
-            })
+    let layers = shown.layers();
+    layers.iter().enumerate().rev().find_map(|(index, layer)| {
+        let cell = cell_of(&layer.lattice, point.x, point.y)?;
+        // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
+        let is_seen = index == 0 || layer.scores[cell].is_some();
+        let offset = shown.offset(layer, cell).filter(|_| is_seen)?;
+        Some(Cell {
+            layer: index,
+            cell,
+            offset,
         })
+    })
 }
 
-fn readout(
-    search: &Search<'_>,
-    searched: &Searched,
-    cell: usize,
-    least_covered: u32,
-    offset: &Offset,
-) -> String {
-    let at = place(offset);
-    let Some(score) = &searched.surface.scores[cell] else {
+/// What is known of the cell at an offset, in words.
+fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> String {
+    let at = match shown.dense {
+        Some(_) => format!("{}, {}", place(offset), heading(offset)),
+        None => place(offset),
+    };
+    let Some(score) = score else {
         return format!("not tried yet at {at}");
     };
     let cost = match score.cost {
         Some(cost) => format!("cost {}", number(cost)),
         None => "no cost".to_owned(),
     };
-    let coverage = search.coverage(score.covered);
-    let note = match score.covered < least_covered {
+    let coverage = shown.search.coverage(score.covered);
+    let note = match score.covered < shown.search.least_covered(shown.floor) {
         true => ", below the floor",
         false => "",
     };
@@ -372,8 +394,8 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
         painter.rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
     };
     let strong = ui.visuals().strong_text_color();
-    for (index, searched) in shown.search.positions().enumerate() {
-        let lattice = &searched.surface.lattice;
+    for (index, layer) in shown.layers().into_iter().enumerate() {
+        let lattice = &layer.lattice;
         if index > 0 {
             let (width, height) = (lattice.columns as f64, lattice.rows as f64);
             let Lattice { centre, step, .. } = lattice;
@@ -414,10 +436,8 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
             false => mark.paint(&painter, at, reach),
         }
     }
-    if let Some(cell) = pointed_at
-        && let Some(searched) = shown.search.positions().nth(cell.lattice)
-    {
-        let step = searched.surface.lattice.step;
+    if let Some(cell) = pointed_at {
+        let step = shown.layers()[cell.layer].lattice.step;
         outline(&cell.offset, step, step, Color32::BLACK, 3.0);
         outline(&cell.offset, step, step, Color32::WHITE, 1.5);
     }

@@ -9,7 +9,7 @@ use super::scale::number;
 use super::search::{Minimum, Search};
 use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
-use crate::grid::{Offset, Phase};
+use crate::grid::{DenseSurface, Offset, Phase};
 use crate::method::Method;
 
 /// What is at a place.
@@ -25,6 +25,8 @@ pub(super) enum MarkKind {
     Ranked(usize),
     /// The minimum under the floor of the slider.
     Floored,
+    /// The least of a dense map.
+    Dense,
 }
 
 /// Half the size of a mark in the legend \[points\].
@@ -43,8 +45,14 @@ pub(super) struct MapMark {
 }
 
 impl MapMark {
-    /// Everything that is to be marked, what matters most last. `floor` is what the slider says.
-    pub(super) fn all(context: &ViewContext<'_>, search: &Search<'_>, floor: f64) -> Vec<Self> {
+    /// Everything that is to be marked, what matters most last. `floor` is what the slider says,
+    /// `dense` the dense map that is shown.
+    pub(super) fn all(
+        context: &ViewContext<'_>,
+        search: &Search<'_>,
+        floor: f64,
+        dense: Option<&DenseSurface>,
+    ) -> Vec<Self> {
         let mut marks = Vec::new();
         let mut add = |kind, offset, pose, cost, name: &str, note: String| {
             marks.push(Self {
@@ -116,6 +124,19 @@ impl MapMark {
                 note,
             );
         }
+        if let Some((offset, score)) = dense.and_then(DenseSurface::minimum) {
+            let words = score.cost.map_or(String::new(), number);
+            let note = format!(", {}, {words}", heading(&offset));
+            let pose = search.pose(&offset);
+            add(
+                MarkKind::Dense,
+                offset,
+                pose,
+                score.cost,
+                "least of all",
+                note,
+            );
+        }
         let cameras = [
             (
                 MarkKind::Feature,
@@ -145,7 +166,7 @@ impl MapMark {
     pub(super) fn paint(&self, painter: &Painter, at: Pos2, reach: f32) {
         if matches!(
             self.kind,
-            MarkKind::Feature | MarkKind::Truth | MarkKind::Camera
+            MarkKind::Feature | MarkKind::Truth | MarkKind::Camera | MarkKind::Dense
         ) {
             let (sin, cos) = (self.offset.yaw_rad as f32).sin_cos();
             let tip = at + 2.4 * reach * vec2(-sin, -cos);
@@ -213,6 +234,16 @@ pub(super) fn place(offset: &Offset) -> String {
     }
 }
 
+/// An offset's heading in words.
+pub(super) fn heading(offset: &Offset) -> String {
+    let degrees = (100.0 * offset.yaw_rad.to_degrees()).round() / 100.0;
+    match degrees {
+        left if left > 0.0 => format!("{left}° left"),
+        right if right < 0.0 => format!("{}° right", -right),
+        _ => "straight ahead".to_owned(),
+    }
+}
+
 impl MarkKind {
     /// The shape that is most like its own among those of plots.
     pub(super) fn plot_shape(self) -> MarkerShape {
@@ -220,6 +251,7 @@ impl MarkKind {
             Self::Start | Self::Ranked(_) | Self::Floored => MarkerShape::Circle,
             Self::Coarse => MarkerShape::Square,
             Self::Fine => MarkerShape::Diamond,
+            Self::Dense => MarkerShape::Asterisk,
             Self::Feature => MarkerShape::Up,
             Self::Truth => MarkerShape::Plus,
             Self::Camera => MarkerShape::Down,
@@ -229,7 +261,7 @@ impl MarkKind {
     pub(super) fn color(self) -> Color32 {
         match self {
             Self::Start => theme::REFERENCE,
-            Self::Coarse | Self::Fine => theme::ESTIMATE,
+            Self::Coarse | Self::Fine | Self::Dense => theme::ESTIMATE,
             Self::Feature => theme::method(Method::FB),
             Self::Truth => theme::TRUTH,
             Self::Camera => theme::CAMERA,
@@ -282,6 +314,17 @@ impl MarkKind {
                 let font = FontId::proportional(1.9 * reach);
                 painter.text(at, Align2::CENTER_CENTER, rank.to_string(), font, color);
             }
+            Self::Dense => {
+                let arms = [0.0, 60.0, 120.0_f32].map(|degrees| {
+                    let (sin, cos) = degrees.to_radians().sin_cos();
+                    1.4 * reach * vec2(sin, cos)
+                });
+                for (width, color) in [(5.0, Color32::WHITE), (2.5, color)] {
+                    for arm in arms {
+                        painter.line_segment([at - arm, at + arm], Stroke::new(width, color));
+                    }
+                }
+            }
             Self::Floored => {
                 painter.circle_stroke(at, reach * 1.3, Stroke::new(4.0, Color32::WHITE));
                 painter.circle_stroke(at, reach * 1.3, Stroke::new(2.0, color));
@@ -311,9 +354,9 @@ pub(super) fn legend(
                 .wrap_mode(wrap_mode);
             let response = ui.add(button.sense(Sense::click()));
             let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
-            // The cross has longer arms than its room here.
+            // These have longer arms than their room here.
             let reach = match mark.kind {
-                MarkKind::Truth => 0.6 * REACH,
+                MarkKind::Truth | MarkKind::Dense => 0.6 * REACH,
                 _ => REACH,
             };
             mark.kind.paint(ui.painter(), at, reach);
@@ -335,6 +378,18 @@ pub(super) fn legend(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_heading_says_to_which_side() {
+        let turned = |degrees: f64| {
+            heading(&Offset {
+                yaw_rad: degrees.to_radians(),
+                ..Offset::default()
+            })
+        };
+        let words = [3.5, -0.25, 0.0].map(turned);
+        assert_eq!(words, ["3.5° left", "0.25° right", "straight ahead"]);
+    }
 
     #[test]
     fn a_place_has_as_many_decimals_as_it_needs_and_no_negative_zero() {

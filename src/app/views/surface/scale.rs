@@ -5,6 +5,7 @@ use egui::{Color32, Mesh, Rect, Sense, Ui, Vec2, pos2, vec2};
 use super::search::Search;
 use crate::app::theme;
 use crate::event::Event;
+use crate::grid::DenseSurface;
 use crate::render::Score;
 use crate::session::Run;
 
@@ -47,6 +48,20 @@ impl Scale {
                 }
                 _ => {}
             }
+        }
+        scale
+    }
+
+    /// The scale of a dense map, as far as it is filled.
+    pub(super) fn of_dense(dense: &DenseSurface, search: &Search<'_>) -> Self {
+        let mut scale = Self {
+            costs: None,
+            coverage: 1.0,
+        };
+        let cheapest = dense.cheapest();
+        for score in cheapest.scores.iter().flatten() {
+            let coverage = search.coverage(score.covered);
+            scale.take(score, coverage, cheapest.least_covered);
         }
         scale
     }
