@@ -10,6 +10,7 @@ mod conic;
 mod loss;
 pub mod p3p;
 pub mod refine;
+mod reprojection;
 
 pub use loss::{Loss, LossShape};
 pub use p3p::{MAX_SOLUTIONS, p3p};

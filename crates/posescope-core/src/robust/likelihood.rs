@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use fearless_simd::{Level, dispatch};
+
 use super::params::MlesacParams;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -27,6 +29,7 @@ pub struct LikelihoodScore {
 ///
 /// Torr, Zisserman, *MLESAC*, CVIU 2000, section 4; a false match lands anywhere in the image.
 pub(super) struct Likelihood {
+    level: Level,
     blocks: Vec<Block>,
     correspondences: usize,
     focal: [f64; 2],
@@ -40,6 +43,10 @@ pub(super) struct Likelihood {
     /// Squared residuals within reach, kept to save the allocation \[px²\].
     near: Vec<f64>,
 }
+
+/// Densities that are multiplied before one logarithm is taken of all: so few that the product is neither too
+/// small nor too large for a number.
+const AT_A_TIME: usize = 8;
 
 /// Correspondences side by side in a block, so that the compiler projects several at a time.
 const LANES: usize = 8;
@@ -82,6 +89,7 @@ impl Likelihood {
         let squared_threshold = params.inlier_threshold_px * params.inlier_threshold_px;
         let reach = -2.0 * variance * (TAU * variance * background * NEGLIGIBLE).ln();
         Self {
+            level: Level::new(),
             blocks: correspondences
                 .chunks(LANES)
                 .map(|chunk| Block::new(chunk, intrinsics))
@@ -117,19 +125,17 @@ impl Likelihood {
         let mut mixing = 0.5;
         for _ in 0..self.em_iterations {
             let false_match = (1.0 - mixing) * self.background;
-            let expected: f64 = self
-                .near
-                .iter()
-                .map(|density| mixing * density / (mixing * density + false_match))
-                .sum();
+            let near = &self.near;
+            let expected = dispatch!(self.level, _simd => expected(near, mixing, false_match));
             mixing = expected / total;
         }
         let false_match = (1.0 - mixing) * self.background;
-        let mut log_likelihood: f64 = self
-            .near
-            .iter()
-            .map(|density| (mixing * density + false_match).ln())
-            .sum();
+        let densities = self.near.chunks(AT_A_TIME).map(|some| {
+            some.iter()
+                .map(|density| mixing * density + false_match)
+                .product::<f64>()
+        });
+        let mut log_likelihood: f64 = densities.map(f64::ln).sum();
         if far > 0 {
             log_likelihood += far as f64 * false_match.ln();
         }
@@ -142,10 +148,18 @@ impl Likelihood {
 
     /// Collects the squared residuals within reach, in front of the camera.
     fn collect_near(&mut self, pose: &Pose) {
-        self.near.clear();
+        // A place more, where what is not near is written.
+        self.near.resize(self.correspondences + 1, 0.0);
+        let count = dispatch!(self.level, _simd => self.put_near(pose));
+        self.near.truncate(count);
+    }
+
+    #[inline(always)]
+    fn put_near(&mut self, pose: &Pose) -> usize {
         let r = pose.rotation.to_rotation_matrix().into_inner();
         let t = pose.translation.vector;
         let [fx, fy] = self.focal;
+        let mut count = 0;
         for Block {
             point: [x, y, z],
             ray: [u, v],
@@ -167,14 +181,35 @@ impl Likelihood {
                 excess[i] = squared_error[i] - self.squared_reach * depth[i] * depth[i];
             }
             if excess.iter().any(|&excess| excess <= 0.0) {
+                let mut squared = [0.0; LANES];
                 for i in 0..LANES {
-                    if excess[i] <= 0.0 && depth[i] > 0.0 {
-                        self.near.push(squared_error[i] / (depth[i] * depth[i]));
-                    }
+                    squared[i] = squared_error[i] / (depth[i] * depth[i]);
+                }
+                // Which are near cannot be foreseen: all are written, and the next over those that are not.
+                for i in 0..LANES {
+                    self.near[count] = squared[i];
+                    count += usize::from((excess[i] <= 0.0) & (depth[i] > 0.0));
                 }
             }
         }
+        count
     }
+}
+
+/// How many of the near are expected to be true, of their densities as true matches. Summed up lane by lane,
+/// whatever the processor.
+#[inline(always)]
+fn expected(densities: &[f64], mixing: f64, false_match: f64) -> f64 {
+    let share = |density: f64| mixing * density / (mixing * density + false_match);
+    let (blocks, rest) = densities.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for block in blocks {
+        for i in 0..LANES {
+            sums[i] += share(block[i]);
+        }
+    }
+    let rest: f64 = rest.iter().copied().map(share).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

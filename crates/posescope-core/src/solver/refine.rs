@@ -1,11 +1,10 @@
 //! Non-linear refinement of a pose: Levenberg–Marquardt on the reprojection error.
 
-use nalgebra::{
-    Matrix2x3, Matrix2x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector2, Vector6,
-};
+use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
 
 use super::Correspondence;
 use super::loss::Loss;
+use super::reprojection::{NormalEquations, Reprojection};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
@@ -62,7 +61,8 @@ pub fn refine(
     start: &Pose,
     loss: Loss,
 ) -> Refinement {
-    let cost_before = cost(correspondences, intrinsics, start, loss);
+    let reprojection = Reprojection::new(correspondences, intrinsics);
+    let cost_before = reprojection.cost(start, loss);
     let mut refinement = Refinement {
         pose: *start,
         cost_before,
@@ -75,13 +75,13 @@ pub fn refine(
         return refinement;
     }
     let mut lambda = FIRST_LAMBDA;
-    let mut normal = NormalEquations::at(correspondences, intrinsics, start, loss);
+    let mut normal = reprojection.normal_equations(start, loss);
     while refinement.steps < MAX_STEPS {
         refinement.steps += 1;
         let (old, mut new) = (refinement.cost_after, f64::NAN);
-        if let Some(twist) = normal.damped_step(lambda) {
+        if let Some(twist) = damped_step(&normal, lambda) {
             let pose = moved(&refinement.pose, &twist);
-            new = cost(correspondences, intrinsics, &pose, loss);
+            new = reprojection.cost(&pose, loss);
             // NaN loses.
             if new < old {
                 refinement.pose = pose;
@@ -94,7 +94,7 @@ pub fn refine(
                 break;
             }
             lambda *= 0.1;
-            normal = NormalEquations::at(correspondences, intrinsics, &refinement.pose, loss);
+            normal = reprojection.normal_equations(&refinement.pose, loss);
         } else if lambda < MAX_LAMBDA {
             lambda *= 10.0;
         } else {
@@ -113,7 +113,8 @@ pub fn pose_covariance(
     pose: &Pose,
     sigma_px: f64,
 ) -> Option<Matrix6<f64>> {
-    let normal = NormalEquations::at(correspondences, intrinsics, pose, Loss::Squared);
+    let reprojection = Reprojection::new(correspondences, intrinsics);
+    let normal = reprojection.normal_equations(pose, Loss::Squared);
     let inverse = normal.hessian.cholesky()?.inverse() * (sigma_px * sigma_px);
     inverse
         .iter()
@@ -128,90 +129,17 @@ fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     Pose::from_parts(translation, rotation) * pose
 }
 
-/// Mean loss \[px²\]; infinite where a point is not in front of the camera.
-fn cost(
-    correspondences: &[Correspondence],
-    intrinsics: &Intrinsics,
-    pose: &Pose,
-    loss: Loss,
-) -> f64 {
-    let sum: f64 = correspondences
-        .iter()
-        .map(|Correspondence { pixel, point }| {
-            intrinsics
-                .project(&(pose * point))
-                .map_or(f64::INFINITY, |seen| {
-                    loss.rho((seen - pixel).norm_squared())
-                })
-        })
-        .sum();
-    sum / correspondences.len() as f64
-}
-
-/// `H ξ = −g` for the twist ξ, with `H = Σ w JᵀJ` and `g = Σ w Jᵀr`.
-struct NormalEquations {
-    hessian: Matrix6<f64>,
-    gradient: Vector6<f64>,
-}
-
-impl NormalEquations {
-    fn at(
-        correspondences: &[Correspondence],
-        intrinsics: &Intrinsics,
-        pose: &Pose,
-        loss: Loss,
-    ) -> Self {
-        let mut hessian = Matrix6::zeros();
-        let mut gradient = Vector6::zeros();
-        for Correspondence { pixel, point } in correspondences {
-            let seen = pose * point;
-            let Some(projected) = intrinsics.project(&seen) else {
-                continue;
-            };
-            let residual: Vector2<f64> = projected - pixel;
-            let jacobian = residual_jacobian(intrinsics, &seen);
-            let weight = loss.weight(residual.norm_squared());
-            hessian += jacobian.tr_mul(&(jacobian * weight));
-            gradient += jacobian.tr_mul(&(residual * weight));
-        }
-        Self { hessian, gradient }
-    }
-
-    /// The step for a damping factor; `None` where the damped matrix is not positive definite.
-    fn damped_step(&self, lambda: f64) -> Option<Vector6<f64>> {
-        let damping = Matrix6::from_diagonal(&(self.hessian.diagonal() * lambda));
-        let factor = (self.hessian + damping).cholesky()?;
-        Some(-factor.solve(&self.gradient))
-    }
-}
-
-/// Derivative of the pixel of `seen` (camera frame, in front) by a twist in the camera frame
-/// \[px/rad, px/m\].
-///
-/// The twist moves the point by `ω × p + v`, and `∂π/∂p = [f/z, −f p/z²]` per image axis.
-fn residual_jacobian(intrinsics: &Intrinsics, seen: &Point3<f64>) -> Matrix2x6<f64> {
-    let inverse_depth = seen.z.recip();
-    let (du, dv) = (intrinsics.fx * inverse_depth, intrinsics.fy * inverse_depth);
-    let by_point = Matrix2x3::new(
-        du,
-        0.0,
-        -du * seen.x * inverse_depth,
-        0.0,
-        dv,
-        -dv * seen.y * inverse_depth,
-    );
-    let mut jacobian = Matrix2x6::zeros();
-    jacobian
-        .fixed_columns_mut::<3>(0)
-        .copy_from(&(by_point * -seen.coords.cross_matrix()));
-    jacobian.fixed_columns_mut::<3>(3).copy_from(&by_point);
-    jacobian
+/// The step for a damping factor; `None` where the damped matrix is not positive definite.
+fn damped_step(normal: &NormalEquations, lambda: f64) -> Option<Vector6<f64>> {
+    let damping = Matrix6::from_diagonal(&(normal.hessian.diagonal() * lambda));
+    let factor = (normal.hessian + damping).cholesky()?;
+    Some(-factor.solve(&normal.gradient))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Point2, Vector3};
+    use nalgebra::{Point2, Point3, Vector2, Vector3};
 
     const KITTI: Intrinsics = Intrinsics {
         fx: 718.856,
@@ -249,28 +177,15 @@ mod tests {
     }
 
     #[test]
-    fn the_residual_jacobian_matches_central_differences() {
-        for Correspondence { point, .. } in scene() {
-            let analytic = residual_jacobian(&KITTI, &(truth() * point));
-            for k in 0..6 {
-                let step = Vector6::ith(k, 1e-6);
-                let pixel = |twist| KITTI.project(&(moved(&truth(), &twist) * point));
-                let (ahead, behind) = (pixel(step).expect("seen"), pixel(-step).expect("seen"));
-                let numeric = (ahead - behind) / 2e-6;
-                assert!((numeric - analytic.column(k)).amax() < 1e-5, "column {k}");
-            }
-        }
-    }
-
-    #[test]
     fn the_gradient_of_each_loss_matches_central_differences_of_the_cost() {
         // Residuals of tens of pixels: beyond the kink of the Huber loss.
         let scene = scene();
         for loss in [Loss::Squared, Loss::Huber(1.5), Loss::Cauchy(20.0)] {
-            let normal = NormalEquations::at(&scene, &KITTI, &start(), loss);
+            let reprojection = Reprojection::new(&scene, &KITTI);
+            let normal = reprojection.normal_equations(&start(), loss);
             for k in 0..6 {
                 let step = Vector6::ith(k, 1e-6);
-                let at = |twist| cost(&scene, &KITTI, &moved(&start(), &twist), loss);
+                let at = |twist| reprojection.cost(&moved(&start(), &twist), loss);
                 // The cost is the mean of ρ(r²) with the derivative 2 w Jᵀr.
                 let numeric = (at(step) - at(-step)) / 2e-6 * scene.len() as f64 / 2.0;
                 let error = (numeric - normal.gradient[k]).abs();
