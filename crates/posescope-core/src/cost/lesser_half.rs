@@ -23,6 +23,7 @@ const MORE_AROUND: f32 = 16.0;
 pub(super) struct LesserHalfFinder {
     level: Level,
     sampled: [u16; BINS],
+    /// Numbers around the guess, and room for as many as there are.
     around: Vec<f32>,
 }
 
@@ -59,10 +60,18 @@ impl LesserHalfFinder {
         }
         let reach = (SHARE_AROUND * values.len() as f32 + MORE_AROUND) / density;
         let range = [median - reach, median + reach];
-        let around = &mut self.around;
-        around.clear();
-        let (below, sum) = dispatch!(level, _simd => add_below(values, range, around));
+        // One more, where what is not around is written.
+        if self.around.len() <= values.len() {
+            self.around.resize(values.len() + 1, 0.0);
+        }
+        let mut around = Around {
+            range,
+            values: &mut self.around,
+            count: 0,
+        };
+        let (below, sum) = dispatch!(level, _simd => add_below(values, &mut around));
         let place = middle.checked_sub(below as usize)?;
+        let around = &mut around.values[..around.count];
         if place >= around.len() {
             return None;
         }
@@ -88,15 +97,16 @@ impl LesserHalfFinder {
         let size = values.len().div_ceil(step) as f32;
         let all = values.len() as f32;
         let place = middle as f32 / all * size;
-        let mut before = 0.0;
+        // Counted in whole numbers, whose sums follow each other faster.
+        let mut before = 0_u16;
         let of_median = sampled.iter().position(|&count| {
-            let within = place < before + f32::from(count);
-            before += if within { 0.0 } else { f32::from(count) };
-            within
+            let is_within = place < f32::from(before + count);
+            before += if is_within { 0 } else { count };
+            is_within
         });
         let of_median = of_median.unwrap_or(BINS - 1);
         let edge = |bin: usize| least_of_bin(bin as u16);
-        let within = (place - before) / f32::from(sampled[of_median].max(1));
+        let within = (place - f32::from(before)) / f32::from(sampled[of_median].max(1));
         let [low, high] = [edge(of_median), edge(of_median + 1)];
         let beside = of_median.saturating_sub(BINS_BESIDE)..(of_median + 1 + BINS_BESIDE).min(BINS);
         let [begin, end] = [beside.start, beside.end].map(edge);
@@ -134,11 +144,31 @@ fn count_below<S: Simd>(simd: S, values: &[f32], limit: f32) -> u32 {
     sums.iter().sum::<i32>() as u32 + rest.count() as u32
 }
 
-/// Number and sum of what is less than the first limit; takes what is not and is less than the second.
+/// Numbers in a range: no less than its first end and less than its second.
+struct Around<'a> {
+    range: [f32; 2],
+    /// Room for all numbers and one more.
+    values: &'a mut [f32],
+    count: usize,
+}
+
+impl Around<'_> {
+    /// Which numbers are in the range cannot be foreseen: each is written, and the next over it if it is not.
+    #[inline(always)]
+    fn take(&mut self, values: &[f32]) {
+        let [low, high] = self.range;
+        for &value in values {
+            self.values[self.count] = value;
+            self.count += usize::from((value >= low) & (value < high));
+        }
+    }
+}
+
+/// Number and sum of what is less than a range; takes what is in it.
 #[inline(always)]
-fn add_below(values: &[f32], limits: [f32; 2], around: &mut Vec<f32>) -> (u32, f64) {
+fn add_below(values: &[f32], around: &mut Around<'_>) -> (u32, f64) {
     const SUMS: usize = 16;
-    let [low, high] = limits;
+    let [low, high] = around.range;
     let mut sums = [0.0_f64; SUMS];
     let mut counted = [0_u32; SUMS];
     let (groups, rest) = values.as_chunks::<SUMS>();
@@ -154,10 +184,10 @@ fn add_below(values: &[f32], limits: [f32; 2], around: &mut Vec<f32>) -> (u32, f
             found | ((value >= low) & (value < high))
         });
         if is_near {
-            take_between(group, limits, around);
+            around.take(group);
         }
     }
-    take_between(rest, limits, around);
+    around.take(rest);
     let below = || rest.iter().filter(|&&value| value < low);
     let sum = below()
         .map(|&value| LesserHalf::rounded(f64::from(value)))
@@ -166,12 +196,6 @@ fn add_below(values: &[f32], limits: [f32; 2], around: &mut Vec<f32>) -> (u32, f
         counted.iter().sum::<u32>() + below().count() as u32,
         sums.iter().sum::<f64>() + sum,
     )
-}
-
-#[inline(never)]
-fn take_between(values: &[f32], [low, high]: [f32; 2], taken: &mut Vec<f32>) {
-    let between = values.iter().filter(|&&value| value >= low && value < high);
-    taken.extend(between);
 }
 
 #[cfg(test)]

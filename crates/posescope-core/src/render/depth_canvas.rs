@@ -94,6 +94,8 @@ impl<T: Copy + Default> DepthCanvas<T> {
     fn draw_points(&mut self, values: Values<'_, T>) -> usize {
         let Projected { pixels, depths, .. } = &self.projected;
         let nearest = &mut self.nearest[..values.query.len()];
+        // Of the same length to whoever compiles this, too.
+        let query = &values.query[..nearest.len()];
         for (&pixel, &depth) in pixels.iter().zip(depths) {
             if let Some(there) = nearest.get_mut(pixel as usize) {
                 *there = lesser(depth, *there);
@@ -103,7 +105,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
         for ((&pixel, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             let pixel = pixel as usize;
             if pixel < nearest.len() {
-                let query = values.query[pixel];
+                let query = query[pixel];
                 taken.take(&mut nearest[pixel], depth, Pair { query, synthetic });
             }
         }
