@@ -50,6 +50,15 @@ pub struct Pair<T> {
 /// The values of both images, each 0 … 255.
 pub type IntensityPair = Pair<f32>;
 
+impl IntensityPair {
+    /// (I_Q − I_S)² \[grey values²\].
+    #[inline(always)]
+    pub fn squared_difference(&self) -> f32 {
+        let difference = self.query - self.synthetic;
+        difference * difference
+    }
+}
+
 /// The bins of a joint histogram that both values fall into.
 pub type BinPair = Pair<u8>;
 
@@ -281,16 +290,9 @@ mod tests {
     /// The cost of the pairs as the grid search asks for it, after that of other pairs.
     fn by_evaluator(cost: &dyn Cost, pairs: &[IntensityPair]) -> Option<f64> {
         let before = &pairs[..pairs.len() / 2];
-        match cost.evaluator() {
-            Evaluator::Pairs(mut cost) => {
-                cost(before);
-                cost(pairs)
-            }
-            Evaluator::Counts { bins, mut cost } => {
-                cost(&JointHistogram::of(before, bins).counts);
-                cost(&JointHistogram::of(pairs, bins).counts)
-            }
-        }
+        let mut evaluator = cost.evaluator();
+        evaluator.cost(before);
+        evaluator.cost(pairs)
     }
 
     #[test]

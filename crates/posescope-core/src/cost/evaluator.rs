@@ -2,7 +2,7 @@
 
 use super::{Entropies, IntensityPair, JointHistogram};
 
-/// The cost of one hypothesis: of its pairs, or of their counts.
+/// The cost of one hypothesis: of its pairs, of what is made of each, or of their counts.
 pub type CostOf<'a, T> = Box<dyn FnMut(&[T]) -> Option<f64> + Send + 'a>;
 
 /// A cost as the grid search asks for it, some ten thousand times in a row: what it needs to know of
@@ -11,6 +11,8 @@ pub type CostOf<'a, T> = Box<dyn FnMut(&[T]) -> Option<f64> + Send + 'a>;
 pub enum Evaluator<'a> {
     /// The cost looks at every pair.
     Pairs(CostOf<'a, IntensityPair>),
+    /// The cost looks at the squared difference of each pair, [`IntensityPair::squared_difference`], in any order.
+    SquaredDifferences(CostOf<'a, f32>),
     /// The cost is one of the joint histogram alone.
     Counts {
         /// Bins per axis, as in [`JointHistogram::of`](super::JointHistogram::of).
@@ -33,6 +35,10 @@ impl Evaluator<'_> {
     pub fn cost(&mut self, pairs: &[IntensityPair]) -> Option<f64> {
         match self {
             Self::Pairs(cost) => cost(pairs),
+            Self::SquaredDifferences(cost) => {
+                let differences = pairs.iter().map(IntensityPair::squared_difference);
+                cost(&differences.collect::<Vec<f32>>())
+            }
             Self::Counts { bins, cost } => cost(&JointHistogram::of(pairs, *bins).counts),
         }
     }

@@ -107,21 +107,6 @@ impl Photometric {
     }
 }
 
-#[inline(always)]
-fn squared_difference(pair: &IntensityPair) -> f32 {
-    let difference = pair.query - pair.synthetic;
-    difference * difference
-}
-
-/// The squared differences of all pairs, in the place of what `errors` held.
-#[inline(always)]
-fn squared_differences(pairs: &[IntensityPair], errors: &mut Vec<f32>) {
-    errors.resize(pairs.len(), 0.0);
-    for (error, pair) in errors.iter_mut().zip(pairs) {
-        *error = squared_difference(pair);
-    }
-}
-
 /// The lower median; `None` of nothing. Leaves `values` partly sorted, which is why it takes time
 /// linear in their number.
 fn median(values: &mut [f32]) -> Option<f32> {
@@ -140,24 +125,34 @@ impl Cost for Photometric {
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
+        let errors: Vec<f32> = pairs
+            .iter()
+            .map(IntensityPair::squared_difference)
+            .collect();
         let threshold = median(&mut errors.clone())?;
         Some(self.mean_up_to(threshold, &errors))
     }
 
     fn evaluator(&self) -> Evaluator<'_> {
         let level = Level::new();
-        let mut errors = Vec::new();
         let mut medians = MedianFinder::new();
+        // Errors that are squared again are not added exactly, so that their order has a part in it.
+        if self.params.power == 2 {
+            let mut errors = Vec::new();
+            return Evaluator::Pairs(Box::new(move |pairs| {
+                errors.clear();
+                errors.extend(pairs.iter().map(IntensityPair::squared_difference));
+                let threshold = medians.lower_median(&errors)?;
+                Some(dispatch!(level, _simd => self.mean_up_to(threshold, &errors)))
+            }));
+        }
         let mut halves = LesserHalfFinder::new();
-        let is_squared_again = self.params.power == 2;
-        Evaluator::Pairs(Box::new(move |pairs| {
-            dispatch!(level, _simd => squared_differences(pairs, &mut errors));
-            if !is_squared_again && let Some((counted, sum)) = halves.find(&errors) {
+        Evaluator::SquaredDifferences(Box::new(move |errors| {
+            if let Some((counted, sum)) = halves.find(errors) {
                 return Some(sum / f64::from(counted));
             }
-            let threshold = medians.lower_median(&errors)?;
-            Some(dispatch!(level, _simd => self.mean_up_to(threshold, &errors)))
+            let threshold = medians.lower_median(errors)?;
+            Some(dispatch!(level, _simd => self.mean_up_to(threshold, errors)))
         }))
     }
 
@@ -170,14 +165,17 @@ impl Cost for Photometric {
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
-        let mut errors: Vec<f32> = pairs.iter().map(squared_difference).collect();
+        let mut errors: Vec<f32> = pairs
+            .iter()
+            .map(IntensityPair::squared_difference)
+            .collect();
         let threshold = median(&mut errors)?;
         Some(Explanation::Weights(PhotometricWeights {
             power: self.params.power,
             threshold,
             counted: pairs
                 .iter()
-                .map(|pair| squared_difference(pair) <= threshold)
+                .map(|pair| pair.squared_difference() <= threshold)
                 .collect(),
         }))
     }

@@ -179,7 +179,7 @@ impl Judge {
 
 /// A canvas and the three histograms of what is drawn on it.
 struct Worker {
-    canvas: DepthCanvas<Bins>,
+    canvas: DepthCanvas<Pair<Bins>>,
     counts: Vec<u32>,
 }
 
@@ -195,7 +195,8 @@ impl Worker {
         let Self { canvas, counts } = self;
         let camera_from_points = reference_from_camera.inverse();
         let positions = &judge.reference.positions;
-        let pairs = canvas.draw(positions, judge.values(), &camera_from_points);
+        let keep = |query, synthetic| Pair { query, synthetic };
+        let pairs = canvas.draw(positions, judge.values(), &camera_from_points, keep);
         Score {
             cost: cost_of(pairs, &judge.params, counts),
             covered: pairs.len() as u32,

@@ -8,7 +8,6 @@ use super::canvas::{MOST_ROWS, Projected, ROW_BITS};
 use super::projection::{Eight, Projection};
 use super::{PointArrays, Values};
 use crate::camera::Intrinsics;
-use crate::cost::Pair;
 use crate::geometry::Pose;
 
 /// The most pixels, those of the margin included: 64 MB.
@@ -21,14 +20,14 @@ const NOTHING: f32 = f32::INFINITY;
 /// what the last one wrote there.
 const STREAMS: usize = 4;
 
-/// Draws points for one hypothesis after the other, and keeps what query and synthetic view show where
-/// both exist: the pairs of [`Rasterizer`](super::Rasterizer), bit by bit, in an order of their own.
+/// Draws points for one hypothesis after the other, and keeps what is made of what query and synthetic view show
+/// where both exist: of the pairs of [`Rasterizer`](super::Rasterizer), bit by bit, in an order of their own.
 ///
 /// First the least depth of each pixel is found, rows of several pixels at once; then each point takes the
 /// pixels where the depth is its own, and leaves them empty, so that of two at the same depth the first
 /// takes them, and nothing is to be cleared. Neither has a branch: which of several points is the nearest cannot
 /// be foreseen, and a third of a drawing's time went into guessing it.
-pub struct DepthCanvas<T> {
+pub struct DepthCanvas<K> {
     level: Level,
     intrinsics: Intrinsics,
     reach: usize,
@@ -36,10 +35,10 @@ pub struct DepthCanvas<T> {
     nearest: Vec<f32>,
     /// Where the points fall: of squares the upper left pixel, the margin's counted.
     projected: Projected,
-    pairs: Vec<Pair<T>>,
+    kept: Vec<K>,
 }
 
-impl<T: Copy + Default> DepthCanvas<T> {
+impl<K: Copy + Default> DepthCanvas<K> {
     /// An empty canvas for a camera; each point covers a square of `splat_px` (odd) pixels. `None` for
     /// an image of more than 16 million pixels, or 65,000 in a row.
     pub fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
@@ -53,7 +52,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
             // A row of three is written as one of four.
             nearest: vec![NOTHING; pixels + 1],
             projected: Projected::default(),
-            pairs: Vec::new(),
+            kept: Vec::new(),
         })
     }
 
@@ -62,13 +61,15 @@ impl<T: Copy + Default> DepthCanvas<T> {
         self.intrinsics = *intrinsics;
     }
 
-    /// What the query and a camera at `camera_from_points` show, at each pixel on which points fall.
-    pub fn draw(
+    /// What `keep` makes of what the query, first, and a camera at `camera_from_points` show, at each pixel on
+    /// which points fall.
+    pub fn draw<T: Copy>(
         &mut self,
         points: &PointArrays,
         values: Values<'_, T>,
         camera_from_points: &Pose,
-    ) -> &[Pair<T>] {
+        keep: impl Fn(T, T) -> K,
+    ) -> &[K] {
         let projection = Projection::new(&self.intrinsics, self.reach as i32, camera_from_points);
         let projection = match self.reach {
             0 => projection,
@@ -79,19 +80,19 @@ impl<T: Copy + Default> DepthCanvas<T> {
         let side = 2 * self.reach + 1;
         let most = (values.points.len() * side * side).min(values.query.len());
         // One more, where what does not count is written.
-        if self.pairs.len() <= most {
-            self.pairs.resize(most + 1, Pair::default());
+        if self.kept.len() <= most {
+            self.kept.resize(most + 1, K::default());
         }
         let count = match self.reach {
-            0 => dispatch!(level, _simd => self.draw_points(values)),
-            1 => dispatch!(level, simd => self.draw_squares::<_, 3>(simd, values)),
-            _ => dispatch!(level, simd => self.draw_squares::<_, 0>(simd, values)),
+            0 => dispatch!(level, _simd => self.draw_points(values, keep)),
+            1 => dispatch!(level, simd => self.draw_squares::<_, _, 3>(simd, values, keep)),
+            _ => dispatch!(level, simd => self.draw_squares::<_, _, 0>(simd, values, keep)),
         };
-        &self.pairs[..count]
+        &self.kept[..count]
     }
 
     #[inline(always)]
-    fn draw_points(&mut self, values: Values<'_, T>) -> usize {
+    fn draw_points<T: Copy>(&mut self, values: Values<'_, T>, keep: impl Fn(T, T) -> K) -> usize {
         let Projected { pixels, depths, .. } = &self.projected;
         let nearest = &mut self.nearest[..values.query.len()];
         // Of the same length to whoever compiles this, too.
@@ -101,12 +102,12 @@ impl<T: Copy + Default> DepthCanvas<T> {
                 *there = lesser(depth, *there);
             }
         }
-        let mut taken = Taken::new(&mut self.pairs);
+        let mut taken = Taken::new(&mut self.kept);
         for ((&pixel, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             let pixel = pixel as usize;
             if pixel < nearest.len() {
-                let query = query[pixel];
-                taken.take(&mut nearest[pixel], depth, Pair { query, synthetic });
+                let kept = keep(query[pixel], synthetic);
+                taken.take(&mut nearest[pixel], depth, kept);
             }
         }
         taken.count
@@ -114,10 +115,11 @@ impl<T: Copy + Default> DepthCanvas<T> {
 
     /// Draws squares of `SIDE` pixels, or 0 for such as the canvas was made for.
     #[inline(always)]
-    fn draw_squares<S: Simd, const SIDE: usize>(
+    fn draw_squares<S: Simd, T: Copy, const SIDE: usize>(
         &mut self,
         simd: S,
         values: Values<'_, T>,
+        keep: impl Fn(T, T) -> K,
     ) -> usize {
         let side = if SIDE == 0 { 2 * self.reach + 1 } else { SIDE };
         let [width, height] =
@@ -142,7 +144,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
         }
 
         let query = values.query;
-        let mut taken = Taken::new(&mut self.pairs);
+        let mut taken = Taken::new(&mut self.kept);
         for ((&corner, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             if corner == Eight::OUT_OF_VIEW {
                 continue;
@@ -161,7 +163,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
                     let there = &mut square[row * stride..][..side];
                     let query = &query[row * width..][..side];
                     for (there, &query) in there.iter_mut().zip(query) {
-                        taken.take(there, depth, Pair { query, synthetic });
+                        taken.take(there, depth, keep(query, synthetic));
                     }
                 }
                 continue;
@@ -172,7 +174,7 @@ impl<T: Copy + Default> DepthCanvas<T> {
                     let (row, column) = (row.wrapping_sub(margin), column.wrapping_sub(margin));
                     if row < height && column < width {
                         let query = query[row * width + column];
-                        taken.take(there, depth, Pair { query, synthetic });
+                        taken.take(there, depth, keep(query, synthetic));
                     } else {
                         *there = NOTHING;
                     }
@@ -222,23 +224,23 @@ fn lesser(new: f32, old: f32) -> f32 {
     if new < old { new } else { old }
 }
 
-/// The pairs of a drawing, so far.
-struct Taken<'a, T> {
-    pairs: &'a mut [Pair<T>],
+/// What is kept of a drawing, so far.
+struct Taken<'a, K> {
+    kept: &'a mut [K],
     count: usize,
 }
 
-impl<'a, T> Taken<'a, T> {
-    fn new(pairs: &'a mut [Pair<T>]) -> Self {
-        Self { pairs, count: 0 }
+impl<'a, K> Taken<'a, K> {
+    fn new(kept: &'a mut [K]) -> Self {
+        Self { kept, count: 0 }
     }
 
-    /// Takes a pixel if what is seen there is at this depth.
+    /// Keeps this of a pixel if what is seen there is at this depth.
     #[inline(always)]
-    fn take(&mut self, there: &mut f32, depth: f32, pair: Pair<T>) {
+    fn take(&mut self, there: &mut f32, depth: f32, kept: K) {
         let bits = there.to_bits();
         let is_seen = bits == depth.to_bits();
-        self.pairs[self.count] = pair;
+        self.kept[self.count] = kept;
         self.count += usize::from(is_seen);
         *there = f32::from_bits(select_unpredictable(is_seen, NOTHING.to_bits(), bits));
     }
@@ -287,10 +289,8 @@ mod tests {
             let values = Values { query: &pixels, points: &intensities };
             for (right, forward) in shifts {
                 let pose = Pose::translation(right, 0.0, forward);
-                let pairs = canvas.draw(&arrays, values, &pose).iter();
-                let mut seen: Vec<_> = pairs
-                    .map(|pair| (pair.query as u32, pair.synthetic as u32))
-                    .collect();
+                let kept = |query: f32, synthetic: f32| (query as u32, synthetic as u32);
+                let mut seen = canvas.draw(&arrays, values, &pose, kept).to_vec();
                 seen.sort_unstable();
                 let mut plainly = Rasterizer::new(&small_camera(), splat_px);
                 let mut drawn: Vec<_> = plainly
@@ -318,7 +318,11 @@ mod tests {
         };
         for splat_px in [1, 3] {
             let mut canvas = DepthCanvas::new(&small_camera(), splat_px).expect("a small image");
-            assert!(canvas.draw(&arrays, values, &twice_as_far).is_empty());
+            assert!(
+                canvas
+                    .draw(&arrays, values, &twice_as_far, |_, seen| seen)
+                    .is_empty()
+            );
             let mut plainly = Rasterizer::new(&small_camera(), splat_px);
             assert!(plainly.splat(&[point], &twice_as_far).is_empty());
         }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::{Canvas, ColoredPoint, DepthCanvas, PointArrays, Score, Values};
 use crate::camera::Intrinsics;
-use crate::cost::{Cost, CostOf, Evaluator, IntensityPair, MOST_BYTE_BINS, byte_bin, count_pairs};
+use crate::cost::{
+    BinPair, Cost, CostOf, Evaluator, IntensityPair, MOST_BYTE_BINS, byte_bin, count_pairs,
+};
 use crate::geometry::Pose;
 
 /// What all hypotheses have in common.
@@ -35,7 +37,7 @@ impl Prepared {
                     points: Arc::new(intensities.map(bin).collect()),
                 }
             }
-            Evaluator::Counts { .. } | Evaluator::Pairs(_) => {
+            Evaluator::Counts { .. } | Evaluator::Pairs(_) | Evaluator::SquaredDifferences(_) => {
                 Shown::Values(Arc::new(intensities.collect()))
             }
         };
@@ -54,13 +56,13 @@ pub(super) enum Worker<'a> {
         points: Arc<Vec<f32>>,
         cost: CostOf<'a, IntensityPair>,
     },
-    Pairs {
+    SquaredDifferences {
         canvas: DepthCanvas<f32>,
         points: Arc<Vec<f32>>,
-        cost: CostOf<'a, IntensityPair>,
+        cost: CostOf<'a, f32>,
     },
     Counts {
-        canvas: DepthCanvas<u8>,
+        canvas: DepthCanvas<BinPair>,
         query: Arc<Vec<u8>>,
         points: Arc<Vec<u8>>,
         bins: usize,
@@ -78,11 +80,9 @@ impl<'a> Worker<'a> {
         intrinsics: &Intrinsics,
         splat_px: usize,
     ) -> Option<Self> {
-        // Whole numbers decide it, whatever the order in which they are counted or added.
-        let knows_no_order = cost.tallying().is_some();
         match (cost.evaluator(), &prepared.shown) {
-            (Evaluator::Pairs(cost), Shown::Values(points)) if knows_no_order => {
-                Some(Self::Pairs {
+            (Evaluator::SquaredDifferences(cost), Shown::Values(points)) => {
+                Some(Self::SquaredDifferences {
                     canvas: DepthCanvas::new(intrinsics, splat_px)?,
                     points: Arc::clone(points),
                     cost,
@@ -111,7 +111,7 @@ impl<'a> Worker<'a> {
     pub fn look_through(&mut self, intrinsics: &Intrinsics) {
         match self {
             Self::Ordered { canvas, .. } => canvas.look_through(intrinsics),
-            Self::Pairs { canvas, .. } => canvas.look_through(intrinsics),
+            Self::SquaredDifferences { canvas, .. } => canvas.look_through(intrinsics),
             Self::Counts { canvas, .. } => canvas.look_through(intrinsics),
         }
     }
@@ -133,14 +133,19 @@ impl<'a> Worker<'a> {
                 let pairs = canvas.draw(&prepared.positions, values, camera_from_points);
                 (cost(pairs), pairs.len())
             }
-            Self::Pairs {
+            Self::SquaredDifferences {
                 canvas,
                 points,
                 cost,
             } => {
                 let values = Values { query, points };
-                let pairs = canvas.draw(&prepared.positions, values, camera_from_points);
-                (cost(pairs), pairs.len())
+                let differences = canvas.draw(
+                    &prepared.positions,
+                    values,
+                    camera_from_points,
+                    |query, synthetic| IntensityPair { query, synthetic }.squared_difference(),
+                );
+                (cost(differences), differences.len())
             }
             Self::Counts {
                 canvas,
@@ -151,7 +156,12 @@ impl<'a> Worker<'a> {
                 cost,
             } => {
                 let values = Values { query, points };
-                let pairs = canvas.draw(&prepared.positions, values, camera_from_points);
+                let pairs = canvas.draw(
+                    &prepared.positions,
+                    values,
+                    camera_from_points,
+                    |query, synthetic| BinPair { query, synthetic },
+                );
                 count_pairs(pairs, *bins, counts);
                 (cost(counts), pairs.len())
             }
