@@ -7,7 +7,9 @@ use std::time::Instant;
 use image::{Rgb, RgbImage};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
-use posescope::grid::{DenseSurface, GridParams, Offset, least_covered};
+use posescope::grid::{
+    DenseSurface, GridParams, LatticeTooLarge, MOST_CELLS, Offset, least_covered,
+};
 use posescope::method::Method;
 use posescope::problem::Problem;
 use posescope::render::{Score, Scorer};
@@ -54,6 +56,10 @@ pub fn surface(args: &SurfaceArgs, terminal: &Terminal) -> Result<(), CliError> 
         yaw_step_deg: args.yaw_step,
         ..task.params.grid.clone()
     };
+    // Before the work, not after it.
+    if let Some(folder) = args.out.parent() {
+        std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    }
     let estimator = estimator::entry(method).make(&task.params);
     let start = Instant::now();
     let mut filled = None;
@@ -97,6 +103,18 @@ fn no_cost(method: Method) -> CliError {
     ))
 }
 
+fn too_large(error: &LatticeTooLarge) -> CliError {
+    let step = if error.phase.is_yaw() {
+        "--yaw-step"
+    } else {
+        "--step"
+    };
+    CliError::Usage(format!(
+        "{step}: {:.0} of them, at most {MOST_CELLS} are scored; take a larger step or a smaller --radius",
+        error.cells
+    ))
+}
+
 /// Scores every position with every heading.
 fn fill(
     scorer: &Scorer<'_>,
@@ -106,8 +124,8 @@ fn fill(
 ) -> Result<DenseSurface, CliError> {
     let at_reference = scorer.score(&[Pose::identity()])[0];
     let least_covered = least_covered(grid.coverage_floor, at_reference.covered);
-    let mut surface = DenseSurface::new(radius_m, grid, least_covered)
-        .map_err(|error| CliError::Usage(error.to_string()))?;
+    let mut surface =
+        DenseSurface::new(radius_m, grid, least_covered).map_err(|error| too_large(&error))?;
     let bar = terminal.bar(surface.hypotheses() as u64);
     while !surface.is_complete() {
         surface.score_next(scorer);

@@ -579,9 +579,34 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
         found.yaw_rad - least.yaw_rad,
     ];
     assert!(off.iter().all(|off| off.abs() < 1e-9), "{off:?}");
-    let readout = hover(&mut window, "Cost map", 0.5, 0.5).expect("a cell");
-    let has_heading = ["straight ahead", "left", "right"].map(|word| readout.contains(word));
-    assert!(has_heading.contains(&true), "{readout}");
+    // Pointing at a place looks from there in its cheapest heading.
+    let mut headings = Vec::new();
+    for (right, down) in [(0.3, 0.5), (0.4, 0.3), (0.6, 0.6), (0.7, 0.4), (0.5, 0.5)] {
+        let readout = hover(&mut window, "Cost map", right, down).expect("a cell");
+        let hovered = window.state().app_state().hovered.expect("a pose");
+        let there = Offset::of(&problem.reference_from_query(&hovered));
+        let near = |(offset, _): &(Offset, _)| {
+            (offset.right_m - there.right_m).hypot(offset.forward_m - there.forward_m) < 1e-6
+        };
+        let known = (0..cells).filter_map(|cell| filled.at(cell)).find(near);
+        let (offset, _) = known.expect("a cell of the map");
+        assert!((offset.yaw_rad - there.yaw_rad).abs() < 1e-9, "{readout}");
+        let degrees = offset.yaw_rad.to_degrees();
+        let side = match degrees {
+            left if left > 1e-6 => format!("{left:.1}° left"),
+            right if right < -1e-6 => format!("{:.1}° right", -right),
+            _ => "straight ahead".to_owned(),
+        };
+        assert!(
+            readout.contains(&side.replace(".0°", "°")),
+            "{readout}: {side}"
+        );
+        headings.push(degrees);
+    }
+    assert!(
+        headings.iter().any(|degrees| degrees.abs() > 1.0),
+        "{headings:?}"
+    );
 
     // Without it the search's own map is back, and the filled one is kept.
     window.key_press(egui::Key::F);

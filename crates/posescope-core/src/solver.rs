@@ -30,3 +30,14 @@ pub struct Correspondence {
 }
 
 bits_of_fields!(Correspondence { pixel, point });
+
+/// A camera for tests, with focal lengths that differ.
+#[cfg(test)]
+const KITTI: crate::camera::Intrinsics = crate::camera::Intrinsics {
+    fx: 718.856,
+    fy: 700.0,
+    cx: 607.1928,
+    cy: 185.2157,
+    width: 1241,
+    height: 376,
+};

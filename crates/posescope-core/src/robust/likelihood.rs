@@ -266,6 +266,24 @@ mod tests {
     }
 
     #[test]
+    fn as_many_residuals_as_one_likes_have_a_likelihood() {
+        let errors = [6.0].repeat(200);
+        let params = MlesacParams::default();
+        let score = |errors: &[f64]| {
+            Likelihood::new(&correspondences(errors), &CAMERA, &params).score(&Pose::identity())
+        };
+        let (few, many) = (score(&errors[..8]), score(&errors));
+        // Equal residuals: the likelihood of one, as often as there are.
+        let expected = few.log_likelihood / 8.0 * 200.0;
+        let off = (many.log_likelihood - expected).abs();
+        assert!(
+            off < 1e-6 * expected.abs(),
+            "{} {expected}",
+            many.log_likelihood
+        );
+    }
+
+    #[test]
     fn three_rounds_of_em_are_enough() {
         let mixing = |em_iterations| {
             let params = MlesacParams {

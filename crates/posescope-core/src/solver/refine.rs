@@ -123,7 +123,7 @@ pub fn pose_covariance(
 }
 
 /// The pose after a twist in the camera frame: rotation \[rad\] first, translation \[m\] second.
-fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
+pub(super) fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(0).into_owned());
     let translation = Translation3::from(twist.fixed_rows::<3>(3).into_owned());
     Pose::from_parts(translation, rotation) * pose
@@ -139,16 +139,8 @@ fn damped_step(normal: &NormalEquations, lambda: f64) -> Option<Vector6<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::KITTI;
     use nalgebra::{Point2, Point3, Vector2, Vector3};
-
-    const KITTI: Intrinsics = Intrinsics {
-        fx: 718.856,
-        fy: 700.0,
-        cx: 607.1928,
-        cy: 185.2157,
-        width: 1241,
-        height: 376,
-    };
 
     fn truth() -> Pose {
         Pose::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.1, -0.2, 0.05))

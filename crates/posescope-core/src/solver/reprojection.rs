@@ -275,30 +275,16 @@ fn add(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::KITTI;
+    use crate::solver::refine::moved;
     use nalgebra::{Matrix2x6, Point2, Point3, Vector2, Vector3};
     use proptest::prelude::*;
-
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 718.856,
-        fy: 700.0,
-        cx: 607.1928,
-        cy: 185.2157,
-        width: 1241,
-        height: 376,
-    };
-
-    fn moved(pose: &Pose, twist: Vector6<f64>) -> Pose {
-        Pose::new(
-            twist.fixed_rows::<3>(3).into(),
-            twist.fixed_rows::<3>(0).into(),
-        ) * pose
-    }
 
     /// `∂π/∂ξ` by central differences.
     fn jacobian(pose: &Pose, point: &Point3<f64>) -> Matrix2x6<f64> {
         let pixel = |twist| {
-            CAMERA
-                .project(&(moved(pose, twist) * point))
+            KITTI
+                .project(&(moved(pose, &twist) * point))
                 .expect("in front")
         };
         let columns: [Vector2<f64>; 6] = std::array::from_fn(|k| {
@@ -317,7 +303,7 @@ mod tests {
         );
         let made = one.prop_map(|(x, y, z, off)| {
             let point = Point3::new(x, y, if z.abs() < 3.0 { z + 8.0 } else { z });
-            let pixel = CAMERA.project(&point).unwrap_or(Point2::new(300.0, 100.0));
+            let pixel = KITTI.project(&point).unwrap_or(Point2::new(300.0, 100.0));
             Correspondence {
                 pixel: pixel + Vector2::new(off, -0.5 * off),
                 point,
@@ -335,10 +321,10 @@ mod tests {
         ) {
             let loss = [Loss::Squared, Loss::Huber(5.0), Loss::Cauchy(5.0)][which];
             let pose = Pose::new(Vector3::new(0.2, -turn, 0.1), Vector3::new(turn, -turn, 0.5 * turn));
-            let reprojection = Reprojection::new(&correspondences, &CAMERA);
+            let reprojection = Reprojection::new(&correspondences, &KITTI);
             let (mut sum, mut hessian, mut gradient) = (0.0, Matrix6::zeros(), Vector6::zeros());
             for Correspondence { pixel, point } in &correspondences {
-                let Some(seen) = CAMERA.project(&(pose * point)) else {
+                let Some(seen) = KITTI.project(&(pose * point)) else {
                     sum = f64::INFINITY;
                     continue;
                 };
