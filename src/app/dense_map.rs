@@ -258,3 +258,44 @@ fn fill(
         ctx.request_repaint();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_scored_twice_counts_once() {
+        let surface = DenseSurface::new(2.0, &GridParams::default(), 0).expect("small");
+        let ask = DenseAsk {
+            method: Method::MI,
+            reference: 0,
+            step_m: 1.0,
+            yaw_step_deg: 1.0,
+            least_covered: 0,
+        };
+        let mut filler = DenseFiller::new(egui::Context::default());
+        let (outbox, answers) = mpsc::channel();
+        filler.answers = answers;
+        filler.maps.push(DenseMap {
+            ask,
+            surface: Ok(surface),
+            took: Duration::ZERO,
+        });
+        let score = Score {
+            cost: Some(1.0),
+            covered: 1,
+        };
+        for tried in [0, 0, 5] {
+            let scored = Scored {
+                ask,
+                tried,
+                scores: vec![score; 5],
+                took: Duration::ZERO,
+            };
+            outbox.send(Ok(scored)).expect("a receiver");
+        }
+        filler.poll().expect("no fault");
+        let map = filler.map(Method::MI).expect("the map");
+        assert_eq!(map.surface().expect("small").tried(), 10);
+    }
+}

@@ -104,13 +104,12 @@ fn no_cost(method: Method) -> CliError {
 }
 
 fn too_large(error: &LatticeTooLarge) -> CliError {
-    let step = if error.phase.is_yaw() {
-        "--yaw-step"
-    } else {
-        "--step"
+    let (step, less) = match error.phase.is_yaw() {
+        true => ("--yaw-step", "a smaller grid.yaw_range"),
+        false => ("--step", "a smaller --radius"),
     };
     CliError::Usage(format!(
-        "{step}: {:.0} of them, at most {MOST_CELLS} are scored; take a larger step or a smaller --radius",
+        "{step}: {:.0} of them, at most {MOST_CELLS} are scored; take a larger step or {less}",
         error.cells
     ))
 }
