@@ -171,22 +171,61 @@ impl<'a> Trace<'a> {
             observer.attend_if_asked()?;
             observer.depth += 1;
             observer.reused = false;
-            observer.deliver(StageStarted { stage }.into())?;
+            // A sink that cancels at the start of a stage has still seen it begin, so it sees it end.
+            if let Err(cancelled) = observer.deliver(StageStarted { stage }.into()) {
+                let _ = observer.end_stage(stage, false);
+                return Err(cancelled.into());
+            }
         }
         let outcome = body(self);
         if let Some(observer) = &mut self.observer {
-            let ended = StageEnded {
-                stage,
-                succeeded: outcome.is_ok(),
-                reused: std::mem::take(&mut observer.reused),
-            };
-            let told = observer.deliver(ended.into());
-            observer.depth -= 1;
+            let told = observer.end_stage(stage, outcome.is_ok());
             if outcome.is_ok() {
                 told?;
             }
         }
         outcome
+    }
+
+    /// Runs `body` with a second sink, which gets the events that it wants before the trace's own sink.
+    ///
+    /// # Errors
+    /// The errors of `body`.
+    pub fn heard_by<T, X>(
+        &mut self,
+        second: &mut dyn Sink,
+        body: impl FnOnce(&mut Trace<'_>) -> Result<T, X>,
+    ) -> Result<T, X> {
+        let Some(observer) = &mut self.observer else {
+            return body(&mut Trace::to(second));
+        };
+        let attention = observer.attention;
+        let mut onward = Onward(observer);
+        let mut both = Fanout::new(vec![second, &mut onward]);
+        match attention {
+            Some(flag) => body(&mut Trace::watched(&mut both, flag)),
+            None => body(&mut Trace::to(&mut both)),
+        }
+    }
+}
+
+/// Passes the events of an inner trace on to the observer of the outer one.
+struct Onward<'t, 'a>(&'t mut Observer<'a>);
+
+impl Sink for Onward<'_, '_> {
+    fn wanted(&self) -> KindSet {
+        self.0.wanted
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        let depth = self.0.depth + record.depth;
+        self.0.deliver_at(depth, record.event.clone())
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.0.sink.attend()?;
+        self.0.wanted = self.0.sink.wanted();
+        Ok(())
     }
 }
 
@@ -207,10 +246,26 @@ impl Observer<'_> {
         Ok(())
     }
 
+    /// Tells the end of the innermost stage, and closes it whatever the sink says.
+    fn end_stage(&mut self, stage: Stage, succeeded: bool) -> Result<(), Cancelled> {
+        let ended = StageEnded {
+            stage,
+            succeeded,
+            reused: std::mem::take(&mut self.reused),
+        };
+        let told = self.deliver(ended.into());
+        self.depth -= 1;
+        told
+    }
+
     fn deliver(&mut self, event: Event) -> Result<(), Cancelled> {
+        self.deliver_at(self.depth, event)
+    }
+
+    fn deliver_at(&mut self, depth: usize, event: Event) -> Result<(), Cancelled> {
         let record = Record {
             index: self.delivered,
-            depth: self.depth,
+            depth,
             event,
         };
         self.delivered += 1;
@@ -297,6 +352,59 @@ mod tests {
                 ..
             })
         ));
+    }
+
+    #[test]
+    fn a_stage_that_is_cancelled_at_its_first_event_is_closed_too() {
+        for stop_at in 0..6 {
+            let mut sink = RecordingSink::wanting(KindSet::ALL);
+            sink.stop_at = Some(stop_at);
+            let _ = two_stages(&mut Trace::to(&mut sink));
+            let mut open = Vec::new();
+            for record in &sink.records {
+                match &record.event {
+                    Event::StageStarted(started) => open.push((started.stage, record.depth)),
+                    Event::StageEnded(ended) => {
+                        assert_eq!(open.pop(), Some((ended.stage, record.depth)), "{stop_at}");
+                    }
+                    _ => {}
+                }
+            }
+            assert_eq!(open, [], "stopped at {stop_at}");
+        }
+    }
+
+    #[test]
+    fn a_second_sink_hears_what_it_wants_and_the_first_hears_the_same_as_alone() {
+        let mut alone = RecordingSink::wanting(KindSet::ALL);
+        let told = |trace: &mut Trace<'_>| trace.stage(Stage::Match, two_stages);
+        told(&mut Trace::to(&mut alone)).expect("not cancelled");
+        let mut first = RecordingSink::wanting(KindSet::ALL);
+        let mut second = RecordingSink::wanting(KindSet::of(&[Kind::ProjectedCloud]));
+        let mut trace = Trace::to(&mut first);
+        trace
+            .stage(Stage::Match, |trace| {
+                trace.heard_by(&mut second, two_stages)
+            })
+            .expect("not cancelled");
+        let places = |sink: &RecordingSink| {
+            let places = sink
+                .records
+                .iter()
+                .map(|r| (r.index, r.depth, r.event.kind()));
+            places.collect::<Vec<_>>()
+        };
+        assert_eq!(places(&first), places(&alone));
+        assert_eq!(
+            second.records.len(),
+            5,
+            "four stage events and one that it wants"
+        );
+        let mut unheard = RecordingSink::wanting(KindSet::ALL);
+        Trace::off()
+            .heard_by(&mut unheard, two_stages)
+            .expect("not cancelled");
+        assert_eq!(unheard.records.len(), 5);
     }
 
     #[test]
