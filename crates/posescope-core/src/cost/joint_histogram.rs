@@ -116,10 +116,13 @@ impl Entropies {
         }
     }
 
-    /// NMI in 0 … 1, normalised by the larger entropy; `None` where both images are constant.
+    /// NMI in 0 … 1, normalised by the larger entropy; `None` where an image is constant.
     pub fn normalized_mutual_information(&self) -> Option<f64> {
-        let larger = self.query.max(self.synthetic);
-        (larger > LEAST_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
+        let (smaller, larger) = match self.query < self.synthetic {
+            true => (self.query, self.synthetic),
+            false => (self.synthetic, self.query),
+        };
+        (smaller > LEAST_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
     }
 
     /// I(Q, S) = H(Q) + H(S) − H(S, Q) \[nat\].

@@ -145,11 +145,11 @@ impl Cost for Orientation {
     }
 }
 
-/// NID in 0 … 1; `None` where both images are constant.
+/// NID in 0 … 1; `None` where an image is constant.
 fn distance(entropies: &Entropies) -> Option<f64> {
-    let joint = entropies.joint;
-    let share = entropies.mutual_information() / joint;
-    (joint > LEAST_ENTROPY).then(|| 1.0 - share.clamp(0.0, 1.0))
+    let share = entropies.mutual_information() / entropies.joint;
+    let smaller = entropies.query.min(entropies.synthetic);
+    (smaller > LEAST_ENTROPY).then(|| 1.0 - share.clamp(0.0, 1.0))
 }
 
 #[cfg(test)]
