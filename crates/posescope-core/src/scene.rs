@@ -259,4 +259,18 @@ mod tests {
         sums.sort_unstable();
         assert!(sums.windows(2).all(|two| two[0] != two[1]));
     }
+
+    #[test]
+    fn a_store_of_frames_forgets_scenes_that_nobody_holds_any_more() {
+        let store: Arc<FrameStore> = Arc::default();
+        let held: Arc<dyn Scene> = Arc::new(bare([1.5; 3]));
+        for gamma in 1..10 {
+            let text = format!("gamma=0.{gamma}5");
+            let degradation = text.parse().expect("a degradation");
+            let tried = degraded(&held, degradation, 0);
+            store.of(&tried);
+            store.of(&held);
+        }
+        assert!(store.scene_count() <= 2, "{}", store.scene_count());
+    }
 }

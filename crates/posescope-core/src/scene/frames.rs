@@ -86,6 +86,13 @@ impl FrameStore {
         }
     }
 
+    /// How many scenes it knows.
+    #[cfg(test)]
+    pub(super) fn scene_count(&self) -> usize {
+        let scenes = self.scenes.lock();
+        scenes.unwrap_or_else(PoisonError::into_inner).len()
+    }
+
     /// Memory that all frames take with what was worked out about them \[bytes\], roughly.
     pub fn bytes(&self) -> usize {
         self.frames.bytes()
@@ -94,6 +101,8 @@ impl FrameStore {
     /// The scene with its frames remembered here, those from before too.
     pub fn of<'a>(self: &Arc<Self>, scene: &'a Arc<dyn Scene>) -> CachedScene<'a> {
         let mut scenes = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
+        // A scene that nobody else holds does not come back: each degradation tried is a scene of its own.
+        scenes.retain(|(known, _)| Arc::strong_count(known) > 1);
         let known = scenes.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
         let id = known.map(|(_, id)| *id).unwrap_or_else(|| {
             let id = SceneId::new();
