@@ -130,11 +130,13 @@ impl Direct {
             evaluations: 1,
             best: start,
             best_score: initial,
+            is_later_round: false,
         };
         trace.emit(|| search.render(Moment::Start, start))?;
 
         let mut coarse_positions = None;
-        for _ in 0..self.grid.rounds {
+        for round in 0..self.grid.rounds {
+            search.is_later_round = round > 0;
             for phase in Phase::ALL {
                 let lattice =
                     Lattice::new(phase, search.best, radius, &self.grid).map_err(Failure::from)?;
@@ -298,6 +300,7 @@ struct Search<'a, 'cost> {
     evaluations: u64,
     best: Offset,
     best_score: Score,
+    is_later_round: bool,
 }
 
 impl Search<'_, '_> {
@@ -310,48 +313,48 @@ impl Search<'_, '_> {
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let mut scores = vec![None; lattice.cells()];
+        let mut surface = ScoredLattice {
+            scores: vec![None; lattice.cells()],
+            lattice: lattice.clone(),
+            least_covered: self.least_covered,
+        };
         let mut least = None;
         let (memory, scorer) = (self.memory, self.scorer);
         let at_a_time = scorer.at_a_time_of(lattice.cells());
         let found = memory.scores(&lattice, || {
-            let mut found = Vec::new();
             let mut hypotheses = lattice.hypotheses();
             loop {
                 trace.checkpoint()?;
                 let some: Vec<_> = hypotheses.by_ref().take(at_a_time).collect();
                 if some.is_empty() {
-                    return Ok(found);
+                    break;
                 }
                 let poses: Vec<Pose> = some
                     .iter()
                     .map(|(_, offset)| offset.reference_from_camera())
                     .collect();
                 for ((cell, offset), score) in some.into_iter().zip(scorer.score(&poses)) {
-                    found.push(score);
-                    scores[cell] = Some(score);
+                    surface.scores[cell] = Some(score);
                     self.tell(lattice.phase, offset, score, &mut least, trace)?;
                 }
             }
+            // Settled scores are cached: a later scorer asks no device, so it would correct nothing.
+            surface.settle(scorer);
+            Ok(surface.scores.iter().flatten().copied().collect())
         })?;
         trace.note_reuse(found.reused);
         if found.reused {
             for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.0) {
-                scores[cell] = Some(score);
+                surface.scores[cell] = Some(score);
                 self.tell(lattice.phase, offset, score, &mut least, trace)?;
             }
         }
-        let mut surface = ScoredLattice {
-            lattice,
-            scores,
-            least_covered: self.least_covered,
-        };
-        surface.settle(scorer);
         let surface = Arc::new(surface);
         let minimum = surface.minimum();
         if let Some(cell) = minimum
             && let (Some(offset), Some(score)) =
                 (surface.lattice.offset(cell), surface.scores[cell])
+            && !self.is_worse(&score)
         {
             (self.best, self.best_score) = (offset, score);
         }
@@ -360,6 +363,18 @@ impl Search<'_, '_> {
             best: minimum.and_then(|cell| surface.lattice.offset(cell)),
         })?;
         Ok(surface)
+    }
+
+    /// Whether a score is worse than the best so far. A later round is centred on the best pose, but its
+    /// coarse disc is the reference's, so its lattice need not contain that pose.
+    fn is_worse(&self, score: &Score) -> bool {
+        self.is_later_round && {
+            let eligible = |score: &Score| score.eligible_cost(self.least_covered);
+            match (eligible(score), eligible(&self.best_score)) {
+                (Some(cost), Some(best)) => cost > best,
+                _ => false,
+            }
+        }
     }
 
     /// Tells the score of a hypothesis, and the view where it is the `least` of its lattice so far.
