@@ -67,6 +67,14 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             event.acceptance.log10_nfa,
             event.distance_m
         ),
+        Event::MatchesGuided(event) => format!(
+            "{} matches have a depth after matching again",
+            event
+                .matches
+                .iter()
+                .filter(|one| one.point.is_some())
+                .count()
+        ),
         Event::FeaturesClassified(event) => {
             format!(
                 "the states of all {} query keypoints are known",

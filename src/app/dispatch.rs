@@ -340,11 +340,15 @@ impl AppState {
         }
     }
 
-    /// All methods on by so many steps of theirs, or back.
+    /// Moves all methods by that many of their steps, once lock-step is on.
     fn go_together(&mut self, steps: isize) {
+        // Without it the keys would hide the card and the estimates, and nothing would say why.
+        let Some(here) = self.options.lockstep else {
+            return;
+        };
         let longest = self.run().spans().iter().map(|span| span.records.len());
         let last = longest.max().unwrap_or(0).saturating_sub(1);
-        let here = self.options.lockstep.unwrap_or(0).min(last);
+        let here = here.min(last);
         self.options.lockstep = Some(here.saturating_add_signed(steps).min(last));
     }
 

@@ -37,7 +37,7 @@ fn command(target: SaveTarget, path: PathBuf) -> Command {
 /// Scene, query and references, as a file is called.
 fn name_of(setup: &Setup) -> String {
     let mut words = vec![setup.references.name().to_owned()];
-    if setup.queries.name() != setup.references.name() {
+    if !setup.is_one_drive() {
         words.push(setup.queries.name().to_owned());
     }
     words.push(setup.query_name().to_owned());
@@ -152,8 +152,7 @@ impl AppState {
         let setup = &self.setup;
         let identity = Identity {
             scene: setup.references.name().to_owned(),
-            query_scene: (setup.queries.name() != setup.references.name())
-                .then(|| setup.queries.name().to_owned()),
+            query_scene: (!setup.is_one_drive()).then(|| setup.queries.name().to_owned()),
             queries: vec![setup.query_name().to_owned()],
             references: setup.reference_names(),
             configuration: run.params.to_toml(),

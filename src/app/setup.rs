@@ -9,7 +9,7 @@ use crate::estimator;
 use crate::event::Side;
 use crate::image::Degradation;
 use crate::lesson::OpenSetting;
-use crate::localize::{References, Selection, frames_within};
+use crate::localize::{References, Selection, frames_within, is_one_drive};
 use crate::method::Method;
 use crate::run::default_failure_radius_m;
 use crate::scene::{FrameStore, Scene};
@@ -110,14 +110,18 @@ impl Setup {
     /// Takes the query's own frame from references that were picked by hand for another one: a photo says
     /// nothing about itself.
     pub(super) fn leave_itself_out(&mut self) {
-        let is_same_scene = self.references.name() == self.queries.name();
-        if self.task.by_hand && is_same_scene {
+        if self.task.by_hand && self.is_one_drive() {
             let others = self.chosen.frames.iter().copied();
             let others: Vec<usize> = others.filter(|frame| *frame != self.query).collect();
             if others.len() < self.chosen.frames.len() {
                 self.chosen = others.into();
             }
         }
+    }
+
+    /// Whether queries and references are frames of one drive.
+    pub(super) fn is_one_drive(&self) -> bool {
+        is_one_drive(self.references.as_ref(), self.queries.as_ref())
     }
 
     /// The methods whose cost can be looked at: those asked for that search one, those of the paper
@@ -150,8 +154,8 @@ impl Setup {
     /// query's position is known.
     pub fn candidates(&self, query: usize) -> Vec<usize> {
         let (references, queries) = (self.references.as_ref(), self.queries.as_ref());
-        let is_same_scene = references.name() == queries.name();
-        let is_query = |frame| is_same_scene && frame == query;
+        let is_one_drive = self.is_one_drive();
+        let is_query = |frame| is_one_drive && frame == query;
         match queries.position(query) {
             Some(place) => frames_within(references, &place, self.task.reach_m(), &is_query),
             None => (0..references.frames().len())

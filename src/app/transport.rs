@@ -153,7 +153,7 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
             .suffix(" m")
             .update_while_editing(false);
         let response = ui.add(drag).labelled_by(label.id);
-        if response.drag_stopped() || response.lost_focus() {
+        if (response.drag_stopped() || response.lost_focus()) && radius != setup.task.radius_m {
             commands.send(Command::SetRadius(radius));
         }
         let mut seed = setup.task.protocol.seed;

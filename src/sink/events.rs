@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use serde_json::{Map, Value, json};
 
-use crate::event::{Event, Moment, Side};
+use crate::event::{DepthsLifted, Event, MatchesGuided, Moment, Side};
 use crate::features::{FeatureState, MatchVerdict};
 use crate::geometry::{Pose, matrix_from_pose};
 use crate::grid::Offset;
@@ -126,8 +126,8 @@ fn data(event: &Event) -> Value {
             "points": event.points,
             "in_view": event.in_view,
         }),
-        Event::DepthsLifted(event) => {
-            let matches = &event.matches;
+        Event::DepthsLifted(DepthsLifted { matches })
+        | Event::MatchesGuided(MatchesGuided { matches }) => {
             json!({
                 "query_keypoint": matches.iter().map(|one| one.query).collect::<Vec<_>>(),
                 "reference_keypoint": matches.iter().map(|one| one.reference).collect::<Vec<_>>(),
@@ -241,7 +241,7 @@ fn data(event: &Event) -> Value {
         Event::CandidatesJudged(event) => json!({
             "methods": event.candidates.iter().map(|one| one.method.name()).collect::<Vec<_>>(),
             "cost": event.candidates.iter().map(|one| one.refined.cost).collect::<Vec<_>>(),
-            "log_likelihood": event.candidates.iter().map(|one| one.log_likelihood).collect::<Vec<_>>(),
+            "from_features": event.candidates.iter().map(|one| one.from_features).collect::<Vec<_>>(),
             "accepted": event.candidates.iter().map(|one| one.accepted).collect::<Vec<_>>(),
             "deviations": event.deviations,
             "needed": event.needed,

@@ -77,6 +77,56 @@ fn without_the_truth_the_card_tells_no_error() {
 }
 
 #[test]
+fn a_stray_key_of_lock_step_leaves_the_card_where_it_is() {
+    let mut window = finished(setup());
+    for key in [Key::Period, Key::Comma] {
+        press(&mut window, Modifiers::NONE, key);
+        assert_eq!(window.state().app_state().options.lockstep, None);
+        assert_eq!(count(&window, "● right"), 4, "{key:?}");
+    }
+    window.state_mut().send(Command::StepTogether(Some(3)));
+    window.run_steps(2);
+    press(&mut window, Modifiers::NONE, Key::Period);
+    assert_eq!(window.state().app_state().options.lockstep, Some(4));
+}
+
+#[test]
+fn leaving_the_radius_as_it_is_starts_nothing_again() {
+    let mut window = finished(setup());
+    let radius = window.state().app_state().setup.task.radius_m;
+    window.get_by_label("Radius").focus();
+    window.run_steps(2);
+    window.get_by_label("Seed").focus();
+    window.run_steps(2);
+    let state = window.state().app_state();
+    assert_eq!(state.setup.task.radius_m, radius);
+    assert!(
+        matches!(state.run_state(), RunState::Finished),
+        "{:?}",
+        state.run_state()
+    );
+}
+
+#[test]
+fn back_to_a_leads_to_a_from_either_run() {
+    let mut window = finished(setup());
+    for command in [Command::Pin, Command::Restart] {
+        window.state_mut().send(command);
+        window.run_steps(2);
+    }
+    window.state_mut().send(Command::ShowView("differences"));
+    for _ in 0..2 {
+        window.run_steps(3);
+        window.get_by_label("Back to A").click();
+        window.run_steps(3);
+        assert_eq!(
+            window.state().app_state().options.compare_mode,
+            CompareMode::Kept
+        );
+    }
+}
+
+#[test]
 fn what_helped_is_tried_by_a_button_and_compared_with_the_run_before() {
     let mut wrong = setup();
     wrong.task.protocol.methods = vec![Method::MI];

@@ -32,6 +32,7 @@ mod loose_photo;
 mod memory;
 mod methods;
 mod mutations;
+mod one_answer;
 mod own_cost;
 mod painted;
 mod pair_matches;

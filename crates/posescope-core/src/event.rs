@@ -180,6 +180,7 @@ events! {
     PoseRefined,
     ConsensusJudged,
     FeaturesClassified,
+    MatchesGuided,
     CloudColored,
     PoseScored,
     PhaseSearched,
@@ -297,6 +298,13 @@ pub struct ConsensusJudged {
 pub struct FeaturesClassified {
     /// One per query keypoint, in their order.
     pub states: Arc<[FeatureState]>,
+}
+
+/// The matches that a pose is judged by after features were matched again where it says they must be.
+#[derive(Clone, Debug)]
+pub struct MatchesGuided {
+    /// The last match with a depth of each query feature that has one, in the order of the features.
+    pub matches: Arc<[LiftedMatch]>,
 }
 
 /// The cloud took the reference photo's grey values.
@@ -446,8 +454,8 @@ pub struct JudgedPose {
     pub method: Method,
     /// The pose as the method gave it, and refined.
     pub refined: Refined,
-    /// What its method made of it, if that matches features: the log likelihood of the matches.
-    pub log_likelihood: Option<f64>,
+    /// Whether its method matches features.
+    pub from_features: bool,
     /// Whether its own method would have answered it.
     pub accepted: bool,
 }

@@ -12,7 +12,7 @@ mod timing;
 mod verdict;
 
 pub use choose::Chooser;
-pub use localizer::{LocalizeError, Localizer, Request};
+pub use localizer::{LocalizeError, Localizer, Request, is_one_drive};
 pub use observer::{LocalizeObserver, NoObserver};
 pub use result::{
     Agreement, CostAtPose, CostReport, Explanation, Helped, PoseReport, QueryResult, Reason,

@@ -23,6 +23,7 @@ pub use acceptance::{
 };
 pub use consensus::{Consensus, Hypothesis, MlesacError, Trial};
 pub use likelihood::LikelihoodScore;
+pub(crate) use local::residuals;
 pub use mlesac::mlesac;
 pub use params::MlesacParams;
 pub use places::{Counted, Places};

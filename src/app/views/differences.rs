@@ -3,7 +3,7 @@
 use egui::{Grid, RichText, ScrollArea, Ui};
 
 use super::View;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{Command, CompareMode, ViewContext, theme};
 use crate::diagnosis::Tolerance;
 use crate::localize::{QueryResult, Standing};
 use crate::measure::{Field, Value};
@@ -34,7 +34,7 @@ impl View for DifferencesView {
                 .on_hover_text("Show the run that was kept (X)")
                 .clicked()
             {
-                context.send(Command::Flip);
+                context.send(Command::Compare(CompareMode::Kept));
             }
         });
         ScrollArea::both().auto_shrink(false).show(ui, |ui| {

@@ -11,7 +11,7 @@ use super::event_context::EventContext;
 use super::scene::log_rays;
 use super::stream::Stream;
 use crate::depth::LiftedMatch;
-use crate::event::{DepthsLifted, Event, FeaturesDetected, HypothesisTried, Side};
+use crate::event::{DepthsLifted, Event, FeaturesDetected, HypothesisTried, MatchesGuided, Side};
 use crate::features::FeatureState;
 use crate::features::{Features, Match, MatchVerdict};
 use crate::geometry::Pose;
@@ -48,7 +48,10 @@ impl FeatureContext {
                 self.canvas(context, stream);
                 self.undecided(context, stream);
             }
-            Event::DepthsLifted(DepthsLifted { matches }) => self.lifted = Arc::clone(matches),
+            Event::DepthsLifted(DepthsLifted { matches })
+            | Event::MatchesGuided(MatchesGuided { matches }) => {
+                self.lifted = Arc::clone(matches);
+            }
             Event::HypothesisTried(tried) => self.tried(tried, evals, stream),
             Event::PoseRefined(refined) => {
                 self.reference_from_query = Some(refined.reference_from_query);

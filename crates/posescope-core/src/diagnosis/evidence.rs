@@ -23,6 +23,8 @@ pub struct Evidence {
     pub decisions: Option<Arc<[Option<Match>]>>,
     /// Depths of the unique matches.
     pub lifted: Option<Arc<[LiftedMatch]>>,
+    /// The last match of each feature, where features were matched again.
+    pub rematched: Option<Arc<[LiftedMatch]>>,
     /// The consensus, refined.
     pub refined: Option<PoseRefined>,
     /// Whether it was accepted.
@@ -66,6 +68,7 @@ impl Sink for Evidence {
             Kind::FeaturesDetected,
             Kind::MatchesDecided,
             Kind::DepthsLifted,
+            Kind::MatchesGuided,
             Kind::PoseRefined,
             Kind::ConsensusJudged,
             Kind::FeaturesClassified,
@@ -89,6 +92,7 @@ impl Sink for Evidence {
                 self.decisions = Some(Arc::clone(&matches.decisions));
             }
             Event::DepthsLifted(depths) => self.lifted = Some(Arc::clone(&depths.matches)),
+            Event::MatchesGuided(guided) => self.rematched = Some(Arc::clone(&guided.matches)),
             Event::PoseRefined(refined) => self.refined = Some(refined.clone()),
             Event::ConsensusJudged(judged) => self.judged = Some(judged.clone()),
             Event::FeaturesClassified(classified) => {

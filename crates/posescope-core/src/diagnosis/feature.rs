@@ -4,11 +4,10 @@ use nalgebra::Vector3;
 use serde_json::json;
 
 use super::matches::TrueMatches;
-use super::{Code, Diagnosis, Subject, failure_alone, suspicion};
+use super::{Code, Diagnosis, Subject, failure_alone, suspicion, trust};
 use crate::camera::Intrinsics;
-use crate::estimator::{Failure, FeatureCounts};
+use crate::estimator::{self, Failure, FeatureBased, FeatureCounts, Guided, Parts};
 use crate::geometry::PoseError;
-use crate::robust::{effective_area_px, inliers_beyond_chance};
 use crate::solver::{Correspondence, pose_covariance, refine};
 
 /// Fewer keypoints than this leave no match to chance.
@@ -190,7 +189,7 @@ fn suspect_truth(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnos
         && deviation_m(subject, matches).is_some_and(|deviation| deviation < FIXED_M);
     let supports_truth = matches.funnel.lifted;
     // What the truth explains beyond chance is there: then both are, and the truth is not suspect.
-    let is_supported = is_beyond_chance(subject, matches, supports_truth);
+    let is_supported = would_be_accepted(subject, matches, &matches.true_ones());
     (is_certain && !is_supported && 5 * supports_truth < inliers).then(|| {
         Diagnosis::new(
             Code::X1,
@@ -295,8 +294,9 @@ fn bad_depths(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosis>
     let counts = subject.outcome.counts?;
     let lost = wrong + lost_for_depth(&counts, matches);
     let starved = right < FEW_MATCHES && lost >= FEW_MATCHES.min(counts.unique / 2);
-    let misled =
-        wrong >= FEW_MATCHES && wrong > right && !is_beyond_chance(subject, matches, right);
+    let misled = wrong >= FEW_MATCHES
+        && wrong > right
+        && !would_be_accepted(subject, matches, &matches.true_ones());
     let is_telling = many_without_depth(matches, counts.unique);
     ((starved || misled) && is_telling && !consensus_is_right(subject)).then(|| {
         Diagnosis::new(
@@ -378,14 +378,18 @@ fn missed_model(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosi
     let params = &subject.params.fb.mlesac;
     let refined = refine(&supporters, camera, &query_from_reference, params.loss()).pose;
     let error = PoseError::between(&query_from_reference.inverse(), &refined.inverse());
-    let explained = matches.correspondences.iter().filter(|c| {
-        let seen = camera.project(&(refined * c.point));
-        seen.is_some_and(|seen| (seen - c.pixel).norm() <= params.inlier_threshold_px)
-    });
-    let (supported, inliers) = (explained.count(), matches.inliers());
+    let is_explained = |at: &usize| {
+        let Correspondence { pixel, point } = matches.correspondences[*at];
+        let seen = camera.project(&(refined * point));
+        seen.is_some_and(|seen| (seen - pixel).norm() <= params.inlier_threshold_px)
+    };
+    let explained: Vec<usize> = (0..matches.correspondences.len())
+        .filter(is_explained)
+        .collect();
+    let (supported, inliers) = (explained.len(), matches.inliers());
     let is_missed = subject.tolerance.contains(&error)
         && supported > inliers
-        && is_beyond_chance(subject, matches, supported);
+        && would_be_accepted(subject, matches, &explained);
     is_missed.then(|| {
         let trials = subject
             .evidence
@@ -405,16 +409,17 @@ fn missed_model(subject: &Subject<'_>, matches: &TrueMatches) -> Option<Diagnosi
     })
 }
 
-/// Whether so many of the correspondences agree with a pose as chance does not explain.
-fn is_beyond_chance(subject: &Subject<'_>, matches: &TrueMatches, supporters: usize) -> bool {
-    let pixels: Vec<_> = matches.correspondences.iter().map(|c| c.pixel).collect();
-    let acceptance = inliers_beyond_chance(
-        supporters,
-        matches.correspondences.len(),
-        subject.params.fb.mlesac.inlier_threshold_px,
-        effective_area_px(&pixels, subject.problem.query.intrinsics.area()),
-    );
-    acceptance.needed.is_some_and(|needed| supporters >= needed)
+/// Whether the method would accept a pose that these correspondences agree on.
+fn would_be_accepted(subject: &Subject<'_>, matches: &TrueMatches, inliers: &[usize]) -> bool {
+    let responsible = trust::responsible(subject.method, subject.outcome);
+    let camera = &subject.problem.query.intrinsics;
+    let correspondences = &matches.correspondences;
+    match estimator::find(responsible).map(|entry| &entry.parts) {
+        Some(Parts::Features) => {
+            FeatureBased::new(subject.params).would_accept(correspondences, inliers, camera)
+        }
+        _ => Guided::new(subject.params).would_accept(correspondences, inliers, camera),
+    }
 }
 
 /// Whether the consensus, accepted or not, is right.

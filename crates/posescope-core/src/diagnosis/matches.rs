@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::Subject;
 use crate::camera::Intrinsics;
 use crate::estimator::projected_cloud;
-use crate::features::{FeatureState, Features, MatchVerdict};
+use crate::features::{Features, MatchVerdict};
 use crate::geometry::Pose;
 use crate::solver::Correspondence;
 
@@ -138,6 +138,9 @@ impl TrueMatches {
             &subject.problem.reference.intrinsics,
             threshold_px,
         );
+        let refined = evidence.refined.as_ref();
+        let query_from_reference_found = refined.map(|found| found.reference_from_query.inverse());
+        let inlier_px = subject.params.fb.mlesac.inlier_threshold_px;
         let all_lifted = evidence.lifted.as_deref().unwrap_or_default();
         let pixels: Vec<_> = all_lifted
             .iter()
@@ -157,8 +160,10 @@ impl TrueMatches {
             };
             let seen = camera.project(&(query_from_reference * point));
             let is_true = seen.is_some_and(|seen| (seen - pixel).norm() <= threshold_px);
-            let state = evidence.states.as_ref().and_then(|s| s.get(lifted.query));
-            let is_inlier = matches!(state, Some(FeatureState::Inlier { .. }));
+            let at_result = query_from_reference_found
+                .as_ref()
+                .and_then(|pose| camera.project(&(pose * point)));
+            let is_inlier = at_result.is_some_and(|seen| (seen - pixel).norm() <= inlier_px);
             matches
                 .correspondences
                 .push(Correspondence { pixel, point });
@@ -173,6 +178,13 @@ impl TrueMatches {
         matches.wrong_depth = matches.wrong_depth.saturating_sub(chance(lifted_elsewhere));
         matches.no_depth = matches.no_depth.saturating_sub(chance(unlifted));
         Some(matches)
+    }
+
+    /// The correspondences that the truth explains.
+    pub(super) fn true_ones(&self) -> Vec<usize> {
+        let all = self.is_true.iter().enumerate();
+        all.filter_map(|(at, is_true)| is_true.then_some(at))
+            .collect()
     }
 
     /// Inliers of the estimate.

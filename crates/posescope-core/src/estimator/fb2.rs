@@ -11,6 +11,7 @@
 mod params;
 mod windows;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Point2;
@@ -20,17 +21,18 @@ use windows::Windows;
 
 use super::consensus::FoundConsensus;
 use super::feature::Agreed;
+use super::feature::states::FeatureStates;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, own, separate_failure};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::depth::{LiftedMatch, ProjectedCloudIndex};
 use crate::event::{
     DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried, MatchesDecided,
-    PoseRefined, ProjectedCloud, Side, Stage,
+    MatchesGuided, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    FeatureState, Features, Keypoint, Match, MatchVerdict, SiftFeatures, SiftParams,
-    best_matches_interruptible, sift_interruptible,
+    Features, Keypoint, Match, SiftFeatures, SiftParams, best_matches_interruptible,
+    sift_interruptible,
 };
 use crate::geometry::Pose;
 use crate::image::Photo;
@@ -40,7 +42,7 @@ use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::RenderParams;
 use crate::robust::{
-    Acceptance, Counted, MlesacError, effective_area_px, inliers_beyond_chance, mlesac,
+    Acceptance, Counted, MlesacError, effective_area_px, inliers_beyond_chance, mlesac, residuals,
 };
 use crate::solver::{Correspondence, refine};
 use crate::trace::{Cancelled, Trace};
@@ -96,10 +98,18 @@ struct PointsKey {
     spread: Exact<f64>,
 }
 
+/// What is known of a run, up to where it stops.
+struct Run<'a> {
+    counts: &'a mut FeatureCounts,
+    agreed: &'a mut Option<Agreed>,
+    states: &'a mut FeatureStates,
+}
+
 /// A match and the pixels that it says belong together.
 #[derive(Clone, Copy)]
 struct Pairing {
     query: usize,
+    reference: usize,
     correspondence: Correspondence,
 }
 
@@ -110,7 +120,6 @@ struct Solved {
     pairings: Vec<Pairing>,
     residuals_px: Vec<f64>,
     inliers: Vec<usize>,
-    log_likelihood: f64,
     trials: usize,
     /// Whether the inliers are more than chance explains.
     acceptance: Acceptance,
@@ -135,15 +144,20 @@ impl Guided {
         let mut agreed = None;
         let pose = trace.stage(Stage::Estimator(ENTRY.method), |trace| {
             let detected = self.detect(problem, &mut counts, trace)?;
-            let first = self.match_freely(problem, &detected, &mut counts, trace)?;
-            let solved = self.match_again(problem, &detected, first, trace)?;
-            counts.inliers = solved.inliers.len();
-            counts.with_depth = counts.with_depth.max(solved.pairings.len());
-            agreed = Some(Agreed {
-                reference_from_query: solved.pose.inverse(),
-                log_likelihood: solved.log_likelihood,
-            });
-            trace.stage(Stage::Accept, |trace| self.accept(problem, &solved, trace))
+            let mut states = FeatureStates::new(detected.query.keypoints.len());
+            let run = Run {
+                counts: &mut counts,
+                agreed: &mut agreed,
+                states: &mut states,
+            };
+            let outcome = self.match_and_solve(problem, &detected, run, trace);
+            // A failed query has states too: they show where its features went.
+            if !matches!(outcome, Err(Halt::Cancelled)) {
+                trace.emit(|| FeaturesClassified {
+                    states: states.shared(),
+                })?;
+            }
+            outcome
         });
         let outcome = Outcome {
             pose: separate_failure(pose)?,
@@ -152,6 +166,39 @@ impl Guided {
             fell_back: false,
         };
         Ok((outcome, agreed))
+    }
+
+    fn match_and_solve(
+        &self,
+        problem: &Problem,
+        detected: &Detected,
+        mut run: Run<'_>,
+        trace: &mut Trace<'_>,
+    ) -> Result<Pose, Halt> {
+        let first = self.match_freely(problem, detected, &mut run, trace)?;
+        let free = first.pairings.clone();
+        let solved = self.match_again(problem, detected, first, trace)?;
+        let camera = &problem.query.intrinsics;
+        let correspondences: Vec<_> = free.iter().map(|p| p.correspondence).collect();
+        let residuals_px = residuals(&correspondences, camera, &solved.pose);
+        let threshold_px = self.params.mlesac.inlier_threshold_px;
+        // A feature that was matched again ends in the state of its last match.
+        let queries = |pairings: &[Pairing]| pairings.iter().map(|p| p.query).collect::<Vec<_>>();
+        for (queries, residuals_px) in [
+            (queries(&free), residuals_px),
+            (queries(&solved.pairings), solved.residuals_px.clone()),
+        ] {
+            let each = queries.into_iter().zip(residuals_px);
+            run.states.after_pose(each, threshold_px);
+        }
+        *run.counts = run.states.counts(detected.reference.keypoints.len());
+        *run.agreed = Some(Agreed {
+            reference_from_query: solved.pose.inverse(),
+        });
+        trace.emit(|| MatchesGuided {
+            matches: detected.last_matches(&free, &solved.pairings),
+        })?;
+        trace.stage(Stage::Accept, |trace| self.accept(problem, &solved, trace))
     }
 
     fn detect(
@@ -237,7 +284,7 @@ impl Guided {
         &self,
         problem: &Problem,
         detected: &Detected,
-        counts: &mut FeatureCounts,
+        Run { counts, states, .. }: &mut Run<'_>,
         trace: &mut Trace<'_>,
     ) -> Result<Solved, Halt> {
         let decisions = trace.stage(Stage::Match, |trace| {
@@ -252,10 +299,8 @@ impl Guided {
             })?;
             Ok::<_, Halt>(decisions)
         })?;
-        let passed = |found: &&Match| found.verdict != MatchVerdict::Ambiguous;
-        let is_unique = |found: &&Match| found.verdict == MatchVerdict::Candidate;
-        counts.ratio_passed = decisions.iter().flatten().filter(passed).count();
-        let unique: Vec<&Match> = decisions.iter().flatten().filter(is_unique).collect();
+        let unique = states.after_matching(&decisions);
+        counts.ratio_passed = states.passed_ratio_test();
         counts.unique = unique.len();
         if unique.len() < MINIMUM {
             return Err(Halt::from(Failure::TooFewMatches {
@@ -266,18 +311,23 @@ impl Guided {
         let pairings = trace.stage(Stage::DepthLift, |trace| {
             trace.emit(|| ProjectedCloud {
                 points: problem.reference.cloud.len(),
-                in_view: problem.reference.cloud.len(),
+                in_view: problem
+                    .reference
+                    .visible_cloud(&self.render)
+                    .positions()
+                    .len(),
             })?;
             let lifted: Arc<[LiftedMatch]> = unique
                 .iter()
-                .map(|found| LiftedMatch {
-                    query: found.query,
-                    ..detected.lifted.0[found.reference]
+                .map(|&(query, reference)| LiftedMatch {
+                    query,
+                    ..detected.lifted.0[reference]
                 })
                 .collect();
             trace.emit(|| DepthsLifted {
                 matches: Arc::clone(&lifted),
             })?;
+            states.after_depth_lift(&lifted);
             let pairings = lifted
                 .iter()
                 .filter_map(|lifted| detected.pairing(lifted.query, lifted.reference));
@@ -340,7 +390,6 @@ impl Guided {
             pairings,
             residuals_px: consensus.residuals_px,
             inliers: consensus.inliers,
-            log_likelihood: consensus.log_likelihood,
             trials: consensus.trials,
             acceptance,
         })
@@ -360,9 +409,10 @@ impl Guided {
         let mut best = first;
         if self.params.guided {
             for _ in 0..GUIDED_ROUNDS {
-                let guided = trace.stage(Stage::MatchGuided, |trace| {
+                let better = trace.stage(Stage::MatchGuided, |trace| {
                     let guided = self.guided(problem, detected, &best, trace)?;
-                    if let Some(guided) = &guided {
+                    let better = guided.filter(|one| one.inliers.len() > best.inliers.len());
+                    if let Some(guided) = &better {
                         trace.emit(|| PoseRefined {
                             reference_from_query: guided.pose.inverse(),
                             inliers: guided.inliers.len(),
@@ -370,22 +420,14 @@ impl Guided {
                             trials: guided.trials,
                         })?;
                     }
-                    Ok::<_, Halt>(guided)
+                    Ok::<_, Halt>(better)
                 })?;
-                match guided {
-                    Some(guided) if guided.inliers.len() > best.inliers.len() => {
-                        best = Solved {
-                            acceptance: best.acceptance,
-                            ..guided
-                        };
-                    }
-                    _ => break,
+                match better {
+                    Some(guided) => best = guided,
+                    None => break,
                 }
             }
         }
-        trace.emit(|| FeaturesClassified {
-            states: states(detected.query.keypoints.len(), &best),
-        })?;
         Ok(best)
     }
 
@@ -444,14 +486,10 @@ impl Guided {
             residuals_px = residuals(&correspondences, camera, &pose);
         }
         let inliers: Vec<usize> = (0..pairings.len())
-            .filter(|&i| residuals_px[i] < threshold)
+            .filter(|&i| residuals_px[i] <= threshold)
             .collect();
-        let sigma = self.params.mlesac.sigma_px;
-        // Here a false match may lie anywhere in its window.
-        let area_px = std::f64::consts::PI * self.params.window_px.powi(2);
         Ok(Some(Solved {
             pose,
-            log_likelihood: log_likelihood(&residuals_px, sigma, area_px),
             acceptance: *acceptance,
             residuals_px,
             pairings,
@@ -514,6 +552,21 @@ impl Guided {
         inliers_beyond_chance(inliers, correspondences, threshold, area_px)
     }
 
+    /// Whether a pose with these inliers in the first matching would be accepted, its place aside.
+    pub(crate) fn would_accept(
+        &self,
+        correspondences: &[Correspondence],
+        inliers: &[usize],
+        intrinsics: &Intrinsics,
+    ) -> bool {
+        let pixels: Vec<_> = correspondences.iter().map(|c| c.pixel).collect();
+        let area_px = effective_area_px(&pixels, intrinsics.area());
+        let acceptance = self.chance(inliers.len(), correspondences.len(), area_px);
+        acceptance
+            .needed
+            .is_some_and(|needed| inliers.len() >= needed)
+    }
+
     fn accept(
         &self,
         problem: &Problem,
@@ -548,52 +601,25 @@ impl Detected {
     fn pairing(&self, query: usize, reference: usize) -> Option<Pairing> {
         Some(Pairing {
             query,
+            reference,
             correspondence: Correspondence {
                 pixel: self.query.keypoints[query].pixel(),
                 point: self.lifted.0[reference].point?,
             },
         })
     }
-}
 
-/// Reprojection errors \[px\]; infinite behind the camera.
-fn residuals(correspondences: &[Correspondence], camera: &Intrinsics, pose: &Pose) -> Vec<f64> {
-    let residual = |correspondence: &Correspondence| {
-        let pixel = camera.project(&(pose * correspondence.point));
-        pixel.map_or(f64::INFINITY, |pixel| (pixel - correspondence.pixel).norm())
-    };
-    correspondences.iter().map(residual).collect()
-}
-
-/// The log likelihood of the residuals where a true match is off by a Gaussian and a false one lies
-/// anywhere in the area, each as likely.
-fn log_likelihood(residuals_px: &[f64], sigma_px: f64, area_px: f64) -> f64 {
-    let variance = sigma_px * sigma_px;
-    let density = |residual: &f64| {
-        let gaussian = (-residual * residual / (2.0 * variance)).exp();
-        0.5 * gaussian / (std::f64::consts::TAU * variance) + 0.5 / area_px
-    };
-    residuals_px
-        .iter()
-        .map(|residual| density(residual).ln())
-        .sum()
-}
-
-/// The state in which every query feature ended.
-fn states(keypoints: usize, solved: &Solved) -> Arc<[FeatureState]> {
-    let mut states = vec![
-        FeatureState::RatioFailed {
-            ratio: f32::INFINITY
+    /// The last match of each query feature that has a depth: where the pose says, else the free one.
+    fn last_matches(&self, free: &[Pairing], last: &[Pairing]) -> Arc<[LiftedMatch]> {
+        let by_query = |pairings: &[Pairing]| -> BTreeMap<usize, usize> {
+            pairings.iter().map(|p| (p.query, p.reference)).collect()
         };
-        keypoints
-    ];
-    for (pairing, &residual_px) in solved.pairings.iter().zip(&solved.residuals_px) {
-        states[pairing.query] = FeatureState::Outlier { residual_px };
-    }
-    for &inlier in &solved.inliers {
-        states[solved.pairings[inlier].query] = FeatureState::Inlier {
-            residual_px: solved.residuals_px[inlier],
+        let mut matches = by_query(free);
+        matches.extend(by_query(last));
+        let lifted = |(query, reference): (usize, usize)| LiftedMatch {
+            query,
+            ..self.lifted.0[reference]
         };
+        matches.into_iter().map(lifted).collect()
     }
-    states.into()
 }

@@ -3,7 +3,7 @@
 mod params;
 mod remembered;
 mod several;
-mod states;
+pub(super) mod states;
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -73,8 +73,6 @@ pub(super) struct Proposal {
 pub(super) struct Agreed {
     /// The query camera in the reference camera's frame.
     pub(super) reference_from_query: Pose,
-    /// The log likelihood of all correspondences.
-    pub(super) log_likelihood: f64,
 }
 
 /// What is known of a run, up to where it stops.
@@ -216,7 +214,6 @@ impl FeatureBased {
         counts.inliers = consensus.inliers.len();
         *agreed = Some(Agreed {
             reference_from_query: consensus.pose.inverse(),
-            log_likelihood: consensus.log_likelihood,
         });
 
         trace.stage(Stage::Accept, |trace| {
@@ -392,7 +389,12 @@ impl FeatureBased {
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
         let intrinsics = &problem.query.intrinsics;
-        let beyond = self.beyond_chance(correspondences, consensus, intrinsics, f64::NEG_INFINITY);
+        let beyond = self.beyond_chance(
+            correspondences,
+            &consensus.inliers,
+            intrinsics,
+            f64::NEG_INFINITY,
+        );
         let found = FoundConsensus {
             reference_from_query: consensus.pose.inverse(),
             acceptance: beyond.acceptance,

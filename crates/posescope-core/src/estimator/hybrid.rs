@@ -55,11 +55,20 @@ pub fn hybrid_outcome(first: &Outcome, second: &Outcome) -> Outcome {
     }
 }
 
-impl Estimator for Hybrid {
-    fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+impl Hybrid {
+    /// As [`Estimator::estimate`], where `ask_first` asks the first method and may refuse its pose.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn estimate_with(
+        &self,
+        problem: &Problem,
+        ask_first: impl FnOnce(&dyn Estimator, &mut Trace<'_>) -> Result<Outcome, Cancelled>,
+        trace: &mut Trace<'_>,
+    ) -> Result<Outcome, Cancelled> {
         let HybridParts { first, second } = self.parts;
         trace.stage(Stage::Estimator(self.method), |trace| {
-            let outcome = self.first.estimate(problem, trace)?;
+            let outcome = ask_first(self.first.as_ref(), trace)?;
             let failure = match &outcome.pose {
                 Ok(_) => {
                     trace.emit(|| BranchTaken {
@@ -77,6 +86,13 @@ impl Estimator for Hybrid {
             let fallback = self.second.estimate(problem, trace)?;
             Ok(hybrid_outcome(&outcome, &fallback))
         })
+    }
+}
+
+impl Estimator for Hybrid {
+    fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
+        let ask = |first: &dyn Estimator, trace: &mut Trace<'_>| first.estimate(problem, trace);
+        self.estimate_with(problem, ask, trace)
     }
 
     fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {

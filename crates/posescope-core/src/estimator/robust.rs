@@ -90,7 +90,7 @@ impl Robust {
                 .map(|&refined| JudgedPose {
                     method: super::mi6::ENTRY.method,
                     refined,
-                    log_likelihood: None,
+                    from_features: false,
                     accepted: true,
                 })
                 .collect();
@@ -101,7 +101,7 @@ impl Robust {
                     candidates.push(JudgedPose {
                         method: proposed.method,
                         refined,
-                        log_likelihood: Some(proposed.agreed.log_likelihood),
+                        from_features: true,
                         accepted: proposed.accepted,
                     });
                 }
@@ -109,7 +109,7 @@ impl Robust {
             // The features' poses come last and the sort is stable: of equally cheap ones the search's
             // stands.
             let price = |candidate: &JudgedPose| {
-                let is_agreed = candidate.log_likelihood.is_some() && candidate.accepted;
+                let is_agreed = candidate.from_features && candidate.accepted;
                 let credit = if is_agreed { self.params.credit } else { 0.0 };
                 let Refined { pose, cost, .. } = candidate.refined;
                 -spread.deviations(self.six.price(&spread, &pose, cost)) - credit

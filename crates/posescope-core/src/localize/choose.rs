@@ -40,8 +40,8 @@ impl Chooser<'_> {
         let (references, queries) = (self.localizer.references(), self.localizer.queries());
         let name = &queries.frames()[query];
         let place = queries.position(query);
-        let is_same_scene = references.name() == queries.name();
-        let excluded = |frame| is_same_scene && frame == query || left_out(frame);
+        let is_one_drive = self.localizer.is_one_drive();
+        let excluded = |frame| is_one_drive && frame == query || left_out(frame);
         let mut within = match (place, self.selection) {
             (Some(place), _) => frames_within(references, &place, self.radius_m, &excluded),
             // What a place looks like is known even where nobody knows where it is.

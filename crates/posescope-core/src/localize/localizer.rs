@@ -13,12 +13,13 @@ use std::sync::Arc;
 
 use self::work::{Answer, MethodOutcome, Place, QueryWork};
 use super::observer::checkpoint;
+use super::single::estimate_traced;
 use super::{
     LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_by,
-    localize_traced, tell_ranking,
+    tell_ranking,
 };
-use crate::diagnosis::{Evidence, Tolerance};
-use crate::estimator::{Failure, Given, hybrid_outcome};
+use crate::diagnosis::{Evidence, Subject, Tolerance, trust};
+use crate::estimator::{self, Estimator, Failure, Given, Hybrid, Outcome, hybrid_outcome};
 use crate::event::KindSet;
 use crate::foreign::Foreign;
 use crate::fusion::Fusion;
@@ -72,6 +73,7 @@ pub struct Localizer<'a> {
     runs_to_explain: usize,
     /// What other systems answered.
     foreign: Foreign,
+    is_one_drive: bool,
 }
 
 impl<'a> Localizer<'a> {
@@ -93,6 +95,7 @@ impl<'a> Localizer<'a> {
         seed: u64,
     ) -> Self {
         Self {
+            is_one_drive: is_one_drive(&references, &queries),
             references,
             queries,
             params,
@@ -115,7 +118,14 @@ impl<'a> Localizer<'a> {
             least_probability: self.least_probability,
             runs_to_explain: 0,
             foreign: self.foreign.clone(),
+            is_one_drive: self.is_one_drive,
         }
+    }
+
+    /// Whether queries and references are frames of one drive, so that a query must not be its own
+    /// reference.
+    pub fn is_one_drive(&self) -> bool {
+        self.is_one_drive
     }
 
     /// The parameters.
@@ -340,9 +350,8 @@ impl<'a> Localizer<'a> {
     }
 
     fn marked(&self, result: QueryResult, setting: Option<Setting>) -> QueryResult {
-        let (scene, queries) = (self.references.name(), self.queries.name());
         QueryResult {
-            query_scene: (queries != scene).then(|| queries.to_owned()),
+            query_scene: (!self.is_one_drive).then(|| self.queries.name().to_owned()),
             degraded: self.queries.as_degraded().map(DegradedScene::degradation),
             setting,
             ..result
@@ -389,7 +398,7 @@ impl<'a> Localizer<'a> {
                 let times = StageTimes::inside(method.name(), runs.into_iter().take(used));
                 let (outcome, evidence) = match observer.wanted() == KindSet::NONE {
                     true => {
-                        let outcome = hybrid_outcome(&feature.estimated, &direct.estimated);
+                        let outcome = hybrid_outcome(&feature.outcome, &direct.estimated);
                         let evidence = match outcome.fell_back {
                             true => feature.evidence.followed_by(&direct.evidence),
                             false => feature.evidence.clone(),
@@ -437,9 +446,39 @@ impl<'a> Localizer<'a> {
                 let given = Given::new(method, Arc::clone(estimates));
                 localize_by(&given, asked, &mut trace)?
             }
-            None => localize_traced(asked, method, self.params, &mut trace)?,
+            None => self.ask(asked, method, &mut trace)?,
         };
         let times = timings.into_times();
         Ok(self.judged(work, problem, method, outcome, evidence, times))
     }
+
+    /// What a method answers. A hybrid falls back where the pose of its first method is refused for a low
+    /// confidence, as where that has none.
+    fn ask(
+        &self,
+        problem: &Problem,
+        method: Method,
+        trace: &mut Trace<'_>,
+    ) -> Result<Outcome, Cancelled> {
+        let parts = estimator::find(method).and_then(|entry| entry.hybrid());
+        let (Some(parts), Some(_)) = (parts, self.least_probability) else {
+            return estimate_traced(problem, method, self.params, trace);
+        };
+        let ask_first = |first: &dyn Estimator, trace: &mut Trace<'_>| {
+            let mut evidence = Evidence::default();
+            let outcome =
+                trace.heard_by(&mut evidence, |trace| localize_by(first, problem, trace))?;
+            let subject = Subject::new(problem, parts.first, self.params, &outcome, &evidence);
+            Ok(trust::accepted(&subject, self.least_probability))
+        };
+        Hybrid::new(method, parts, self.params).estimate_with(problem, ask_first, trace)
+    }
+}
+
+/// Whether two scenes have the same frames at the same places. Their names do not tell: a name is no path,
+/// and every KITTI folder has a sequence `00`.
+pub fn is_one_drive(a: &dyn Scene, b: &dyn Scene) -> bool {
+    a.name() == b.name()
+        && a.frames() == b.frames()
+        && (0..a.frames().len()).all(|frame| a.pose(frame) == b.pose(frame))
 }

@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::diagnosis::{Evidence, Subject, trust};
 use crate::estimator::{self, Estimator, Failure, JointReference, Outcome};
 use crate::fusion::{Share, fuse_jointly};
 use crate::geometry::Pose;
@@ -21,12 +22,33 @@ pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
         .unwrap_or_else(|Cancelled| unreachable!("a trace that is off cancels nothing"))
 }
 
-/// Localises as [`localize`] does, and tells every decision to a trace; that changes nothing of the
-/// answer.
+/// Localises as [`localize`] does, and emits every decision to a trace, which does not change the answer.
 ///
 /// # Errors
-/// [`Cancelled`] when whoever listens asks the run to stop.
+/// [`Cancelled`] when a sink asks the run to stop.
 pub fn localize_traced(
+    problem: &Problem,
+    method: Method,
+    params: &Params,
+    trace: &mut Trace<'_>,
+) -> Result<Outcome, Cancelled> {
+    let least = estimator::find(method).map_or(0.0, |entry| entry.least_probability(params));
+    if least == 0.0 {
+        return estimate_traced(problem, method, params, trace);
+    }
+    let mut evidence = Evidence::default();
+    let outcome = trace.heard_by(&mut evidence, |trace| {
+        estimate_traced(problem, method, params, trace)
+    })?;
+    let subject = Subject::new(problem, method, params, &outcome, &evidence);
+    Ok(trust::accepted(&subject, None))
+}
+
+/// What the method's estimator answers. A pose is not refused yet for a low confidence.
+///
+/// # Errors
+/// [`Cancelled`] when a sink asks the run to stop.
+pub(super) fn estimate_traced(
     problem: &Problem,
     method: Method,
     params: &Params,

@@ -54,7 +54,7 @@ pub(super) fn locally_optimized(
 }
 
 /// Reprojection error of every correspondence; infinite behind the camera \[px\].
-pub(super) fn residuals(
+pub(crate) fn residuals(
     correspondences: &[Correspondence],
     intrinsics: &Intrinsics,
     pose: &Pose,

@@ -86,6 +86,7 @@ impl<'a> FeatureProgress<'a> {
                 },
                 Event::MatchesDecided(decided) => progress.decisions = Some(&decided.decisions),
                 Event::DepthsLifted(lifted) => progress.lifted = Some(&lifted.matches),
+                Event::MatchesGuided(guided) => progress.lifted = Some(&guided.matches),
                 Event::FeaturesClassified(classified) => progress.states = Some(&classified.states),
                 _ => {}
             }

@@ -54,6 +54,7 @@ impl<'a> LiftedFeatures<'a> {
         for event in events(run, cursor) {
             match event {
                 Event::DepthsLifted(event) => progress.lifted = &event.matches,
+                Event::MatchesGuided(event) => progress.lifted = &event.matches,
                 Event::FeaturesClassified(event) => progress.states = Some(&event.states),
                 Event::HypothesisTried(event) => {
                     if let Some(best) = &event.trial.best {

@@ -47,7 +47,8 @@ impl Inliers {
         look: Look,
     ) -> Option<Self> {
         let features = evidence.query.as_ref()?;
-        let (states, lifted) = (evidence.states.as_ref()?, evidence.lifted.as_ref()?);
+        let states = evidence.states.as_ref()?;
+        let lifted = evidence.rematched.as_ref().or(evidence.lifted.as_ref())?;
         let refined = evidence.refined.as_ref()?;
         let mut residuals = Vec::new();
         let mut inliers = Vec::new();
@@ -70,7 +71,7 @@ impl Inliers {
         let camera_from_reference = refined.reference_from_query.inverse();
         Some(Self {
             count: inliers.len(),
-            correspondences: refined.correspondences,
+            correspondences: lifted.iter().filter(|one| one.point.is_some()).count(),
             spread: root_mean_square_distance(&inliers) / width.hypot(height),
             median_residual_px,
             covariance: pose_covariance(&inliers, intrinsics, &camera_from_reference, sigma_px),

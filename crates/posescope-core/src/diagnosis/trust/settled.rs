@@ -66,7 +66,7 @@ impl Settled {
             coverage: summary.coverage_best / summary.coverage_reference.max(f64::MIN_POSITIVE),
             gathered: same.count() as f64 / refined.len() as f64,
             features: evidence.candidates.as_ref().map(|candidates| {
-                let of_features = candidates.iter().filter(|one| one.log_likelihood.is_some());
+                let of_features = candidates.iter().filter(|one| one.from_features);
                 FeaturesSay::of(
                     &answer,
                     of_features.map(|one| (one.refined.pose, one.accepted)),

@@ -8,8 +8,7 @@ use crate::estimator::{Failure, Halt};
 use crate::event::Side;
 use crate::problem::Problem;
 use crate::robust::{
-    Acceptance, AcceptanceRule, Consensus, Counted, MlesacError, MlesacParams, Places,
-    places_beyond_chance,
+    Acceptance, AcceptanceRule, Counted, MlesacError, MlesacParams, Places, places_beyond_chance,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
@@ -103,7 +102,7 @@ impl FeatureBased {
     pub(in crate::estimator) fn beyond_chance(
         &self,
         correspondences: &[Correspondence],
-        consensus: &Consensus,
+        inliers: &[usize],
         intrinsics: &Intrinsics,
         least_reach_px: f64,
     ) -> BeyondChance {
@@ -118,7 +117,7 @@ impl FeatureBased {
         let places = Places::of(correspondences.iter().map(|c| c.pixel), reach_px);
         let area_px = intrinsics.area();
         // False matches gather where the texture is, so chance has less room than the whole image.
-        let acceptance = places_beyond_chance(&consensus.inliers, &places, threshold_px, area_px);
+        let acceptance = places_beyond_chance(inliers, &places, threshold_px, area_px);
         BeyondChance {
             acceptance,
             tested: places.count(),
@@ -127,6 +126,17 @@ impl FeatureBased {
                 false => Counted::Correspondences,
             },
         }
+    }
+
+    /// Whether a pose with these inliers among the correspondences would be accepted, its place aside.
+    pub(crate) fn would_accept(
+        &self,
+        correspondences: &[Correspondence],
+        inliers: &[usize],
+        intrinsics: &Intrinsics,
+    ) -> bool {
+        let beyond = self.beyond_chance(correspondences, inliers, intrinsics, f64::NEG_INFINITY);
+        self.accepts(&beyond.acceptance)
     }
 
     /// Whether the rule accepts a verdict.

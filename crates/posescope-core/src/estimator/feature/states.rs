@@ -3,18 +3,19 @@
 use std::sync::Arc;
 
 use crate::depth::LiftedMatch;
+use crate::estimator::FeatureCounts;
 use crate::features::FeatureState;
 use crate::features::{Match, MatchVerdict};
 use crate::robust::Consensus;
 
 /// The state of each query feature, brought up to date by every stage until the one it ends in.
-pub(super) struct FeatureStates {
+pub(in crate::estimator) struct FeatureStates {
     states: Vec<FeatureState>,
 }
 
 impl FeatureStates {
     /// At first no feature has a match at all.
-    pub(super) fn new(keypoints: usize) -> Self {
+    pub(in crate::estimator) fn new(keypoints: usize) -> Self {
         Self {
             states: vec![
                 FeatureState::RatioFailed {
@@ -26,7 +27,10 @@ impl FeatureStates {
     }
 
     /// Returns the unique matches as (query, reference) indices.
-    pub(super) fn after_matching(&mut self, decisions: &[Option<Match>]) -> Vec<(usize, usize)> {
+    pub(in crate::estimator) fn after_matching(
+        &mut self,
+        decisions: &[Option<Match>],
+    ) -> Vec<(usize, usize)> {
         let mut matches = Vec::new();
         for decision in decisions.iter().flatten() {
             self.states[decision.query] = match decision.verdict {
@@ -46,14 +50,14 @@ impl FeatureStates {
         matches
     }
 
-    pub(super) fn passed_ratio_test(&self) -> usize {
+    pub(in crate::estimator) fn passed_ratio_test(&self) -> usize {
         self.states
             .iter()
             .filter(|state| !matches!(state, FeatureState::RatioFailed { .. }))
             .count()
     }
 
-    pub(super) fn after_depth_lift(&mut self, lifted: &[LiftedMatch]) {
+    pub(in crate::estimator) fn after_depth_lift(&mut self, lifted: &[LiftedMatch]) {
         for lifted in lifted.iter().filter(|lifted| lifted.point.is_none()) {
             self.states[lifted.query] = FeatureState::NoDepth {
                 distance_px: lifted.lidar_distance_px,
@@ -61,7 +65,11 @@ impl FeatureStates {
         }
     }
 
-    pub(super) fn after_consensus(&mut self, members: &[usize], consensus: &Consensus) {
+    pub(in crate::estimator) fn after_consensus(
+        &mut self,
+        members: &[usize],
+        consensus: &Consensus,
+    ) {
         for (&query, &residual_px) in members.iter().zip(&consensus.residuals_px) {
             self.states[query] = FeatureState::Outlier { residual_px };
         }
@@ -72,7 +80,49 @@ impl FeatureStates {
         }
     }
 
-    pub(super) fn shared(&self) -> Arc<[FeatureState]> {
+    /// What a pose makes of matches, by query feature and residual \[px\]: inliers are within the threshold.
+    pub(in crate::estimator) fn after_pose(
+        &mut self,
+        residuals_px: impl Iterator<Item = (usize, f64)>,
+        threshold_px: f64,
+    ) {
+        for (query, residual_px) in residuals_px {
+            self.states[query] = match residual_px <= threshold_px {
+                true => FeatureState::Inlier { residual_px },
+                false => FeatureState::Outlier { residual_px },
+            };
+        }
+    }
+
+    /// The counts that the states add up to.
+    pub(in crate::estimator) fn counts(&self, reference_keypoints: usize) -> FeatureCounts {
+        let mut counts = FeatureCounts {
+            query_keypoints: self.states.len(),
+            reference_keypoints,
+            ..FeatureCounts::default()
+        };
+        for state in &self.states {
+            let passed = match state {
+                FeatureState::RatioFailed { .. } => 0,
+                FeatureState::NotUnique { .. } => 1,
+                FeatureState::NoDepth { .. } => 2,
+                FeatureState::Outlier { .. } => 3,
+                FeatureState::Inlier { .. } => 4,
+            };
+            let tests = [
+                &mut counts.ratio_passed,
+                &mut counts.unique,
+                &mut counts.with_depth,
+                &mut counts.inliers,
+            ];
+            for count in tests.into_iter().take(passed) {
+                *count += 1;
+            }
+        }
+        counts
+    }
+
+    pub(in crate::estimator) fn shared(&self) -> Arc<[FeatureState]> {
         self.states.as_slice().into()
     }
 }

@@ -109,7 +109,8 @@ impl JointFeatures {
         let supports = pool.supports(&consensus, references.len());
 
         let intrinsics = &lead.query.intrinsics;
-        let beyond = (self.features).beyond_chance(correspondences, &consensus, intrinsics, 0.0);
+        let beyond =
+            (self.features).beyond_chance(correspondences, &consensus.inliers, intrinsics, 0.0);
         // Where the query can be, the reference says that explains most of it.
         let inliers = |index: usize| supports[index].map_or(0.0, |support| support.amount());
         let most = (0..references.len())

@@ -119,10 +119,9 @@ impl Localizer<'_> {
         let [used] = asked.references.frames[..] else {
             return None;
         };
-        let (references, queries) = (self.references(), self.queries());
-        let is_same_scene = references.name() == queries.name();
+        let references = self.references();
         let place = Point3::from(references.pose(used)?.translation.vector);
-        let left_out = |frame: usize| frame == used || is_same_scene && frame == query;
+        let left_out = |frame: usize| frame == used || self.is_one_drive && frame == query;
         let radius_m = asked.radius_m;
         let within = frames_within(references, &place, radius_m, &left_out);
         within.get(farther * within.len() / 3).copied()

@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::trace::{Cancelled, Fanout, Sink, Trace};
 
 impl Localizer<'_> {
-    /// FB counts them anyway; for the direct methods the same features are matched.
+    /// The matches of FB, whichever methods run, so that a fused result depends on no other method.
     pub(super) fn count_matches(
         &self,
         work: &mut QueryWork<'_>,
@@ -27,10 +27,9 @@ impl Localizer<'_> {
                 continue;
             }
             checkpoint(observer)?;
-            let counted = work.candidates.values().find_map(|of_method| {
-                let candidate = of_method.get(problem)?.as_ref()?;
-                candidate.outcome.counts
-            });
+            let counted = work
+                .candidate(problem, Method::FB)
+                .and_then(|candidate| candidate.outcome.counts);
             let Problem {
                 query,
                 reference,
