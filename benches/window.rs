@@ -204,7 +204,6 @@ fn open() -> Option<Window> {
         query,
         chosen: vec![reference].into(),
         index: Arc::default(),
-        failure_radius_m: 10.0,
         mode: RunMode::Running,
         folder: std::env::temp_dir(),
     };

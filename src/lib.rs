@@ -23,8 +23,8 @@ pub use posescope_core::{
     localize_by, localize_traced,
 };
 pub use posescope_core::{
-    camera, cloud, code, cost, depth, describe, diagnosis, estimator, event, features, foreign,
-    fusion, geometry, grid, history, image, judge, localize, memo, method, params, problem, render,
+    camera, cloud, cost, depth, describe, diagnosis, estimator, event, features, foreign, fusion,
+    geometry, grid, history, image, judge, localize, memo, method, params, problem, render,
     retrieval, robust, solver, text, trace,
 };
 

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use posescope_core::files::write_whole;
 
-use crate::localize::{LocalizeError, Localizer, QueryResult, Request, Standing};
+use crate::localize::{LocalizeError, Localizer, QueryResult, Request};
 use crate::measure::{
     Change, GateResult, Measures, Row, RunComparison, Table, Tolerance, measure, plots,
     read_gate_results, read_rows, tables,
@@ -70,9 +70,6 @@ struct ReportedResult {
     /// The number of its query.
     query: usize,
     result: QueryResult,
-    standing: Standing,
-    /// Whether it failed by the failure radius of the run, or is not right.
-    is_failure: bool,
     /// The recording that was kept, seen from the run folder.
     recording: Option<String>,
     /// What happened to it since the baseline.
@@ -96,7 +93,7 @@ impl ReportedResult {
         }
         text += &match error {
             Some(error) => format!(", {}", error.translation()),
-            None => format!(", {}", self.standing.words()),
+            None => format!(", {}", self.result.grade),
         };
         if let Some(primary) = diagnosis.first() {
             text += &format!(": {} {}", primary.code, primary.text);
@@ -136,7 +133,7 @@ impl RunReport {
         let results: Vec<QueryResult> = read_results(folder)?.collect::<Result<_, _>>()?;
         let mut results = reported(folder, &run, results);
         let baseline = match baseline {
-            Some(before) => Some(held_against(before, &run, &rows, &mut results)?),
+            Some(before) => Some(held_against(before, &rows, &mut results)?),
             None => None,
         };
         let mut thumbnails = BTreeMap::new();
@@ -150,7 +147,10 @@ impl RunReport {
                     ));
                 }
                 draw_failures(&run, &scenes, &params, &mut results, pictures);
-                let failures = results.iter().filter(|one| one.is_failure).count();
+                let failures = results
+                    .iter()
+                    .filter(|one| one.result.grade.is_failure())
+                    .count();
                 if failures > pictures {
                     notes.push(format!(
                         "{pictures} of {failures} failures have pictures; posescope report RUN \
@@ -188,7 +188,6 @@ fn reported(folder: &Path, run: &RunFile, results: Vec<QueryResult>) -> Vec<Repo
         ];
         let next = queries.len();
         let query = *queries.entry(key).or_insert(next);
-        let standing = result.standing(run.protocol.right, true);
         let recording = pair_of(run, &result)
             .map(|pair| recording_name(pair, &result.query, result.method, several_pairs))
             .map(|name| format!("{FAILURES}/{name}.rrd"))
@@ -196,9 +195,6 @@ fn reported(folder: &Path, run: &RunFile, results: Vec<QueryResult>) -> Vec<Repo
         ReportedResult {
             number,
             query,
-            is_failure: !result.is_success(run.failure_radius_m)
-                || matches!(standing, Standing::Wrong | Standing::NoPose),
-            standing,
             recording,
             change: None,
             pictures: FailurePictures::default(),
@@ -217,17 +213,12 @@ fn pair_of<'a>(run: &'a RunFile, result: &QueryResult) -> Option<&'a ScenePair> 
 
 fn held_against(
     before: &Path,
-    run: &RunFile,
     rows: &[Row],
     results: &mut [ReportedResult],
 ) -> Result<Baseline, FolderError> {
     let run_before = read_run(before)?;
     let rows_before = read_rows(before)?;
-    let comparison = RunComparison::of(
-        (&rows_before, run_before.failure_radius_m),
-        (rows, run.failure_radius_m),
-        &Tolerance::default(),
-    );
+    let comparison = RunComparison::of(&rows_before, rows, &Tolerance::default());
     for one in &comparison.differences {
         // Rows and results are the same lines.
         let at = rows.iter().position(|row| *row == one.after);
@@ -286,7 +277,7 @@ fn draw_failures(
     most: usize,
 ) {
     let failures: Vec<usize> = (0..results.len())
-        .filter(|&at| results[at].is_failure)
+        .filter(|&at| results[at].result.grade.is_failure())
         .take(most)
         .collect();
     for pair in &run.pairs {

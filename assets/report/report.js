@@ -39,7 +39,7 @@
 
   const show = () => {
     const words = filters.elements.words.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const wanted = ["method", "is", "code"].map((name) => [name, filters.elements[name].value]);
+    const wanted = ["method", "grade", "code"].map((name) => [name, filters.elements[name].value]);
     let met = rows.filter(({ row, text }) =>
       words.every((word) => text.includes(word)) &&
       wanted.every(([name, value]) => value === "" || row.dataset[name] === value));

@@ -5,14 +5,14 @@ use egui::{Align, Layout, RichText, Ui};
 use super::command::{Command, Queue};
 use super::state::AppState;
 use super::theme;
-use crate::diagnosis::Diagnosis;
-use crate::localize::{Helped, QueryResult, Standing};
+use crate::diagnosis::{Confidence, Diagnosis, Grade, confidence};
+use crate::localize::{Helped, QueryResult};
 use crate::method::Method;
 use crate::session::{Part, RunState, Span};
 
 /// Widths of the columns before the sentence \[points\].
 const METHOD: f32 = 64.0;
-const STANDING: f32 = 128.0;
+const GRADE: f32 = 128.0;
 const ERROR: f32 = 128.0;
 
 /// The card, which is never lower for a query than it was: what is below does not move while a person looks
@@ -67,7 +67,7 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
                 state.run().spans().last().is_some_and(|span| {
                     span.part.method() == Some(method) && span.result.is_none()
                 });
-            cell(ui, STANDING, |ui| {
+            cell(ui, GRADE, |ui| {
                 ui.weak(match has_begun {
                     true => state.run_state().of_what_has_begun(),
                     false => "not run yet",
@@ -114,29 +114,35 @@ fn deciding(state: &AppState, method: Method) -> Option<&Span> {
 /// `is_old` where it was known before this run.
 fn told(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult, is_old: bool) {
     let shows_truth = state.options.shows_truth;
-    let standing = result.standing(state.setup.task.protocol.right, shows_truth);
-    cell(ui, STANDING, |ui| {
-        let text = format!("{} {standing}", standing.mark());
+    let grade = result.grade_shown(shows_truth);
+    cell(ui, GRADE, |ui| {
+        let text = format!("{} {grade}", grade.glyph());
         ui.label(
             RichText::new(text)
-                .color(theme::standing(ui.visuals(), standing))
+                .color(theme::grade(ui.visuals(), grade))
                 .strong(),
         );
     });
     cell(ui, ERROR, |ui| match (&result.error, shows_truth) {
         (Some(error), true) => {
             let text = format!("{}, {}", error.translation(), error.rotation());
-            let text = match standing {
-                Standing::Wrong => RichText::new(text).strong(),
+            let text = match grade {
+                Grade::Wrong => RichText::new(text).strong(),
                 _ => RichText::new(text),
             };
             ui.label(text).on_hover_text("From the truth");
         }
         _ => {
-            let trust = result.trust.as_ref();
-            if let Some(probability) = trust.and_then(|trust| trust.probability) {
-                let text = format!("{:.0} % sure", 100.0 * probability);
-                let help = "Of poses like this one so many are within 1 m of the truth";
+            if let Some(known) = &result.confidence {
+                let percent = confidence::percent(known.probability);
+                let text = match known.word {
+                    Confidence::Low => format!("{} {percent}", known.word.glyph()),
+                    Confidence::Trusted | Confidence::Unsure => percent,
+                };
+                let help = format!(
+                    "{}: probability that this pose is within 1 m of the truth",
+                    known.word
+                );
                 ui.label(text).on_hover_text(help);
             }
         }
@@ -146,19 +152,19 @@ fn told(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult, i
             ui.weak("known before:")
                 .on_hover_text("From before this run, which has not come so far yet");
         }
-        why(ui, state, commands, result, standing);
+        why(ui, state, commands, result, grade);
     });
 }
 
 /// The cause in one sentence, and what helped.
-fn why(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult, standing: Standing) {
+fn why(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult, grade: Grade) {
     let shows_truth = state.options.shows_truth;
     let may_be_told = |finding: &&Diagnosis| shows_truth || !finding.code.is_failure();
     let mut findings = result.diagnosis.iter().filter(may_be_told);
     match (findings.next(), &result.reason) {
         (Some(finding), _) => {
             let code = RichText::new(finding.code.name()).strong();
-            ui.label(code).on_hover_text(finding.code.about());
+            ui.label(code).on_hover_text(finding.code.title());
             ui.label(&finding.text);
             let others: Vec<&str> = findings.map(|finding| finding.code.name()).collect();
             if !others.is_empty() {
@@ -174,7 +180,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult, st
             ui.weak(supported_by(result, shows_truth));
         }
     }
-    if shows_truth && standing > Standing::LowConfidence {
+    if shows_truth && grade.is_failure() {
         helped(ui, state, commands, result);
     }
 }

@@ -19,7 +19,7 @@ use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::image::Degradation;
-use crate::localize::{References, Standing};
+use crate::localize::References;
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 use crate::sink::rerun::Targets;
@@ -414,10 +414,8 @@ impl AppState {
 
     /// The first wrong or missing answer of a query, by its position among the query's results.
     fn first_failure(&self, query: usize) -> Option<usize> {
-        let right = self.setup.task.protocol.right;
-        let known = self.results.get(&query)?;
-        let mut known = known.iter();
-        known.position(|result| result.standing(right, true) >= Standing::Wrong)
+        let mut known = self.results.get(&query)?.iter();
+        known.position(|result| result.grade.is_failure())
     }
 
     fn next_failure(&mut self, back: bool) {

@@ -158,7 +158,6 @@ impl AppState {
             configuration: run.params.to_toml(),
             degraded: setup.task.protocol.degrade,
             seed: setup.task.protocol.seed,
-            failure_radius_m: setup.failure_radius_m,
         };
         let mut recorder = Recorder::open(targets, &identity, &setup.task.protocol.methods)?;
         recorder.begin_query(0, &loaded.problems, loaded.truth.as_ref());

@@ -12,7 +12,7 @@ use super::setup::{ReferencePick, Setup};
 use crate::fusion::Fusion;
 use crate::method::Method;
 use crate::params::Params;
-use crate::run::{Protocol, default_failure_radius_m};
+use crate::run::Protocol;
 use crate::scene::{self, Scene};
 use crate::session::{Breakpoint, IndexFile, Task, TaskScenes};
 
@@ -28,9 +28,6 @@ pub(super) struct SavedSession {
     task: Task,
     query: String,
     references: Vec<String>,
-    /// The scene's own where a session says nothing of it.
-    #[serde(default)]
-    failure_radius_m: Option<f64>,
     /// The position of the cursor.
     pub(super) cursor: usize,
     /// The tree of views.
@@ -51,8 +48,6 @@ struct SavedSession1 {
     radius_m: f64,
     #[serde(default)]
     prior_m: Option<f64>,
-    #[serde(default)]
-    failure_radius_m: Option<f64>,
     seed: u64,
     breakpoints: Vec<Breakpoint>,
     #[serde(deserialize_with = "posescope_core::text::parsed")]
@@ -85,7 +80,6 @@ impl From<SavedSession1> for SavedSession {
                 breakpoints: saved.breakpoints,
                 ..Task::of(saved.scene)
             },
-            failure_radius_m: saved.failure_radius_m,
             query: saved.query,
             references: saved.references,
             cursor: saved.cursor,
@@ -99,7 +93,6 @@ impl SavedSession {
         Self {
             schema: SCHEMA.to_owned(),
             task: setup.task.clone(),
-            failure_radius_m: Some(setup.failure_radius_m),
             query: setup.query_name().to_owned(),
             references: setup.reference_names(),
             cursor,
@@ -166,9 +159,6 @@ impl SavedSession {
             task.format = task.format.or_else(|| now.format.clone());
             task.index = task.index.or_else(|| now.index.clone());
         }
-        let failure_radius_m = self
-            .failure_radius_m
-            .unwrap_or_else(|| default_failure_radius_m(references.name()));
         Ok(Setup {
             offered: match is_same_scene {
                 true => present.offered.clone(),
@@ -183,7 +173,6 @@ impl SavedSession {
                 false => Arc::new(IndexFile::new(&task.scene, task.index.clone())),
             },
             task,
-            failure_radius_m,
             ..present.clone()
         })
     }

@@ -4,8 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use crate::code::Code;
-use crate::diagnosis::Tolerance;
+use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{Condition, ConditionError, Migration, migrations, verdict_name};
 use crate::method::Method;
@@ -74,8 +73,6 @@ pub(super) struct Wanted {
     pub(super) change: Option<VerdictChange>,
     /// Whether the verdict has to be another one than before.
     pub(super) only_changed: bool,
-    /// What right means.
-    pub(super) right: Tolerance,
 }
 
 /// The rows that met what was wanted of results of a version.
@@ -152,7 +149,7 @@ impl Selection {
                 && (!wanted.only_changed || known.verdicts(row.query, result).is_some_and(is_other))
                 && condition
                     .as_ref()
-                    .is_none_or(|condition| condition.is_met(result, wanted.right))
+                    .is_none_or(|condition| condition.is_met(result))
         };
         let rows: Rc<[ResultRow]> = known.rows().filter(is_wanted).map(|(row, _)| row).collect();
         *latest = Some((known.version, wanted.clone(), Rc::clone(&rows)));

@@ -11,7 +11,6 @@ use crate::image::Degradation;
 use crate::lesson::OpenSetting;
 use crate::localize::{References, Selection, frames_within, is_one_drive};
 use crate::method::Method;
-use crate::run::default_failure_radius_m;
 use crate::scene::{FrameStore, Scene};
 use crate::session::{IndexFile, Job, RunMode, Task};
 use crate::text::UnknownWord;
@@ -64,8 +63,6 @@ pub struct Setup {
     pub chosen: References,
     /// What a choice by looks asks.
     pub index: Arc<IndexFile>,
-    /// The translation error from which on a pose counts as a failure \[m\].
-    pub failure_radius_m: f64,
     /// Whether it waits at the first step or runs.
     pub mode: RunMode,
     /// Where recordings, pictures and sessions are saved unless somebody names another place.
@@ -83,7 +80,6 @@ impl Setup {
         } = open;
         Self {
             offered: vec![query],
-            failure_radius_m: default_failure_radius_m(scenes.references.name()),
             references: scenes.references,
             queries: scenes.queries,
             query,

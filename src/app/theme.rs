@@ -7,9 +7,9 @@
 
 use egui::{Color32, FontId, TextStyle, Visuals};
 
+use crate::diagnosis::Grade;
 use crate::estimator;
 use crate::features::FeatureState;
-use crate::localize::Standing;
 use crate::method::Method;
 use crate::palette::{self, Rgb};
 
@@ -53,8 +53,6 @@ pub const ESTIMATE: Color32 = rgb(palette::ESTIMATE);
 pub const TRUTH: Color32 = rgb(palette::TRUTH);
 /// Colour of the camera in hand.
 pub const CAMERA: Color32 = rgb(palette::UNDECIDED);
-/// Colour of a pose that is too far from the truth.
-pub const FAR: Color32 = Color32::from_rgb(0xE6, 0x9F, 0x00);
 
 /// Colour of stages that make something ready.
 pub const STAGE_PREPARE: Color32 = Color32::from_rgb(0x6A, 0x8C, 0xAF);
@@ -69,12 +67,11 @@ pub const STAGE_JUDGE: Color32 = Color32::from_rgb(0x5F, 0x9E, 0x8F);
 
 /// Everything whose colour stands for what it is.
 #[cfg(test)]
-const MEANINGS: [Color32; 10] = [
+const MEANINGS: [Color32; 9] = [
     REFERENCE,
     ESTIMATE,
     TRUTH,
     CAMERA,
-    FAR,
     STAGE_PREPARE,
     STAGE_SEARCH,
     STAGE_LIFT,
@@ -93,12 +90,11 @@ pub fn state(index: usize) -> Color32 {
 }
 
 /// The colour of what a result is worth, as text.
-pub fn standing(visuals: &Visuals, standing: Standing) -> Color32 {
-    match standing {
-        Standing::Right => text(visuals, TRUTH),
-        Standing::Unmeasured => visuals.text_color(),
-        Standing::LowConfidence => text(visuals, FAR),
-        Standing::Wrong | Standing::NoPose => text(visuals, ESTIMATE),
+pub fn grade(visuals: &Visuals, grade: Grade) -> Color32 {
+    match grade {
+        Grade::Right => text(visuals, TRUTH),
+        Grade::Unmeasured => visuals.text_color(),
+        Grade::Wrong | Grade::NoPose => text(visuals, ESTIMATE),
     }
 }
 
@@ -299,6 +295,6 @@ mod tests {
     #[test]
     fn a_colour_that_can_be_read_stays_what_it_is() {
         let dark = visuals(egui::Theme::Dark);
-        assert_eq!(text(&dark, FAR), FAR);
+        assert_eq!(text(&dark, REFERENCE), REFERENCE);
     }
 }

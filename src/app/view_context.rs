@@ -148,7 +148,6 @@ impl<'a> ViewContext<'a> {
             condition: self.options.results_filter.clone(),
             change: self.options.verdict_change.clone(),
             only_changed: self.options.only_differences && known.before.is_some(),
-            right: self.setup.task.protocol.right,
         };
         self.state.selection.rows(known, &wanted)
     }

@@ -19,10 +19,12 @@ pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
         metres: args.tolerance_m,
         degrees: args.tolerance_deg,
     };
-    let (before, after) = (read_run(&args.before)?, read_run(&args.after)?);
+    for run in [&args.before, &args.after] {
+        read_run(run)?;
+    }
     let comparison = RunComparison::of(
-        (&read_rows(&args.before)?, before.failure_radius_m),
-        (&read_rows(&args.after)?, after.failure_radius_m),
+        &read_rows(&args.before)?,
+        &read_rows(&args.after)?,
         &tolerance,
     );
     if comparison.common == 0 {
@@ -79,8 +81,8 @@ pub fn shown(comparison: &RunComparison, width: Option<usize>) -> String {
             one.change.name().to_owned(),
             one.before.query.clone(),
             one.before.method.to_string(),
-            one.verdicts[0].words(one.before.error.as_ref()),
-            one.verdicts[1].words(one.after.error.as_ref()),
+            one.grades[0].words(one.before.error.as_ref()),
+            one.grades[1].words(one.after.error.as_ref()),
         ];
         table.push(cells, one.before.group().to_string());
     }
@@ -140,8 +142,8 @@ fn text(comparison: &RunComparison) -> String {
             one.change.name(),
             one.before.query,
             one.before.method,
-            one.verdicts[0].words(one.before.error.as_ref()),
-            one.verdicts[1].words(one.after.error.as_ref()),
+            one.grades[0].words(one.before.error.as_ref()),
+            one.grades[1].words(one.after.error.as_ref()),
             one.before.group()
         );
     }

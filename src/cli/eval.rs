@@ -17,7 +17,7 @@ use posescope::params::Params;
 use posescope::report::write_html;
 use posescope::run::{
     Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
-    ScenePair, Scenes, defaults, inputs, merge, read_run,
+    ScenePair, Scenes, defaults, inputs, merge,
 };
 use posescope::scene::{self, Retriever, Scene};
 use posescope::session::command_line;
@@ -335,14 +335,14 @@ fn finish(
     }
     let mut compared = None;
     if let Some(before) = args.baseline.as_ref().or(args.failed.as_ref()) {
-        let comparison = against(before, folder, run, args.failed.is_some())?;
+        let comparison = against(before, folder, args.failed.is_some())?;
         if !terminal.is_quiet() {
             output::print(&diff::shown(&comparison, terminal.width()).trim_end())?;
         }
         diff::record(&comparison, (before, folder), None, terminal)?;
         let changes = comparison.differences.iter();
         let broken = changes.filter(|one| one.change == Change::Broken);
-        let news = broken.filter(|one| !known.has(&one.after, run.failure_radius_m));
+        let news = broken.filter(|one| !known.has(&one.after));
         let news = news.count();
         if news > 0 {
             failures.push(format!("{news} queries broken since {}", before.display()));
@@ -386,13 +386,7 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
 }
 
 /// What changed since the run before; `only_again` leaves out of it what was not asked again.
-fn against(
-    before: &Path,
-    folder: &Path,
-    run: &RunFile,
-    only_again: bool,
-) -> Result<RunComparison, CliError> {
-    let radius_before_m = read_run(before)?.failure_radius_m;
+fn against(before: &Path, folder: &Path, only_again: bool) -> Result<RunComparison, CliError> {
     let (mut rows_before, rows) = (read_rows(before)?, read_rows(folder)?);
     if only_again {
         let key = |row: &Row| [row.scene.clone(), row.query.clone()];
@@ -400,8 +394,8 @@ fn against(
         rows_before.retain(|row| again.contains(&key(row)));
     }
     Ok(RunComparison::of(
-        (&rows_before, radius_before_m),
-        (&rows, run.failure_radius_m),
+        &rows_before,
+        &rows,
         &Tolerance::default(),
     ))
 }

@@ -37,7 +37,6 @@ pub struct FailureRecordings<'a> {
     params: &'a Params,
     degraded: Degradation,
     seed: u64,
-    failure_radius_m: f64,
     several_pairs: bool,
     bar: indicatif::ProgressBar,
     observer: CliObserver,
@@ -115,7 +114,6 @@ impl<'a> FailureRecordings<'a> {
             params,
             degraded: run.protocol.degrade,
             seed: run.protocol.seed,
-            failure_radius_m: run.failure_radius_m,
             several_pairs,
             bar,
             observer,
@@ -147,7 +145,6 @@ impl<'a> FailureRecordings<'a> {
             configuration: self.params.to_toml(),
             degraded: self.degraded,
             seed: self.seed,
-            failure_radius_m: self.failure_radius_m,
         };
         let mut recorder = Recorder::open(&targets, &identity, &[query.method])?;
         // A panic was told as the query's result; here it only ends the recording.

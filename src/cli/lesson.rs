@@ -8,7 +8,6 @@ use comfy_table::{ContentArrangement, Table, presets};
 use posescope::estimator;
 use posescope::lesson::{Lesson, OpenSetting, Page, PageTurner};
 use posescope::method::Method;
-use posescope::run::default_failure_radius_m;
 use posescope::scene::Scene;
 use posescope::sink::rerun::{Identity, Recorder, Targets, Views};
 
@@ -167,7 +166,6 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
         configuration: first.task.params.to_toml(),
         degraded: first.task.protocol.degrade,
         seed: first.task.protocol.seed,
-        failure_radius_m: default_failure_radius_m(scene),
     };
     let targets = Targets {
         save: Some(path.to_owned()),

@@ -7,7 +7,6 @@ use posescope::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
-use posescope::run::default_failure_radius_m;
 use posescope::scene::{Retriever, Scene};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::SceneNames;
@@ -192,10 +191,6 @@ impl Plan<'_> {
         }
     }
 
-    fn failure_radius_m(&self) -> f64 {
-        default_failure_radius_m(self.localizer.references().name())
-    }
-
     fn show(
         &self,
         results: &[(QueryResult, Duration)],
@@ -205,7 +200,7 @@ impl Plan<'_> {
             return Ok(());
         }
         let width = terminal.width();
-        let table = table::results(results, self.failure_radius_m(), width);
+        let table = table::results(results, width);
         let text = table + &story(results, width);
         if self.args.json.as_deref().is_some_and(output::is_stdout) {
             eprint!("{text}");
@@ -301,7 +296,6 @@ impl Plan<'_> {
             configuration: self.task.params.to_toml(),
             degraded: self.task.protocol.degrade,
             seed: self.task.protocol.seed,
-            failure_radius_m: self.failure_radius_m(),
         };
         Ok(Some(Recorder::open(
             &targets,

@@ -19,15 +19,15 @@ pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> Strin
             Some(fusion) => format!("{} {fusion}", result.method),
             None => result.method.to_string(),
         };
-        let sentence = format!(
-            "{} {name}: {} {}.",
-            result.query, primary.code, primary.text
-        );
+        let sentence = format!("{} {name}: {} {}", result.query, primary.code, primary.text);
         text += &format!("\n{}", lines(sentence));
         for other in result.diagnosis.iter().skip(1) {
             text += &lines(format!("  also {}: {}", other.code, other.text));
         }
         let Some(explanation) = &result.explanation else {
+            if result.grade.is_failure() {
+                text += &lines(format!("  try: {}", primary.code.rule().advice));
+            }
             continue;
         };
         for helped in &explanation.helped {

@@ -2,38 +2,29 @@
 
 use std::time::Duration;
 
+use posescope::diagnosis::{Grade, confidence};
 use posescope::geometry::PoseError;
-use posescope::localize::{QueryResult, Status, Verdict};
+use posescope::localize::{QueryResult, Status};
 
 use super::columns::Columns;
 
 /// One row per query, reference and method, for lines of at most `width` characters, if they have a limit.
-pub fn results(
-    results: &[(QueryResult, Duration)],
-    failure_radius_m: f64,
-    width: Option<usize>,
-) -> String {
+pub fn results(results: &[(QueryResult, Duration)], width: Option<usize>) -> String {
     let header = [
         "query",
         "reference",
         "start",
         "method",
+        "grade",
         "error",
         "rotation",
         "max Euler",
         "time",
     ];
     // Of a query against the same references, only the method differs.
-    let mut table = Columns::new(header, "verdict, or evidence", 3, &[2, 4, 5, 6, 7]);
+    let mut table = Columns::new(header, "verdict, or evidence", 3, &[2, 5, 6, 7, 8]);
     for (result, time) in results {
         let part = |part: fn(&PoseError) -> String| result.error.as_ref().map(part);
-        let translation = part(PoseError::translation).unwrap_or_default();
-        let error = match result.verdict(failure_radius_m) {
-            Verdict::NoPose => "failed".to_owned(),
-            Verdict::Unmeasured => "unknown".to_owned(),
-            Verdict::Far => format!("far: {translation}"),
-            Verdict::Near => translation,
-        };
         let start = result.initial_error.as_ref().map(PoseError::translation);
         let cells = [
             result.query.clone(),
@@ -43,7 +34,8 @@ pub fn results(
                 Some(fusion) => format!("{} {fusion}", result.method),
                 None => result.method.to_string(),
             },
-            error,
+            format!("{} {}", result.grade.glyph(), result.grade),
+            part(PoseError::translation).unwrap_or_default(),
             part(PoseError::rotation).unwrap_or_default(),
             part(PoseError::max_euler).unwrap_or_default(),
             format!("{:.2} s", time.as_secs_f64()),
@@ -53,12 +45,26 @@ pub fn results(
     table.text(width)
 }
 
-/// What the result rests on, in a few words.
+/// What the result rests on, in a few words; without the truth how likely it is right.
 fn evidence(result: &QueryResult) -> String {
-    // That a pose is doubted says less than what speaks for it, and is said below the table.
+    let rests_on = rests_on(result);
+    match &result.confidence {
+        Some(known) if result.grade == Grade::Unmeasured => format!(
+            "{} {}, {} likely within {} m; {rests_on}",
+            known.word.glyph(),
+            known.word,
+            confidence::percent(known.probability),
+            confidence::WITHIN_M
+        ),
+        _ => rests_on,
+    }
+}
+
+fn rests_on(result: &QueryResult) -> String {
+    // That a pose is uncertain says less than what speaks for it, and stands below the table.
     let primary = result.diagnosis.first();
     if let Some(primary) = primary.filter(|primary| primary.code.is_failure()) {
-        return format!("{} {}", primary.code, primary.code.about());
+        return format!("{} {}", primary.code, primary.code.title());
     }
     if let Some(reason) = &result.reason {
         return format!("{}: {}", reason.code, reason.text);

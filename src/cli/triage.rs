@@ -12,11 +12,14 @@ use super::terminal::Terminal;
 
 /// Prints the table, or writes the results.
 pub fn triage(args: &TriageArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let run = read_run(&args.run)?;
-    let right = args.right.unwrap_or(run.protocol.right);
-    let results: Vec<QueryResult> = read_results(&args.run)?.collect::<Result<_, _>>()?;
+    read_run(&args.run)?;
+    let mut results: Vec<QueryResult> = read_results(&args.run)?.collect::<Result<_, _>>()?;
+    if let Some(right) = args.right {
+        let graded = results.into_iter().map(|result| result.graded(right));
+        results = graded.collect();
+    }
     let all: Vec<&QueryResult> = results.iter().collect();
-    let chosen = select(&all, right, args.condition.as_ref(), args.sort);
+    let chosen = select(&all, args.condition.as_ref(), args.sort);
     let shown = &chosen[..chosen.len().min(args.limit.unwrap_or(usize::MAX))];
     match &args.json {
         // The run's own bytes.
@@ -30,9 +33,7 @@ pub fn triage(args: &TriageArgs, terminal: &Terminal) -> Result<(), CliError> {
         None => {
             let rows = shown.iter().map(|&index| {
                 let cells = args.columns.iter();
-                cells
-                    .map(|field| field.text(&results[index], right))
-                    .collect()
+                cells.map(|field| field.text(&results[index])).collect()
             });
             output::print(&table(&args.columns, rows).to_string())?;
         }

@@ -7,7 +7,7 @@ use clap::Parser as _;
 use posescope::app::{self, KnownResults, ReferencePick, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::params::Params;
-use posescope::run::{Protocol, ScenePair, default_failure_radius_m, read_run};
+use posescope::run::{Protocol, ScenePair, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
@@ -99,7 +99,6 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<_, _>>()?;
-    let failure_radius_m = default_failure_radius_m(references.name());
     let mut setup = Setup {
         offered: (0..queries.frames().len()).collect(),
         references,
@@ -108,7 +107,6 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         chosen: named.into(),
         index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
         task,
-        failure_radius_m,
         mode: RunMode::Paused,
         folder: saving_folder().to_owned(),
     };
@@ -149,6 +147,20 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
     )))
 }
 
+/// A run has queries of its own.
+fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
+    let given = [
+        ("--queries", args.task.queries.is_some()),
+        ("--camera", args.task.camera.is_some()),
+    ];
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => Err(CliError::Usage(format!(
+            "{option} does not go with the folder of a run, which has its own queries; name a scene instead"
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// The queries of a run, with its results; the first failure is looked at first.
 fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), CliError> {
     let file = read_run(folder)?;
@@ -159,6 +171,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         )));
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
+    refuse_other_queries(args)?;
     let given = &args.task.protocol;
     let format = given.format.as_deref().or(file.format.as_deref());
     let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
@@ -174,11 +187,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         Some(argument) => scene::open(argument, format)?.into(),
         None => Arc::clone(&references),
     };
-    let protocol = Protocol {
-        prior_m: given.prior.or(file.protocol.prior_m),
-        degrade: given.degrade.unwrap_or(file.protocol.degrade),
-        ..file.protocol
-    };
+    let protocol = given.over(file.protocol.clone())?;
     let queries = protocol.as_asked(queries, references.as_ref())?;
     let mut params = Params::default();
     params
@@ -187,15 +196,19 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
             path: folder.join("run.toml"),
             source,
         })?;
-    let results = results_of(folder, pair, queries.as_ref())?;
-    let before = match &args.before {
-        Some(before) => Some(results_of(before, pair, queries.as_ref())?),
-        None => None,
+    let params = given.config.over(params)?;
+    let results_of = |folder: &Path| -> Result<Results, CliError> {
+        let mut results = results_of(folder, pair, queries.as_ref())?;
+        for result in results.values_mut().flatten() {
+            *result = result.clone().graded(protocol.right);
+        }
+        Ok(results)
     };
-    let failure_radius_m = file.failure_radius_m;
+    let results = results_of(folder)?;
+    let before = args.before.as_deref().map(results_of).transpose()?;
     let is_failure = |results: &[QueryResult]| {
         let mut results = results.iter();
-        results.any(|result| !result.is_success(failure_radius_m))
+        results.any(|result| result.grade.is_failure())
     };
     let first = results
         .iter()
@@ -206,10 +219,12 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         (None, Some((query, _))) => *query,
         (None, None) => 0,
     };
-    let reference_frames = results
-        .get(&query)
-        .and_then(|results| results.first())
-        .map_or(&[][..], |result| &result.references)
+    let of_run = results.get(&query).and_then(|results| results.first());
+    let reference_names = match args.task.reference.as_slice() {
+        [] => of_run.map_or(&[][..], |result| &result.references),
+        named => named,
+    };
+    let reference_frames = reference_names
         .iter()
         .map(|name| references.find(name))
         .collect::<Result<Vec<_>, _>>()?;
@@ -218,9 +233,9 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         scene: scene_argument,
         queries: other.cloned(),
         format: format.map(str::to_owned),
-        by_hand: false,
+        by_hand: !args.task.reference.is_empty(),
         index: args.task.index.clone(),
-        radius_m: radius_m.unwrap_or(args.task.radius),
+        radius_m: args.task.radius.or(radius_m).unwrap_or(Protocol::RADIUS_M),
         protocol,
         params,
         breakpoints: args.task.breakpoints.clone(),
@@ -234,7 +249,6 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         chosen: reference_frames.into(),
         index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
         task,
-        failure_radius_m,
         mode: RunMode::Paused,
         folder: saving_folder().to_owned(),
     };

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use super::metrics::Row;
 use super::migration::{Migration, migrations};
-use crate::code::Code;
-use crate::localize::Verdict;
+use crate::diagnosis::{Code, Grade};
 
 /// Changes of a pose's error that are not worth mentioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,13 +27,13 @@ impl Default for Tolerance {
 /// What happened to a query from one run to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Change {
-    /// It succeeded and does no longer: a regression.
+    /// It was not wrong or missing, and is now: a regression.
     Broken,
-    /// It failed and does no longer.
+    /// It was wrong or missing, and is no longer.
     Fixed,
-    /// It succeeds in both, and its error grew by more than the tolerance.
+    /// It fails in neither, and its error grew by more than the tolerance.
     Worse,
-    /// It succeeds in both, and its error shrank by more than the tolerance.
+    /// It fails in neither, and its error shrank by more than the tolerance.
     Better,
 }
 
@@ -59,8 +58,8 @@ pub struct Difference {
     pub before: Row,
     /// The result in the second run.
     pub after: Row,
-    /// What became of the query in the first and in the second run, each by its failure radius.
-    pub verdicts: [Verdict; 2],
+    /// What the result is worth in the first and in the second run.
+    pub grades: [Grade; 2],
 }
 
 /// All differences of two runs.
@@ -79,28 +78,27 @@ pub struct RunComparison {
 }
 
 impl RunComparison {
-    /// Compares two runs. Each has its own failure radius \[m\].
-    pub fn of(before: (&[Row], f64), after: (&[Row], f64), tolerance: &Tolerance) -> Self {
+    /// Compares two runs.
+    pub fn of(before: &[Row], after: &[Row], tolerance: &Tolerance) -> Self {
         let key = |row: &Row| format!("{:?}/{}/{}", row.group(), row.query, row.method);
-        let mut others: BTreeMap<String, &Row> =
-            after.0.iter().map(|row| (key(row), row)).collect();
+        let mut others: BTreeMap<String, &Row> = after.iter().map(|row| (key(row), row)).collect();
         let mut comparison = Self::default();
         let mut pairs = Vec::new();
-        for row in before.0 {
+        for row in before {
             let Some(other) = others.remove(&key(row)) else {
                 comparison.only_before += 1;
                 continue;
             };
             comparison.common += 1;
             pairs.push((row.method, [row, other].map(primary)));
-            let verdicts = [row.verdict(before.1), other.verdict(after.1)];
-            let [was, is] = verdicts.map(Verdict::is_success);
+            let grades = [row.grade, other.grade];
+            let [was, is] = grades.map(|grade| !grade.is_failure());
             if let Some(change) = change(was, is, row, other, tolerance) {
                 comparison.differences.push(Difference {
                     change,
                     before: row.clone(),
                     after: other.clone(),
-                    verdicts,
+                    grades,
                 });
             }
         }
@@ -154,7 +152,7 @@ mod tests {
     use super::*;
 
     fn compare(before: &[Row], after: &[Row]) -> RunComparison {
-        RunComparison::of((before, 10.0), (after, 10.0), &Tolerance::default())
+        RunComparison::of(before, after, &Tolerance::default())
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
+use super::metrics::is_success;
 use super::report::read_rows;
 use super::table::Table;
 use super::{measure, tables};
@@ -348,7 +349,7 @@ fn csv(folder: &Path, run: &RunFile, choice: &ResultChoice) -> Result<String, Ex
         if !choice.takes(&result) {
             continue;
         }
-        let success = result.is_success(run.failure_radius_m);
+        let success = is_success(result.status, result.error.as_ref(), run.failure_radius_m);
         let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
         let setting = result.setting;
         let mut cells = vec![

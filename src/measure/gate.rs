@@ -5,12 +5,13 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::metrics::Measures;
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::method::Method;
 
 /// What a gate looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Metric {
+    Right,
     Success,
     Recall {
         metres: f64,
@@ -63,7 +64,7 @@ impl FromStr for Gate {
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || {
             format!(
-                "`{text}`: METRIC@METHOD >= NUMBER expected, where METRIC is success, \
+                "`{text}`: METRIC@METHOD >= NUMBER expected, where METRIC is right, success, \
                  recall@0.5m,5deg, median_m, median_deg, rmse_m, rmse_deg, share(CODE) of a verdict, \
                  median(confidence) or median(time) in seconds, and the comparison >=, >, <= or <"
             )
@@ -96,6 +97,7 @@ impl FromStr for Gate {
 
 fn metric_of(text: &str) -> Option<Metric> {
     Some(match text {
+        "right" => Metric::Right,
         "success" => Metric::Success,
         "median_m" => Metric::MedianMetres,
         "median_deg" => Metric::MedianDegrees,
@@ -160,6 +162,7 @@ impl Gate {
     fn value(&self, measures: &Measures) -> Option<f64> {
         let errors = &measures.of_successes;
         match self.metric {
+            Metric::Right => Some(measures.share(measures.right)),
             Metric::Success => Some(measures.success_rate),
             Metric::Recall { metres, degrees } => measures.recall_within(metres, degrees),
             Metric::MedianMetres => errors.median_m,
@@ -178,7 +181,7 @@ impl Gate {
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::{Finding, TrustOfRow, measure, tests::rows};
+    use super::super::metrics::{ConfidenceOfRow, Finding, measure, tests::rows};
     use super::*;
 
     fn passes(gate: &str) -> bool {
@@ -188,6 +191,8 @@ mod tests {
 
     #[test]
     fn gates_hold_where_the_figures_by_hand_say_so() {
+        assert!(passes("right@mi >= 0.5"));
+        assert!(!passes("right@mi > 0.5"));
         assert!(passes("success@mi >= 0.75"));
         assert!(!passes("success@mi > 0.75"));
         assert!(passes("recall@0.5m,5deg@fb >= 0.5"));
@@ -207,8 +212,8 @@ mod tests {
             .enumerate()
         {
             row.seconds = Some(at as f64);
-            row.trust = (at > 0).then_some(TrustOfRow {
-                probability: Some(0.9 + 0.01 * at as f64),
+            row.confidence = (at > 0).then_some(ConfidenceOfRow {
+                probability: 0.9 + 0.01 * at as f64,
             });
             row.diagnosis
                 .extend((at == 3).then_some(Finding { code: Code::D3 }));

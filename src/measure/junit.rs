@@ -10,7 +10,6 @@ use super::metrics::{Finding, Row};
 use crate::diagnosis::Diagnosis;
 use crate::fusion::Fusion;
 use crate::localize::{Reason, Setting};
-use crate::run::RunFile;
 use crate::run::{FolderError, read_results};
 
 /// What a case is made of.
@@ -29,7 +28,6 @@ struct Case {
 /// A line of the results that is none.
 pub fn junit(
     folder: &Path,
-    run: &RunFile,
     gate_results: &[GateResult],
     known: &KnownFailures,
 ) -> Result<String, FolderError> {
@@ -53,15 +51,13 @@ pub fn junit(
             name += &format!(" ← {queries}");
         }
         name += &format!(" {}", row.method);
-        let verdict = row.verdict(run.failure_radius_m);
+        let words = row.grade.words(row.error.as_ref());
         let status = match (diagnosis.first(), &reason) {
-            _ if verdict.is_success() => TestCaseStatus::success(),
-            _ if known.has(&row, run.failure_radius_m) => {
-                skipped(&verdict.words(row.error.as_ref()))
-            }
+            _ if !row.grade.is_failure() => TestCaseStatus::success(),
+            _ if known.has(&row) => skipped(&words),
             (Some(primary), _) => failure(primary.code.name(), &primary.text),
             (None, Some(reason)) => failure(reason.code.name(), &reason.text),
-            (None, None) => failure("far", &verdict.words(row.error.as_ref())),
+            (None, None) => failure(row.grade.word(), &words),
         };
         let case = TestCase::new(case_name(&row.query, row.setting, row.fusion), status);
         match suites.iter_mut().find(|suite| suite.name.as_str() == name) {

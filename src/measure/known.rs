@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::metrics::Row;
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::method::Method;
 use crate::run::is_called;
 
@@ -124,14 +124,14 @@ impl KnownFailures {
     }
 
     /// Whether the result is wrong in a way that the list knows.
-    pub fn has(&self, row: &Row, failure_radius_m: f64) -> bool {
-        is_wrong(row, failure_radius_m) && self.of(row).any(|line| line.allows(row))
+    pub fn has(&self, row: &Row) -> bool {
+        is_wrong(row) && self.of(row).any(|line| line.allows(row))
     }
 
     /// What became of the list in a run.
-    pub fn report(&self, rows: &[Row], failure_radius_m: f64) -> KnownReport {
-        let wrong = |row: &&Row| is_wrong(row, failure_radius_m);
-        let known = |row: &&Row| self.has(row, failure_radius_m);
+    pub fn report(&self, rows: &[Row]) -> KnownReport {
+        let wrong = |row: &&Row| is_wrong(row);
+        let known = |row: &&Row| self.has(row);
         let mut report = KnownReport {
             still: rows.iter().filter(known).count(),
             ..KnownReport::default()
@@ -180,10 +180,10 @@ impl KnownFailure {
     }
 }
 
-/// Whether a result is a failure of the run or has a verdict that says what is wrong.
-fn is_wrong(row: &Row, failure_radius_m: f64) -> bool {
+/// Whether a result is wrong, missing, or has a verdict that says what is wrong.
+fn is_wrong(row: &Row) -> bool {
     let primary = row.diagnosis.first();
-    !row.is_success(failure_radius_m) || primary.is_some_and(|finding| finding.code.is_failure())
+    row.grade.is_failure() || primary.is_some_and(|finding| finding.code.is_failure())
 }
 
 #[cfg(test)]
@@ -211,14 +211,13 @@ mod tests {
     fn a_line_knows_a_failure_by_query_method_and_code() {
         let known = read("# ours\n70 mi D3 # the search\n\n000071 fb\n").expect("a list");
         let far = |query, method| row(query, method, Some(50.0));
-        assert!(known.has(&with_code(far("000070", "mi"), "D3"), 10.0));
-        assert!(!known.has(&with_code(far("000070", "mi"), "D2"), 10.0));
-        assert!(!known.has(&far("000070", "fb"), 10.0));
-        assert!(known.has(&with_code(far("71", "fb"), "R3"), 10.0));
-        // Within the failure radius and wrong all the same, then right.
-        let near = row("000070", "mi", Some(2.0));
-        assert!(known.has(&with_code(near.clone(), "D3"), 10.0));
-        assert!(!known.has(&near, 10.0));
+        assert!(known.has(&with_code(far("000070", "mi"), "D3")));
+        assert!(!known.has(&with_code(far("000070", "mi"), "D2")));
+        assert!(!known.has(&far("000070", "fb")));
+        assert!(known.has(&with_code(far("71", "fb"), "R3")));
+        let near = row("000070", "mi", Some(0.5));
+        assert!(known.has(&with_code(near.clone(), "D3")));
+        assert!(!known.has(&near));
     }
 
     #[test]
@@ -228,7 +227,7 @@ mod tests {
             with_code(row("70", "mi", None), "D2"),
             row("71", "fb", Some(0.1)),
         ];
-        let report = known.report(&rows, 10.0);
+        let report = known.report(&rows);
         assert_eq!(report.still, 0);
         assert!(report.fixed[0].starts_with("71 fb is right now; take it off "));
         assert!(report.fixed[0].ends_with("known.txt:2"));

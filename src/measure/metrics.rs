@@ -1,6 +1,7 @@
 //! What the results of many queries amount to.
 //!
-//! Medians and RMSE are over successes ([`Verdict`]) of the method, and once more over queries that
+//! A *success* is the paper's: a pose within the failure radius of the run ([`Row::is_success`]). *Right* is a
+//! pose within the tolerance of `--right`. Medians and RMSE are over successes, and once more over queries that
 //! all methods report as solved, whatever the error, as in the paper: its medians exceed any failure
 //! radius. Their rotation is the greatest Euler angle, as there.
 //! In the recall, which goes by the rotation angle, a failure has an infinite error.
@@ -10,10 +11,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::chance::Chance;
-use crate::code::Code;
+use crate::diagnosis::{Code, Grade};
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
-use crate::localize::{Setting, Status, Verdict};
+use crate::localize::{Setting, Status};
 use crate::method::Method;
 
 /// The limits of the recall: metres and degrees.
@@ -38,6 +39,8 @@ pub struct Row {
     pub setting: Option<Setting>,
     /// Whether there is a pose.
     pub status: Status,
+    /// What it is worth by the truth.
+    pub grade: Grade,
     /// Its error, where the truth is known.
     pub error: Option<PoseError>,
     /// The error of the reference pose, where the truth is known.
@@ -52,20 +55,19 @@ pub struct Row {
     /// What the cost was like, if a cost was minimised.
     #[serde(default)]
     pub cost: Option<CostOfRow>,
-    /// How far the pose is to be believed.
+    /// How likely the pose is right.
     #[serde(default)]
-    pub trust: Option<TrustOfRow>,
+    pub confidence: Option<ConfidenceOfRow>,
     /// How long the method took \[s\], where that was asked for; no result says it.
     #[serde(skip)]
     pub seconds: Option<f64>,
 }
 
-/// What the statistics want to know of a pose's trust.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TrustOfRow {
+/// What the statistics want to know of a pose's confidence.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConfidenceOfRow {
     /// The probability of being within 1 m.
-    #[serde(default)]
-    pub probability: Option<f64>,
+    pub probability: f64,
 }
 
 /// What the statistics want to know of a cost.
@@ -93,19 +95,15 @@ pub struct Finding {
 }
 
 impl Row {
-    /// Whether there is a pose and, where the truth is known, a near one.
+    /// The paper's success: there is a pose and, where the truth is known, it is nearer than the failure
+    /// radius (section 4.2).
     pub fn is_success(&self, failure_radius_m: f64) -> bool {
-        self.verdict(failure_radius_m).is_success()
+        is_success(self.status, self.error.as_ref(), failure_radius_m)
     }
 
     /// Whether a direct method's result lies where its grid ends.
     pub fn is_on_rim(&self) -> bool {
         self.cost.is_some_and(|cost| cost.on_rim)
-    }
-
-    /// What became of the query.
-    pub fn verdict(&self, failure_radius_m: f64) -> Verdict {
-        Verdict::new(self.status, self.error.as_ref(), failure_radius_m)
     }
 
     /// What is measured together with this row.
@@ -117,6 +115,12 @@ impl Row {
             fusion: self.fusion,
         }
     }
+}
+
+/// The paper's success ([`Row::is_success`]). An error that is no number is not near.
+pub(super) fn is_success(status: Status, error: Option<&PoseError>, failure_radius_m: f64) -> bool {
+    let is_near = error.is_none_or(|error| error.translation_m < failure_radius_m);
+    status == Status::Ok && is_near
 }
 
 /// Results that differ in query and method alone.
@@ -216,6 +220,9 @@ pub struct Measures {
     /// How many queries had no reference; they count as failures.
     #[serde(default)]
     pub without_reference: usize,
+    /// How many queries have a right pose, within the tolerance of the run.
+    #[serde(default)]
+    pub right: usize,
     /// How many queries have a pose within the failure radius.
     pub successes: usize,
     /// Successes over queries.
@@ -330,6 +337,7 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
             poses: count(&|row| row.status == Status::Ok),
             off_rim: count(&|row| row.status == Status::Ok && !row.is_on_rim()),
             without_reference: count(&|row| row.references.is_empty()),
+            right: count(&|row| row.grade == Grade::Right),
             successes: count(&success),
             success_rate: share(count(&success), rows.len()),
             of_successes: errors_of(&success),
@@ -343,7 +351,7 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
                 }),
                 failure_radius_m,
             ),
-            median_confidence: median_of(&|row| row.trust?.probability),
+            median_confidence: median_of(&|row| Some(row.confidence?.probability)),
             median_s: median_of(&|row| row.seconds),
             errors: has_truth.then(|| rows.iter().map(error).collect()),
         };
@@ -375,6 +383,11 @@ pub(super) mod tests {
             } else {
                 Status::Failed
             },
+            grade: match error {
+                None => Grade::NoPose,
+                Some(error) if error <= 2.0 => Grade::Right,
+                Some(_) => Grade::Wrong,
+            },
             error: error.map(|error| PoseError {
                 translation_m: error,
                 rotation_deg: error,
@@ -384,7 +397,7 @@ pub(super) mod tests {
             diagnosis: Vec::new(),
             references: vec!["000000".to_owned()],
             cost: None,
-            trust: None,
+            confidence: None,
             seconds: None,
         }
     }

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::method::Method;
 
 /// What a result is called in which nothing was found.

@@ -96,10 +96,10 @@ pub fn write_report(
     let radius_m = run.failure_radius_m;
     let measures = measure(&rows, radius_m);
     let mut gated = rows.clone();
-    gated.retain(|row| !known.has(row, radius_m));
+    gated.retain(|row| !known.has(row));
     let gated = measure(&gated, radius_m);
     let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&gated)).collect();
-    let known_report = known.report(&rows, radius_m);
+    let known_report = known.report(&rows);
     let tables = tables::tables(run, &measures);
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
@@ -121,7 +121,7 @@ pub fn write_report(
         write(&path, svg.as_bytes())?;
     }
     let path = folder.join("junit.xml");
-    let xml = junit::junit(folder, run, &gate_results, known)?;
+    let xml = junit::junit(folder, &gate_results, known)?;
     write(&path, xml.as_bytes())?;
     Ok(Report {
         measures,

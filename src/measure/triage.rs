@@ -6,7 +6,6 @@ mod field;
 pub use condition::{Condition, ConditionError};
 pub use field::{Field, Value};
 
-use crate::diagnosis::Tolerance;
 use crate::localize::QueryResult;
 use crate::text::UnknownWord;
 
@@ -36,18 +35,17 @@ impl std::str::FromStr for Order {
 /// does not have comes last.
 pub fn select(
     results: &[&QueryResult],
-    right: Tolerance,
     condition: Option<&Condition>,
     order: Option<Order>,
 ) -> Vec<usize> {
-    let is_met = |result: &QueryResult| condition.is_none_or(|one| one.is_met(result, right));
+    let is_met = |result: &QueryResult| condition.is_none_or(|one| one.is_met(result));
     let mut chosen: Vec<usize> = (0..results.len())
         .filter(|&index| is_met(results[index]))
         .collect();
     if let Some(order) = order {
         let mut keyed: Vec<(Value, usize)> = chosen
             .into_iter()
-            .map(|index| (order.field.of(results[index], right), index))
+            .map(|index| (order.field.of(results[index]), index))
             .collect();
         keyed.sort_by(|(a, _), (b, _)| a.compare(b, order.descending));
         chosen = keyed.into_iter().map(|(_, index)| index).collect();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use plotters::prelude::*;
 
 use super::ReportedResult;
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::localize::Status;
 use crate::measure::{Measures, method_color, verdict_color};
 use crate::method::Method;
@@ -241,7 +241,7 @@ pub(super) fn verdicts(measures: &[Measures]) -> Option<Result<String, String>> 
                     words.push((
                         format!(
                             "{method}{place}: {code} {}: {count} of {} queries ({share:.0} %)",
-                            code.about(),
+                            code.title(),
                             one.queries
                         ),
                         None,

@@ -3,8 +3,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Baseline, ReportedResult, RunReport};
-use crate::code::Code;
-use crate::localize::Standing;
+use crate::diagnosis::{Code, Grade};
 use crate::measure::{Change, Table};
 use crate::method::Method;
 use crate::run::RunFile;
@@ -105,9 +104,16 @@ fn asked(report: &RunReport) -> Markup {
                 @if let Some(prior) = protocol.prior_m { dt { "Prior" } dd { (prior) " m" } }
                 @if !fusions.is_empty() { dt { "Fusions" } dd { (fusions) } }
                 @if !protocol.degrade.is_none() { dt { "Photos degraded" } dd { (protocol.degrade) } }
-                dt { "A failure" } dd { "a pose " (run.failure_radius_m) " m off or more, or none" }
-                dt { "Right" } dd { "within " (protocol.right) }
-                @if let Some(accept) = protocol.accept { dt { "Accepted" } dd { "from a probability of " (accept) " on" } }
+                @if let Some(format) = &run.format { dt { "Format" } dd { (format) } }
+                @for file in &protocol.estimates { dt { "Poses of another system" } dd { (file) } }
+                @if let Some(folder) = &protocol.matches { dt { "Matches of another system" } dd { (folder.display()) } }
+                @if let Some(file) = &protocol.gps { dt { "Positions of the queries" } dd { (file.display()) } }
+                @if run.share < 1.0 { dt { "Drawn as queries" } dd { (100.0 * run.share) " % of the frames" } }
+                @if let Some(limit) = run.limit { dt { "At most" } dd { (limit) " queries" } }
+                dt { "Right" } dd { "within " (protocol.right) " of the truth; wrong otherwise" }
+                dt { "Success, as the paper counts it" } dd { "within " (run.failure_radius_m) " m of the truth" }
+                @if let Some(accept) = protocol.accept { dt { "Refused" } dd { "poses with a confidence below " (accept) } }
+                @if protocol.explain > 0 { dt { "Explained" } dd { "failures, by up to " (protocol.explain) " runs each" } }
                 dt { "Seed" } dd { (protocol.seed) }
                 dt { "Parameters" }
                 dd {
@@ -194,8 +200,8 @@ fn changes(report: &RunReport, baseline: &Baseline) -> Markup {
                                     td class=(if matches!(one.change, Change::Broken | Change::Worse) { "wrong" } else { "right" }) { (one.change.name()) }
                                     td { (one.before.query) }
                                     td { (one.before.method) }
-                                    td { (one.verdicts[0].words(one.before.error.as_ref())) }
-                                    td { (one.verdicts[1].words(one.after.error.as_ref())) }
+                                    td { (one.grades[0].words(one.before.error.as_ref())) }
+                                    td { (one.grades[1].words(one.after.error.as_ref())) }
                                     td { (one.before.group()) }
                                 }
                             }
@@ -233,7 +239,7 @@ const COLUMNS: [(&str, &str); 12] = [
     ("method", ""),
     ("where", "wide"),
     ("reference", "wide"),
-    ("is", ""),
+    ("grade", ""),
     ("error (m)", "number"),
     ("rotation (°)", "number"),
     ("start (m)", "number wide"),
@@ -263,7 +269,7 @@ fn results(report: &RunReport) -> Markup {
             form.filters id="filters" hidden {
                 label { "Words" input type="search" name="words" autocomplete="off"; }
                 (choice("method", "Method", methods(report)))
-                (choice("is", "Is", standings(report)))
+                (choice("grade", "Grade", grades(report)))
                 (choice("code", "Verdict", codes(report)))
                 button type="reset" { "No filter" }
             }
@@ -311,25 +317,22 @@ fn methods(report: &RunReport) -> Vec<(String, String)> {
         .collect()
 }
 
-fn standings(report: &RunReport) -> Vec<(String, String)> {
-    Standing::ALL
-        .into_iter()
-        .filter(|standing| report.results.iter().any(|one| one.standing == *standing))
-        .map(|standing| (standing.to_string(), standing.to_string()))
+fn grades(report: &RunReport) -> Vec<(String, String)> {
+    let has = |grade: &Grade| report.results.iter().any(|one| one.result.grade == *grade);
+    let grades = Grade::ALL.into_iter().filter(has);
+    grades
+        .map(|grade| (grade.to_string(), grade.to_string()))
         .collect()
 }
 
 fn codes(report: &RunReport) -> Vec<(String, String)> {
-    let found = |code: &&Code| {
-        report
-            .results
-            .iter()
-            .any(|one| primary(one) == Some(**code))
+    let found = |code: &Code| {
+        let mut results = report.results.iter();
+        results.any(|one| primary(one) == Some(*code))
     };
-    Code::ALL
-        .iter()
-        .filter(found)
-        .map(|code| (code.to_string(), format!("{code} {}", code.about())))
+    let codes = Code::all().into_iter().filter(found);
+    codes
+        .map(|code| (code.to_string(), format!("{code} {}", code.title())))
         .collect()
 }
 
@@ -340,7 +343,7 @@ fn primary(one: &ReportedResult) -> Option<Code> {
 fn row(report: &RunReport, one: &ReportedResult, columns: &[&(&str, &str)]) -> Markup {
     let code = primary(one).map_or(String::new(), |code| code.to_string());
     html! {
-        tr id={ "r" (one.number) } data-method=(one.result.method) data-is=(one.standing) data-code=(code) {
+        tr id={ "r" (one.number) } data-method=(one.result.method) data-grade=(one.result.grade) data-code=(code) {
             @for (name, class) in columns { (cell(report, one, name, class)) }
         }
     }
@@ -388,23 +391,24 @@ fn cell(report: &RunReport, one: &ReportedResult, name: &str, class: &str) -> Ma
             html! { td class=[class] { (place) } }
         }
         "reference" => html! { td class=[class] { (result.references.join(" ")) } },
-        "is" => {
-            let class = match one.standing {
-                Standing::Right => "right",
-                Standing::Wrong => "wrong",
-                Standing::NoPose => "none",
-                Standing::Unmeasured | Standing::LowConfidence => "",
+        "grade" => {
+            let grade = result.grade;
+            let class = match grade {
+                Grade::Right => "right",
+                Grade::Wrong => "wrong",
+                Grade::NoPose => "none",
+                Grade::Unmeasured => "",
             };
-            html! { td class=(class) { (one.standing.mark()) " " (one.standing) } }
+            html! { td class=(class) { (grade.glyph()) " " (grade) } }
         }
         "error (m)" => number(result.error.map(|error| error.translation_m), 3),
         "rotation (°)" => number(result.error.map(|error| error.rotation_deg), 2),
         "start (m)" => number(result.initial_error.map(|error| error.translation_m), 3),
-        "probability" => number(result.trust.as_ref().and_then(|trust| trust.probability), 3),
+        "probability" => number(result.confidence.as_ref().map(|one| one.probability), 3),
         "code" => html! {
             td {
                 @if let Some(primary) = result.diagnosis.first() {
-                    @if one.is_failure {
+                    @if one.result.grade.is_failure() {
                         a href={ "#f" (one.number) } title=(primary.text) { (primary.code) }
                     } @else {
                         span title=(primary.text) { (primary.code) }
@@ -417,8 +421,11 @@ fn cell(report: &RunReport, one: &ReportedResult, name: &str, class: &str) -> Ma
 }
 
 fn failures(report: &RunReport) -> Markup {
-    let failures: Vec<&ReportedResult> =
-        report.results.iter().filter(|one| one.is_failure).collect();
+    let failures: Vec<&ReportedResult> = report
+        .results
+        .iter()
+        .filter(|one| one.result.grade.is_failure())
+        .collect();
     html! {
         section aria-labelledby="failures" {
             h2 id="failures" { "Failures (" (failures.len()) ")" }

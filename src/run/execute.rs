@@ -276,9 +276,7 @@ impl Execution<'_> {
         let per_method = (results.len() / methods.len().max(1)).max(1);
         let per_request = self.run.protocol.fusions.len().max(1);
         for (&method, of_method) in methods.iter().zip(results.chunks(per_method)) {
-            let failed = |(result, _): &(QueryResult, StageTimes)| {
-                !result.is_success(self.run.failure_radius_m)
-            };
+            let failed = |(result, _): &(QueryResult, StageTimes)| result.grade.is_failure();
             let Some(request) = of_method
                 .iter()
                 .position(failed)
@@ -324,6 +322,7 @@ impl Execution<'_> {
                             protocol.seed,
                             Err(&failure),
                             None,
+                            protocol.right,
                         )
                     };
                     results.push((result, StageTimes::default()));

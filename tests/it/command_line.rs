@@ -174,7 +174,10 @@ fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
     let results = std::fs::read(out.join("results.jsonl")).expect("results");
     for result in json_lines(&results) {
         let reason = &result["reason"]["text"];
-        assert_eq!(reason, "no reference frame with pose and scan within 0.5 m");
+        assert_eq!(
+            reason,
+            "No reference frame with pose and scan within 0.5 m of the query."
+        );
     }
 }
 

@@ -4,7 +4,7 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Command, KnownResults, NamedPose, Results};
-use posescope::code::Code;
+use posescope::diagnosis::Code;
 use posescope::event::{Event, Stage};
 use posescope::localize::QueryResult;
 use posescope::method::Method;
@@ -288,8 +288,8 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
         rows.collect()
     };
     let compared = posescope::measure::RunComparison::of(
-        (&rows(&before), 10.0),
-        (&rows(&now), 10.0),
+        &rows(&before),
+        &rows(&now),
         &posescope::measure::Tolerance::default(),
     );
     assert_eq!(compared.migrations.len(), 1);

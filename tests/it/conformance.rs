@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope::cloud::Cloud;
-use posescope::code::Code;
 use posescope::cost::{
     self, Cost, Entropies, Evaluator, Explanation, IntensityPair, JointHistogram,
 };
+use posescope::diagnosis::Code;
 use posescope::estimator::{self, Outcome, Parts};
 use posescope::event::{
     DepthsLifted, Event, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind, KindSet,
@@ -423,7 +423,7 @@ fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
             Parts::Own(own) if own.has_features => assert!(outcome.pose.is_ok()),
             Parts::Cost(_) | Parts::Own(_) => {
                 let failure = outcome.pose.expect_err("400 million hypotheses");
-                assert_eq!(failure.code(), Code::D9);
+                assert_eq!(Code::of(&failure), Code::D9);
                 let said = failure.to_string();
                 assert!(
                     said.contains("400040001") && said.contains("grid.coarse_step"),

@@ -1,7 +1,7 @@
 //! Single decisions of the estimators, on two walls: each parameter changes what it says it does.
 
 use posescope::cloud::Cloud;
-use posescope::code::Code;
+use posescope::diagnosis::Code;
 use posescope::diagnosis::{Evidence, Subject, Tolerance};
 use posescope::estimator::{self, Failure, Outcome};
 use posescope::geometry::Pose;
@@ -43,7 +43,7 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
         matches!(failure, Failure::OutsideRadius { .. }),
         "{failure}"
     );
-    assert_eq!(failure.code(), Code::R9);
+    assert_eq!(Code::of(&failure), Code::R9);
     for accepting in ["fb.accept=paper", "fb.radius_slack=2"] {
         let pose = outcome(Method::FB, &near, &with(&[accepting])).pose;
         assert!(pose.is_ok(), "{accepting}");

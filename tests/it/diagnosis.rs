@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use posescope::code::Code;
-use posescope::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope::diagnosis::Code;
+use posescope::diagnosis::{Diagnosis, Evidence, Family, RULES, Subject, Tolerance, diagnose};
 use posescope::event::KindSet;
 use posescope::geometry::Pose;
 use posescope::localize::{
@@ -193,8 +193,8 @@ fn the_look_of_one_pose_is_not_taken_for_that_of_another() {
         let outcome = localize_traced(problem, Method::FB, params, &mut trace);
         let outcome = outcome.expect("nobody cancels");
         let subject = Subject::new(problem, Method::FB, params, &outcome, &evidence);
-        let trust = subject.trust.expect("of a pose");
-        (outcome.pose.expect("a pose"), trust)
+        let confidence = subject.confidence.expect("of a pose");
+        (outcome.pose.expect("a pose"), confidence)
     };
     let settings = ["fb.ratio=0.8", "fb.ratio=0.5"].map(|setting| with(&[setting]));
     let told = settings
@@ -217,7 +217,7 @@ fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
     let outside = beyond.iter().find(|finding| finding.code == Code::R9);
     let outside = outside.expect("R9");
     assert!(
-        outside.text.contains("3.4 m from the reference"),
+        outside.text.contains("3.40 m from the reference"),
         "{}",
         outside.text
     );
@@ -526,10 +526,7 @@ fn a_pose_that_is_less_certain_than_asked_for_is_refused() {
             .localize(0, 1, requests, &[Method::FB], &mut NoObserver, keep)
             .expect("good data");
     }
-    let probability = results[0]
-        .trust
-        .as_ref()
-        .and_then(|trust| trust.probability);
+    let probability = results[0].confidence.as_ref().map(|one| one.probability);
     assert!(
         probability.is_some_and(|p| (0.0..1.0).contains(&p)),
         "{probability:?}"
@@ -571,17 +568,61 @@ fn a_method_may_ask_for_more_certainty_than_nobody_does() {
     let reason = never.reason.expect("no pose is that certain");
     assert_eq!(reason.code, Code::L1);
     assert_eq!(
-        always.trust, never.trust,
+        always.confidence, never.confidence,
         "how certain it is, it says all the same"
     );
 }
 
-#[test]
-fn every_code_is_explained() {
-    let page = include_str!("../../docs/diagnosis.md");
-    for code in Code::ALL {
-        assert!(page.contains(&format!("| **{code}** |")), "{code}");
+/// The table of verdicts as docs/diagnosis.md has it.
+fn table_of_verdicts() -> String {
+    let mut table = "\n| code | it means | applies to | needs the truth | what to do |\n\
+                     |---|---|---|---|---|\n"
+        .to_owned();
+    for rule in RULES {
+        let families: Vec<&str> = rule
+            .applies_to
+            .iter()
+            .map(|family| family.words())
+            .collect();
+        let applies_to = match families.len() {
+            0 => "–".to_owned(),
+            all if all == Family::ALL.len() => "all".to_owned(),
+            _ => families.join(", "),
+        };
+        let conclusive = if rule.is_conclusive {
+            ", conclusive"
+        } else {
+            ""
+        };
+        let truth = if rule.needs_truth { "yes" } else { "no" };
+        table += &format!(
+            "| **{}** | {}{conclusive} | {applies_to} | {truth} | {} |\n",
+            rule.code, rule.title, rule.advice
+        );
     }
+    table
+}
+
+#[test]
+fn verdicts_in_the_docs_are_those_of_the_rules() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/diagnosis.md");
+    let page = std::fs::read_to_string(&path).expect("the page");
+    let begin = page.find("<!-- verdicts").expect("where the table begins");
+    let begin = begin + page[begin..].find("-->").expect("its end") + "-->\n".len();
+    let end = page
+        .find("<!-- /verdicts -->")
+        .expect("where the table ends");
+    let table = table_of_verdicts() + "\n";
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        let page = format!("{}{table}{}", &page[..begin], &page[end..]);
+        std::fs::write(&path, page).expect("writable");
+        return;
+    }
+    assert_eq!(
+        &page[begin..end],
+        table,
+        "UPDATE_DOCS=1 cargo test verdicts_in_the_docs writes the table"
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::process::{Command as Process, Stdio};
 use std::sync::Arc;
 
 use assert_cmd::Command;
-use posescope::code::Code;
+use posescope::diagnosis::Code;
 use posescope::image::Photo;
 use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
 use posescope::method::Method;
@@ -78,7 +78,7 @@ fn a_run_folder_holds_what_is_promised() {
     let sequence = SmallSequence::of(&FRAMES);
     let out = sequence.path().join("run");
     // Hardly a pose is within a micrometre, so that many queries fail; three are recorded.
-    let extra = ["--failure-radius", "0.000001", "--max-recordings", "3"];
+    let extra = ["--right", "0.000001m,5deg", "--max-recordings", "3"];
     let output = eval(&sequence, &out, &extra)
         .output()
         .expect("the binary starts");
@@ -119,7 +119,7 @@ fn a_run_folder_holds_what_is_promised() {
     assert_eq!(junit.matches("<testcase ").count(), 24);
     let failed: Vec<String> = results
         .iter()
-        .filter(|result| !result.is_success(0.000001))
+        .filter(|result| result.grade.is_failure())
         .map(|result| format!("{}-{}", result.query, result.method))
         .collect();
     assert!(failed.len() > 3, "{failed:?}");
@@ -355,7 +355,14 @@ fn gates_and_regressions_decide_the_exit_code() {
     run(
         &sequence,
         &good,
-        &["--failure-radius", "100", "--gate", "success@mi >= 0.5"],
+        &[
+            "--failure-radius",
+            "100",
+            "--gate",
+            "success@mi >= 0.5",
+            "--right",
+            "100m,180deg",
+        ],
     );
     expect_line(
         &mut eval(
@@ -372,7 +379,7 @@ fn gates_and_regressions_decide_the_exit_code() {
         &["--help"],
     );
     let baseline = good.to_str().expect("a plain path");
-    let extra = ["--failure-radius", "0.000001", "--baseline", baseline];
+    let extra = ["--right", "0.000001m,5deg", "--baseline", baseline];
     expect_line(&mut eval(&sequence, &bad, &extra), 1, &["broken since"]);
     let diff = |a: &Path, b: &Path| {
         let mut command = posescope();

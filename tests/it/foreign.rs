@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use posescope::code::Code;
+use posescope::diagnosis::Code;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
 use tempfile::TempDir;

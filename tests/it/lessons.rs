@@ -6,7 +6,6 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Command, Setup, views};
-use posescope::diagnosis::Tolerance;
 use posescope::lesson::{Answer, Lesson, Moment};
 use posescope::localize::{NoObserver, QueryResult};
 use posescope::session::RunState;
@@ -258,7 +257,7 @@ fn every_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
                 .filter(|(variant, _)| *variant == claim.variant);
             let is_met = of_variant
                 .flat_map(|(_, results)| results)
-                .any(|result| claim.holds.is_met(result, Tolerance::default()));
+                .any(|result| claim.holds.is_met(result));
             let (name, variant) = (&lesson.name, &claim.variant);
             assert!(
                 is_met,

@@ -39,7 +39,6 @@ fn identity() -> Identity {
         configuration: Params::default().to_toml(),
         degraded: Default::default(),
         seed: 7,
-        failure_radius_m: 10.0,
     }
 }
 

@@ -88,7 +88,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
         web_viewer()
     );
     assert!(page.contains(&link));
-    assert!(page.contains("too few features"));
+    assert!(page.contains("Too few keypoints"));
     // A direct method's failure has its costs.
     assert!(
         page.contains("of positions around the reference") || page.contains("positions around")
@@ -123,9 +123,29 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
 }
 
 #[test]
+fn the_report_says_all_that_was_asked() {
+    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
+    let out = run(
+        &sequence,
+        "run",
+        &["--limit", "3", "--explain", "1", "--accept", "0.25"],
+    );
+    let page = text(&out.join("report.html"));
+    for words in [
+        "<dt>At most</dt><dd>3 queries",
+        "by up to 1 runs each",
+        "poses with a confidence below 0.25",
+        "within 1m,5deg of the truth; wrong otherwise",
+        "Success, as the paper counts it",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+}
+
+#[test]
 fn two_runs_are_held_against_each_other() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let before = run(&sequence, "before", &["--failure-radius", "0.5"]);
+    let before = run(&sequence, "before", &["--right", "0.5m,5deg"]);
     let after = run(&sequence, "after", &[]);
     posescope()
         .arg("report")
@@ -137,7 +157,7 @@ fn two_runs_are_held_against_each_other() {
     assert!(page.contains("Changes since <code>"));
     assert!(
         page.contains(">fixed</td>"),
-        "a greater radius fixes what was far"
+        "a wider tolerance fixes what was wrong"
     );
 }
 
@@ -149,7 +169,7 @@ fn what_comes_from_elsewhere_is_no_markup() {
     for file in ["run.toml", "results.jsonl"] {
         let path = out.join(file);
         let spoilt = text(&path).replace("000002", evil);
-        let spoilt = spoilt.replace("too few features", "<img src=x onerror=alert(1)>");
+        let spoilt = spoilt.replace("Too few keypoints", "<img src=x onerror=alert(1)>");
         fs::write(path, spoilt).expect("writable");
     }
     let mut command = posescope();

@@ -101,11 +101,11 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
     let black = image::GrayImage::new(160, 64);
     black.save(sequence.image("000002")).expect("writable");
     let before = sequence.path().join("before");
-    let words = ["--seed", "3", "--failure-radius", "2"];
+    let words = ["--seed", "3", "--right", "2m,10deg"];
     eval(&sequence, &before, &words).assert().code(0);
     let failed: Vec<String> = results(&before)
         .into_iter()
-        .filter(|result| !result.is_success(2.0))
+        .filter(|result| result.grade.is_failure())
         .map(|result| result.query)
         .collect();
     assert!(failed.contains(&"000002".to_owned()) && !failed.contains(&"000000".to_owned()));
@@ -123,7 +123,7 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
         "seed = 3",
         "bins = 32",
         "degrade = \"exposure=1\"",
-        "failure_radius_m = 2.0",
+        "right = \"2m,10deg\"",
     ] {
         assert!(run.contains(line), "{line} is missing in {run}");
     }
@@ -145,9 +145,13 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
 
     // Where nothing failed there is nothing to do.
     let fine = sequence.path().join("fine");
-    eval(&sequence, &fine, &["--only", "0", "--method", "fb"])
-        .assert()
-        .code(0);
+    eval(
+        &sequence,
+        &fine,
+        &["--only", "0", "--method", "fb", "--right", "9m,90deg"],
+    )
+    .assert()
+    .code(0);
     let mut command = posescope();
     command.args(["eval", "--failed"]).arg(&fine);
     let output = command.output().expect("it starts");

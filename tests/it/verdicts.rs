@@ -75,32 +75,34 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
 fn the_window_counts_the_failures_that_the_run_counts() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3, 4, 5]);
     let out = sequence.path().join("run");
-    posescope()
-        .arg("eval")
-        .arg(sequence.folder())
-        .args([
-            "--method",
-            "mi",
-            "--references",
-            "random:1",
-            "--radius",
-            "3",
-        ])
-        .args(["--max-recordings", "0", "--out"])
-        .arg(&out)
-        .assert()
-        .code(0);
-    let rows = read_rows(&out).expect("results");
-    let mut errors: Vec<f64> = rows
+    let eval = |right: &str, out: &std::path::Path| {
+        posescope()
+            .arg("eval")
+            .arg(sequence.folder())
+            .args([
+                "--method",
+                "mi",
+                "--references",
+                "random:1",
+                "--radius",
+                "3",
+            ])
+            .args(["--max-recordings", "0", "--right", right, "--out"])
+            .arg(out)
+            .assert()
+            .code(0);
+        read_rows(out).expect("results")
+    };
+    let mut errors: Vec<f64> = eval("1m,5deg", &sequence.path().join("first"))
         .iter()
         .filter_map(|row| Some(row.error?.translation_m))
         .collect();
     errors.sort_by(f64::total_cmp);
-    // Nearer than 10 m, all of them.
-    let failure_radius_m = errors[errors.len() / 2];
-    assert!(failure_radius_m < 10.0);
-    let measures = measure(&rows, failure_radius_m);
-    let failed = measures[0].queries - measures[0].successes;
+    // Half of them are right.
+    let right = format!("{}m,180deg", errors[errors.len() / 2]);
+    let rows = eval(&right, &out);
+    let measures = measure(&rows, 10.0);
+    let failed = measures[0].queries - measures[0].right;
     assert!(failed > 0 && failed < 6, "{failed} of 6 failed");
 
     let mut results = Results::new();
@@ -109,7 +111,6 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     }
     let setup = Setup {
         offered: results.keys().copied().filter(|query| *query < 3).collect(),
-        failure_radius_m,
         ..setup()
     };
     let mut window = window_with_results(setup, results);

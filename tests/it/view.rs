@@ -28,6 +28,75 @@ fn without_a_display_it_records_instead() {
     assert!(sequence.path().join("recordings/000005.rrd").is_file());
 }
 
+#[test]
+fn the_options_beside_the_folder_of_a_run_are_obeyed_or_refused() {
+    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
+    let run = sequence.path().join("run");
+    posescope()
+        .arg("eval")
+        .arg(sequence.folder())
+        .args([
+            "--method",
+            "fb,mi",
+            "--radius",
+            "2",
+            "--max-recordings",
+            "0",
+            "--out",
+        ])
+        .arg(&run)
+        .assert()
+        .code(0);
+    let view = |options: &[&str]| {
+        let output = posescope()
+            .current_dir(sequence.path())
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .arg("view")
+            .arg(&run)
+            .args(options)
+            .output()
+            .expect("the binary starts");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (
+            output.status.code(),
+            text(&output.stdout),
+            text(&output.stderr),
+        )
+    };
+    let methods = |table: &str| {
+        let is_method = |word: &&str| ["fb", "pm", "mi", "hy"].contains(word);
+        let rows = table.lines().filter(|line| line.starts_with("00000"));
+        let words = rows.filter_map(|line| line.split_whitespace().find(is_method));
+        words.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let (code, table, said) = view(&[]);
+    assert_eq!(
+        (code, methods(&table)),
+        (Some(0), vec!["fb".into(), "mi".into()]),
+        "{said}"
+    );
+    let (_, table, said) = view(&["--method", "pm"]);
+    assert_eq!(methods(&table), ["pm"], "{said}");
+    let (_, table, said) = view(&[
+        "--query",
+        "0",
+        "--method",
+        "mi",
+        "--right",
+        "0.000001m,1deg",
+    ]);
+    assert!(table.contains("▲ wrong"), "{table}{said}");
+    let (_, table, said) = view(&["--query", "0", "--reference", "3", "--method", "fb"]);
+    assert!(table.contains("000003"), "{table}{said}");
+    for refused in [["--queries", "street"], ["--camera", "1,1,1,1"]] {
+        let options = [&["--query", "0"][..], &refused[..]].concat();
+        let (code, _, said) = view(&options);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(refused[0]), "{said}");
+    }
+}
+
 /// A process that ends with the test.
 struct KilledOnDrop(Child);
 

@@ -38,7 +38,6 @@ pub fn setup() -> Setup {
         query: 1,
         chosen: vec![0].into(),
         index: Arc::default(),
-        failure_radius_m: 10.0,
         mode: RunMode::Paused,
         folder: std::env::temp_dir(),
     }

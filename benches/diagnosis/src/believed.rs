@@ -1,10 +1,11 @@
 //! Is anything believed that cannot be known, or doubted that is right?
 //!
 //! `cargo run -p posescope-diagnosis --bin believed -- --places 40` localises queries that show nothing
-//! of their place (grey, noise, mirrored, upside down, another town) without telling the truth, and
-//! counts the poses without any verdict: there should be none. Then it localises proper queries of all
-//! conditions against references of all, and counts failure verdicts on poses that are right, with the
-//! truth and without: there should be hardly any.
+//! of their place (grey, noise, mirrored, upside down, another town) without the truth, and counts the poses
+//! that are trusted: there should be none. Then it localises proper queries of all conditions against references
+//! of all, and counts failure verdicts on right poses, with the truth and without, and right poses of low
+//! confidence: there should be hardly any. Last, it counts the wrong poses that are trusted, at the limit of
+//! 0.95 and at 0.98.
 //!
 //! Options: `--places N` (40), `--seed N` (0), `--real yes` for the pairs of real photos below
 //! `POSESCOPE_DATA` instead of the street.
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use image::{Rgb, RgbImage};
-use posescope::diagnosis::Tolerance;
+use posescope::diagnosis::{Confidence, Grade};
 use posescope::localize::{QueryResult, Status};
 use posescope::method::Method;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
@@ -67,31 +68,36 @@ fn main() -> Result<(), String> {
         true => in_real_pairs()?,
         false => on_the_street(places, seed),
     };
-    let (mut believed, mut alarms) = (Counts::new(), Counts::new());
-    for (of_unknowable, of_right) in counted {
-        add(&mut believed, of_unknowable);
-        add(&mut alarms, of_right);
+    let mut sums = [Counts::new(), Counts::new(), Counts::new()];
+    for of_place in counted {
+        for (sum, counts) in sums.iter_mut().zip(of_place) {
+            add(sum, counts);
+        }
     }
+    let [unknowable, one, two] = &sums;
     print(
-        "Queries that show nothing of their place: poses believed without any verdict",
-        &believed,
+        "Queries that show nothing of their place: trusted poses",
+        unknowable,
     );
-    print("Poses that are right: failure verdicts", &alarms);
+    print("Query and reference of one condition", one);
+    print("Query and reference of any two conditions", two);
     Ok(())
 }
 
-/// What was counted at each place: of queries that cannot be known, and of those that were right.
-fn on_the_street(places: usize, seed: u64) -> Vec<(Counts, Counts)> {
+/// What was counted at each place: of queries that show nothing of it, of proper ones in one condition, and in
+/// two.
+fn on_the_street(places: usize, seed: u64) -> Vec<[Counts; 3]> {
     let drives = Drives::new();
     let conditions = Condition::ALL.map(|c| (c, Traversal::new(WORLD_SEED, c, Size::Full)));
     let done = AtomicUsize::new(0);
     let at = |number| {
         let place = Place::numbered(&drives, number, seed);
-        let right = place.street().map(|street| {
-            let kept = in_two_conditions(&place, street, &conditions);
-            right(&kept)
+        let proper = place.street().map(|street| {
+            let cases = in_two_conditions(&place, street, &conditions);
+            cases.map(|case| graded(&[case]))
         });
-        let counts = (unknowable(&place), right.unwrap_or_default());
+        let [one, two] = proper.unwrap_or_default();
+        let counts = [unknowable(&place), one, two];
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         eprintln!("{count} of {places} places");
         counts
@@ -99,7 +105,7 @@ fn on_the_street(places: usize, seed: u64) -> Vec<(Counts, Counts)> {
     (0..places).into_par_iter().map(at).collect()
 }
 
-fn in_real_pairs() -> Result<Vec<(Counts, Counts)>, String> {
+fn in_real_pairs() -> Result<Vec<[Counts; 3]>, String> {
     let pairs = real_pairs::all()?;
     if pairs.is_empty() {
         println!("skipped: no data");
@@ -107,7 +113,7 @@ fn in_real_pairs() -> Result<Vec<(Counts, Counts)>, String> {
     let counted = pairs.par_iter().enumerate().map(|(number, pair)| {
         let place = Place::real(pair, number);
         eprintln!("{}", pair.name);
-        (unknowable(&place), right(&[place.case()]))
+        [unknowable(&place), graded(&[place.case()]), Counts::new()]
     });
     Ok(counted.collect())
 }
@@ -161,17 +167,20 @@ fn unknowable(place: &Place<'_>) -> Counts {
         let mut case = case.clone();
         case.query.photo = photo;
         for result in case.results(&METHODS, false) {
-            let is_believed = result.status == Status::Ok && result.diagnosis.is_empty();
+            let is_trusted = result.confidence_word() == Some(Confidence::Trusted);
             let entry = counts.entry((kind, result.method.name())).or_default();
-            entry.add(is_believed, probability(&result));
+            entry.add(
+                result.status == Status::Ok && is_trusted,
+                probability(&result),
+            );
         }
     }
     counts
 }
 
 fn probability(result: &QueryResult) -> f64 {
-    let trust = result.trust.as_ref();
-    trust.and_then(|trust| trust.probability).unwrap_or(0.0)
+    let confidence = result.confidence.as_ref();
+    confidence.map_or(0.0, |confidence| confidence.probability)
 }
 
 /// The query and the reference of the place in two conditions each.
@@ -205,23 +214,37 @@ fn in_two_conditions(
     })
 }
 
-/// Failure verdicts and doubts on the poses that are right.
-fn right(cases: &[Case]) -> Counts {
+/// What is said of poses that are right, and of those that are wrong.
+fn graded(cases: &[Case]) -> Counts {
     let mut counts = Counts::new();
     for case in cases {
         let (known, withheld) = (case.results(&METHODS, true), case.results(&METHODS, false));
         for (known, withheld) in known.iter().zip(&withheld) {
-            let tolerance = Tolerance::default();
-            if !known.error.is_some_and(|error| tolerance.contains(&error)) {
+            let p = probability(withheld);
+            if known.grade == Grade::Wrong {
+                for (kind, limit) in [("wrong, from 0.95 on", 0.95), ("wrong, from 0.98 on", 0.98)]
+                {
+                    let entry = counts.entry((kind, known.method.name())).or_default();
+                    entry.add(p >= limit, p);
+                }
+            }
+            if known.grade != Grade::Right {
                 continue;
             }
             let is_alarm =
                 |result: &QueryResult| result.diagnosis.iter().any(|d| d.code.is_failure());
-            let is_doubted = |result: &QueryResult| !result.diagnosis.is_empty();
+            let word = withheld.confidence_word();
             for (kind, bad) in [
-                ("truth known", is_alarm(known)),
-                ("truth withheld", is_alarm(withheld)),
-                ("low confidence alone", is_doubted(withheld)),
+                (
+                    "right, with a failure verdict, truth known",
+                    is_alarm(known),
+                ),
+                (
+                    "right, with a failure verdict, truth withheld",
+                    is_alarm(withheld),
+                ),
+                ("right, low confidence", word == Some(Confidence::Low)),
+                ("right, not trusted", word != Some(Confidence::Trusted)),
             ] {
                 let entry = counts.entry((kind, known.method.name())).or_default();
                 entry.add(bad, probability(withheld));

@@ -4,7 +4,7 @@
 //! condition of the street against references of every other, fits a logistic function of each method's
 //! signals where both are overcast, sunny or snowy, and on queries that do not show their place (mirrored, of another
 //! town, of another street of this one), and prints its coefficients, as
-//! `diagnosis/trust/coefficients.rs` holds them. Then it judges the probabilities that posescope has
+//! `diagnosis/confidence/coefficients.rs` holds them. Then it judges the probabilities that posescope has
 //! now, and those of the coefficients, on the pairs that night or rain is part of: calibration error,
 //! area under the ROC curve, reliability by tenths.
 //!
@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{DMatrix, DVector};
-use posescope::diagnosis::{Evidence, trust};
+use posescope::diagnosis::{Evidence, confidence};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::image::Photo;
@@ -376,17 +376,18 @@ fn of_problem(
         let outcome = estimator
             .estimate(problem, &mut Trace::to(&mut evidence))
             .expect("nobody cancels");
-        let signals = trust::signals(problem, method, &params, &outcome, &evidence);
+        let signals = confidence::signals(problem, method, &params, &outcome, &evidence);
         let (Ok(pose), Some(signals)) = (&outcome.pose, signals) else {
             continue;
         };
-        let is_near = truth
-            .is_some_and(|truth| PoseError::between(truth, pose).translation_m < trust::WITHIN_M);
+        let is_near = truth.is_some_and(|truth| {
+            PoseError::between(truth, pose).translation_m < confidence::WITHIN_M
+        });
         samples.push(Sample {
             method: method.name().to_owned(),
             conditions: conditions.clone(),
             is_near,
-            probability: trust::probability(method, &signals.values),
+            probability: confidence::probability(method, &signals.values),
             names: signals
                 .names
                 .iter()
@@ -415,7 +416,7 @@ fn read(path: &str) -> Result<Vec<Sample>, String> {
             let (method, conditions, is_near, names, values) = read;
             let known = JUDGED.iter().find(|known| known.name() == method);
             Ok(Sample {
-                probability: known.and_then(|known| trust::probability(*known, &values)),
+                probability: known.and_then(|known| confidence::probability(*known, &values)),
                 method,
                 conditions,
                 is_near,

@@ -10,7 +10,7 @@
 //! Options: `--cases N` (60), `--disc N` (20) of them over the whole disc, `--seed N` (0), `--misses` to
 //! print those that disagree.
 
-use posescope::code::Code;
+use posescope::diagnosis::Code;
 use posescope::diagnosis::{Evidence, Subject, Tolerance, diagnose};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};

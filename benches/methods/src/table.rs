@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::time::Instant;
 
-use posescope::diagnosis::{Evidence, Subject, trust};
+use posescope::diagnosis::{Evidence, Subject, confidence};
 use posescope::estimator;
 use posescope::event::{Event, Kind, KindSet};
 use posescope::geometry::{Pose, PoseError};
@@ -219,7 +219,7 @@ fn measure(cases: &[Case], options: &Options) -> Vec<Measured> {
                 };
                 let subject =
                     Subject::new(&problem, asked.method, &asked.params, &outcome, &evidence);
-                let outcome = trust::accepted(&subject, None);
+                let outcome = confidence::accepted(&subject, None);
                 let took_s = started.elapsed().as_secs_f64();
                 let error = outcome.pose.as_ref().ok();
                 let error = error.map(|pose| PoseError::between(&case.truth, pose));
@@ -230,7 +230,7 @@ fn measure(cases: &[Case], options: &Options) -> Vec<Measured> {
                         (Err(failure), _) => failure.to_string(),
                         _ => String::new(),
                     };
-                    let probability = subject.trust.as_ref().and_then(|trust| trust.probability);
+                    let probability = subject.confidence.as_ref().map(|one| one.probability);
                     let cost = outcome.cost.map_or(f64::NAN, |cost| cost.best);
                     let from_truth = match options.from_truth {
                         true => {

@@ -1,78 +1,70 @@
-//! Why a pose is wrong or missing: verdicts with their evidence.
+//! What a result is worth, and why it is wrong or missing.
 //!
-//! A verdict is a value beside the result. Nothing here changes a pose: estimators know no truth and
-//! tell what they do; what they told ([`Evidence`]) is compared with the truth, where that is known,
-//! and ordered tests say what failed. The first that fires is the primary verdict, those after it are
-//! listed behind.
+//! An [`Assessment`] is made once for each result, from its pose, the truth where that is known, and the
+//! tolerance: a *grade*, a *confidence* and *verdicts* with their evidence. Nothing here changes a pose.
+//! Estimators know no truth; they emit events, and what verdicts need of those is an [`Evidence`].
 //!
-//! | file | verdicts |
+//! | file | what it holds |
 //! |---|---|
-//! | `suspicion` | X1: the truth, a calibration or the units cannot be right |
-//! | `direct` | D1 to D8: the search, the cost, or what it was not allowed to move |
-//! | `settled` | D2, D3, D4, H1 of methods that search from many starts |
-//! | `feature`, `guided` | R1 to R9: where the true matches went |
-//! | `foreign` | those of a direct method that need a pose alone, for poses of other systems |
-//! | `combined` | H1, F1, V1: hybrids, fusions, retrieval |
-//! | `trust` | L1: how far a pose is to be believed without knowing the truth |
+//! | `rules`, one file for each code in `rules/` | the table of verdicts: test, sentence, proof, remedies |
+//! | `case` | what a rule looks at |
+//! | `matches`, `search`, `starts` | what the truth says about matches, a grid search, a search from many starts |
+//! | `confidence` | how likely a pose is right, without the truth |
+//! | `fused` | fused poses and rankings |
+//! | `remedies` | what may help |
 //!
 //! A pose that is right carries at most L1.
 
-mod combined;
+mod ask;
+mod assessment;
+mod case;
+pub mod confidence;
 mod descent;
-mod direct;
 mod evidence;
-mod feature;
-mod foreign;
-mod guided;
+mod family;
+mod fused;
 mod matches;
+mod numbers;
+mod proof;
 pub mod remedies;
-mod settled;
-mod suspicion;
+mod reported;
+mod rules;
+mod search;
+mod starts;
 mod tolerance;
-pub mod trust;
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 
-pub use crate::code::Code;
-pub use combined::{Member, diagnose_fusion, diagnose_joint, diagnose_ranking, fused_trust};
+pub use assessment::{Assessment, Grade};
+pub use case::{Case, FusionCase, Member, RankingCase};
+pub use confidence::{Confidence, PoseConfidence};
 pub use evidence::Evidence;
+pub use family::Family;
+pub use fused::{diagnose_fusion, diagnose_ranking, fused_confidence};
+pub use proof::{MapOverlay, Proof};
+pub use rules::{Code, DecidedAt, RULES, Rule, Test};
 pub use tolerance::Tolerance;
-pub use trust::Trust;
 
-use crate::estimator::{self, Failure, Outcome, Parts};
+use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
+use search::Search;
 
-/// A finding about why a pose is wrong, missing or hardly to be believed.
+/// A verdict on why a pose is wrong, missing or uncertain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// The code.
     pub code: Code,
-    /// The finding in one sentence.
+    /// The verdict in one or two sentences, made from the evidence.
     pub text: String,
     /// The numbers behind it.
     pub evidence: Value,
 }
 
-impl Diagnosis {
-    /// What an estimator that has no pose says itself.
-    pub fn of_failure(failure: &Failure) -> Self {
-        Self::new(failure.code(), failure.to_string(), json!({}))
-    }
-
-    fn new(code: Code, text: impl Into<String>, evidence: Value) -> Self {
-        Self {
-            code,
-            text: text.into(),
-            evidence,
-        }
-    }
-}
-
-/// What is judged: a method's outcome on a problem, what it told, and the truth where it is known.
+/// What is assessed: a method's outcome on a problem, what it emitted, and the truth where it is known.
 #[derive(Clone, Debug)]
 pub struct Subject<'a> {
     /// The problem.
@@ -83,10 +75,10 @@ pub struct Subject<'a> {
     pub params: &'a Params,
     /// What it answered.
     pub outcome: &'a Outcome,
-    /// What it told.
+    /// What it emitted.
     pub evidence: &'a Evidence,
-    /// How far its pose is to be believed; `None` without a pose.
-    pub trust: Option<Trust>,
+    /// How likely its pose is right; `None` without a pose, and where it cannot be known.
+    pub confidence: Option<PoseConfidence>,
     /// The query's true pose, `world_from_camera`.
     pub truth: Option<&'a Pose>,
     /// When a pose is right.
@@ -94,7 +86,7 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// An outcome and what was told on the way to it.
+    /// An outcome and what was emitted on the way to it.
     pub fn new(
         problem: &'a Problem,
         method: Method,
@@ -108,13 +100,13 @@ impl<'a> Subject<'a> {
             params,
             outcome,
             evidence,
-            trust: Trust::of(problem, method, params, outcome, evidence),
+            confidence: PoseConfidence::of(problem, method, params, outcome, evidence),
             truth: None,
             tolerance: Tolerance::default(),
         }
     }
 
-    /// The same, held against the truth: right is what is within the tolerance of it.
+    /// The same, compared with the truth: right is what is within the tolerance of it.
     #[must_use]
     pub fn against(self, truth: Option<&'a Pose>, tolerance: Tolerance) -> Self {
         Self {
@@ -124,15 +116,22 @@ impl<'a> Subject<'a> {
         }
     }
 
+    /// What the pose is worth by the truth.
+    pub fn grade(&self) -> Grade {
+        let has_pose = self.outcome.pose.is_ok();
+        Grade::of(has_pose, self.error().as_ref(), self.tolerance)
+    }
+
     /// The error of the pose, where there are both a pose and the truth.
     fn error(&self) -> Option<PoseError> {
         let pose = self.outcome.pose.as_ref().ok()?;
         Some(PoseError::between(self.truth?, pose))
     }
 
-    fn is_right(&self) -> bool {
-        self.error()
-            .is_some_and(|error| self.tolerance.contains(&error))
+    /// Whether its confidence is low.
+    fn is_low(&self) -> bool {
+        let word = self.confidence.as_ref().map(|confidence| confidence.word);
+        word == Some(Confidence::Low)
     }
 
     /// The true pose of the query camera in the reference camera's frame.
@@ -143,66 +142,51 @@ impl<'a> Subject<'a> {
 
 /// The verdicts on one method's outcome, the primary one first; none where nothing is wrong.
 pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
-    let mut found = Vec::new();
-    let doubt = subject.trust.as_ref().and_then(low_confidence);
-    if !subject.is_right() {
-        found.extend(suspicion::of_units(subject));
-        let responsible = trust::responsible(subject.method, subject.outcome);
-        let of_method = match estimator::find(responsible).map(|entry| &entry.parts) {
-            Some(Parts::Features) => feature::diagnose(subject),
-            Some(Parts::Cost(_)) => direct::diagnose(subject),
-            Some(Parts::Own(own)) if own.shows.is_some() => settled::diagnose(subject),
-            Some(Parts::Own(own)) if own.has_features => guided::diagnose(subject),
-            None => foreign::diagnose(subject),
-            _ => failure_alone(subject),
-        };
-        let combined = combined::of_hybrid(subject, responsible);
-        let (suspicions, others): (Vec<_>, Vec<_>) =
-            of_method.into_iter().partition(|d| d.code == Code::X1);
-        found.extend(suspicions);
-        found.extend(combined);
-        found.extend(others);
-    }
-    // Where nobody knows the truth, the doubt comes before what only speaks for it.
-    let speaks_for_it = |finding: &Diagnosis| matches!(finding.code, Code::D1 | Code::D8);
-    let place = match subject.truth {
-        None => found.iter().position(speaks_for_it),
-        Some(_) => None,
+    let grade = subject.grade();
+    let responsible = confidence::responsible(subject.method, subject.outcome);
+    let Some(family) = Family::of(responsible) else {
+        let failure = subject.outcome.pose.as_ref().err();
+        return failure.map(Diagnosis::of_failure).into_iter().collect();
     };
-    let place = place.unwrap_or(found.len());
-    found.splice(place..place, doubt);
-    // One finding for each code: the first says most.
-    let mut seen = Vec::new();
-    found.retain(|finding: &Diagnosis| {
-        let is_new = !seen.contains(&finding.code);
-        seen.push(finding.code);
-        is_new
-    });
+    let is_searched = matches!(family, Family::Grid | Family::Given);
+    let mut found = match is_searched && grade != Grade::Right {
+        true => Search::of(subject, family == Family::Given, |search| {
+            tried(&Case::new(subject, family, search), grade)
+        }),
+        false => tried(&Case::new(subject, family, None), grade),
+    };
+    // A method's own failure, unless a rule says more than that something else is suspect.
+    let is_explained = found
+        .iter()
+        .any(|one| one.code.is_failure() && one.code != Code::X1);
+    if let (Err(failure), false) = (&subject.outcome.pose, is_explained) {
+        let place = found.iter().take_while(|one| one.code == Code::X1).count();
+        let reported = Diagnosis::of_failure(failure);
+        found.retain(|one| one.code != reported.code);
+        found.insert(place, reported);
+    }
+    // Without the truth, the doubt comes before what only speaks for it.
+    if subject.truth.is_none() {
+        found.sort_by_key(|one| one.code != Code::L1 && matches!(one.code, Code::D1 | Code::D8));
+    }
     found
 }
 
-/// What the estimator itself said, where there is no pose.
-fn failure_alone(subject: &Subject<'_>) -> Vec<Diagnosis> {
-    let failure = subject.outcome.pose.as_ref().err();
-    failure.map(Diagnosis::of_failure).into_iter().collect()
-}
-
-fn low_confidence(trust: &Trust) -> Option<Diagnosis> {
-    let probability = trust.probability?;
-    trust.is_low().then(|| {
-        Diagnosis::new(
-            Code::L1,
-            format!(
-                "low confidence: poses like this one are within {} m in {:.0} % of cases",
-                trust::WITHIN_M,
-                // Rounded down, so that nobody reads the limit where it was missed.
-                (100.0 * probability).floor()
-            ),
-            json!({
-                "probability": probability,
-                "runner_up_margin": trust.runner_up_margin,
-                "inlier_spread": trust.inlier_spread,
-            }),
-        )
-    })
+/// The verdicts of all rules that apply, in their order.
+fn tried(case: &Case<'_, '_>, grade: Grade) -> Vec<Diagnosis> {
+    let mut found = Vec::new();
+    let mut is_concluded = false;
+    for rule in RULES {
+        let Test::Method(test) = rule.test else {
+            continue;
+        };
+        let applies = rule.applies_to.contains(&case.family)
+            && (!rule.needs_truth || case.subject.truth.is_some())
+            && !(rule.code.is_failure() && (grade == Grade::Right || is_concluded));
+        if let Some(verdict) = applies.then(|| test(case)).flatten() {
+            is_concluded |= rule.is_conclusive;
+            found.push(verdict);
+        }
+    }
+    found
 }

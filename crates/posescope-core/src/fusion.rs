@@ -239,7 +239,7 @@ fn no_pose(shares: &[Share], candidates: &[Candidate<'_>]) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::Code;
+    use crate::diagnosis::Code;
     use crate::history::History;
     use proptest::prelude::*;
 
@@ -376,9 +376,9 @@ mod tests {
         let candidates = [(60, Err(failure())), (5, Ok(at(1.0))), (60, Err(failure()))];
         for name in ["maxf", "r-wavg"] {
             let reason = fused(name, &candidates).0.expect_err("no pose");
-            assert_eq!(reason.code(), Code::R3);
+            assert_eq!(Code::of(&reason), Code::R3);
             let text = reason.to_string();
-            assert!(text.contains("r0") && text.contains("2 unique"), "{text}");
+            assert!(text.contains("r0") && text.contains("2 of 90"), "{text}");
         }
         assert!(fused("wavg", &candidates).0.is_ok());
         let (_, told) = fused("r-wavg", &candidates);
@@ -397,7 +397,7 @@ mod tests {
     #[test]
     fn without_a_reference_there_is_no_pose() {
         for entry in Fusion::of_the_paper() {
-            assert_eq!(fused_nothing(&entry).code(), Code::R1);
+            assert_eq!(Code::of(&fused_nothing(&entry)), Code::R1);
         }
     }
 

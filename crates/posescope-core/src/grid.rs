@@ -159,10 +159,10 @@ impl Phase {
     /// What makes its lattice smaller.
     fn remedy(self) -> &'static str {
         match self {
-            Self::PositionCoarse => "raise grid.coarse_step or lower the radius",
-            Self::PositionFine => "raise grid.fine_step or lower grid.fine_range",
-            Self::YawCoarse => "raise grid.yaw_step or lower grid.yaw_range",
-            Self::YawFine => "raise grid.yaw_fine_step or lower grid.yaw_fine_range",
+            Self::PositionCoarse => "Raise grid.coarse_step or lower the radius",
+            Self::PositionFine => "Raise grid.fine_step or lower grid.fine_range",
+            Self::YawCoarse => "Raise grid.yaw_step or lower grid.yaw_range",
+            Self::YawFine => "Raise grid.yaw_fine_step or lower grid.yaw_fine_range",
         }
     }
 

@@ -36,7 +36,6 @@
 
 pub mod camera;
 pub mod cloud;
-pub mod code;
 pub mod cost;
 pub mod depth;
 pub mod descent;

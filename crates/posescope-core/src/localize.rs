@@ -7,9 +7,7 @@ mod observer;
 mod result;
 mod select;
 mod single;
-mod standing;
 mod timing;
-mod verdict;
 
 pub use choose::Chooser;
 pub use localizer::{LocalizeError, Localizer, Request, is_one_drive};
@@ -22,6 +20,4 @@ pub use select::{
     ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, tell_ranking,
 };
 pub use single::{localize, localize_by, localize_jointly, localize_traced, words_of};
-pub use standing::Standing;
 pub use timing::{StageTimes, StageTimings};
-pub use verdict::Verdict;

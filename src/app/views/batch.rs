@@ -7,8 +7,7 @@ use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
 
 use super::View;
 use crate::app::{Command, ResultRow, ViewContext, theme};
-use crate::diagnosis::Tolerance;
-use crate::localize::{QueryResult, Standing};
+use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
 
@@ -16,13 +15,13 @@ use crate::method::Method;
 const COLUMNS: [(&str, f32); 10] = [
     ("query", 84.0),
     ("method", 56.0),
-    ("is", 104.0),
+    ("grade", 104.0),
     ("error", 60.0),
     ("code", 48.0),
     ("cause", *CAUSE.start()),
     ("rotation", 64.0),
     ("start", 60.0),
-    ("confidence", 76.0),
+    ("probability", 76.0),
     ("reference", 110.0),
 ];
 
@@ -50,13 +49,11 @@ struct Shown {
 struct Made {
     chosen: Rc<[ResultRow]>,
     order: Option<Order>,
-    right: Tolerance,
     version: u64,
 }
 
 impl View for BatchView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let right = context.setup.task.protocol.right;
         ui.horizontal(|ui| {
             let label = ui.label("Where");
             let hint = "method = mi and code = D3";
@@ -84,7 +81,7 @@ impl View for BatchView {
             );
             return;
         }
-        self.make(context, chosen, right);
+        self.make(context, chosen);
         let Some((_, Shown { rows, words })) = &self.made else {
             return;
         };
@@ -109,12 +106,11 @@ impl View for BatchView {
 
 impl BatchView {
     /// Sorts, where anything has changed.
-    fn make(&mut self, context: &ViewContext<'_>, chosen: Rc<[ResultRow]>, right: Tolerance) {
+    fn make(&mut self, context: &ViewContext<'_>, chosen: Rc<[ResultRow]>) {
         let version = context.results_version();
         if let Some((made, _)) = &self.made
             && Rc::ptr_eq(&made.chosen, &chosen)
             && made.order == self.order
-            && made.right == right
             && made.version == version
         {
             return;
@@ -123,13 +119,12 @@ impl BatchView {
             .iter()
             .filter_map(|row| context.result(*row))
             .collect();
-        let order = select(&results, right, None, self.order);
+        let order = select(&results, None, self.order);
         let rows: Vec<ResultRow> = order.into_iter().map(|index| chosen[index]).collect();
-        let words = words(context, &rows, right);
+        let words = words(context, &rows);
         let made = Made {
             chosen,
             order: self.order,
-            right,
             version,
         };
         self.made = Some((made, Shown { rows, words }));
@@ -165,11 +160,11 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
 }
 
 /// How many are shown, and how many of them are wrong or missing, by method.
-fn words(context: &ViewContext<'_>, rows: &[ResultRow], right: Tolerance) -> String {
+fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
     let results: usize = context.results.values().map(Vec::len).sum();
     let mut failed: BTreeMap<Method, usize> = BTreeMap::new();
     for result in rows.iter().filter_map(|row| context.result(*row)) {
-        let is_failed = result.standing(right, true) >= Standing::Wrong;
+        let is_failed = result.grade.is_failure();
         *failed.entry(result.method).or_default() += usize::from(is_failed);
     }
     let failed: Vec<String> = failed
@@ -252,9 +247,8 @@ fn draw(
     at: ResultRow,
     result: &QueryResult,
 ) {
-    let right = context.setup.task.protocol.right;
     let ResultRow { query, place } = at;
-    let standing = result.standing(right, true);
+    let grade = result.grade;
     let is_here = query == context.setup.query;
     let row = ui.horizontal(|ui| {
         for &(name, width) in columns {
@@ -262,11 +256,11 @@ fn draw(
                 continue;
             };
             let mut text = RichText::new(match name {
-                "is" => format!("{} {standing}", standing.mark()),
-                _ => field.text(result, right),
+                "grade" => format!("{} {grade}", grade.glyph()),
+                _ => field.text(result),
             });
-            if name == "is" {
-                text = text.color(theme::standing(ui.visuals(), standing));
+            if name == "grade" {
+                text = text.color(theme::grade(ui.visuals(), grade));
             } else if name == "method" {
                 text = text.color(theme::text(ui.visuals(), theme::method(result.method)));
             } else if is_here {

@@ -11,7 +11,8 @@ use egui_plot::{Legend, Line, MarkerShape, Plot, PlotPoint, Points};
 
 use super::View;
 use crate::app::{Command, ResultRow, ViewContext, theme};
-use crate::localize::{QueryResult, Standing};
+use crate::diagnosis::Grade;
+use crate::localize::QueryResult;
 use crate::measure::{Field, Value};
 use crate::method::Method;
 
@@ -141,23 +142,19 @@ type Chosen<'a> = (ResultRow, &'a QueryResult);
 
 impl ChartsView {
     fn scatter(&self, ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>]) {
-        let right = context.setup.task.protocol.right;
         let number = |name: &str, result: &QueryResult| {
-            let value = Field::find(name).ok()?.of(result, right);
+            let value = Field::find(name).ok()?.of(result);
             match value {
                 Value::Number(number) if number.is_finite() => Some(number),
                 _ => None,
             }
         };
-        let mut kinds: BTreeMap<Standing, Vec<[f64; 2]>> = BTreeMap::new();
+        let mut kinds: BTreeMap<Grade, Vec<[f64; 2]>> = BTreeMap::new();
         let mut places = Vec::new();
         for (row, result) in results {
             let at = number(self.across, result).zip(number(self.up, result));
             let Some((x, y)) = at else { continue };
-            kinds
-                .entry(result.standing(right, true))
-                .or_default()
-                .push([x, y]);
+            kinds.entry(result.grade).or_default().push([x, y]);
             places.push((*row, *result, [x, y]));
         }
         let (across, up) = (self.across, self.up);
@@ -166,15 +163,14 @@ impl ChartsView {
             .y_axis_label(up)
             .legend(Legend::default())
             .show(ui, |plot| {
-                for (standing, points) in kinds {
-                    let shape = match standing {
-                        Standing::Right | Standing::Unmeasured => MarkerShape::Circle,
-                        Standing::LowConfidence => MarkerShape::Diamond,
-                        Standing::Wrong => MarkerShape::Up,
-                        Standing::NoPose => MarkerShape::Cross,
+                for (grade, points) in kinds {
+                    let shape = match grade {
+                        Grade::Right | Grade::Unmeasured => MarkerShape::Circle,
+                        Grade::Wrong => MarkerShape::Up,
+                        Grade::NoPose => MarkerShape::Cross,
                     };
-                    let color = theme::standing(&plot.ctx().global_style().visuals, standing);
-                    let points = Points::new(standing.to_string(), points).shape(shape);
+                    let color = theme::grade(&plot.ctx().global_style().visuals, grade);
+                    let points = Points::new(grade.to_string(), points).shape(shape);
                     plot.points(points.radius(4.0).color(color));
                 }
             });

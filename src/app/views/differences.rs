@@ -4,8 +4,8 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 
 use super::View;
 use crate::app::{Command, CompareMode, ViewContext, theme};
-use crate::diagnosis::Tolerance;
-use crate::localize::{QueryResult, Standing};
+use crate::diagnosis::Grade;
+use crate::localize::QueryResult;
 use crate::measure::{Field, Value};
 
 /// A, B, what lies between them.
@@ -39,7 +39,6 @@ impl View for DifferencesView {
         });
         ScrollArea::both().auto_shrink(false).show(ui, |ui| {
             changed(ui, &a.settings(), &b.settings());
-            let right = context.setup.task.protocol.right;
             for result in b.results() {
                 let same = |other: &&QueryResult| {
                     other.method == result.method
@@ -47,7 +46,7 @@ impl View for DifferencesView {
                         && other.references == result.references
                 };
                 match a.results().find(same) {
-                    Some(before) => self.table(ui, context, before, result, right),
+                    Some(before) => self.table(ui, context, before, result),
                     None => {
                         title(ui, result);
                         ui.weak("A has no such result");
@@ -108,7 +107,7 @@ const NAMES: [&str; 7] = [
 ];
 /// Fields that would tell the truth.
 const TRUTH: [&str; 8] = [
-    "is",
+    "grade",
     "code",
     "codes",
     "error",
@@ -119,21 +118,14 @@ const TRUTH: [&str; 8] = [
 ];
 
 impl DifferencesView {
-    fn table(
-        &self,
-        ui: &mut Ui,
-        context: &ViewContext<'_>,
-        a: &QueryResult,
-        b: &QueryResult,
-        right: Tolerance,
-    ) {
+    fn table(&self, ui: &mut Ui, context: &ViewContext<'_>, a: &QueryResult, b: &QueryResult) {
         title(ui, b);
         let shows_truth = context.options.shows_truth;
         let fields = Field::ALL.iter().filter(|field| {
             !NAMES.contains(&field.name) && (shows_truth || !TRUTH.contains(&field.name))
         });
         let rows: Vec<Compared> = fields
-            .filter_map(|field| Compared::of(field, a, b, right))
+            .filter_map(|field| Compared::of(field, a, b))
             .filter(|row| self.shows_same || row.a != row.b)
             .collect();
         if rows.is_empty() {
@@ -154,22 +146,22 @@ impl DifferencesView {
                 ui.end_row();
             }
         });
-        let standings = [a, b].map(|result| result.standing(right, shows_truth));
-        if standings[0] != standings[1] {
-            ui.label(RichText::new(became(standings)).strong());
+        let grades = [a, b].map(|result| result.grade_shown(shows_truth));
+        if grades[0] != grades[1] {
+            ui.label(RichText::new(became(grades)).strong());
         }
         ui.separator();
     }
 }
 
 /// What became of an answer, in words.
-fn became([a, b]: [Standing; 2]) -> String {
-    let how = match (a >= Standing::Wrong, b >= Standing::Wrong) {
+fn became([a, b]: [Grade; 2]) -> String {
+    let how = match (a.is_failure(), b.is_failure()) {
         (true, false) => "fixed",
         (false, true) => "broken",
         _ => "changed",
     };
-    format!("{how}: {} {a} → {} {b}", a.mark(), b.mark())
+    format!("{how}: {} {a} → {} {b}", a.glyph(), b.glyph())
 }
 
 /// A field in both runs.
@@ -182,20 +174,15 @@ struct Compared {
 
 impl Compared {
     /// `None` where neither has it.
-    fn of(
-        field: &'static Field,
-        a: &QueryResult,
-        b: &QueryResult,
-        right: Tolerance,
-    ) -> Option<Self> {
-        let difference = match (field.of(a, right), field.of(b, right)) {
+    fn of(field: &'static Field, a: &QueryResult, b: &QueryResult) -> Option<Self> {
+        let difference = match (field.of(a), field.of(b)) {
             (Value::None, Value::None) => return None,
             (Value::Number(a), Value::Number(b)) => {
                 Some(format!("{:+.*}", field.decimals.unwrap_or(0), b - a))
             }
             _ => None,
         };
-        let text = |result| match field.text(result, right) {
+        let text = |result| match field.text(result) {
             text if text.is_empty() => "–".to_owned(),
             text => text,
         };

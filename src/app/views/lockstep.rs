@@ -108,13 +108,12 @@ impl LockstepView {
             };
             if let (true, Some(result)) = (is_over, &span.result) {
                 let shows_truth = context.options.shows_truth;
-                let right = context.setup.task.protocol.right;
-                let standing = result.standing(right, shows_truth);
+                let grade = result.grade_shown(shows_truth);
                 let error = result.error.filter(|_| shows_truth);
                 let error =
                     error.map_or(String::new(), |error| format!(", {}", error.translation()));
-                let words = format!("{} {standing}{error}", standing.mark());
-                let color = theme::standing(ui.visuals(), standing);
+                let words = format!("{} {grade}{error}", grade.glyph());
+                let color = theme::grade(ui.visuals(), grade);
                 ui.label(RichText::new(words).color(color).strong());
             }
         });

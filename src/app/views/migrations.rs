@@ -6,7 +6,7 @@ use egui::{Button, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
 use crate::app::{Command, VerdictChange, ViewContext, theme};
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::measure::{Migration, verdict_name};
 use crate::method::Method;
 
@@ -62,8 +62,8 @@ fn words(migrations: &[Migration]) -> String {
 
 /// Where a verdict stands in a row or a column: `ok` first, then by code.
 fn place(name: &str) -> usize {
-    let codes = Code::ALL.iter().position(|code| code.name() == name);
-    codes.map_or(0, |place| place + 1)
+    let place = Code::all().iter().position(|code| code.name() == name);
+    place.map_or(0, |place| place + 1)
 }
 
 fn matrix(ui: &mut Ui, context: &ViewContext<'_>, method: Method, migrations: &[&Migration]) {
@@ -102,8 +102,8 @@ fn matrix(ui: &mut Ui, context: &ViewContext<'_>, method: Method, migrations: &[
 }
 
 fn about(name: &str) -> &'static str {
-    let code = Code::ALL.iter().find(|code| code.name() == name);
-    code.map_or("nothing was found", |code| code.about())
+    let code: Option<Code> = name.parse().ok();
+    code.map_or("no verdict", Code::title)
 }
 
 /// A number that is clicked to see its results.
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn verdicts_are_in_the_order_of_the_codes_behind_ok() {
         assert_eq!(place("ok"), 0);
-        let places: Vec<usize> = Code::ALL.iter().map(|code| place(code.name())).collect();
+        let places: Vec<usize> = Code::all().iter().map(|code| place(code.name())).collect();
         assert!(places.is_sorted() && places[0] == 1);
     }
 

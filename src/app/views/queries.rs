@@ -83,21 +83,18 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize) {
 
 /// One mark per method: what it is tells the shape too.
 pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
-    let (right, shows_truth) = (
-        context.setup.task.protocol.right,
-        context.options.shows_truth,
-    );
+    let shows_truth = context.options.shows_truth;
     ui.spacing_mut().item_spacing.x = 2.0;
     let methods: BTreeSet<Method> = results.iter().map(|result| result.method).collect();
     for method in methods {
         for result in results.iter().filter(|r| r.method == method) {
             // As the card says it.
-            let standing = result.standing(right, shows_truth);
-            let color = theme::standing(ui.visuals(), standing);
+            let grade = result.grade_shown(shows_truth);
+            let color = theme::grade(ui.visuals(), grade);
             let error = result.error.filter(|_| shows_truth);
             let error = error.map_or(String::new(), |error| format!(", {error}"));
-            ui.label(RichText::new(standing.mark()).color(color))
-                .on_hover_text(format!("{}: {standing}{error}", method.label()));
+            ui.label(RichText::new(grade.glyph()).color(color))
+                .on_hover_text(format!("{}: {grade}{error}", method.label()));
         }
     }
 }

@@ -4,8 +4,8 @@ use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::View;
 use crate::app::{ViewContext, theme};
-use crate::code::Code;
-use crate::localize::{QueryResult, Verdict};
+use crate::diagnosis::{Code, Grade};
+use crate::localize::QueryResult;
 use crate::session::Span;
 
 /// The report of the run, so far.
@@ -86,27 +86,23 @@ fn name(ui: &mut Ui, span: &Span) {
     );
 }
 
-/// The verdict in words and its colour. An error tells the ground truth, which may be hidden.
+/// The grade in words and its colour. An error reveals the ground truth, which may be hidden.
 fn verdict(result: &QueryResult, context: &ViewContext<'_>) -> (String, Option<Color32>) {
-    let failure_radius_m = context.setup.failure_radius_m;
-    let words = result.words(failure_radius_m);
-    match result.verdict(failure_radius_m) {
-        // The reason is told below, in full.
-        Verdict::NoPose => {
-            // What the estimator said itself, where the truth is hidden.
-            let found = result
-                .diagnosis
-                .first()
-                .filter(|_| context.options.shows_truth);
+    let shows_truth = context.options.shows_truth;
+    let grade = result.grade_shown(shows_truth);
+    let words = match grade {
+        // The reason stands below, in full: with the truth hidden, the estimator's own.
+        Grade::NoPose => {
+            let found = result.diagnosis.first().filter(|_| shows_truth);
             let code = found.map(|finding| finding.code);
             let code = code.or_else(|| result.reason.as_ref().map(|reason| reason.code));
             let code = code.map_or(String::new(), |code| format!(", {code}"));
-            (format!("× no pose{code}"), Some(theme::ESTIMATE))
+            format!("{grade}{code}")
         }
-        _ if !context.options.shows_truth => ("a pose".to_owned(), None),
-        Verdict::Far => (format!("▲ {words}"), Some(theme::FAR)),
-        Verdict::Near | Verdict::Unmeasured => (words, None),
-    }
+        _ => grade.words(result.error.as_ref().filter(|_| shows_truth)),
+    };
+    let color = grade.is_failure().then_some(theme::ESTIMATE);
+    (format!("{} {words}", grade.glyph()), color)
 }
 
 fn verdicts(ui: &mut Ui, context: &ViewContext<'_>, others: &[&QueryResult]) {
@@ -175,7 +171,7 @@ fn findings(ui: &mut Ui, span: &Span, shows_truth: bool) {
             } else {
                 code.weak()
             };
-            ui.label(code).on_hover_text(finding.code.about());
+            ui.label(code).on_hover_text(finding.code.title());
             ui.label(&finding.text);
         });
     }

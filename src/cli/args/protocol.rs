@@ -63,11 +63,10 @@ pub struct ProtocolArgs {
     /// Seed of every random choice [default: 0]
     #[arg(long)]
     pub seed: Option<u64>,
-    /// How near the truth a pose is right; one that is not gets a verdict that says why [default:
-    /// 1m,5deg]
+    /// How near the truth a pose is right; another is wrong, and a verdict says why [default: 1m,5deg]
     #[arg(long, value_name = "METRES,DEGREES")]
     pub right: Option<Right>,
-    /// Refuse poses that are within 1 m of the truth with less than this probability (L1)
+    /// Refuse poses of a lower confidence: the probability of being within 1 m of the truth
     #[arg(long, value_name = "PROBABILITY", value_parser = share)]
     pub accept: Option<f64>,
     /// Localise a query that went wrong again, at most so often for each result, and say what would

@@ -91,8 +91,9 @@ pub struct TaskArgs {
     #[arg(long, value_name = "FILE")]
     pub index: Option<PathBuf>,
     /// How far the query may be from its reference: the disc that the direct methods search [m]
-    #[arg(long, value_name = "METRES", default_value_t = Protocol::RADIUS_M, value_parser = positive)]
-    pub radius: f64,
+    /// [default: 15; of a run its own]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub radius: Option<f64>,
     #[command(flatten)]
     pub protocol: ProtocolArgs,
     /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10), with the
@@ -110,7 +111,7 @@ impl TaskArgs {
             format: self.protocol.format.clone(),
             by_hand: !self.reference.is_empty(),
             index: self.index.clone(),
-            radius_m: self.radius,
+            radius_m: self.radius.unwrap_or(Protocol::RADIUS_M),
             protocol: self.protocol.over(Protocol::default())?,
             params: self.protocol.config.resolve()?,
             breakpoints: self.breakpoints.clone(),
@@ -127,7 +128,7 @@ impl Default for TaskArgs {
             camera: None,
             reference: Vec::new(),
             index: None,
-            radius: Protocol::RADIUS_M,
+            radius: None,
             protocol: ProtocolArgs::default(),
             breakpoints: Vec::new(),
         }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use posescope::diagnosis::Tolerance;
+use posescope::diagnosis::{Code, Tolerance};
 use posescope::measure::{Condition, Field, Order};
 
 #[derive(Debug, Args)]
@@ -22,7 +22,7 @@ pub struct TriageArgs {
         value_name = "FIELDS",
         value_delimiter = ',',
         value_parser = field,
-        default_value = "query,reference,method,is,error,rotation,code,confidence"
+        default_value = "query,reference,method,grade,error,rotation,code,probability"
     )]
     pub columns: Vec<&'static Field>,
     /// At most as many
@@ -43,10 +43,13 @@ fn field(name: &str) -> Result<&'static Field, String> {
 fn conditions() -> String {
     let fields = Field::ALL.iter();
     let fields = fields.map(|field| format!("\n- {}: {}", field.name, field.about));
+    let codes = Code::all().into_iter();
+    let codes = codes.map(|code| format!("\n- {code}: {}", code.title()));
     format!(
         "Only results that meet this, for example \"method = mi and code = D1 and coverage < 0.1\".\n\n\
          FIELD RELATION VALUE, joined by and, or, not and parentheses. Relations: = != < <= > >=, and ~ \
-         for words that hold others. Fields:{}",
-        fields.collect::<String>()
+         for words that contain others. Fields:{}\n\nCodes:{}",
+        fields.collect::<String>(),
+        codes.collect::<String>()
     )
 }

@@ -16,7 +16,7 @@ use crate::cli::failure::CliError;
 /// What the run asked, of the queries on which a method failed, with what the arguments change.
 pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
     let run = read_run(before)?;
-    let failed = failed(&read_rows(before)?, run.failure_radius_m);
+    let failed = failed(&read_rows(before)?);
     let mut params = Params::default();
     let given = params.merge_toml(&run.params.to_string());
     given.map_err(|source| CliError::Config {
@@ -72,16 +72,15 @@ pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
     })
 }
 
-/// Whether a query of the run failed.
+/// Whether a query of the run is wrong or has no pose.
 pub fn has_failed(before: &Path) -> Result<bool, CliError> {
-    let radius_m = read_run(before)?.failure_radius_m;
-    Ok(!failed(&read_rows(before)?, radius_m).is_empty())
+    Ok(!failed(&read_rows(before)?).is_empty())
 }
 
-/// Queries with a failed result.
-fn failed(rows: &[Row], failure_radius_m: f64) -> BTreeSet<[String; 3]> {
+/// Queries with a result that is wrong or has no pose.
+fn failed(rows: &[Row]) -> BTreeSet<[String; 3]> {
     rows.iter()
-        .filter(|row| !row.is_success(failure_radius_m))
+        .filter(|row| row.grade.is_failure())
         .map(|row| {
             let queries = row.query_scene.as_ref().unwrap_or(&row.scene);
             key(&row.scene, queries, &row.query)

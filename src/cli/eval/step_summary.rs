@@ -64,8 +64,8 @@ pub fn of_run(
                 "broken: {} {}, {} → {}",
                 plain(&one.before.query),
                 one.before.method,
-                one.verdicts[0].words(one.before.error.as_ref()),
-                one.verdicts[1].words(one.after.error.as_ref())
+                one.grades[0].words(one.before.error.as_ref()),
+                one.grades[1].words(one.after.error.as_ref())
             )
         }));
         text += &format!("{} fixed\n\n", comparison.count(Change::Fixed));

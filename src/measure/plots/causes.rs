@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::measure::metrics::Row;
 use crate::method::Method;
 

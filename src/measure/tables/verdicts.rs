@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::percent;
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::measure::metrics::Measures;
 use crate::measure::table::Table;
 
@@ -23,7 +23,7 @@ pub(super) fn verdicts(measures: &[Measures]) -> Option<Table> {
     let columns = codes.iter().map(|code| format!("{code} (%)"));
     let meanings: Vec<String> = codes
         .iter()
-        .map(|code| format!("{code} {}", code.about()))
+        .map(|code| format!("{code} {}", code.title()))
         .collect();
     let mut table = Table::new(
         "verdicts",

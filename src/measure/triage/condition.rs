@@ -3,7 +3,6 @@
 use std::str::FromStr;
 
 use super::field::{Field, Value};
-use crate::diagnosis::Tolerance;
 use crate::localize::QueryResult;
 
 /// A condition on a result.
@@ -68,19 +67,19 @@ impl Condition {
         &self.text
     }
 
-    /// Whether a result meets it. A pose is right within the tolerance.
-    pub fn is_met(&self, result: &QueryResult, right: Tolerance) -> bool {
-        self.tree.is_met(result, right)
+    /// Whether a result meets it.
+    pub fn is_met(&self, result: &QueryResult) -> bool {
+        self.tree.is_met(result)
     }
 }
 
 impl Tree {
-    fn is_met(&self, result: &QueryResult, right: Tolerance) -> bool {
+    fn is_met(&self, result: &QueryResult) -> bool {
         match self {
-            Self::All(parts) => parts.iter().all(|part| part.is_met(result, right)),
-            Self::Any(parts) => parts.iter().any(|part| part.is_met(result, right)),
-            Self::Not(part) => !part.is_met(result, right),
-            Self::Number(field, relation, limit) => match field.of(result, right) {
+            Self::All(parts) => parts.iter().all(|part| part.is_met(result)),
+            Self::Any(parts) => parts.iter().any(|part| part.is_met(result)),
+            Self::Not(part) => !part.is_met(result),
+            Self::Number(field, relation, limit) => match field.of(result) {
                 Value::Number(number) => match relation {
                     Relation::Is => number == *limit,
                     Relation::IsNot => number != *limit,
@@ -93,7 +92,7 @@ impl Tree {
                 Value::Words(_) | Value::None => false,
             },
             Self::Words(field, relation, wanted) => {
-                let words = field.text(result, right).to_lowercase();
+                let words = field.text(result).to_lowercase();
                 match relation {
                     Relation::Is => words == *wanted,
                     Relation::IsNot => words != *wanted,
@@ -324,7 +323,7 @@ mod tests {
         assert_eq!(plain, tree("code = D1 or (code = d2 and error>1)"));
         assert_ne!(plain, tree("(code = D1 or code = D2) and error > 1"));
         assert_eq!(tree("not (error > 1)"), tree("not error > 1"));
-        assert_eq!(tree("is = 'no pose'"), tree("is = \"No pose\""));
+        assert_eq!(tree("grade = 'no pose'"), tree("grade = \"No pose\""));
     }
 
     proptest! {

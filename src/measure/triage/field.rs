@@ -2,7 +2,6 @@
 
 use std::cmp::Ordering;
 
-use crate::diagnosis::Tolerance;
 use crate::localize::QueryResult;
 use crate::text::UnknownWord;
 
@@ -74,12 +73,13 @@ impl Field {
         words("fusion", "the fusion", |r| {
             r.fusion.as_ref().map_or(String::new(), ToString::to_string)
         }),
-        Self {
-            name: "is",
-            about: "right, wrong, no pose; without the truth low confidence or a pose",
-            decimals: None,
-            read: Read::Judged(|r, right| r.standing(right, true).to_string()),
-        },
+        words("grade", "right, wrong, no pose or unmeasured", |r| {
+            r.grade.to_string()
+        }),
+        words("confidence", "trusted, unsure or low", |r| {
+            r.confidence_word()
+                .map_or(String::new(), |word| word.to_string())
+        }),
         words("code", "the primary verdict", |r| {
             r.diagnosis
                 .first()
@@ -88,7 +88,7 @@ impl Field {
         words("cause", "the primary verdict in one phrase", |r| {
             r.diagnosis
                 .first()
-                .map_or(String::new(), |d| d.code.about().to_owned())
+                .map_or(String::new(), |d| d.code.title().to_owned())
         }),
         words("codes", "all verdicts", |r| {
             let codes: Vec<&str> = r.diagnosis.iter().map(|d| d.code.name()).collect();
@@ -106,8 +106,8 @@ impl Field {
             3,
             |r| Some(r.initial_error?.translation_m),
         ),
-        number("confidence", "probability of being within 1 m", 3, |r| {
-            r.trust.as_ref()?.probability
+        number("probability", "probability of being within 1 m", 3, |r| {
+            Some(r.confidence.as_ref()?.probability)
         }),
         number("keypoints", "keypoints of the query", 0, |r| {
             Some(r.counts?.query_keypoints as f64)
@@ -165,18 +165,17 @@ impl Field {
             .ok_or_else(|| UnknownWord::among(name, "field", names))
     }
 
-    /// Its value in a result. A pose is right within the tolerance.
-    pub fn of(&self, result: &QueryResult, right: Tolerance) -> Value {
+    /// Its value in a result.
+    pub fn of(&self, result: &QueryResult) -> Value {
         match self.read {
             Read::Words(read) => Value::Words(read(result)),
-            Read::Judged(read) => Value::Words(read(result, right)),
             Read::Number(read) => read(result).map_or(Value::None, Value::Number),
         }
     }
 
     /// Its value as it is shown; nothing where there is none.
-    pub fn text(&self, result: &QueryResult, right: Tolerance) -> String {
-        match self.of(result, right) {
+    pub fn text(&self, result: &QueryResult) -> String {
+        match self.of(result) {
             Value::Words(words) => words,
             Value::Number(number) => format!("{number:.*}", self.decimals.unwrap_or(0)),
             Value::None => String::new(),
@@ -188,8 +187,6 @@ impl Field {
 enum Read {
     Words(fn(&QueryResult) -> String),
     Number(fn(&QueryResult) -> Option<f64>),
-    /// What depends on when a pose is right.
-    Judged(fn(&QueryResult, Tolerance) -> String),
 }
 
 const fn words(name: &'static str, about: &'static str, read: fn(&QueryResult) -> String) -> Field {

@@ -249,10 +249,10 @@ impl Recording {
     }
 
     fn result_in_words(&mut self, result: &QueryResult) {
-        let outcome = result.words(self.identity.failure_radius_m);
-        let level = match result.is_success(self.identity.failure_radius_m) {
-            true => TextLogLevel::INFO,
-            false => TextLogLevel::WARN,
+        let outcome = result.words();
+        let level = match result.grade.is_failure() {
+            false => TextLogLevel::INFO,
+            true => TextLogLevel::WARN,
         };
         self.say(&format!("{} result: {outcome}", result.method), level);
     }

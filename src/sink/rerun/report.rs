@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use super::Identity;
 use super::scene::Origin;
+use crate::diagnosis::Grade;
 use crate::geometry::PoseError;
-use crate::localize::{QueryResult, Verdict};
+use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::problem::Problem;
 
@@ -31,7 +32,7 @@ pub(super) fn markdown(
         );
     }
     text += &story(results);
-    text += &errors(results, identity.failure_radius_m);
+    text += &errors(results);
     text += &features(results);
     text += &costs(results);
     text += &costs_at_poses(results);
@@ -63,7 +64,7 @@ fn story(results: &[QueryResult]) -> String {
         };
         let error = result.error.as_ref();
         let error = error.map_or(String::new(), |error| format!(", {}", error.translation()));
-        text += &format!("**{name}{error}: {}** {}.\n\n", primary.code, primary.text);
+        text += &format!("**{name}{error}: {}** {}\n\n", primary.code, primary.text);
         for other in others {
             text += &format!("- also {}: {}\n", other.code, other.text);
         }
@@ -84,23 +85,22 @@ fn story(results: &[QueryResult]) -> String {
     text
 }
 
-fn errors(results: &[QueryResult], failure_radius_m: f64) -> String {
-    let mut text =
-        "| method | error | rotation | max Euler | result | probability of 1 m | reference |\n\
+fn errors(results: &[QueryResult]) -> String {
+    let mut text = "| method | error | rotation | max Euler | grade | confidence | reference |\n\
                     |:--|--:|--:|--:|:--|--:|:--|\n"
-            .to_owned();
+        .to_owned();
     for result in results {
-        let verdict = match (result.verdict(failure_radius_m), &result.reason) {
-            (Verdict::NoPose, Some(reason)) => format!("no pose, **{}**", reason.code),
-            (Verdict::NoPose, None) => "no pose".to_owned(),
-            (Verdict::Far, _) => "**far**".to_owned(),
-            (Verdict::Near | Verdict::Unmeasured, _) => "pose".to_owned(),
+        let grade = match (result.grade, &result.reason) {
+            (Grade::NoPose, Some(reason)) => format!("{}, **{}**", result.grade, reason.code),
+            (Grade::Wrong, _) => format!("**{}**", result.grade),
+            (grade, _) => grade.to_string(),
         };
         let part = |part: fn(&PoseError) -> String| {
             let error = result.error.as_ref();
             error.map_or("–".to_owned(), part)
         };
-        let probability = result.trust.as_ref().and_then(|trust| trust.probability);
+        let confidence = result.confidence.as_ref();
+        let confidence = confidence.map(|one| format!("{} {:.2}", one.word, one.probability));
         row(
             &mut text,
             &[
@@ -108,8 +108,8 @@ fn errors(results: &[QueryResult], failure_radius_m: f64) -> String {
                 &part(PoseError::translation),
                 &part(PoseError::rotation),
                 &part(PoseError::max_euler),
-                &verdict,
-                &probability.map_or("–".to_owned(), |probability| format!("{probability:.2}")),
+                &grade,
+                &confidence.unwrap_or("–".to_owned()),
                 &result.references.join(", "),
             ],
         );

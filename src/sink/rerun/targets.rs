@@ -59,8 +59,6 @@ pub struct Identity {
     pub degraded: Degradation,
     /// The seed of every random choice.
     pub seed: u64,
-    /// The translation error from which on a pose counts as a failure \[m\].
-    pub failure_radius_m: f64,
 }
 
 impl Identity {

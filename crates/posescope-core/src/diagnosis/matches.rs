@@ -1,21 +1,22 @@
 //! Where the true matches went: with the truth known, every match is true or false.
 
-use nalgebra::{Matrix3, Point2, Point3};
-use serde_json::{Value, json};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use serde::Serialize;
 
 use super::Subject;
 use crate::camera::Intrinsics;
 use crate::estimator::projected_cloud;
 use crate::features::{Features, MatchVerdict};
 use crate::geometry::Pose;
-use crate::solver::Correspondence;
+use crate::robust::MlesacParams;
+use crate::solver::{Correspondence, pose_covariance};
 
 /// A match is true if the keypoint is this many inlier thresholds from where the truth puts it: the
 /// truth and the depths are not exact either.
 const THRESHOLDS: f64 = 2.0;
 
 /// How many reference keypoints with a depth, and true matches of them, were left at each stage of FB.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub(super) struct Funnel {
     /// Reference keypoints with a depth.
     pub(super) with_depth: usize,
@@ -36,38 +37,45 @@ pub(super) struct Funnel {
 }
 
 impl Funnel {
-    pub(super) fn evidence(&self) -> Value {
-        json!({
-            "with_depth": self.with_depth,
-            "visible": self.visible,
-            "detected": self.detected,
-            "nearest": self.nearest,
-            "ratio": self.ratio,
-            "unique": self.unique,
-            "lifted": self.lifted,
-            "inliers": self.inliers,
-        })
-    }
-
     /// The step before `lifted` that lost the greatest share of what it got, and both counts.
-    pub(super) fn deadliest(&self) -> (&'static str, usize, usize) {
+    pub(super) fn worst_step(&self) -> (Step, usize, usize) {
         let steps = [
-            ("are not detected in the query", self.visible, self.detected),
-            (
-                "have another nearest neighbour",
-                self.detected,
-                self.nearest,
-            ),
-            ("fail the ratio test", self.nearest, self.ratio),
-            ("are not mutually best", self.ratio, self.unique),
+            (Step::Detect, self.visible, self.detected),
+            (Step::Match, self.detected, self.nearest),
+            (Step::Ratio, self.nearest, self.ratio),
+            (Step::Unique, self.ratio, self.unique),
         ];
         let kept = |before: usize, after: usize| after as f64 / before.max(1) as f64;
         let worst = steps
             .into_iter()
             .filter(|(_, before, _)| *before > 0)
             .min_by(|a, b| kept(a.1, a.2).total_cmp(&kept(b.1, b.2)));
-        worst.unwrap_or(("are in view", self.with_depth, self.visible))
+        worst.unwrap_or((Step::View, self.with_depth, self.visible))
     }
+}
+
+/// A step at which true matches are lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Step {
+    /// Reference keypoints are out of the query's view.
+    View,
+    /// No query keypoint is where one must be.
+    Detect,
+    /// The nearest neighbour is another one.
+    Match,
+    /// The ratio test fails.
+    Ratio,
+    /// Another query keypoint is nearer.
+    Unique,
+}
+
+/// How a method matches and lifts features.
+pub(super) struct Matching<'a> {
+    pub(super) mlesac: &'a MlesacParams,
+    pub(super) depth_radius_px: f64,
+    pub(super) visible: bool,
+    pub(super) radius_slack: f64,
 }
 
 /// All that the truth says about the matches of a problem.
@@ -85,18 +93,23 @@ pub(super) struct TrueMatches {
     pub(super) wrong_depth: usize,
     /// Unique matches that lie on the epipolar line and have no depth at all, beyond chance.
     pub(super) no_depth: usize,
+    /// All unique matches.
+    pub(super) all_unique: usize,
+    /// Keypoints of the reference.
+    pub(super) reference_keypoints: usize,
 }
 
 impl TrueMatches {
     /// `None` where the method did not come to matching, or nobody knows the truth.
-    pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
+    pub(super) fn of(subject: &Subject<'_>, matching: &Matching<'_>) -> Option<Self> {
         let evidence = subject.evidence;
         let (query, reference) = (evidence.query.as_ref()?, evidence.reference.as_ref()?);
         let truth = subject.reference_from_truth()?;
         let query_from_reference = truth.inverse();
         let camera = &subject.problem.query.intrinsics;
-        let threshold_px = THRESHOLDS * subject.params.fb.mlesac.inlier_threshold_px;
-        let points = lifted_keypoints(subject, reference);
+        let inlier_px = matching.mlesac.inlier_threshold_px;
+        let threshold_px = THRESHOLDS * inlier_px;
+        let points = lifted_keypoints(subject, matching, reference);
         let predicted: Vec<Option<Point2<f64>>> = points
             .iter()
             .map(|point| {
@@ -116,7 +129,9 @@ impl TrueMatches {
             detected: detected(query, &predicted, threshold_px),
             ..Funnel::default()
         };
+        let mut all_unique = 0;
         for found in evidence.decisions.iter().flat_map(|d| d.iter()).flatten() {
+            all_unique += usize::from(found.verdict == MatchVerdict::Candidate);
             if !is_near(found.query, found.reference) {
                 continue;
             }
@@ -131,6 +146,8 @@ impl TrueMatches {
             is_inlier: Vec::new(),
             wrong_depth: 0,
             no_depth: 0,
+            all_unique,
+            reference_keypoints: reference.keypoints.len(),
         };
         let epipolar = Epipolar::new(
             &truth,
@@ -140,7 +157,6 @@ impl TrueMatches {
         );
         let refined = evidence.refined.as_ref();
         let query_from_reference_found = refined.map(|found| found.reference_from_query.inverse());
-        let inlier_px = subject.params.fb.mlesac.inlier_threshold_px;
         let all_lifted = evidence.lifted.as_deref().unwrap_or_default();
         let pixels: Vec<_> = all_lifted
             .iter()
@@ -187,6 +203,41 @@ impl TrueMatches {
             .collect()
     }
 
+    /// Whether so many unique matches lie on their epipolar lines without the right depth that they cannot
+    /// all be false. Streets look alike, and false matches of a drive lie near epipolar lines too.
+    pub(super) fn many_without_depth(&self) -> bool {
+        4 * (self.wrong_depth + self.no_depth) >= self.all_unique
+    }
+
+    /// True matches that a better cloud would have kept. Where the cloud gives depths as clouds do, those
+    /// that have none lie where no scan reaches, and more of them would not have come from there.
+    pub(super) fn lost_for_depth(&self) -> usize {
+        /// Share of the reference keypoints that a scan gives a depth at least.
+        const USUAL: f64 = 0.1;
+        let is_usual = self.funnel.with_depth as f64 >= USUAL * self.reference_keypoints as f64;
+        if is_usual { 0 } else { self.no_depth }
+    }
+
+    /// How far the inliers of the consensus let its camera centre move \[m\]; `None` where they do not fix
+    /// it.
+    pub(super) fn deviation_m(&self, subject: &Subject<'_>, sigma_px: f64) -> Option<f64> {
+        let refined = subject.evidence.refined.as_ref()?;
+        let inliers: Vec<Correspondence> = self
+            .correspondences
+            .iter()
+            .zip(&self.is_inlier)
+            .filter_map(|(correspondence, is_inlier)| is_inlier.then_some(*correspondence))
+            .collect();
+        let covariance = pose_covariance(
+            &inliers,
+            &subject.problem.query.intrinsics,
+            &refined.reference_from_query.inverse(),
+            sigma_px,
+        )?;
+        let variances = Vector3::new(covariance[(3, 3)], covariance[(4, 4)], covariance[(5, 5)]);
+        Some(variances.sum().sqrt())
+    }
+
     /// Inliers of the estimate.
     pub(super) fn inliers(&self) -> usize {
         self.is_inlier
@@ -197,11 +248,15 @@ impl TrueMatches {
 }
 
 /// The 3-D point of every reference keypoint that has a depth near by.
-fn lifted_keypoints(subject: &Subject<'_>, reference: &Features) -> Vec<Option<Point3<f64>>> {
+fn lifted_keypoints(
+    subject: &Subject<'_>,
+    matching: &Matching<'_>,
+    reference: &Features,
+) -> Vec<Option<Point3<f64>>> {
     let tuple = &subject.problem.reference;
-    let params = subject.params;
-    let cloud = projected_cloud(tuple, params.fb.visible.then_some(&params.render));
-    let radius_px = subject.params.fb.depth_radius_px;
+    let render = &subject.params.render;
+    let cloud = projected_cloud(tuple, matching.visible.then_some(render));
+    let radius_px = matching.depth_radius_px;
     reference
         .keypoints
         .iter()
@@ -281,5 +336,34 @@ impl Epipolar {
         let line = self.fundamental * reference.to_homogeneous();
         let distance = line.dot(&query.to_homogeneous()).abs() / line.x.hypot(line.y);
         distance <= self.threshold_px / THRESHOLDS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 200 reference keypoints this many have a depth; 40 true matches have none.
+    fn lost(with_depth: usize) -> usize {
+        let matches = TrueMatches {
+            funnel: Funnel {
+                with_depth,
+                ..Funnel::default()
+            },
+            correspondences: Vec::new(),
+            is_true: Vec::new(),
+            is_inlier: Vec::new(),
+            wrong_depth: 0,
+            no_depth: 40,
+            all_unique: 40,
+            reference_keypoints: 200,
+        };
+        matches.lost_for_depth()
+    }
+
+    #[test]
+    fn matches_without_a_depth_are_lost_where_the_cloud_is_sparser_than_clouds_are() {
+        assert_eq!([0, 19].map(lost), [40, 40]);
+        assert_eq!([20, 120].map(lost), [0, 0]);
     }
 }

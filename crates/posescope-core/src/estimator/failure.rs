@@ -1,6 +1,5 @@
 //! Why a query could not be localised.
 
-use crate::code::Code;
 use crate::grid::LatticeTooLarge;
 use crate::method::Method;
 use crate::robust::Counted;
@@ -11,7 +10,7 @@ use crate::robust::Counted;
 pub enum Failure {
     /// A photo shows hardly any texture.
     #[error(
-        "too few features: {query} in the query, {reference} in the reference, at least 4 are needed"
+        "Too few keypoints: {query} in the query, {reference} in the reference, at least 4 needed."
     )]
     TooFewFeatures {
         /// Keypoints of the query photo.
@@ -21,7 +20,7 @@ pub enum Failure {
     },
     /// Fewer than four matches survived the ratio test and uniqueness.
     #[error(
-        "too few matches: {unique} unique of {keypoints} query features, at least 4 are needed"
+        "Too few matches: {unique} of {keypoints} query keypoints have a unique one, at least 4 needed."
     )]
     TooFewMatches {
         /// Mutually best matches.
@@ -30,7 +29,7 @@ pub enum Failure {
         keypoints: usize,
     },
     /// Fewer than four matches have a depth.
-    #[error("too few matches have a LiDAR depth: {with_depth} of {unique}, at least 4 are needed")]
+    #[error("Too few matches have a depth: {with_depth} of {unique}, at least 4 needed.")]
     TooFewDepths {
         /// Matches with a 3-D point.
         with_depth: usize,
@@ -39,8 +38,7 @@ pub enum Failure {
     },
     /// No hypothesis is consistent with four correspondences.
     #[error(
-        "no pose is consistent with 4 of the {correspondences} correspondences \
-         (best {best_inliers}, after {trials} trials)"
+        "No pose has 4 inliers: the best of {trials} trials has {best_inliers} of {correspondences} correspondences."
     )]
     NoConsensus {
         /// Correspondences tried.
@@ -52,7 +50,7 @@ pub enum Failure {
     },
     /// The consensus is one that chance gives as well.
     #[error(
-        "{inliers} of {tested} {} agree on a pose, which chance explains; {needed} are needed",
+        "Too few inliers: {inliers} of {tested} {}, at least {needed} needed to rule out chance.",
         counted.name()
     )]
     ChanceConsensus {
@@ -67,8 +65,7 @@ pub enum Failure {
     },
     /// The pose is farther from the reference than the query can be.
     #[error(
-        "the consensus pose is {distance_m:.1} m from the reference, \
-         outside the uncertainty radius of {radius_m:.1} m"
+        "The pose is too far from the reference: {distance_m:.1} m, where {radius_m:.1} m is allowed."
     )]
     OutsideRadius {
         /// Distance of the pose from the reference \[m\].
@@ -77,28 +74,30 @@ pub enum Failure {
         radius_m: f64,
     },
     /// The reference camera sees no point of its cloud.
-    #[error("none of the cloud's {points} points is in view of the reference camera")]
+    #[error("The reference camera sees none of the {points} points of its cloud.")]
     NothingInView {
         /// Points of the cloud.
         points: usize,
     },
     /// No hypothesis has a cost: nothing covered enough, or the images are constant there.
-    #[error("none of {hypotheses} hypotheses could be compared with the query")]
+    #[error(
+        "Nothing to compare: none of {hypotheses} hypotheses covers enough of the query, or an image is constant."
+    )]
     NothingComparable {
         /// Hypotheses scored.
         hypotheses: usize,
     },
     /// Every hypothesis costs the same, so none is better than another.
-    #[error("the cost is {cost:.4} at each of {hypotheses} hypotheses: nothing tells them apart")]
+    #[error("No pose stands out: the cost is {cost:.4} at all {hypotheses} hypotheses.")]
     FlatCost {
         /// The one cost.
         cost: f64,
         /// Hypotheses that could be compared with the query.
         hypotheses: usize,
     },
-    /// Wherever the search went down, it left the disc.
+    /// Every minimum that was refined lies outside of the disc.
     #[error(
-        "all of {minima} minima that were refined lead out of the disc, more than {reach_m:.2} m from the reference"
+        "All {minima} refined minima lie outside the search, more than {reach_m:.1} m from the reference."
     )]
     LedOutside {
         /// Minima that were refined.
@@ -108,8 +107,7 @@ pub enum Failure {
     },
     /// The least cost is one that wrong poses have as well.
     #[error(
-        "the least cost, {cost:.4}, is {deviations:.1} standard deviations below those of other poses, \
-         which chance explains; {needed:.1} are needed"
+        "The lowest cost does not stand out: {deviations:.1} σ below other poses, at least {needed:.1} σ needed."
     )]
     ChanceMinimum {
         /// The least cost.
@@ -123,15 +121,14 @@ pub enum Failure {
     #[error(transparent)]
     LatticeTooLarge(#[from] LatticeTooLarge),
     /// There is nothing to localise against.
-    #[error("no reference frame{}", radius_m.map(|radius| format!(" with pose and scan within {radius} m")).unwrap_or_default())]
+    #[error("No reference frame{}.", radius_m.map(|radius| format!(" with pose and scan within {radius} m of the query")).unwrap_or_default())]
     NoReference {
         /// Where references were sought, around the query's known position \[m\].
         radius_m: Option<f64>,
     },
     /// Several references were to be fused, and each failed by itself.
     #[error(
-        "none of {weighed} references gave a pose (of {references}, the others have too few matches); \
-         the best, {best}: {failure}"
+        "No reference gave a pose; {weighed} of {references} had enough matches. The best, {best}: {failure}"
     )]
     NoReferenceSucceeded {
         /// References that the fusion gave a weight.
@@ -144,57 +141,38 @@ pub enum Failure {
         failure: Box<Failure>,
     },
     /// Several references were to give one pose at once, and the method takes one at a time.
-    #[error("{method} takes one reference at a time, so that it has no joint pose of several")]
+    #[error("{method} takes one reference at a time, so it has no joint pose.")]
     NotJoint {
         /// The method.
         method: Method,
     },
-    /// Another system was asked, and its answers have none here.
-    #[error("{answers} has no {missing}")]
+    /// Another system has no answer here.
+    #[error("There is nothing to judge: {answers} has no {missing}.")]
     NotAnswered {
         /// Whose answers.
         answers: String,
         /// What is not among them.
         missing: String,
     },
-    /// The pose is less certain than somebody asked for.
+    /// The confidence of the pose is below what the user or the method requires.
     #[error(
-        "the pose is within 1 m with a probability of {probability:.2}, and {needed:.2} is asked for"
+        "Confidence too low: {} likely within 1 m, {:.0} % required.", percent(*.probability), 100.0 * .needed
     )]
     LowConfidence {
         /// Its probability of being within 1 m.
         probability: f64,
-        /// The probability that is asked for.
+        /// The probability that is required.
         needed: f64,
     },
     /// A bug: an estimator panicked.
-    #[error("internal error: {message}")]
+    #[error("Internal error, please report it: {message}")]
     Internal {
         /// What it said.
         message: String,
     },
 }
 
-impl Failure {
-    /// The code of the reason in results.
-    pub fn code(&self) -> Code {
-        match self {
-            Self::NothingInView { .. } | Self::NoReference { .. } => Code::R1,
-            Self::TooFewFeatures { .. } => Code::R2,
-            Self::TooFewMatches { .. }
-            | Self::NoConsensus { .. }
-            | Self::ChanceConsensus { .. } => Code::R3,
-            Self::TooFewDepths { .. } => Code::R4,
-            Self::OutsideRadius { .. } => Code::R9,
-            Self::NothingComparable { .. } | Self::FlatCost { .. } => Code::D5,
-            Self::LedOutside { .. } => Code::D8,
-            Self::ChanceMinimum { .. } => Code::D6,
-            Self::LatticeTooLarge(_) => Code::D9,
-            Self::NoReferenceSucceeded { failure, .. } => failure.code(),
-            Self::NotJoint { .. } => Code::F2,
-            Self::NotAnswered { .. } => Code::E1,
-            Self::LowConfidence { .. } => Code::L1,
-            Self::Internal { .. } => Code::X9,
-        }
-    }
+/// Rounded down, so that a limit that was missed never reads as reached.
+fn percent(probability: f64) -> String {
+    format!("{:.0} %", (100.0 * probability).floor())
 }

@@ -494,7 +494,7 @@ impl Guided {
             residuals_px,
             pairings,
             inliers,
-            trials: 0,
+            trials: before.trials,
         }))
     }
 

@@ -14,7 +14,7 @@ pub const MOST_CELLS: usize = 1 << 20;
 /// A phase of the search has more than [`MOST_CELLS`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the search grid is too large: {} has {cells:.0} cells, at most {MOST_CELLS} are searched; {}",
+    "The search grid is too large: {} has {cells:.0} cells, at most {MOST_CELLS} are searched. {}.",
     phase.name(),
     phase.remedy()
 )]
@@ -148,8 +148,8 @@ mod tests {
         assert_eq!(refused.cells, 20_001.0 * 20_001.0);
         assert_eq!(
             refused.to_string(),
-            "the search grid is too large: position, coarse has 400040001 cells, at most 1048576 \
-             are searched; raise grid.coarse_step or lower the radius"
+            "The search grid is too large: position, coarse has 400040001 cells, at most 1048576 \
+             are searched. Raise grid.coarse_step or lower the radius."
         );
         for radius_m in [1e300, f64::INFINITY] {
             assert!(coarse(radius_m, 0.05).is_err());

@@ -18,7 +18,7 @@ use super::{
     LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_by,
     tell_ranking,
 };
-use crate::diagnosis::{Evidence, Subject, Tolerance, trust};
+use crate::diagnosis::{Evidence, Subject, Tolerance, confidence};
 use crate::estimator::{self, Estimator, Failure, Given, Hybrid, Outcome, hybrid_outcome};
 use crate::event::KindSet;
 use crate::foreign::Foreign;
@@ -374,6 +374,7 @@ impl<'a> Localizer<'a> {
                 self.seed,
                 Err(failure),
                 work.truth.as_ref(),
+                self.tolerance,
             )
         }
     }
@@ -412,7 +413,9 @@ impl<'a> Localizer<'a> {
                         (again.estimated, again.evidence)
                     }
                 };
-                self.judged(work, problem, method, outcome, evidence, times)
+                // A fallback has the verdicts of the method that it fell back to.
+                let verdicts = outcome.fell_back.then(|| direct.result.diagnosis.clone());
+                self.judged(work, problem, method, outcome, evidence, times, verdicts)
             }
             None => self.estimate(work, problem, method, observer)?,
         };
@@ -449,7 +452,7 @@ impl<'a> Localizer<'a> {
             None => self.ask(asked, method, &mut trace)?,
         };
         let times = timings.into_times();
-        Ok(self.judged(work, problem, method, outcome, evidence, times))
+        Ok(self.judged(work, problem, method, outcome, evidence, times, None))
     }
 
     /// What a method answers. A hybrid falls back where the pose of its first method is refused for a low
@@ -469,7 +472,7 @@ impl<'a> Localizer<'a> {
             let outcome =
                 trace.heard_by(&mut evidence, |trace| localize_by(first, problem, trace))?;
             let subject = Subject::new(problem, parts.first, self.params, &outcome, &evidence);
-            Ok(trust::accepted(&subject, self.least_probability))
+            Ok(confidence::accepted(&subject, self.least_probability))
         };
         Hybrid::new(method, parts, self.params).estimate_with(problem, ask_first, trace)
     }

@@ -6,7 +6,9 @@ use std::str::FromStr;
 use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
-use crate::diagnosis::{Code, Diagnosis, Subject, Trust, diagnose};
+use crate::diagnosis::{
+    Assessment, Code, Confidence, Diagnosis, Grade, PoseConfidence, Subject, Tolerance,
+};
 use crate::estimator::{self, CostSummary, Failure, FeatureCounts};
 use crate::fusion::Fusion;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
@@ -48,6 +50,8 @@ pub struct QueryResult {
     pub setting: Option<Setting>,
     /// Whether there is a pose.
     pub status: Status,
+    /// What it is worth by the truth, within the tolerance of the run.
+    pub grade: Grade,
     /// Why there is none.
     pub reason: Option<Reason>,
     /// The estimated pose.
@@ -63,16 +67,15 @@ pub struct QueryResult {
     /// What our costs say of a pose that another system found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub costs_at_pose: Vec<CostAtPose>,
-    /// Why the pose is wrong, missing or hardly to be believed, the primary verdict first.
+    /// Why the pose is wrong, missing or uncertain, the primary verdict first.
     pub diagnosis: Vec<Diagnosis>,
     /// What was tried to make a wrong pose right, if it was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub explanation: Option<Explanation>,
-    /// How far the pose is to be believed, from what the method itself can tell.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trust: Option<Trust>,
+    /// How likely the pose is right, by what the method itself leaves behind.
+    pub confidence: Option<PoseConfidence>,
     /// How far the poses of the methods that ran before on the same reference are from this one. The
-    /// probability of `trust` does not know of them, so that it depends on no other method.
+    /// confidence does not know of them, so that it depends on no other method.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub agreement: Vec<Agreement>,
     /// What each reference alone gave, where several were fused; they have no such list.
@@ -304,8 +307,17 @@ fn costs_at(subject: &Subject<'_>, pose: &Pose) -> Vec<CostAtPose> {
     costs
 }
 
-/// Measures an outcome against the true pose, where it is known, and says what is wrong with it.
+/// Measures an outcome against the true pose, where it is known, and assesses it.
 pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
+    evaluate_as(scene, subject, Assessment::of(subject))
+}
+
+/// As [`evaluate`], with an assessment that is known.
+pub(super) fn evaluate_as(
+    scene: &str,
+    subject: &Subject<'_>,
+    assessment: Assessment,
+) -> QueryResult {
     let Subject {
         problem,
         method,
@@ -347,8 +359,9 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
             Ok(pose) if estimator::find(method).is_none() => costs_at(subject, pose),
             _ => Vec::new(),
         },
-        diagnosis: diagnose(subject),
-        trust: subject.trust.clone(),
+        grade: assessment.grade,
+        diagnosis: assessment.verdicts,
+        confidence: assessment.confidence,
         ..QueryResult::new(
             scene,
             &problem.query.name,
@@ -356,6 +369,7 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
             problem.seed,
             outcome.pose.as_ref(),
             truth,
+            subject.tolerance,
         )
     }
 }
@@ -369,7 +383,11 @@ impl QueryResult {
         seed: u64,
         pose: Result<&Pose, &Failure>,
         truth: Option<&Pose>,
+        right: Tolerance,
     ) -> Self {
+        let error = truth
+            .zip(pose.ok())
+            .map(|(truth, pose)| PoseError::between(truth, pose));
         Self {
             schema: SCHEMA.to_owned(),
             scene: scene.to_owned(),
@@ -386,24 +404,59 @@ impl QueryResult {
             } else {
                 Status::Failed
             },
+            grade: Grade::of(pose.is_ok(), error.as_ref(), right),
             reason: pose.err().map(|failure| Reason {
-                code: failure.code(),
+                code: Code::of(failure),
                 text: failure.to_string(),
             }),
             pose: pose.ok().map(PoseReport::from),
-            error: truth
-                .zip(pose.ok())
-                .map(|(truth, pose)| PoseError::between(truth, pose)),
+            error,
             initial_error: None,
             counts: None,
             cost: None,
             costs_at_pose: Vec::new(),
             diagnosis: pose.err().map(Diagnosis::of_failure).into_iter().collect(),
             explanation: None,
-            trust: None,
+            confidence: None,
             agreement: Vec::new(),
             per_reference: Some(Vec::new()),
         }
+    }
+
+    /// The grade as it may be shown: what the truth decides is unmeasured where the truth is hidden.
+    pub fn grade_shown(&self, shows_truth: bool) -> Grade {
+        match self.grade {
+            Grade::Right | Grade::Wrong if !shows_truth => Grade::Unmeasured,
+            grade => grade,
+        }
+    }
+
+    /// What became of the query: the reason of a failure, or the grade with the error.
+    pub fn words(&self) -> String {
+        match &self.reason {
+            Some(reason) => format!("{} {}", reason.code, reason.text),
+            None => self.grade.words(self.error.as_ref()),
+        }
+    }
+
+    /// The same result, graded by another tolerance.
+    #[must_use]
+    pub fn graded(self, right: Tolerance) -> Self {
+        Self {
+            grade: Grade::of(self.status == Status::Ok, self.error.as_ref(), right),
+            ..self
+        }
+    }
+
+    /// Its confidence in one word, where it has one.
+    pub fn confidence_word(&self) -> Option<Confidence> {
+        self.confidence.as_ref().map(|confidence| confidence.word)
+    }
+
+    /// Whether a hybrid took its second method's answer.
+    pub fn fell_back(&self) -> bool {
+        let is_hybrid = estimator::find(self.method).is_some_and(|entry| entry.hybrid().is_some());
+        is_hybrid && (self.cost.is_some() || self.status == Status::Failed)
     }
 
     /// The same, as it stands in the list of another result.

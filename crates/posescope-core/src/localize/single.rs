@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::diagnosis::{Evidence, Subject, trust};
+use crate::diagnosis::{Evidence, Subject, confidence};
 use crate::estimator::{self, Estimator, Failure, JointReference, Outcome};
 use crate::fusion::{Share, fuse_jointly};
 use crate::geometry::Pose;
@@ -41,7 +41,7 @@ pub fn localize_traced(
         estimate_traced(problem, method, params, trace)
     })?;
     let subject = Subject::new(problem, method, params, &outcome, &evidence);
-    Ok(trust::accepted(&subject, None))
+    Ok(confidence::accepted(&subject, None))
 }
 
 /// What the method's estimator answers. A pose is not refused yet for a low confidence.

@@ -8,7 +8,7 @@ use egui_plot::{Bar, BarChart, Legend, Plot};
 
 use super::Chosen;
 use crate::app::{Command, ViewContext, theme};
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::method::Method;
 
@@ -56,7 +56,7 @@ pub(super) fn by_method(ui: &mut Ui, results: &[Chosen<'_>]) {
                         let bar = Bar::new(index as f64, count)
                             .base_offset(below[index])
                             .width(0.7)
-                            .name(format!("{} {code}: {}", method.label(), code.about()));
+                            .name(format!("{} {code}: {}", method.label(), code.title()));
                         below[index] += count;
                         Some(bar)
                     });
@@ -168,7 +168,7 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, method: Method, tally: &Tally) 
         ui.end_row();
         for code in tally.codes() {
             match code {
-                Some(code) => ui.strong(code.name()).on_hover_text(code.about()),
+                Some(code) => ui.strong(code.name()).on_hover_text(code.title()),
                 None => ui.weak("none"),
             };
             for pair in &pairs {

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use super::*;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
-use crate::code::Code;
+use crate::diagnosis::Code;
 use crate::estimator::{entry, methods};
 use crate::fusion::fuse_jointly;
 use crate::geometry::yaw;
@@ -227,7 +227,7 @@ fn the_same_reference_many_times_is_no_more_evidence_than_once() {
     };
     let problems = problems(["a", "b", "c", "d", "e"].map(copy).into());
     let (pose, shares) = jointly(Method::FB, &problems, &[9; 5]);
-    assert_eq!(pose.map_err(|failure| failure.code()), Err(Code::R3));
+    assert_eq!(pose.map_err(|failure| Code::of(&failure)), Err(Code::R3));
     assert!(shares.iter().all(|share| share.weight == 0.0));
     assert!(
         shares

@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use super::work::Answer;
 use super::{LocalizeError, Localizer, Request};
+use crate::diagnosis::Grade;
 use crate::diagnosis::remedies::{Change, Remedy, remedies};
 use crate::geometry::PoseError;
 use crate::localize::observer::{LocalizeObserver, NoObserver, checkpoint};
@@ -24,9 +25,8 @@ impl Localizer<'_> {
     ) -> Result<(), Cancelled> {
         for answer in answers {
             let result = &answer.result;
-            let is_right = |error: &PoseError| self.tolerance.contains(error);
             let is_measured = result.initial_error.is_some();
-            if !is_measured || result.error.as_ref().is_some_and(is_right) {
+            if !is_measured || !result.grade.is_failure() {
                 continue;
             }
             let mut explanation = Explanation::default();
@@ -49,7 +49,13 @@ impl Localizer<'_> {
     ) -> Result<(), Cancelled> {
         let Answer { result, asked, .. } = answer;
         let candidates = result.diagnosis.first().map_or(Vec::new(), |primary| {
-            remedies(primary.code, result.method, self.params(), asked.radius_m)
+            remedies(
+                primary.code,
+                result.method,
+                result.fell_back(),
+                self.params(),
+                asked.radius_m,
+            )
         });
         let candidates: Vec<Changed> = candidates
             .iter()
@@ -142,8 +148,8 @@ impl Changed {
         let again = localizer.with_other_params(&self.params);
         let mut found = None;
         let keep = |result: QueryResult, _| {
-            let is_right = |error: &PoseError| again.tolerance().contains(error);
-            found = found.or(result.error.filter(is_right));
+            let is_right = result.grade == Grade::Right;
+            found = found.or(result.error.filter(|_| is_right));
             Ok::<(), LocalizeError>(())
         };
         let requests = std::slice::from_ref(&self.request);

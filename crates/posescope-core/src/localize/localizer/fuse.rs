@@ -2,7 +2,7 @@
 
 use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
-use crate::diagnosis::{Member, diagnose_fusion, diagnose_joint, fused_trust};
+use crate::diagnosis::{Member, diagnose_fusion, fused_confidence};
 use crate::estimator::{Failure, JointReference, count_matches};
 use crate::features::{PairMatches, remembered};
 use crate::fusion::{self, Fusion, Share, Way};
@@ -93,7 +93,7 @@ impl Localizer<'_> {
             .map(|(share, (.., candidate))| Member {
                 share,
                 verdicts: &candidate.result.diagnosis,
-                trust: candidate.result.trust.as_ref(),
+                confidence: candidate.result.confidence.as_ref(),
             })
             .collect();
         let truth = work.truth.as_ref();
@@ -108,14 +108,17 @@ impl Localizer<'_> {
             initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
                 PoseError::between(truth, &problem.reference.world_from_camera)
             }),
-            diagnosis: match fusion.way {
-                Way::Weighed(_) => diagnose_fusion(&pose, &fused_members, truth, self.tolerance),
-                Way::Joint => diagnose_joint(&pose, &fused_members, truth, self.tolerance),
-            },
-            trust: pose
+            diagnosis: diagnose_fusion(
+                &pose,
+                &fused_members,
+                truth,
+                self.tolerance,
+                matches!(fusion.way, Way::Joint),
+            ),
+            confidence: pose
                 .as_ref()
                 .ok()
-                .and_then(|pose| fused_trust(pose, &fused_members)),
+                .and_then(|pose| fused_confidence(pose, &fused_members)),
             per_reference: Some(
                 solved
                     .iter()
@@ -129,6 +132,7 @@ impl Localizer<'_> {
                 self.seed,
                 pose.as_ref(),
                 truth,
+                self.tolerance,
             )
         };
         let result = self.with_ranking_judged(result, request, truth);

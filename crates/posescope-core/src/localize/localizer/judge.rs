@@ -2,10 +2,13 @@
 
 use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
-use crate::diagnosis::{Evidence, Subject, diagnose_ranking, trust};
+use crate::diagnosis::{
+    Assessment, Diagnosis, Evidence, Grade, Subject, confidence, diagnose_ranking,
+};
 use crate::estimator::Outcome;
 use crate::geometry::Pose;
-use crate::localize::{QueryResult, StageTimes, evaluate};
+use crate::localize::result::evaluate_as;
+use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::scene::Scene;
 
@@ -17,11 +20,8 @@ impl Localizer<'_> {
         request: &Request,
         truth: Option<&Pose>,
     ) -> QueryResult {
-        let is_right = result
-            .error
-            .is_some_and(|error| self.tolerance.contains(&error));
         let ranking = request.references.ranking.as_ref().zip(truth);
-        if !is_right
+        if result.grade != Grade::Right
             && let Some(verdict) = ranking
                 .and_then(|(ranking, truth)| diagnose_ranking(ranking, truth, request.radius_m))
         {
@@ -30,8 +30,12 @@ impl Localizer<'_> {
         result
     }
 
-    /// What is made of an estimator's outcome: a pose that is not believed enough is refused, and what
-    /// is wrong with the result is said.
+    /// Refuses a pose of too low a confidence, and assesses the result. `verdicts` are those of another
+    /// method that answered the same, where they are known.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "an outcome and all that is known of it"
+    )]
     pub(super) fn judged(
         &self,
         work: &QueryWork<'_>,
@@ -40,16 +44,25 @@ impl Localizer<'_> {
         estimated: Outcome,
         evidence: Evidence,
         times: StageTimes,
+        verdicts: Option<Vec<Diagnosis>>,
     ) -> MethodOutcome {
         let solved = &work.problems[problem];
         let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
-        let outcome = trust::accepted(&subject, self.least_probability);
+        let outcome = confidence::accepted(&subject, self.least_probability);
         let subject = Subject {
             outcome: &outcome,
             ..subject
         };
         let subject = subject.against(work.truth.as_ref(), self.tolerance);
-        let mut result = evaluate(self.references.name(), &subject);
+        let assessment = match verdicts {
+            Some(verdicts) => Assessment {
+                grade: subject.grade(),
+                confidence: subject.confidence.clone(),
+                verdicts,
+            },
+            None => Assessment::of(&subject),
+        };
+        let mut result = evaluate_as(self.references.name(), &subject, assessment);
         if let Ok(pose) = &outcome.pose {
             result.agreement = work.agreement(problem, method, pose);
         }

@@ -1,0 +1,143 @@
+//! What rules are asked for against their verdicts: changes of settings, for a method with its parameters.
+
+use super::family::Family;
+use crate::method::Method;
+use crate::params::Params;
+use crate::robust::MlesacParams;
+
+/// What is done differently.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// A parameter, as `--set` takes it: `grid.rounds=2`.
+    Set(String),
+    /// Another uncertainty radius \[m\].
+    Radius(f64),
+    /// Another method.
+    Method(Method),
+    /// Another reference: the one so many places farther from the one that was used.
+    Reference(usize),
+}
+
+/// Changes that are tried together.
+pub type Remedy = Vec<Change>;
+
+/// What remedies are asked for: a method with its parameters and the radius of its search.
+#[derive(Clone, Copy, Debug)]
+pub struct Ask<'a> {
+    /// How the method finds its pose.
+    pub family: Family,
+    /// Its parameters.
+    pub params: &'a Params,
+    /// The uncertainty radius \[m\].
+    pub radius_m: f64,
+}
+
+impl Ask<'_> {
+    /// A parameter with another number.
+    pub(super) fn set(&self, key: &str, value: f64) -> Change {
+        Change::Set(format!("{key}={}", rounded(value)))
+    }
+
+    /// A parameter with another word.
+    pub(super) fn word(&self, key: &str, word: &str) -> Change {
+        Change::Set(format!("{key}={word}"))
+    }
+
+    /// The first key, for a method that matches again the second.
+    pub(super) fn key(&self, first: &'static str, guided: &'static str) -> &'static str {
+        match self.family {
+            Family::Guided => guided,
+            _ => first,
+        }
+    }
+
+    /// Another radius.
+    pub(super) fn radius(&self, times: f64) -> Change {
+        Change::Radius(rounded(self.radius_m * times))
+    }
+
+    /// A higher or lower floor of coverage.
+    pub(super) fn floor(&self, times: f64, least: f64) -> Change {
+        let floor = self.params.grid.coverage_floor * times;
+        self.set("grid.coverage_floor", floor.max(least).min(1.0))
+    }
+
+    /// One more round of a search on a grid.
+    pub(super) fn rounds(&self) -> Change {
+        Change::Set(format!(
+            "grid.rounds={}",
+            (self.params.grid.rounds + 1).min(10)
+        ))
+    }
+
+    /// More search of the kind that the method does; `None` for one that does none.
+    pub(super) fn more_search(&self) -> Option<Change> {
+        match self.family {
+            Family::Grid => Some(self.rounds()),
+            Family::Starts => {
+                let starts = (2 * self.params.mi6.starts).min(200);
+                Some(self.set("mi6.starts", starts as f64))
+            }
+            _ => None,
+        }
+    }
+
+    /// Coarse positions half as far apart.
+    pub(super) fn dense(&self) -> Change {
+        self.set("grid.coarse_step", self.params.grid.coarse_step_m / 2.0)
+    }
+
+    /// Twice the range of yaw.
+    pub(super) fn wide_yaw(&self) -> Change {
+        let range = (2.0 * self.params.grid.yaw_range_deg).min(180.0);
+        self.set("grid.yaw_range", range)
+    }
+
+    /// Larger splats.
+    pub(super) fn wider_splat(&self) -> Change {
+        Change::Set(format!(
+            "render.splat_px={}",
+            self.params.render.splat_px + 2
+        ))
+    }
+
+    /// A looser or stricter ratio test.
+    pub(super) fn ratio(&self, by: f64) -> Change {
+        match self.family {
+            Family::Guided => {
+                // Matched again, a feature needs not stand out as far.
+                self.set("fb2.ratio", (self.params.fb2.ratio + by).clamp(0.1, 0.98))
+            }
+            _ => self.set("fb.ratio", (self.params.fb.ratio + by).clamp(0.1, 1.0)),
+        }
+    }
+
+    /// More keypoints, by a lower threshold of the detector.
+    pub(super) fn more_keypoints(&self, by: f64) -> Change {
+        match self.family {
+            Family::Guided => self.set("fb2.contrast", self.params.fb2.sift.contrast * by),
+            _ => self.set("surf.threshold", self.params.surf.threshold * by),
+        }
+    }
+
+    /// How far a projected point may be from the keypoint that it lends its depth \[px\].
+    pub(super) fn depth_radius_px(&self) -> f64 {
+        match self.family {
+            Family::Guided => self.params.fb2.depth_radius_px,
+            _ => self.params.fb.depth_radius_px,
+        }
+    }
+
+    /// MLESAC's parameters.
+    pub(super) fn mlesac(&self) -> &MlesacParams {
+        match self.family {
+            Family::Guided => &self.params.fb2.mlesac,
+            _ => &self.params.fb.mlesac,
+        }
+    }
+}
+
+/// Three digits are enough, and are what the command line then says.
+fn rounded(value: f64) -> f64 {
+    (value * 1000.0).round() / 1000.0
+}

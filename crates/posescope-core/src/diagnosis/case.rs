@@ -1,0 +1,162 @@
+//! What a rule looks at: one result with all that is known about it. What takes time is computed once, when
+//! the first rule asks.
+
+use std::cell::OnceCell;
+
+use super::confidence::{self, PoseConfidence};
+use super::family::Family;
+use super::matches::{Matching, TrueMatches};
+use super::search::Search;
+use super::starts::Starts;
+use super::{Diagnosis, Subject, Tolerance};
+use crate::estimator::{self, Failure, FeatureBased, Guided, HybridParts};
+use crate::fusion::Share;
+use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
+use crate::retrieval::ReferenceRanking;
+use crate::solver::Correspondence;
+
+/// A result that is wrong, missing or perhaps uncertain.
+pub struct Case<'a, 'cost> {
+    pub(super) subject: &'a Subject<'a>,
+    pub(super) family: Family,
+    /// The method whose pose it is: of a hybrid the one that it took.
+    pub(super) responsible: Method,
+    /// The search on a grid, or what stands for one.
+    pub(super) search: Option<&'a Search<'a, 'cost>>,
+    matches: OnceCell<Option<TrueMatches>>,
+    starts: OnceCell<Option<Starts>>,
+    contrast: OnceCell<f64>,
+}
+
+impl<'a, 'cost> Case<'a, 'cost> {
+    pub(super) fn new(
+        subject: &'a Subject<'a>,
+        family: Family,
+        search: Option<&'a Search<'a, 'cost>>,
+    ) -> Self {
+        Self {
+            subject,
+            family,
+            responsible: confidence::responsible(subject.method, subject.outcome),
+            search,
+            matches: OnceCell::new(),
+            starts: OnceCell::new(),
+            contrast: OnceCell::new(),
+        }
+    }
+
+    /// The parts of the hybrid that the method is, if it is one.
+    pub(super) fn hybrid(&self) -> Option<HybridParts> {
+        estimator::find(self.subject.method)?.hybrid()
+    }
+
+    /// What the truth says about the matches; `None` where nothing was matched.
+    pub(super) fn matches(&self) -> Option<&TrueMatches> {
+        let matches = || TrueMatches::of(self.subject, &self.matching());
+        self.matches.get_or_init(matches).as_ref()
+    }
+
+    /// Where the truth leads under the cost of a search from many starts.
+    pub(super) fn starts(&self) -> Option<&Starts> {
+        let starts = || Starts::of(self.subject);
+        self.starts.get_or_init(starts).as_ref()
+    }
+
+    /// Standard deviation of the query's grey values.
+    pub(super) fn contrast(&self) -> f64 {
+        const STRIDE: usize = 7;
+        *self.contrast.get_or_init(|| {
+            let photo = &self.subject.problem.query.photo.gray;
+            let values = photo.as_raw().iter().step_by(STRIDE);
+            let values = values.map(|&value| f64::from(value));
+            let count = values.len() as f64;
+            let mean = values.clone().sum::<f64>() / count;
+            (values.map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+        })
+    }
+
+    /// How the method matches features.
+    pub(super) fn matching(&self) -> Matching<'a> {
+        let params = self.subject.params;
+        match self.family {
+            Family::Guided => Matching {
+                mlesac: &params.fb2.mlesac,
+                depth_radius_px: params.fb2.depth_radius_px,
+                visible: true,
+                radius_slack: params.fb2.radius_slack,
+            },
+            _ => Matching {
+                mlesac: &params.fb.mlesac,
+                depth_radius_px: params.fb.depth_radius_px,
+                visible: params.fb.visible,
+                radius_slack: params.fb.radius_slack,
+            },
+        }
+    }
+
+    /// Whether the method would accept a pose that these correspondences agree on.
+    pub(super) fn would_accept(&self, matches: &TrueMatches, inliers: &[usize]) -> bool {
+        let (params, camera) = (self.subject.params, &self.subject.problem.query.intrinsics);
+        let correspondences: &[Correspondence] = &matches.correspondences;
+        match self.family {
+            Family::Guided => Guided::new(params).would_accept(correspondences, inliers, camera),
+            _ => FeatureBased::new(params).would_accept(correspondences, inliers, camera),
+        }
+    }
+
+    /// The error of the consensus, accepted or not.
+    pub(super) fn consensus_error(&self) -> Option<PoseError> {
+        let refined = self.subject.evidence.refined.as_ref()?;
+        let pose = (self.subject.problem).world_from_query(&refined.reference_from_query);
+        Some(PoseError::between(self.subject.truth?, &pose))
+    }
+
+    /// How far the inliers of the consensus let its camera centre move \[m\]; `None` where they do not fix it.
+    pub(super) fn deviation_m(&self, matches: &TrueMatches) -> Option<f64> {
+        matches.deviation_m(self.subject, self.matching().mlesac.sigma_px)
+    }
+
+    /// Whether the consensus, accepted or not, is right.
+    pub(super) fn consensus_is_right(&self) -> bool {
+        let error = self.consensus_error();
+        error.is_some_and(|error| self.subject.tolerance.contains(&error))
+    }
+}
+
+/// What one reference gave in a fusion, and what is known of it alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Member<'a> {
+    /// Its weight and its pose.
+    pub share: &'a Share,
+    /// The verdicts on it alone.
+    pub verdicts: &'a [Diagnosis],
+    /// The confidence of its pose.
+    pub confidence: Option<&'a PoseConfidence>,
+}
+
+/// The member of most weight, of equals the first.
+pub(super) fn heaviest<'m, 'a>(members: &'m [Member<'a>]) -> Option<&'m Member<'a>> {
+    members
+        .iter()
+        .rev()
+        .max_by(|a, b| a.share.weight.total_cmp(&b.share.weight))
+}
+
+/// A fused pose, and what each reference gave.
+pub struct FusionCase<'a> {
+    pub(super) pose: &'a Result<Pose, Failure>,
+    pub(super) members: &'a [Member<'a>],
+    pub(super) truth: &'a Pose,
+    pub(super) tolerance: Tolerance,
+    /// Whether all references were used at once, in place of an average.
+    pub(super) is_joint: bool,
+}
+
+/// How references were ranked by what they look like.
+pub struct RankingCase<'a> {
+    pub(super) ranking: &'a ReferenceRanking,
+    pub(super) truth: &'a Pose,
+    /// A frame is of the right place if it is within this of the truth \[m\].
+    pub(super) radius_m: f64,
+}

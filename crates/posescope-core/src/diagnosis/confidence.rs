@@ -1,0 +1,341 @@
+//! How likely an accepted pose is right, without knowing the truth.
+//!
+//! What an estimator leaves behind says how far its pose stands out from what chance gives: for methods of
+//! features the inliers beyond chance, how well they fix the pose, and whether the photos go together there
+//! better than elsewhere; for a search on a grid how deep its minimum is beside the other hypotheses, the
+//! runner-up and shuffled pixels; for a search from many starts how many of them end at it, and whether
+//! features lead there too. A logistic function of these signals is the probability of being within
+//! [`WITHIN_M`]. Its coefficients were fitted on some conditions of the street, at default parameters, and are
+//! judged on others (`docs/diagnosis.md`).
+
+mod appearance;
+mod coefficients;
+mod inliers;
+mod minimum;
+mod settled;
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+pub use coefficients::probability;
+
+use super::family::Family;
+use super::{Evidence, Subject};
+use crate::estimator::{self, Failure, Outcome};
+use crate::grid::{Phase, ScoredLattice};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::text::UnknownWord;
+use appearance::Look;
+use inliers::Inliers;
+use minimum::Minimum;
+use settled::Settled;
+
+/// The distance from the truth that [`PoseConfidence::probability`] speaks of \[m\].
+pub const WITHIN_M: f64 = 1.0;
+
+/// A pose is trusted from this probability on.
+pub const TRUSTED_FROM: f64 = 0.95;
+
+/// A pose of less probability is more likely wrong than right.
+pub const LOW_BELOW: f64 = 0.5;
+
+/// How likely a pose is right, in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Confidence {
+    /// At least [`TRUSTED_FROM`].
+    Trusted,
+    /// Neither trusted nor low.
+    Unsure,
+    /// Below [`LOW_BELOW`].
+    Low,
+}
+
+impl Confidence {
+    /// All of them, from the best.
+    pub const ALL: [Self; 3] = [Self::Trusted, Self::Unsure, Self::Low];
+
+    /// That of a probability.
+    pub fn of(probability: f64) -> Self {
+        match probability {
+            p if p >= TRUSTED_FROM => Self::Trusted,
+            p if p >= LOW_BELOW => Self::Unsure,
+            _ => Self::Low,
+        }
+    }
+
+    /// The word, the same everywhere.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Trusted => "trusted",
+            Self::Unsure => "unsure",
+            Self::Low => "low",
+        }
+    }
+
+    /// The glyph, the same everywhere.
+    pub fn glyph(self) -> &'static str {
+        match self {
+            Self::Trusted => "◇",
+            Self::Unsure => "◈",
+            Self::Low => "◆",
+        }
+    }
+}
+
+impl fmt::Display for Confidence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.word())
+    }
+}
+
+impl FromStr for Confidence {
+    type Err = UnknownWord;
+
+    fn from_str(word: &str) -> Result<Self, UnknownWord> {
+        let found = Self::ALL.into_iter().find(|one| one.word() == word);
+        found.ok_or_else(|| UnknownWord::among(word, "confidence", Self::ALL.map(Self::word)))
+    }
+}
+
+crate::serde_as_text!(Confidence);
+
+/// What the coefficients of a probability were fitted on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Calibration {
+    /// Conditions of the built-in street.
+    #[default]
+    Street,
+}
+
+/// How likely a pose is right, and how far it may be off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseConfidence {
+    /// Probability of being within 1 m of the truth, from this method alone.
+    pub probability: f64,
+    /// The same in one word.
+    pub word: Confidence,
+    /// What the probability was calibrated on.
+    pub calibrated_on: Calibration,
+    /// Standard deviation of the camera centre along its own axes, right, down, forward \[m\]; 0 along
+    /// what is not searched. `None` where nothing fixes the pose.
+    pub position_std_m: Option<[f64; 3]>,
+    /// Standard deviation of the rotation about the same axes \[°\].
+    pub rotation_std_deg: Option<[f64; 3]>,
+    /// Root mean square distance of the inliers from their centre, as a share of the image's diagonal;
+    /// of methods that have inliers.
+    pub inlier_spread: Option<f64>,
+    /// How much deeper the minimum is than the runner-up, in robust standard deviations of the coarse
+    /// costs; of methods that search a cost, where there is a runner-up.
+    pub runner_up_margin: Option<f64>,
+    /// What chance alone would give: the cost of shuffled pixels for a method that searches a cost;
+    /// for methods of features the decimal logarithm of the number of false alarms.
+    pub chance_level: Option<f64>,
+}
+
+/// A probability as people read it. Rounded down, so that a limit that was missed never reads as reached.
+pub fn percent(probability: f64) -> String {
+    match (100.0 * probability).floor() {
+        0.0 => "under 1 %".to_owned(),
+        percent => format!("{percent:.0} %"),
+    }
+}
+
+/// What a probability is made of: names and values, in one order for all results of one family.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signals {
+    /// The names.
+    pub names: &'static [&'static str],
+    /// The values; all are finite.
+    pub values: Vec<f64>,
+}
+
+impl PoseConfidence {
+    /// A probability alone.
+    pub fn new(probability: f64) -> Self {
+        Self {
+            probability,
+            word: Confidence::of(probability),
+            calibrated_on: Calibration::Street,
+            position_std_m: None,
+            rotation_std_deg: None,
+            inlier_spread: None,
+            runner_up_margin: None,
+            chance_level: None,
+        }
+    }
+
+    /// That of the pose of an outcome; `None` without a pose, and for a method that was not calibrated.
+    pub fn of(
+        problem: &Problem,
+        method: Method,
+        params: &Params,
+        outcome: &Outcome,
+        evidence: &Evidence,
+    ) -> Option<Self> {
+        outcome.pose.as_ref().ok()?;
+        let method = responsible(method, outcome);
+        match Family::of(method)? {
+            Family::Features => of_features(problem, method, params, evidence, Look::QUICK),
+            Family::Guided => of_features(problem, method, params, evidence, Look::THOROUGH),
+            Family::Grid => of_search(method, outcome, evidence),
+            Family::Starts => of_settled(method, outcome, evidence),
+            Family::Given => None,
+        }
+    }
+}
+
+/// The method whose pose an outcome has: of a hybrid the one that it took.
+pub fn responsible(method: Method, outcome: &Outcome) -> Method {
+    responsible_of(method, outcome.fell_back)
+}
+
+/// The method whose pose a result has: of a hybrid the one that it took.
+pub(super) fn responsible_of(method: Method, fell_back: bool) -> Method {
+    match estimator::find(method).and_then(|entry| entry.hybrid()) {
+        Some(parts) if fell_back => parts.second,
+        Some(parts) => parts.first,
+        None => method,
+    }
+}
+
+/// The outcome, without its pose where that is less probably right than its method lets pass, or than
+/// `asked` for.
+pub fn accepted(subject: &Subject<'_>, asked: Option<f64>) -> Outcome {
+    let of_method = estimator::find(subject.method)
+        .map_or(0.0, |entry| entry.least_probability(subject.params));
+    let needed = asked.unwrap_or(0.0).max(of_method);
+    match subject.confidence.as_ref().map(|one| one.probability) {
+        Some(probability) if probability < needed => Outcome {
+            pose: Err(Failure::LowConfidence {
+                probability,
+                needed,
+            }),
+            ..subject.outcome.clone()
+        },
+        _ => subject.outcome.clone(),
+    }
+}
+
+/// The signals of an outcome with a pose, as the probability takes them.
+pub fn signals(
+    problem: &Problem,
+    method: Method,
+    params: &Params,
+    outcome: &Outcome,
+    evidence: &Evidence,
+) -> Option<Signals> {
+    outcome.pose.as_ref().ok()?;
+    let method = responsible(method, outcome);
+    match Family::of(method)? {
+        family @ (Family::Features | Family::Guided) => {
+            let look = match family {
+                Family::Guided => Look::THOROUGH,
+                _ => Look::QUICK,
+            };
+            let consensus = Inliers::of(problem, params, evidence, look)?;
+            Some(consensus.signals(evidence))
+        }
+        Family::Grid => Some(Minimum::of(outcome, evidence)?.signals()),
+        Family::Starts => Some(Settled::of(outcome, evidence)?.signals()),
+        Family::Given => None,
+    }
+}
+
+fn of_features(
+    problem: &Problem,
+    method: Method,
+    params: &Params,
+    evidence: &Evidence,
+    look: Look,
+) -> Option<PoseConfidence> {
+    let inliers = Inliers::of(problem, params, evidence, look)?;
+    let signals = inliers.signals(evidence);
+    let covariance = inliers.covariance;
+    let deviation = |first: usize| {
+        covariance.map(|c| std::array::from_fn(|axis| c[(first + axis, first + axis)].sqrt()))
+    };
+    Some(PoseConfidence {
+        position_std_m: deviation(3),
+        rotation_std_deg: deviation(0).map(|d: [f64; 3]| d.map(f64::to_degrees)),
+        inlier_spread: Some(inliers.spread),
+        chance_level: evidence.judged.as_ref().map(|j| j.acceptance.log10_nfa),
+        ..PoseConfidence::new(probability(method, &signals.values)?)
+    })
+}
+
+fn of_search(method: Method, outcome: &Outcome, evidence: &Evidence) -> Option<PoseConfidence> {
+    let minimum = Minimum::of(outcome, evidence)?;
+    let deviations = minimum.deviations(evidence);
+    Some(PoseConfidence {
+        position_std_m: deviations.map(|[right, forward, _]| [right, 0.0, forward]),
+        rotation_std_deg: deviations.map(|[.., yaw]| [0.0, yaw.to_degrees(), 0.0]),
+        runner_up_margin: minimum.runner_up_margin,
+        chance_level: outcome.cost.as_ref()?.shuffled,
+        ..PoseConfidence::new(probability(method, &minimum.signals().values)?)
+    })
+}
+
+fn of_settled(method: Method, outcome: &Outcome, evidence: &Evidence) -> Option<PoseConfidence> {
+    let settled = Settled::of(outcome, evidence)?;
+    Some(PoseConfidence {
+        runner_up_margin: settled.runner_up_margin,
+        chance_level: outcome.cost.as_ref()?.shuffled,
+        ..PoseConfidence::new(probability(method, &settled.signals().values)?)
+    })
+}
+
+/// Large values say little more than moderate ones.
+fn tamed(value: f64) -> f64 {
+    value.signum() * value.abs().ln_1p()
+}
+
+fn surface(evidence: &Evidence, phase: Phase) -> Option<&ScoredLattice> {
+    let found = |surface: &&std::sync::Arc<ScoredLattice>| surface.lattice.phase == phase;
+    evidence.surfaces.iter().find(found).map(AsRef::as_ref)
+}
+
+fn eligible_costs(surface: &ScoredLattice) -> Vec<f64> {
+    (0..surface.scores.len())
+        .filter_map(|cell| surface.eligible_cost(cell))
+        .collect()
+}
+
+/// The median, and the standard deviation that a normal distribution of the same median absolute
+/// deviation has.
+fn centre_and_deviation(values: &mut [f64]) -> Option<(f64, f64)> {
+    let centre = median(values)?;
+    let mut deviations: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
+    let deviation = 1.4826 * median(&mut deviations)?;
+    Some((centre, deviation.max(1e-9)))
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len().checked_sub(1)? / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_is_trusted_from_nineteen_in_twenty_on_and_low_below_one_half() {
+        let words = [0.0, 0.499, 0.5, 0.949, 0.95, 1.0].map(Confidence::of);
+        use Confidence::{Low, Trusted, Unsure};
+        assert_eq!(words, [Low, Low, Unsure, Unsure, Trusted, Trusted]);
+        for one in Confidence::ALL {
+            assert_eq!(one.word().parse(), Ok(one));
+        }
+    }
+
+    #[test]
+    fn a_limit_that_was_missed_does_not_read_as_reached() {
+        let texts = [0.003, 0.4999, 0.9499, 1.0].map(percent);
+        assert_eq!(texts, ["under 1 %", "49 %", "94 %", "100 %"]);
+    }
+}

@@ -1,0 +1,182 @@
+//! D1: the lowest cost covers too little.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::search::{Search, TELLING_PIXELS};
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+use crate::grid::Phase;
+
+/// A minimum that covers less than this share of what the truth covers is hardly covered.
+const HARDLY_COVERED: f64 = 0.5;
+
+/// What the truth must save more than the result, as a share of the cost of shuffled pixels, if the
+/// result's cost is low by chance.
+const MORE_GAIN: f64 = 0.02;
+
+/// Without the truth, a minimum that covers less than this share of what the reference covers.
+const NEXT_TO_NOTHING: f64 = 0.15;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D1,
+    title: "the lowest cost covers too little",
+    advice: "raise grid.coverage_floor",
+    applies_to: &[Family::Grid, Family::Given],
+    needs_truth: false,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
+    proof: Proof::CostMap(MapOverlay::Coverage),
+    remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    match case.search {
+        Some(search) if search.result_cost.is_none() => Some(out_of_view(search)),
+        Some(search) => too_few_pixels(search),
+        None => next_to_nothing(case),
+    }
+}
+
+/// At another system's pose, next to nothing of the reference's cloud is in view.
+fn out_of_view(search: &Search<'_, '_>) -> Diagnosis {
+    RULE.found(&OutOfView {
+        judge: search.judge.map(|method| method.name()),
+        covered: search.covered(&search.result),
+        covered_at_reference: search.covered(&Default::default()),
+    })
+}
+
+#[derive(Serialize)]
+struct OutOfView {
+    judge: Option<&'static str>,
+    covered: usize,
+    covered_at_reference: usize,
+}
+
+impl fmt::Display for OutOfView {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "Almost nothing of the reference's cloud is in view at this pose: {} px. The reference itself sees {} px.",
+            self.covered, self.covered_at_reference
+        )
+    }
+}
+
+/// So few pixels match by chance.
+fn too_few_pixels(search: &Search<'_, '_>) -> Option<Diagnosis> {
+    let rivals = search.rivals()?;
+    let at_truth = search.covered(&rivals.near.offset);
+    let at_result = search.covered(&rivals.winner.offset);
+    if !is_hardly_covered(at_result, at_truth) {
+        return None;
+    }
+    let gain_at_truth = search.gain(&rivals.near.offset)?;
+    let gain_at_result = search.gain(&rivals.winner.offset)?;
+    (gain_at_result + MORE_GAIN < gain_at_truth).then(|| {
+        RULE.found(&TooFewPixels {
+            judge: search.judge.map(|method| method.name()),
+            covered_at_result: at_result,
+            covered_at_truth: at_truth,
+            gain_at_result,
+            gain_at_truth,
+        })
+    })
+}
+
+/// Whether a minimum covers so few pixels beside the truth that this is a cause. Where the truth covers
+/// next to nothing too, that the minimum covers less is none.
+fn is_hardly_covered(at_result: usize, at_truth: usize) -> bool {
+    (at_result as f64) < HARDLY_COVERED * at_truth as f64 && at_truth >= TELLING_PIXELS
+}
+
+#[derive(Serialize)]
+struct TooFewPixels {
+    judge: Option<&'static str>,
+    covered_at_result: usize,
+    covered_at_truth: usize,
+    gain_at_result: f64,
+    gain_at_truth: f64,
+}
+
+impl fmt::Display for TooFewPixels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The lowest cost covers too little: {} px, and {} px near the truth. So few pixels match by chance.",
+            self.covered_at_result, self.covered_at_truth
+        )
+    }
+}
+
+/// Of a pose that is more likely wrong than right, what speaks against it without the truth.
+fn next_to_nothing(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    if case.subject.truth.is_some() || !case.subject.is_low() {
+        return None;
+    }
+    let summary = case.subject.outcome.cost?;
+    case.subject.evidence.minimum?;
+    let share_of_reference = summary.coverage_best / summary.coverage_reference;
+    (share_of_reference < NEXT_TO_NOTHING).then(|| {
+        RULE.found(&Uncovered {
+            coverage: summary.coverage_best,
+            share_of_reference,
+            chance_level: summary.shuffled,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Uncovered {
+    coverage: f64,
+    share_of_reference: f64,
+    chance_level: Option<f64>,
+}
+
+impl fmt::Display for Uncovered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The lowest cost covers too little: {:.2} % of the photo. The reference pose covers {:.1} times as much.",
+            100.0 * self.coverage,
+            1.0 / self.share_of_reference
+        )
+    }
+}
+
+pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let mut tried = vec![
+        vec![ask.floor(2.0, 0.1)],
+        vec![ask.floor(4.0, 0.2)],
+        vec![ask.radius(1.5)],
+        vec![ask.radius(0.5)],
+        vec![ask.floor(8.0, 0.4)],
+    ];
+    if let Some(more) = ask.more_search() {
+        tried.push(vec![ask.floor(2.0, 0.1), more]);
+    }
+    tried
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_minimum_is_hardly_covered_beside_a_truth_that_tells_something() {
+        assert!(is_hardly_covered(249, 500));
+        assert!(
+            !is_hardly_covered(250, 500),
+            "half of what the truth covers"
+        );
+        assert!(!is_hardly_covered(10, 499), "too little at the truth");
+        assert!(is_hardly_covered(4_999, 10_000));
+    }
+}

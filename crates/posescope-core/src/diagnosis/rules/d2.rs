@@ -1,0 +1,170 @@
+//! D2: the cost prefers another place.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::{metres, pair};
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::search::Search;
+use crate::diagnosis::starts::Starts;
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+use crate::geometry::PoseError;
+use crate::grid::{Offset, Phase};
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D2,
+    title: "the cost prefers another place",
+    advice: "use another method or another reference",
+    applies_to: Family::COSTED,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
+    proof: Proof::CostMap(MapOverlay::Preference),
+    remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    match case.family {
+        Family::Starts => by_starts(case.starts()?),
+        _ => by_grid(case.search?),
+    }
+}
+
+/// Tried last of all causes, it holds wherever none of the others ended the list.
+fn by_grid(search: &Search<'_, '_>) -> Option<Diagnosis> {
+    let judge = search.judge.map(|method| method.name());
+    let cost_at_result = search.result_cost?;
+    let Some(rivals) = search.rivals() else {
+        // Where the truth is out of a search's reach, its own cost still says which of both is preferred.
+        let cost_near_truth = search.cost_at_truth().filter(|_| judge.is_some())?;
+        return (cost_near_truth >= cost_at_result).then(|| {
+            RULE.found(&Preferred {
+                judge,
+                cost_near_truth,
+                cost_at_result,
+                cost_elsewhere: cost_at_result,
+                distance_m: search.distance_from_truth(&search.result),
+                near_truth: None,
+                elsewhere: None,
+            })
+        });
+    };
+    Some(RULE.found(&Preferred {
+        judge,
+        cost_near_truth: rivals.near.cost,
+        cost_at_result,
+        cost_elsewhere: rivals.winner.cost,
+        distance_m: search.distance_from_truth(&rivals.winner.offset),
+        near_truth: Some(At::from(&rivals.near.offset)),
+        elsewhere: Some(At::from(&rivals.winner.offset)),
+    }))
+}
+
+/// A searched pose beside the reference's.
+#[derive(Serialize)]
+pub(super) struct At {
+    right_m: f64,
+    forward_m: f64,
+    yaw_deg: f64,
+}
+
+impl From<&Offset> for At {
+    fn from(offset: &Offset) -> Self {
+        Self {
+            right_m: offset.right_m,
+            forward_m: offset.forward_m,
+            yaw_deg: offset.yaw_rad.to_degrees(),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Preferred {
+    judge: Option<&'static str>,
+    cost_near_truth: f64,
+    cost_at_result: f64,
+    cost_elsewhere: f64,
+    /// How far elsewhere is from the truth \[m\].
+    distance_m: f64,
+    near_truth: Option<At>,
+    elsewhere: Option<At>,
+}
+
+impl fmt::Display for Preferred {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (elsewhere, near) = pair(self.cost_elsewhere, self.cost_near_truth);
+        let of = match self.judge {
+            Some(judge) => format!(" of {judge}"),
+            None => String::new(),
+        };
+        write!(
+            f,
+            "The cost{of} prefers a wrong place: {elsewhere} at {} from the truth, at best {near} near the truth (lower \
+             is better).",
+            metres(self.distance_m)
+        )
+    }
+}
+
+fn by_starts(starts: &Starts) -> Option<Diagnosis> {
+    let near = starts.near.as_ref()?;
+    (!starts.is_missed()).then(|| {
+        RULE.found(&PreferredBySix {
+            cost_near_truth: near.refined.cost,
+            cost_at_result: starts.result_cost,
+            penalty_near_truth: near.penalty,
+            penalty_at_result: starts.result_penalty,
+            near_truth_error: near.error,
+            leads_away: !near.is_right,
+            turned_by_prior: starts.is_turned_by_prior(),
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct PreferredBySix {
+    cost_near_truth: f64,
+    cost_at_result: f64,
+    penalty_near_truth: f64,
+    penalty_at_result: f64,
+    near_truth_error: PoseError,
+    leads_away: bool,
+    turned_by_prior: bool,
+}
+
+impl fmt::Display for PreferredBySix {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.leads_away {
+            return write!(
+                f,
+                "The cost has no minimum at the truth: refined from there, the pose moves {} away.",
+                metres(self.near_truth_error.translation_m)
+            );
+        }
+        let (result, near) = pair(self.cost_at_result, self.cost_near_truth);
+        write!(
+            f,
+            "The cost prefers a wrong place: {result} at the result, {near} near the truth (lower is better)."
+        )?;
+        match self.turned_by_prior {
+            true => f.write_str(" The prior on likely poses decided."),
+            false => Ok(()),
+        }
+    }
+}
+
+pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let mut tried = vec![
+        vec![ask.floor(4.0, 0.2)],
+        vec![ask.wider_splat()],
+        vec![ask.radius(0.5)],
+    ];
+    tried.extend(ask.more_search().map(|more| vec![more]));
+    tried
+}

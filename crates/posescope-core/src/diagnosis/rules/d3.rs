@@ -1,0 +1,279 @@
+//! D3: the search missed a lower cost near the truth.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::d2::At;
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::{ordinal, pair};
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::search::{Place, Search};
+use crate::diagnosis::starts::Starts;
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+use crate::geometry::PoseError;
+use crate::grid::{Offset, Phase, ScoredLattice};
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D3,
+    title: "the search missed a lower cost near the truth",
+    advice: "search more: grid.rounds, a smaller grid.coarse_step; mi6.starts for mi6 and robust",
+    applies_to: Family::COSTED,
+    needs_truth: true,
+    is_conclusive: true,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
+    proof: Proof::CostMap(MapOverlay::Ranks),
+    remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    match case.family {
+        Family::Starts => by_starts(case.starts()?),
+        Family::Given => by_given(case.search?),
+        _ => by_grid(case.search?),
+    }
+}
+
+fn by_grid(search: &Search<'_, '_>) -> Option<Diagnosis> {
+    let rivals = search.rivals().filter(|rivals| rivals.is_missed)?;
+    let lost = lost_in(search, &rivals.near);
+    Some(RULE.found(&Missed {
+        cost_near_truth: rivals.near.cost,
+        cost_at_result: search.result_cost?,
+        distance_m: search.distance_from_truth(&rivals.near.offset),
+        near_truth: At::from(&rivals.near.offset),
+        lost_in: lost.phase.map(Phase::name),
+        rank: lost.rank,
+        margin: lost.margin,
+    }))
+}
+
+#[derive(Serialize)]
+struct Missed {
+    cost_near_truth: f64,
+    cost_at_result: f64,
+    /// How far the pose near the truth is from it \[m\].
+    distance_m: f64,
+    near_truth: At,
+    lost_in: Option<&'static str>,
+    /// The rank of the coarse cell nearest to the pose near the truth.
+    rank: Option<usize>,
+    /// What that cell costs more than the lowest.
+    margin: Option<f64>,
+}
+
+impl fmt::Display for Missed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (near, result) = pair(self.cost_near_truth, self.cost_at_result);
+        write!(
+            f,
+            "The search missed it: cost {near} near the truth, {result} at the result (lower is better)."
+        )?;
+        match (self.rank, self.lost_in) {
+            (Some(rank), _) => write!(
+                f,
+                " The coarse grid ranked the right cell {}.",
+                ordinal(rank)
+            ),
+            (None, Some(phase)) => write!(f, " It went wrong in the phase “{phase}”."),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+/// Another system's pose costs more than the truth.
+fn by_given(search: &Search<'_, '_>) -> Option<Diagnosis> {
+    let cost_at_result = search.result_cost?;
+    let cost_near_truth = match search.rivals() {
+        Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
+        None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
+    };
+    Some(RULE.found(&Told {
+        judge: search.judge?.name(),
+        cost_near_truth,
+        cost_at_result,
+    }))
+}
+
+#[derive(Serialize)]
+struct Told {
+    judge: &'static str,
+    cost_near_truth: f64,
+    cost_at_result: f64,
+}
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (near, here) = pair(self.cost_near_truth, self.cost_at_result);
+        write!(
+            f,
+            "The photos agree better near the truth: the cost of {} is {near} there and {here} here (lower is better).",
+            self.judge
+        )
+    }
+}
+
+fn by_starts(starts: &Starts) -> Option<Diagnosis> {
+    let near = starts.near.as_ref().filter(|_| starts.is_missed())?;
+    Some(RULE.found(&MissedBySix {
+        cost_near_truth: near.refined.cost,
+        cost_at_result: starts.result_cost,
+        penalty_near_truth: near.penalty,
+        penalty_at_result: starts.result_penalty,
+        near_truth_error: near.error,
+        turned_by_prior: starts.is_turned_by_prior(),
+    }))
+}
+
+#[derive(Serialize)]
+struct MissedBySix {
+    cost_near_truth: f64,
+    cost_at_result: f64,
+    penalty_near_truth: f64,
+    penalty_at_result: f64,
+    near_truth_error: PoseError,
+    turned_by_prior: bool,
+}
+
+impl fmt::Display for MissedBySix {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (near, result) = pair(self.cost_near_truth, self.cost_at_result);
+        match self.turned_by_prior {
+            false => write!(
+                f,
+                "The search missed it: cost {near} near the truth, {result} at the result (lower is better). No start led there."
+            ),
+            true => write!(
+                f,
+                "The search missed it: the pose near the truth is likelier, at cost {near}. The result has {result} (lower \
+                 is better)."
+            ),
+        }
+    }
+}
+
+/// Where the search turned away from the truth.
+#[derive(Default)]
+struct Loss {
+    phase: Option<Phase>,
+    rank: Option<usize>,
+    margin: Option<f64>,
+}
+
+/// The phase that turned away from the truth.
+fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
+    let at = |phase: Phase| {
+        let surface = search.surface(phase)?;
+        Some((surface, surface.lattice.offset(surface.minimum()?)?))
+    };
+    let Some((coarse, chosen)) = at(Phase::PositionCoarse) else {
+        return Loss::default();
+    };
+    let target = near.offset;
+    let away = |offset: &Offset| {
+        let (right, forward) = (
+            offset.right_m - target.right_m,
+            offset.forward_m - target.forward_m,
+        );
+        right.hypot(forward)
+    };
+    let fine_reach = search.grid.fine_range_m.hypot(search.grid.fine_range_m);
+    if away(&chosen) > fine_reach + search.grid.fine_step_m {
+        return lost_among_coarse(coarse, &away);
+    }
+    let tolerance_m = search.subject.tolerance.translation_m;
+    let phase = match at(Phase::PositionFine) {
+        Some((_, chosen)) if away(&chosen) > tolerance_m => Some(Phase::PositionFine),
+        _ => search.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
+    };
+    Loss {
+        phase,
+        ..Loss::default()
+    }
+}
+
+/// The rank of the coarse cell nearest to the target, and what it costs more than the one chosen.
+fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> Loss {
+    let lost = Loss {
+        phase: Some(coarse.lattice.phase),
+        ..Loss::default()
+    };
+    let nearest = coarse
+        .lattice
+        .hypotheses()
+        .filter_map(|(cell, offset)| Some((away(&offset), coarse.eligible_cost(cell)?)))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let least = coarse.minimum().and_then(|cell| coarse.eligible_cost(cell));
+    let (Some((_, cost)), Some(least)) = (nearest, least) else {
+        return lost;
+    };
+    let lower = (0..coarse.scores.len())
+        .filter_map(|cell| coarse.eligible_cost(cell))
+        .filter(|other| *other < cost)
+        .count();
+    Loss {
+        rank: Some(lower + 1),
+        margin: Some(cost - least),
+        ..lost
+    }
+}
+
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let (floor, splat) = (ask.floor(3.0, 0.15), ask.wider_splat());
+    match ask.family {
+        Family::Starts => {
+            let mi6 = &ask.params.mi6;
+            let starts = ask.set("mi6.starts", (2 * mi6.starts).min(200) as f64);
+            let finalists = ask.set("mi6.finalists", (2 * mi6.finalists).min(100) as f64);
+            let dense = ask.set("grid.coarse_step", ask.params.grid.coarse_step_m / 2.0);
+            let yaws = ask.set("mi6.coarse_yaws", (2 * mi6.coarse_yaws).min(61) as f64);
+            vec![
+                vec![starts.clone(), finalists.clone()],
+                vec![dense.clone()],
+                vec![dense, starts, finalists],
+                vec![yaws],
+                vec![floor],
+                vec![splat],
+            ]
+        }
+        _ => {
+            let (rounds, dense) = (ask.rounds(), ask.dense());
+            vec![
+                vec![rounds.clone()],
+                vec![dense.clone()],
+                vec![dense.clone(), rounds.clone()],
+                vec![floor.clone()],
+                vec![splat],
+                vec![ask.wide_yaw(), rounds],
+                vec![dense, floor],
+            ]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_is_plain_and_its_numbers_have_three_digits() {
+        let missed = Missed {
+            cost_near_truth: 0.914_63,
+            cost_at_result: 0.927_01,
+            distance_m: 0.05,
+            near_truth: At::from(&Offset::default()),
+            lost_in: Some(Phase::PositionCoarse.name()),
+            rank: Some(5),
+            margin: Some(0.0039),
+        };
+        assert_eq!(
+            missed.to_string(),
+            "The search missed it: cost 0.915 near the truth, 0.927 at the result (lower is better). \
+             The coarse grid ranked the right cell 5th."
+        );
+    }
+}

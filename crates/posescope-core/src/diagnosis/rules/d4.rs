@@ -1,0 +1,156 @@
+//! D4: the truth is outside of what is searched.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::metres;
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::search::Search;
+use crate::diagnosis::starts::Starts;
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+use crate::grid::Phase;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D4,
+    title: "the truth is outside of what is searched",
+    advice: "raise --radius or grid.yaw_range; lower grid.coverage_floor",
+    applies_to: Family::SEARCHING,
+    needs_truth: true,
+    is_conclusive: true,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
+    proof: Proof::CostMap(MapOverlay::Reach),
+    remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let radius_m = case.subject.problem.uncertainty_radius_m;
+    match case.family {
+        Family::Starts => by_starts(case.starts()?, radius_m),
+        _ => by_grid(case.search?, radius_m),
+    }
+}
+
+fn by_grid(search: &Search<'_, '_>, radius_m: f64) -> Option<Diagnosis> {
+    let truth = search.truth_offset();
+    let outside = |is_turned: bool| {
+        RULE.found(&Outside {
+            distance_m: truth.right_m.hypot(truth.forward_m),
+            radius_m,
+            yaw_deg: truth.yaw_rad.to_degrees(),
+            yaw_range_deg: search.grid.yaw_range_deg,
+            is_turned,
+        })
+    };
+    match search.out_of_reach() {
+        (true, _) => Some(outside(false)),
+        (false, true) => Some(outside(true)),
+        (false, false) => search.near_truth().is_none().then(|| {
+            RULE.found(&Uncovered {
+                covered: search.covered(&search.nearest_reachable()),
+                least_covered: search.least_covered,
+            })
+        }),
+    }
+}
+
+#[derive(Serialize)]
+struct Outside {
+    distance_m: f64,
+    radius_m: f64,
+    yaw_deg: f64,
+    yaw_range_deg: f64,
+    is_turned: bool,
+}
+
+impl fmt::Display for Outside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.is_turned {
+            false => write!(
+                f,
+                "The truth is outside of the search: {} from the reference, {} is searched.",
+                metres(self.distance_m),
+                metres(self.radius_m)
+            ),
+            true => write!(
+                f,
+                "The query is turned too far: {:.1}° against the reference, ±{:.1}° is searched.",
+                self.yaw_deg, self.yaw_range_deg
+            ),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Uncovered {
+    covered: usize,
+    least_covered: u32,
+}
+
+impl fmt::Display for Uncovered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "Too little of the cloud is in view near the truth: {} px, grid.coverage_floor needs {}.",
+            self.covered, self.least_covered
+        )
+    }
+}
+
+fn by_starts(starts: &Starts, radius_m: f64) -> Option<Diagnosis> {
+    starts.near.is_none().then(|| {
+        RULE.found(&Unreached {
+            distance_m: starts.distance_m,
+            radius_m,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Unreached {
+    distance_m: f64,
+    radius_m: f64,
+}
+
+impl fmt::Display for Unreached {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.distance_m > self.radius_m {
+            true => write!(
+                f,
+                "The truth is outside of the search: {} from the reference, {} is searched.",
+                metres(self.distance_m),
+                metres(self.radius_m)
+            ),
+            false => f.write_str(
+                "The search cannot end at the truth: too little of the cloud is in view there, or it leaves the disc.",
+            ),
+        }
+    }
+}
+
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let wider = [vec![ask.radius(1.5)], vec![ask.radius(2.0)]];
+    match ask.family {
+        Family::Starts => {
+            let mut tried = Vec::from(wider);
+            tried.push(vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)]);
+            tried.push(vec![ask.floor(0.2, 0.0)]);
+            tried
+        }
+        _ => {
+            let [first, second] = wider;
+            vec![
+                first,
+                vec![ask.wide_yaw(), ask.rounds()],
+                second,
+                vec![ask.floor(0.2, 0.0)],
+                vec![ask.set("grid.yaw_range", 45.0), ask.rounds()],
+            ]
+        }
+    }
+}

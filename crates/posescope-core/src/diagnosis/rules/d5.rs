@@ -1,0 +1,57 @@
+//! D5: nothing makes one hypothesis stand out.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+
+/// Standard deviation of grey values below which a photo shows nothing.
+const TEXTURELESS: f64 = 2.0;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D5,
+    title: "no pose stands out: the query shows nothing",
+    advice: "use another photo, or another reference",
+    applies_to: Family::COSTED,
+    needs_truth: false,
+    is_conclusive: true,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Assess),
+    proof: Proof::CostMap(MapOverlay::Flat),
+    remedies: no_remedy,
+};
+
+/// Whether the query is the same everywhere: costs may differ, but by nothing that it shows.
+pub(super) fn is_textureless(case: &Case<'_, '_>) -> bool {
+    Family::COSTED.contains(&case.family)
+        && case.subject.outcome.pose.is_ok()
+        && case.contrast() < TEXTURELESS
+}
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    is_textureless(case).then(|| {
+        RULE.found(&Textureless {
+            deviation: case.contrast(),
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Textureless {
+    deviation: f64,
+}
+
+impl fmt::Display for Textureless {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The query has no texture: its grey values vary by {:.1} only. No pose can stand out.",
+            self.deviation
+        )
+    }
+}

@@ -1,0 +1,58 @@
+//! D6: the images look too different.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, d2};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::pair;
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D6,
+    title: "the images look too different",
+    advice: "use another method, or a reference of similar light",
+    applies_to: &[Family::Grid, Family::Given],
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Assess),
+    proof: Proof::CostMap(MapOverlay::Preference),
+    remedies: d2::remedies,
+};
+
+/// The images share nothing, even at the truth.
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let search = case.search?;
+    let rivals = search.rivals().filter(|rivals| rivals.is_changed)?;
+    let against = search.against_chance(&rivals.near.offset)?;
+    Some(RULE.found(&Changed {
+        judge: search.judge.map(|method| method.name()),
+        cost_near_truth: rivals.near.cost,
+        chance_level: against.mean,
+        chance_deviation: against.deviation,
+        deviations: against.deviations(),
+    }))
+}
+
+#[derive(Serialize)]
+struct Changed {
+    judge: Option<&'static str>,
+    cost_near_truth: f64,
+    chance_level: f64,
+    chance_deviation: f64,
+    deviations: f64,
+}
+
+impl fmt::Display for Changed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (near, chance) = pair(self.cost_near_truth, self.chance_level);
+        write!(
+            f,
+            "The images look too different: even near the truth the cost is {near}. Shuffled pixels cost {chance}."
+        )
+    }
+}

@@ -1,0 +1,96 @@
+//! D7: height, pitch or roll, which are not searched, are off.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, d2};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::{metres, pair};
+use crate::diagnosis::search::{Place, Search};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::geometry::PoseError;
+
+/// How far the truth must be off the plane of the search for that to be a cause.
+const OFF_PLANE_M: f64 = 0.1;
+const OFF_PLANE_DEG: f64 = 0.5;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D7,
+    title: "height, pitch or roll are off, which are not searched",
+    advice: "use mi6 or robust, which search all six freedoms",
+    applies_to: &[Family::Grid, Family::Given],
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::End,
+    proof: Proof::FreedViews,
+    remedies: d2::remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let search = case.search?;
+    let rivals = search.rivals()?;
+    let frozen = search.off_the_plane();
+    if !search.subject.tolerance.contains(&frozen) {
+        return Some(found(search, frozen, &rivals.near, None));
+    }
+    // Where photos share nothing, a pose off the plane could win by chance alone. What is on the plane has
+    // nothing to win by leaving it.
+    let is_on_plane = frozen.translation_m < OFF_PLANE_M && frozen.rotation_deg < OFF_PLANE_DEG;
+    if rivals.is_changed || is_on_plane {
+        return None;
+    }
+    let best = search.best_in_six_freedoms(&rivals.near)?;
+    (best < rivals.winner.cost)
+        .then(|| found(search, frozen, &rivals.near, Some((best, rivals.winner.cost))))
+}
+
+fn found(
+    search: &Search<'_, '_>,
+    frozen_error: PoseError,
+    near: &Place,
+    won: Option<(f64, f64)>,
+) -> Diagnosis {
+    RULE.found(&Frozen {
+        judge: search.judge.map(|method| method.name()),
+        height_m: -search.truth.translation.y,
+        frozen_error,
+        cost_in_six_freedoms: won.map(|(best, _)| best),
+        cost_elsewhere: won.map(|(_, elsewhere)| elsewhere),
+        cost_near_truth: near.cost,
+    })
+}
+
+#[derive(Serialize)]
+struct Frozen {
+    judge: Option<&'static str>,
+    height_m: f64,
+    /// How far the truth is from the searched pose at its place with its heading.
+    frozen_error: PoseError,
+    cost_in_six_freedoms: Option<f64>,
+    cost_elsewhere: Option<f64>,
+    cost_near_truth: f64,
+}
+
+impl fmt::Display for Frozen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.cost_in_six_freedoms, self.cost_elsewhere) {
+            (Some(best), Some(elsewhere)) => {
+                let (best, elsewhere) = pair(best, elsewhere);
+                write!(
+                    f,
+                    "Height, pitch or roll are off, and not searched. With them free the cost is {best} near the truth, \
+                     below {elsewhere} elsewhere."
+                )
+            }
+            _ => write!(
+                f,
+                "No searched pose is right: the truth is {}, {:.1}° off in height, pitch and roll, which are not searched.",
+                metres(self.frozen_error.translation_m),
+                self.frozen_error.rotation_deg
+            ),
+        }
+    }
+}

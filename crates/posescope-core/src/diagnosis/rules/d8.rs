@@ -1,0 +1,87 @@
+//! D8: the minimum lies where the grid ends.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, d1};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::metres;
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
+use crate::event::Stage;
+use crate::grid::Phase;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::D8,
+    title: "the lowest cost is at the rim of the search",
+    advice: "raise --radius",
+    applies_to: &[Family::Grid],
+    needs_truth: false,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
+    proof: Proof::CostMap(MapOverlay::Rim),
+    remedies: d1::remedies,
+};
+
+/// With the truth, where the minimum's basin goes on outside; without, of a pose that is more likely wrong
+/// than right.
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    match case.subject.truth {
+        Some(_) => {
+            let search = case.search?;
+            let rivals = search.rivals()?;
+            let rim = on_rim(case)?;
+            (!rivals.is_changed && search.goes_on_outside()).then_some(rim)
+        }
+        None => on_rim(case).filter(|_| case.subject.is_low()),
+    }
+}
+
+fn on_rim(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    case.subject.outcome.cost?;
+    let offset = case.subject.evidence.minimum?.offset;
+    let (grid, radius_m) = (
+        &case.subject.params.grid,
+        case.subject.problem.uncertainty_radius_m,
+    );
+    grid.is_on_rim(&offset, radius_m).then(|| {
+        let distance_m = offset.right_m.hypot(offset.forward_m);
+        RULE.found(&Rim {
+            distance_m,
+            radius_m,
+            yaw_deg: offset.yaw_rad.to_degrees().abs(),
+            yaw_range_deg: grid.yaw_range_deg,
+            is_position: distance_m > radius_m - 0.5 * grid.coarse_step_m,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Rim {
+    distance_m: f64,
+    radius_m: f64,
+    yaw_deg: f64,
+    yaw_range_deg: f64,
+    is_position: bool,
+}
+
+impl fmt::Display for Rim {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("The lowest cost is at the rim of the search: ")?;
+        match self.is_position {
+            true => write!(
+                f,
+                "{} from the reference, {} is searched.",
+                metres(self.distance_m),
+                metres(self.radius_m)
+            ),
+            false => write!(
+                f,
+                "a yaw of {:.1}°, ±{:.1}° is searched.",
+                self.yaw_deg, self.yaw_range_deg
+            ),
+        }
+    }
+}

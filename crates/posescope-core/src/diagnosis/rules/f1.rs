@@ -1,0 +1,132 @@
+//! F1: one reference dragged the fusion.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use crate::diagnosis::case::{FusionCase, Member, heaviest};
+use crate::diagnosis::numbers::metres;
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::event::Stage;
+use crate::fusion::{ShareOutcome, average_pose};
+use crate::geometry::{Pose, PoseError};
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::F1,
+    title: "one reference dragged the fusion",
+    advice: "try --fusion r-wavg or --fusion joint",
+    applies_to: &[],
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Fusion(test),
+    decided_at: DecidedAt::Stage(Stage::Fuse),
+    proof: Proof::PoseMap,
+    remedies: no_remedy,
+};
+
+fn test(case: &FusionCase<'_>) -> Option<Diagnosis> {
+    let pose = case.pose.as_ref().ok()?;
+    let error = PoseError::between(case.truth, pose);
+    match case.is_joint {
+        true => resting(heaviest(case.members)?, case.truth, error),
+        false => dragging(case, error),
+    }
+}
+
+/// The reference without which the fused pose would be right; of several the one whose pose is farthest
+/// off.
+fn dragging(case: &FusionCase<'_>, error: PoseError) -> Option<Diagnosis> {
+    let kept: Vec<(&Member<'_>, &Pose)> = case
+        .members
+        .iter()
+        .filter(|member| member.share.outcome == ShareOutcome::Kept)
+        .filter_map(|member| Some((member, member.share.pose.as_ref()?)))
+        .collect();
+    let is_right =
+        |pose: &Pose| (case.tolerance).contains(&PoseError::between(case.truth, pose));
+    let without = |left_out: usize| {
+        let others = kept.iter().enumerate().filter(|(at, _)| *at != left_out);
+        let others: Vec<(f64, &Pose)> = others
+            .map(|(_, (member, pose))| (member.share.weight, *pose))
+            .collect();
+        average_pose(&others)
+    };
+    let culprits = kept.iter().enumerate().filter_map(|(at, (member, own))| {
+        let rest = without(at).filter(is_right)?;
+        Some((
+            member,
+            PoseError::between(case.truth, own),
+            PoseError::between(case.truth, &rest),
+        ))
+    });
+    let (member, own_error, error_without) =
+        culprits.max_by(|a, b| a.1.translation_m.total_cmp(&b.1.translation_m))?;
+    Some(RULE.found(&Dragged {
+        reference: member.share.reference.clone(),
+        weight: member.share.weight,
+        own_error,
+        error_without,
+        error,
+    }))
+}
+
+#[derive(Serialize)]
+struct Dragged {
+    reference: String,
+    weight: f64,
+    own_error: PoseError,
+    error_without: PoseError,
+    error: PoseError,
+}
+
+impl fmt::Display for Dragged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [own, without, fused] =
+            [&self.own_error, &self.error_without, &self.error].map(|e| metres(e.translation_m));
+        write!(
+            f,
+            "Reference {} dragged the fused pose: its own pose is {own} off. Without it the fused pose is {without} off, \
+             with it {fused}.",
+            self.reference
+        )
+    }
+}
+
+/// On which reference a wrong joint pose rests.
+fn resting(member: &Member<'_>, truth: &Pose, error: PoseError) -> Option<Diagnosis> {
+    let share = member.share;
+    let support = share.support?;
+    Some(RULE.found(&Resting {
+        reference: share.reference.clone(),
+        weight: share.weight,
+        own_error: share.pose.map(|own| PoseError::between(truth, &own)),
+        error,
+        support: support.words(),
+    }))
+}
+
+#[derive(Serialize)]
+struct Resting {
+    reference: String,
+    weight: f64,
+    own_error: Option<PoseError>,
+    error: PoseError,
+    support: String,
+}
+
+impl fmt::Display for Resting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The joint pose is {} off and rests on reference {} (weight {:.2}). ",
+            metres(self.error.translation_m),
+            self.reference,
+            self.weight,
+        )?;
+        match &self.own_error {
+            Some(own) => write!(f, "Its own pose is {} off.", metres(own.translation_m)),
+            None => f.write_str("Alone it has no pose."),
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! L1: low confidence.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::confidence::{self, Confidence, PoseConfidence};
+use crate::diagnosis::{Diagnosis, Proof};
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::L1,
+    title: "low confidence",
+    advice: "do not rely on it; --accept 0.9 refuses such poses",
+    applies_to: Family::ALL,
+    needs_truth: false,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::End,
+    proof: Proof::DecidingStage,
+    remedies: no_remedy,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    low(case.subject.confidence.as_ref())
+}
+
+/// The verdict on a pose of this confidence.
+pub(in crate::diagnosis) fn low(confidence: Option<&PoseConfidence>) -> Option<Diagnosis> {
+    let confidence = confidence?;
+    (confidence.word == Confidence::Low).then(|| {
+        RULE.found(&Low {
+            probability: confidence.probability,
+            runner_up_margin: confidence.runner_up_margin,
+            inlier_spread: confidence.inlier_spread,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Low {
+    probability: f64,
+    runner_up_margin: Option<f64>,
+    inlier_spread: Option<f64>,
+}
+
+impl fmt::Display for Low {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "Low confidence: {} likely within {} m.",
+            confidence::percent(self.probability),
+            confidence::WITHIN_M
+        )
+    }
+}

@@ -1,0 +1,65 @@
+//! R1: the reference does not see the query's scene.
+
+use std::fmt;
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use crate::camera::Intrinsics;
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::event::Stage;
+
+/// Share of the reference's points that the query must show.
+const LEAST_OVERLAP: f64 = 0.05;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::R1,
+    title: "the reference does not see the query's scene",
+    advice: "use another reference",
+    applies_to: Family::MATCHING,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Match),
+    proof: Proof::CloudOnPhoto,
+    remedies: no_remedy,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    case.matches()?;
+    let query_from_reference = case.subject.reference_from_truth()?.inverse();
+    let problem = case.subject.problem;
+    let in_view = |camera: &Intrinsics, point: &Point3<f64>| {
+        let pixel = camera.project(point);
+        pixel.is_some_and(|pixel| camera.contains(&pixel))
+    };
+    let (mut seen, mut shared) = (0_usize, 0_usize);
+    for point in problem.reference.cloud.points.iter().step_by(8) {
+        let point = point.cast();
+        if in_view(&problem.reference.intrinsics, &point) {
+            seen += 1;
+            let other = query_from_reference * point;
+            shared += usize::from(in_view(&problem.query.intrinsics, &other));
+        }
+    }
+    let overlap = shared as f64 / seen.max(1) as f64;
+    (seen > 0 && overlap < LEAST_OVERLAP).then(|| RULE.found(&Overlap { overlap }))
+}
+
+#[derive(Serialize)]
+struct Overlap {
+    overlap: f64,
+}
+
+impl fmt::Display for Overlap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The reference does not see what the query sees: {:.1} % of its points are in the query's true view.",
+            100.0 * self.overlap
+        )
+    }
+}

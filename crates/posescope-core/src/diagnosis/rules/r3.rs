@@ -1,0 +1,93 @@
+//! R3: too few true matches.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::matches::{Funnel, Step};
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::event::Stage;
+
+/// Fewer true matches stand out from no crowd of false ones.
+pub(super) const FEW_MATCHES: usize = 8;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::R3,
+    title: "too few true matches",
+    advice: "raise fb.ratio or get more keypoints; other light needs another method",
+    applies_to: Family::MATCHING,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::Match),
+    proof: Proof::Matches,
+    remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let matches = case.matches()?;
+    let funnel = matches.funnel;
+    let without_depth = match matches.many_without_depth() {
+        true => matches.wrong_depth + matches.lost_for_depth(),
+        false => 0,
+    };
+    let true_ones = funnel.unique.max(funnel.lifted) + without_depth;
+    if true_ones >= FEW_MATCHES || case.consensus_is_right() {
+        return None;
+    }
+    let (lost_at, before, after) = funnel.worst_step();
+    Some(RULE.found(&Matches {
+        unique: matches.all_unique,
+        lost_at,
+        before,
+        after,
+        true_matches: funnel,
+    }))
+}
+
+#[derive(Serialize)]
+struct Matches {
+    unique: usize,
+    lost_at: Step,
+    before: usize,
+    after: usize,
+    true_matches: Funnel,
+}
+
+impl fmt::Display for Matches {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (before, lost) = (self.before, self.before - self.after.min(self.before));
+        write!(
+            f,
+            "Too few true matches: {} of {}. {lost} of {before} ",
+            self.true_matches.unique, self.unique
+        )?;
+        f.write_str(match self.lost_at {
+            Step::View => "reference keypoints with a depth are out of the query's view.",
+            Step::Detect => "visible reference keypoints were not detected in the query.",
+            Step::Match => "visible reference keypoints look more like something else.",
+            Step::Ratio => "true nearest neighbours fail the ratio test.",
+            Step::Unique => "true matches are not mutually best.",
+        })
+    }
+}
+
+pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let mut tried = vec![
+        vec![ask.ratio(0.06)],
+        vec![ask.more_keypoints(0.2)],
+        vec![ask.more_keypoints(0.2), ask.ratio(0.06)],
+    ];
+    tried.extend(match ask.family {
+        Family::Guided => vec![
+            ask.set("fb2.window", 2.0 * ask.params.fb2.window_px),
+            ask.set("fb2.least_probability", 0.0),
+        ],
+        _ => vec![ask.word("fb.accept", "paper")],
+    }.into_iter().map(|change| vec![change]));
+    tried
+}

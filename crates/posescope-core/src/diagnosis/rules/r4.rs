@@ -1,0 +1,80 @@
+//! R4: depths are missing or wrong.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::r3::FEW_MATCHES;
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::matches::Funnel;
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::event::Stage;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::R4,
+    title: "depths are missing or wrong",
+    advice: "raise fb.depth_radius, try fb.depth=guarded; does the cloud belong to the photo?",
+    applies_to: Family::MATCHING,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::Stage(Stage::DepthLift),
+    proof: Proof::DepthPatch,
+    remedies,
+};
+
+/// True matches whose depth is missing or wrong.
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let matches = case.matches()?;
+    let right = matches.funnel.lifted;
+    let (wrong, missing) = (matches.wrong_depth, matches.no_depth);
+    let lost = wrong + matches.lost_for_depth();
+    let starved = right < FEW_MATCHES && lost >= FEW_MATCHES.min(matches.all_unique / 2);
+    let misled = wrong >= FEW_MATCHES
+        && wrong > right
+        && !case.would_accept(matches, &matches.true_ones());
+    let is_telling = matches.many_without_depth();
+    ((starved || misled) && is_telling && !case.consensus_is_right()).then(|| {
+        RULE.found(&Depths {
+            right,
+            wrong,
+            missing,
+            true_matches: matches.funnel,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Depths {
+    right: usize,
+    wrong: usize,
+    missing: usize,
+    true_matches: Funnel,
+}
+
+impl fmt::Display for Depths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "Depths are missing or wrong. Of the matches on the true epipolar lines, {} have the right depth, {} a \
+             wrong one, {} none.",
+            self.right, self.wrong, self.missing
+        )
+    }
+}
+
+pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let mut tried = vec![vec![ask.set(
+        ask.key("fb.depth_radius", "fb2.depth_radius"),
+        2.0 * ask.depth_radius_px(),
+    )]];
+    tried.push(match ask.family {
+        Family::Guided => vec![ask.set("fb2.depth_spread", 3.0 * ask.params.fb2.depth_spread)],
+        _ => vec![ask.word("fb.depth", "guarded")],
+    });
+    tried.extend([vec![ask.ratio(0.06)], vec![ask.more_keypoints(0.2)]]);
+    tried
+}

@@ -1,0 +1,67 @@
+//! R5: the inliers do not fix the pose.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, r4};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::matches::Funnel;
+use crate::diagnosis::{Diagnosis, Proof};
+
+/// A pose is fixed if it is off by less than this, by the covariance of its inliers \[m\].
+pub(super) const FIXED_M: f64 = 0.3;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::R5,
+    title: "the inliers do not fix the pose",
+    advice: "get more matches, and better spread ones",
+    applies_to: Family::MATCHING,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::End,
+    proof: Proof::InlierSpread,
+    remedies: r4::remedies,
+};
+
+/// The inliers are true, but leave the pose play.
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let matches = case.matches()?;
+    let inliers = matches.inliers();
+    case.subject.outcome.pose.as_ref().ok()?;
+    if inliers == 0 || 2 * matches.funnel.inliers < inliers {
+        return None;
+    }
+    let deviation_m = case.deviation_m(matches);
+    if deviation_m.is_some_and(|deviation| deviation < FIXED_M) {
+        return None;
+    }
+    Some(RULE.found(&Loose {
+        deviation_m,
+        inliers,
+        true_matches: matches.funnel,
+    }))
+}
+
+#[derive(Serialize)]
+struct Loose {
+    deviation_m: Option<f64>,
+    inliers: usize,
+    true_matches: Funnel,
+}
+
+impl fmt::Display for Loose {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let inliers = self.inliers;
+        match self.deviation_m {
+            Some(deviation) => write!(
+                f,
+                "The {inliers} inliers do not fix the pose: it may move by {deviation:.2} m. {} of them are true matches.",
+                self.true_matches.inliers
+            ),
+            None => write!(f, "The {inliers} inliers leave the pose undetermined."),
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! R8: the pose was accepted and is wrong.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::matches::Funnel;
+use crate::diagnosis::numbers::metres;
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::geometry::PoseError;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::R8,
+    title: "a wrong pose was accepted",
+    advice: "lower fb.ratio; something moved, or the place looks like another",
+    applies_to: Family::MATCHING,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::End,
+    proof: Proof::Matches,
+    remedies,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    let matches = case.matches()?;
+    Some(RULE.found(&Accepted {
+        error: case.subject.error()?,
+        inliers: matches.inliers(),
+        true_inliers: matches.funnel.inliers,
+        supports_truth: matches.funnel.lifted,
+        true_matches: matches.funnel,
+    }))
+}
+
+#[derive(Serialize)]
+struct Accepted {
+    error: PoseError,
+    inliers: usize,
+    true_inliers: usize,
+    supports_truth: usize,
+    true_matches: Funnel,
+}
+
+impl fmt::Display for Accepted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "A wrong pose was accepted: {} matches agree on it, {} off, {} of them true. The truth explains {}.",
+            self.inliers,
+            metres(self.error.translation_m),
+            self.true_inliers,
+            self.supports_truth
+        )
+    }
+}
+
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let mut tried = vec![vec![ask.ratio(-0.1)], vec![ask.ratio(-0.2)]];
+    if ask.family == Family::Features {
+        tried.insert(1, vec![ask.word("fb.depth", "guarded")]);
+    }
+    tried
+}

@@ -1,0 +1,82 @@
+//! R9: a pose outside the prior.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::numbers::metres;
+use crate::diagnosis::ask::{Ask, Remedy};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::estimator::Failure;
+use crate::geometry::PoseError;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::R9,
+    title: "the pose is outside the prior",
+    advice: "raise --radius or fb.radius_slack",
+    applies_to: Family::MATCHING,
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::End,
+    proof: Proof::PoseMap,
+    remedies,
+};
+
+/// A pose was refused for its distance from the reference, or the right one would have been.
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    case.matches()?;
+    if let Some(Failure::OutsideRadius {
+        distance_m,
+        radius_m,
+    }) = case.subject.outcome.pose.as_ref().err()
+    {
+        return Some(RULE.found(&Outside {
+            distance_m: *distance_m,
+            radius_m: *radius_m,
+            error: Some(case.consensus_error()?),
+        }));
+    }
+    let distance_m = (case.subject.reference_from_truth()?.translation.vector).norm();
+    let radius_m = case.subject.problem.believed_within_m();
+    let is_outside = distance_m > radius_m * (1.0 + case.matching().radius_slack);
+    is_outside.then(|| {
+        RULE.found(&Outside {
+            distance_m,
+            radius_m,
+            error: None,
+        })
+    })
+}
+
+/// The pose that was found, or without an error the truth.
+#[derive(Serialize)]
+struct Outside {
+    distance_m: f64,
+    radius_m: f64,
+    error: Option<PoseError>,
+}
+
+impl fmt::Display for Outside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (distance, radius) = (metres(self.distance_m), metres(self.radius_m));
+        match &self.error {
+            Some(error) => write!(
+                f,
+                "The pose was refused for its distance: {distance} from the reference, {radius} allowed. It is {} off.",
+                metres(error.translation_m)
+            ),
+            None => write!(
+                f,
+                "The truth is outside the prior: {distance} from the reference, {radius} allowed."
+            ),
+        }
+    }
+}
+
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    [1.5, 2.0, 3.0].map(|times| vec![ask.radius(times)]).into()
+}

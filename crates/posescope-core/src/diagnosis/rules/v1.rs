@@ -1,0 +1,86 @@
+//! V1: the right place was ranked too low.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use crate::diagnosis::case::RankingCase;
+use crate::diagnosis::numbers::{metres, ordinal};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::event::Stage;
+use crate::retrieval::RankedReference;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::V1,
+    title: "the right place was ranked too low",
+    advice: "take more references: retrieve:K with a larger K",
+    applies_to: &[],
+    needs_truth: true,
+    is_conclusive: false,
+    test: Test::Ranking(test),
+    decided_at: DecidedAt::Stage(Stage::Retrieve),
+    proof: Proof::Ranking,
+    remedies: no_remedy,
+};
+
+/// None of the references that were taken is of the right place.
+fn test(case: &RankingCase<'_>) -> Option<Diagnosis> {
+    let ranking = case.ranking;
+    let distance = |frame: &RankedReference| {
+        let pose = frame.world_from_camera.as_ref()?;
+        Some((pose.translation.vector - case.truth.translation.vector).norm())
+    };
+    let is_right_place = |frame: &RankedReference| {
+        distance(frame).is_some_and(|distance| distance <= case.radius_m)
+    };
+    let first_right = ranking.frames.iter().position(is_right_place);
+    if first_right.is_some_and(|rank| rank < ranking.chosen) {
+        return None;
+    }
+    let best = ranking.frames.first()?;
+    Some(RULE.found(&Ranked {
+        first: best.name.clone(),
+        first_distance_m: distance(best),
+        rank_of_right_place: first_right.map(|rank| rank + 1),
+        taken: ranking.chosen,
+        ranked: ranking.frames.len(),
+        radius_m: case.radius_m,
+    }))
+}
+
+#[derive(Serialize)]
+struct Ranked {
+    first: String,
+    first_distance_m: Option<f64>,
+    rank_of_right_place: Option<usize>,
+    taken: usize,
+    ranked: usize,
+    radius_m: f64,
+}
+
+impl fmt::Display for Ranked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.rank_of_right_place {
+            Some(rank) => write!(
+                f,
+                "Retrieval ranked the right place {}, and only {} taken.",
+                ordinal(rank),
+                match self.taken {
+                    1 => "1 was".to_owned(),
+                    taken => format!("{taken} were"),
+                }
+            )?,
+            None => write!(
+                f,
+                "Retrieval missed the right place: none of {} ranked frames is within {} of the truth.",
+                self.ranked,
+                metres(self.radius_m)
+            )?,
+        }
+        match self.first_distance_m {
+            Some(m) => write!(f, " It ranked {} first, {} away.", self.first, metres(m)),
+            None => write!(f, " It ranked {} first.", self.first),
+        }
+    }
+}

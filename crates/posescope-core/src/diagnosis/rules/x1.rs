@@ -1,0 +1,503 @@
+//! X1: the ground truth, a calibration or the units are suspect.
+
+use std::fmt;
+
+use nalgebra::{Translation3, Vector2};
+use serde::Serialize;
+
+use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use crate::camera::Intrinsics;
+use crate::diagnosis::case::Case;
+use crate::diagnosis::family::Family;
+use crate::diagnosis::descent::{Descended, compass_search};
+use crate::diagnosis::matches::TrueMatches;
+use crate::diagnosis::numbers::{metres, pair};
+use crate::diagnosis::search::{BEYOND_CHANCE, Search};
+use crate::diagnosis::{Diagnosis, Proof};
+use crate::geometry::{Pose, PoseError};
+use crate::render::Score;
+use crate::solver::Correspondence;
+
+pub(super) const RULE: Rule = Rule {
+    code: Code::X1,
+    title: "the ground truth or a calibration is suspect",
+    advice: "check calibration, pose convention and units; `posescope doctor` does",
+    applies_to: Family::ALL,
+    needs_truth: false,
+    is_conclusive: false,
+    test: Test::Method(test),
+    decided_at: DecidedAt::End,
+    proof: Proof::CloudOnPhoto,
+    remedies: no_remedy,
+};
+
+fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    if let Some(found) = units(case) {
+        return Some(found);
+    }
+    // A query that shows nothing says nothing about a calibration either.
+    if super::d5::is_textureless(case) {
+        return None;
+    }
+    match case.family {
+        Family::Features | Family::Guided => {
+            let matches = case.matches()?;
+            poses(case)
+                .or_else(|| cloud(matches))
+                .or_else(|| camera_by_matches(case, matches))
+                .or_else(|| truth_by_matches(case, matches))
+        }
+        Family::Grid | Family::Given => {
+            let search = case.search?;
+            search.result_cost?;
+            poses(case)
+                .or_else(|| camera_by_cost(search))
+                .or_else(|| truth_by_cost(case, search))
+        }
+        Family::Starts => poses(case),
+    }
+}
+
+/// The cloud is not in metres.
+fn units(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    /// Median depths of a cloud that no scanner and no indoor depth camera has \[m\].
+    const LEAST_DEPTH_M: f64 = 0.1;
+    const GREATEST_DEPTH_M: f64 = 400.0;
+    const STRIDE: usize = 16;
+    let points = case.subject.problem.reference.cloud.points.iter();
+    let depths = points.step_by(STRIDE).map(|point| point.z);
+    let mut depths: Vec<f32> = depths.filter(|&depth| depth > 0.0).collect();
+    let middle = depths.len().checked_sub(1)? / 2;
+    let median_depth_m = f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let (unit, times) = if median_depth_m > GREATEST_DEPTH_M {
+        ("millimetres", 1e-3)
+    } else if median_depth_m < LEAST_DEPTH_M {
+        ("kilometres", 1e3)
+    } else {
+        return None;
+    };
+    Some(RULE.found(&Units {
+        median_depth_m,
+        unit,
+        depth_in_unit_m: median_depth_m * times,
+    }))
+}
+
+#[derive(Serialize)]
+struct Units {
+    median_depth_m: f64,
+    unit: &'static str,
+    depth_in_unit_m: f64,
+}
+
+impl fmt::Display for Units {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The cloud is hardly in metres: its median depth is {:.3} m. Read as {} it would be {:.1} m.",
+            self.median_depth_m, self.unit, self.depth_in_unit_m
+        )
+    }
+}
+
+/// The pose agrees with the truth if the poses of the scene are read in another way.
+///
+/// Only for a pose that is more likely right than wrong: one of many poses agrees with something by chance.
+fn poses(case: &Case<'_, '_>) -> Option<Diagnosis> {
+    const LIKELY: f64 = 0.5;
+    /// How well another reading must agree with the estimate.
+    const AGREEING_M: f64 = 0.5;
+    const AGREEING_DEG: f64 = 2.0;
+    let subject = case.subject;
+    let pose = subject.outcome.pose.as_ref().ok()?;
+    let truth = subject.truth?;
+    let confidence = subject.confidence.as_ref();
+    if confidence.is_some_and(|confidence| confidence.probability < LIKELY) {
+        return None;
+    }
+    let reference = &subject.problem.reference.world_from_camera;
+    let found = subject.problem.reference_from_query(pose);
+    let stated = subject.reference_from_truth()?;
+    let inverted = reference * truth.inverse();
+    let in_metres = Pose::from_parts(
+        Translation3::from(stated.translation.vector / 1000.0),
+        stated.rotation,
+    );
+    let radius_m = subject.problem.uncertainty_radius_m;
+    let is_far = stated.translation.vector.norm() > 5.0 * radius_m;
+    let readings = [
+        ("camera_from_world (inverted)", inverted, true),
+        ("millimetres", in_metres, is_far),
+    ];
+    let agreeing = readings.into_iter().find(|(_, reading, is_possible)| {
+        let error = PoseError::between(reading, &found);
+        *is_possible && error.translation_m < AGREEING_M && error.rotation_deg < AGREEING_DEG
+    });
+    let (reading, pose, _) = agreeing?;
+    Some(RULE.found(&Poses {
+        reading,
+        error: PoseError::between(&pose, &found),
+        error_as_stated: PoseError::between(&stated, &found),
+    }))
+}
+
+#[derive(Serialize)]
+struct Poses {
+    reading: &'static str,
+    error: PoseError,
+    error_as_stated: PoseError,
+}
+
+impl fmt::Display for Poses {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The scene's poses are suspect: read as {}, the estimate is {} off. As stated it is {} off.",
+            self.reading,
+            metres(self.error.translation_m),
+            metres(self.error_as_stated.translation_m)
+        )
+    }
+}
+
+/// Fewer matches than this stand out from no crowd.
+const FEW_MATCHES: usize = 8;
+
+/// The matches agree with the truth but nearly none of their depths do: the cloud is not that of the photo.
+fn cloud(matches: &TrueMatches) -> Option<Diagnosis> {
+    let (right_depth, wrong_depth) = (matches.funnel.lifted, matches.wrong_depth);
+    let is_foreign = wrong_depth >= 3 * FEW_MATCHES && wrong_depth > 4 * right_depth;
+    is_foreign.then(|| {
+        RULE.found(&Cloud {
+            wrong_depth,
+            right_depth,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct Cloud {
+    wrong_depth: usize,
+    right_depth: usize,
+}
+
+impl fmt::Display for Cloud {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The cloud does not belong to the reference photo: {} matches fit the true pose with wrong depths, \
+             {} with the right one.",
+            self.wrong_depth, self.right_depth
+        )
+    }
+}
+
+/// From the true pose, another focal length and principal point explain far more matches.
+fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
+    let query_from_reference = case.subject.reference_from_truth()?.inverse();
+    let stated = &case.subject.problem.query.intrinsics;
+    let threshold_px = case.matching().mlesac.inlier_threshold_px;
+    let explained = |camera: &Intrinsics| {
+        let is_explained = |c: &&Correspondence| {
+            let seen = camera.project(&(query_from_reference * c.point));
+            seen.is_some_and(|seen| (seen - c.pixel).norm() <= threshold_px)
+        };
+        matches.correspondences.iter().filter(is_explained).count()
+    };
+    let before = explained(stated);
+    let (camera, after) = likeliest_camera(matches, &query_from_reference, stated)
+        .map(|camera| (camera, explained(&camera)))?;
+    // What another pose explains as well says nothing against the camera.
+    let is_more =
+        after >= 3 * FEW_MATCHES && 2 * after > 3 * before && 5 * after > 6 * matches.inliers();
+    let is_other = (camera.fx / stated.fx - 1.0).abs() > 0.02
+        || (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > 8.0;
+    (is_more && is_other).then(|| {
+        RULE.found(&CameraByMatches {
+            explained: before,
+            explained_otherwise: after,
+            camera,
+            stated: *stated,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct CameraByMatches {
+    explained: usize,
+    explained_otherwise: usize,
+    camera: Intrinsics,
+    stated: Intrinsics,
+}
+
+impl fmt::Display for CameraByMatches {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The query camera is suspect: from the true pose it explains {} matches as stated. {} would explain {}.",
+            self.explained,
+            otherwise_stated(&self.camera, &self.stated),
+            self.explained_otherwise
+        )
+    }
+}
+
+/// In what a camera differs from the stated one, to the pixel.
+fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
+    let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
+    let focal_length = format!(
+        "A focal length of {:.0} px instead of {:.0}",
+        camera.fx, stated.fx
+    );
+    match centre(camera) == centre(stated) {
+        true => focal_length,
+        false => format!("{focal_length} and a centre at {}", centre(camera)),
+    }
+}
+
+/// The camera of one focal length and any centre that explains most matches from a pose.
+///
+/// Two matches fix a focal length and a centre; pairs are taken at a fixed stride, so that equal runs
+/// ask equal pairs.
+fn likeliest_camera(
+    matches: &TrueMatches,
+    query_from_reference: &Pose,
+    stated: &Intrinsics,
+) -> Option<Intrinsics> {
+    const PAIRS: usize = 400;
+    const THRESHOLD_PX: f64 = 4.0;
+    let rays: Vec<(Vector2<f64>, &Correspondence)> = matches
+        .correspondences
+        .iter()
+        .filter_map(|correspondence| {
+            let seen = query_from_reference * correspondence.point;
+            (seen.z > 0.1).then(|| (seen.coords.xy() / seen.z, correspondence))
+        })
+        .collect();
+    let count = rays.len();
+    if count < FEW_MATCHES {
+        return None;
+    }
+    let aspect = stated.fy / stated.fx;
+    let camera_of = |a: usize, b: usize| {
+        let ((ray_a, a), (ray_b, b)) = (rays[a], rays[b]);
+        let (rays, pixels) = (ray_a - ray_b, a.pixel - b.pixel);
+        let scaled = Vector2::new(rays.x, rays.y * aspect);
+        let squared = scaled.norm_squared();
+        if squared < 0.01 {
+            return None;
+        }
+        let fx = scaled.dot(&pixels) / squared;
+        let within = (0.3..3.0).contains(&(fx / stated.fx));
+        within.then(|| Intrinsics {
+            fx,
+            fy: fx * aspect,
+            cx: a.pixel.x - fx * ray_a.x,
+            cy: a.pixel.y - fx * aspect * ray_a.y,
+            ..*stated
+        })
+    };
+    let support = |camera: &Intrinsics| {
+        rays.iter()
+            .filter(|(ray, c)| {
+                let u = camera.fx * ray.x + camera.cx - c.pixel.x;
+                let v = camera.fy * ray.y + camera.cy - c.pixel.y;
+                u.hypot(v) <= THRESHOLD_PX
+            })
+            .count()
+    };
+    (0..PAIRS)
+        .filter_map(|k| {
+            let a = k * 7919 % count;
+            let b = (a + 1 + k * 104_729 % (count - 1)) % count;
+            let camera = camera_of(a, b)?;
+            Some((support(&camera), camera))
+        })
+        // Of equal ones the first.
+        .reduce(|best, next| if next.0 > best.0 { next } else { best })
+        .map(|(_, camera)| camera)
+}
+
+/// The photos agree on a pose as well as photos ever do, and it is not the stated truth.
+fn truth_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
+    const NEARLY_CERTAIN: f64 = -15.0;
+    let error = case.subject.error().or_else(|| case.consensus_error())?;
+    let judged = case.subject.evidence.judged.as_ref()?;
+    let (inliers, total) = (matches.inliers(), matches.correspondences.len());
+    let is_fixed = || case.deviation_m(matches).is_some_and(|m| m < super::r5::FIXED_M);
+    let is_certain =
+        judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= total && is_fixed();
+    let supports_truth = matches.funnel.lifted;
+    // What the truth explains beyond chance is there: then both are, and the truth is not suspect.
+    let is_supported = || case.would_accept(matches, &matches.true_ones());
+    (is_certain && 5 * supports_truth < inliers && !is_supported()).then(|| {
+        RULE.found(&TruthByMatches {
+            inliers,
+            correspondences: total,
+            supports_truth,
+            error,
+        })
+    })
+}
+
+#[derive(Serialize)]
+struct TruthByMatches {
+    inliers: usize,
+    correspondences: usize,
+    supports_truth: usize,
+    error: PoseError,
+}
+
+impl fmt::Display for TruthByMatches {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The ground truth is suspect: {} of {} matches agree on a pose {} from it. The truth explains {}.",
+            self.inliers,
+            self.correspondences,
+            metres(self.error.translation_m),
+            self.supports_truth
+        )
+    }
+}
+
+/// What another camera must save beyond the best pose, as a share of the cost of shuffled pixels.
+const TELLING_GAIN: f64 = 0.02;
+
+/// From the true pose, another focal length explains the query much better than any pose does with the
+/// stated one.
+fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
+    const TIMES: [f64; 8] = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.4];
+    let near = search.near_truth();
+    let result_cost = search.result_cost?;
+    let stated = search.subject.problem.query.intrinsics;
+    let camera = |at: &[f64; 3]| Intrinsics {
+        fx: stated.fx * at[0].exp(),
+        fy: stated.fy * at[0].exp(),
+        cx: stated.cx + at[1],
+        cy: stated.cy + at[2],
+        ..stated
+    };
+    let stated_score = search.scorer.score(&[search.truth])[0];
+    let cost_at_truth = stated_score.eligible_cost(search.least_covered)?;
+    let costs = |places: &[[f64; 3]]| -> Vec<Option<f64>> {
+        let cameras: Vec<Intrinsics> = places.iter().map(camera).collect();
+        let scores = search.scorer.score_seen_by(&cameras, &search.truth);
+        let costs = scores
+            .iter()
+            .map(|score| comparable_cost(score, &stated_score));
+        costs.collect()
+    };
+    let focal_lengths = TIMES.map(|times| [times.ln(), 0.0, 0.0]);
+    let best = focal_lengths
+        .into_iter()
+        .zip(costs(&focal_lengths))
+        .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
+        .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
+    let chance = search.shuffled_cost?;
+    let rival = near.map_or(f64::INFINITY, |near| near.cost).min(result_cost);
+    // Far behind is no reason to stop: only with its own centre does another camera catch up.
+    if best.cost >= cost_at_truth {
+        return None;
+    }
+    let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
+    if rival - best.cost <= TELLING_GAIN * chance {
+        return None;
+    }
+    let camera = camera(&best.at);
+    // A cost can also fall because dark falls on dark: pixels must go together better than the same pixels
+    // shuffled do, and by more than they do with the stated camera.
+    let otherwise = search.against_chance_of(&search.scorer.seen_by(&camera), &search.truth)?;
+    let stated_gain = near
+        .and_then(|near| search.gain(&near.offset))
+        .into_iter()
+        .chain(search.gain(&search.result))
+        .fold(0.0, f64::max);
+    if otherwise.deviations() < BEYOND_CHANCE || otherwise.gain() < stated_gain + TELLING_GAIN {
+        return None;
+    }
+    Some(RULE.found(&CameraByCost {
+        cost_at_truth,
+        cost_otherwise: best.cost,
+        camera,
+        stated,
+    }))
+}
+
+/// What another camera costs; `None` for one that sees so little of the cloud that its cost is low by
+/// chance, as one of a much shorter focal length does.
+fn comparable_cost(other: &Score, stated: &Score) -> Option<f64> {
+    other.eligible_cost(stated.covered / 2)
+}
+
+#[derive(Serialize)]
+struct CameraByCost {
+    cost_at_truth: f64,
+    cost_otherwise: f64,
+    camera: Intrinsics,
+    stated: Intrinsics,
+}
+
+impl fmt::Display for CameraByCost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (stated, otherwise) = pair(self.cost_at_truth, self.cost_otherwise);
+        write!(
+            f,
+            "The query camera is suspect: the cost at the truth is {stated} as stated (lower is better). {} gives \
+             {otherwise}.",
+            otherwise_stated(&self.camera, &self.stated)
+        )
+    }
+}
+
+/// The result is as certain as results ever are, and it is not the stated truth. Where the images agree at
+/// the truth too, though less, both are there, and the truth is not suspect.
+fn truth_by_cost(case: &Case<'_, '_>, search: &Search<'_, '_>) -> Option<Diagnosis> {
+    const NEARLY_CERTAIN: f64 = 0.97;
+    const SUPPORTED: f64 = 0.5;
+    let probability = case.subject.confidence.as_ref()?.probability;
+    // Few wrong poses are so certain, and shuffling takes its time.
+    if probability < NEARLY_CERTAIN {
+        return None;
+    }
+    let error = case.subject.error()?;
+    let near = search.near_truth();
+    let gain = near.and_then(|near| search.gain(&near.offset));
+    if gain.unwrap_or(0.0) > SUPPORTED * search.gain(&search.result)? {
+        return None;
+    }
+    Some(RULE.found(&TruthByCost { probability, error }))
+}
+
+#[derive(Serialize)]
+struct TruthByCost {
+    probability: f64,
+    error: PoseError,
+}
+
+impl fmt::Display for TruthByCost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "The ground truth is suspect: the pose is {:.0} % likely right, but {} from it.",
+            100.0 * self.probability,
+            metres(self.error.translation_m)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_that_sees_less_than_half_of_the_cloud_is_not_compared() {
+        let score = |covered| Score {
+            cost: Some(0.1),
+            covered,
+        };
+        let stated = score(1000);
+        assert_eq!(comparable_cost(&score(499), &stated), None);
+        assert_eq!(comparable_cost(&score(500), &stated), Some(0.1));
+    }
+}
