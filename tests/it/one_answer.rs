@@ -102,11 +102,7 @@ fn a_fused_result_depends_on_no_other_method() {
         (FB2, NID),
         (Method::MI, Method::FB),
     ] {
-        let mut both = [wanted, other];
-        for methods in [&[wanted][..], &both.clone()[..], {
-            both.reverse();
-            &both
-        }] {
+        for methods in [&[wanted][..], &[wanted, other], &[other, wanted]] {
             let found = of(methods, wanted);
             assert_eq!(
                 found.pose,

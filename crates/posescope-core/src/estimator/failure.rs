@@ -51,7 +51,7 @@ pub enum Failure {
     /// The consensus is one that chance gives as well.
     #[error(
         "Too few inliers: {inliers} of {tested} {}, at least {needed} needed to rule out chance.",
-        counted.name()
+        counted.words()
     )]
     ChanceConsensus {
         /// Inliers of the returned pose.
@@ -156,7 +156,7 @@ pub enum Failure {
     },
     /// The confidence of the pose is below what the user or the method requires.
     #[error(
-        "Confidence too low: {} likely within 1 m, {:.0} % required.", percent(*.probability), 100.0 * .needed
+        "The pose was refused: only {} likely within 1 m, {:.0} % required.", percent(*.probability), 100.0 * .needed
     )]
     LowConfidence {
         /// Its probability of being within 1 m.

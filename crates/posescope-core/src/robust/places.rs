@@ -19,6 +19,14 @@ impl Counted {
             Self::Places => "places",
         }
     }
+
+    /// The same in a sentence.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Correspondences => "correspondences",
+            Self::Places => "image positions",
+        }
+    }
 }
 
 /// The places in the query photo that correspondences are of.

@@ -110,7 +110,7 @@ impl fmt::Display for TooFewPixels {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The lowest cost covers too little: {} px, and {} px near the truth. So few pixels match by chance.",
+            "The pose of lowest cost covers too little: {} px, where one near the truth covers {} px. With so few, a low cost can be chance.",
             self.covered_at_result, self.covered_at_truth
         )
     }
@@ -144,7 +144,7 @@ impl fmt::Display for Uncovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The lowest cost covers too little: {:.2} % of the photo. The reference pose covers {:.1} times as much.",
+            "The pose of lowest cost covers too little: {:.2} % of the photo. The reference pose covers {:.1} times as much.",
             100.0 * self.coverage,
             1.0 / self.share_of_reference
         )

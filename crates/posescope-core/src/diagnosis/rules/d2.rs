@@ -105,7 +105,7 @@ impl fmt::Display for Preferred {
         };
         write!(
             f,
-            "The cost{of} prefers a wrong place: {elsewhere} at {} from the truth, at best {near} near the truth (lower \
+            "The cost{of} prefers a wrong place: {elsewhere} at {} from the truth. The lowest near the truth is {near} (lower \
              is better).",
             metres(self.distance_m)
         )
@@ -148,13 +148,16 @@ impl fmt::Display for PreferredBySix {
             );
         }
         let (result, near) = pair(self.cost_at_result, self.cost_near_truth);
-        write!(
-            f,
-            "The cost prefers a wrong place: {result} at the result, {near} near the truth (lower is better)."
-        )?;
         match self.turned_by_prior {
-            true => f.write_str(" The prior on likely poses decided."),
-            false => Ok(()),
+            false => write!(
+                f,
+                "The cost prefers a wrong place: {result} at the result, {near} near the truth (lower is better)."
+            ),
+            true => write!(
+                f,
+                "The prior on likely poses decided against the truth: cost {near} near it, {result} at the result (lower is \
+                 better)."
+            ),
         }
     }
 }

@@ -76,7 +76,7 @@ impl fmt::Display for Missed {
         match (self.rank, self.lost_in) {
             (Some(rank), _) => write!(
                 f,
-                " The coarse grid ranked the right cell {}.",
+                " The coarse grid ranked the right cell {}, and only the 1st is refined.",
                 ordinal(rank)
             ),
             (None, Some(phase)) => write!(f, " It went wrong in the phase “{phase}”."),
@@ -142,17 +142,14 @@ struct MissedBySix {
 impl fmt::Display for MissedBySix {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (near, result) = pair(self.cost_near_truth, self.cost_at_result);
-        match self.turned_by_prior {
-            false => write!(
-                f,
-                "The search missed it: cost {near} near the truth, {result} at the result (lower is better). No start led there."
-            ),
-            true => write!(
-                f,
-                "The search missed it: the pose near the truth is likelier, at cost {near}. The result has {result} (lower \
-                 is better)."
-            ),
-        }
+        write!(
+            f,
+            "The search missed it: cost {near} near the truth, {result} at the result (lower is better). "
+        )?;
+        f.write_str(match self.turned_by_prior {
+            false => "No start led there.",
+            true => "With the prior on likely poses the truth wins.",
+        })
     }
 }
 
@@ -273,7 +270,7 @@ mod tests {
         assert_eq!(
             missed.to_string(),
             "The search missed it: cost 0.915 near the truth, 0.927 at the result (lower is better). \
-             The coarse grid ranked the right cell 5th."
+             The coarse grid ranked the right cell 5th, and only the 1st is refined."
         );
     }
 }

@@ -79,7 +79,7 @@ impl fmt::Display for Outside {
             ),
             true => write!(
                 f,
-                "The query is turned too far: {:.1}° against the reference, ±{:.1}° is searched.",
+                "The query is turned too far: its yaw is {:.1}° against the reference, and ±{:.1}° is searched.",
                 self.yaw_deg, self.yaw_range_deg
             ),
         }

@@ -13,7 +13,7 @@ use crate::event::Stage;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D6,
-    title: "the images look too different",
+    title: "the photos look too different",
     advice: "use another method, or a reference of similar light",
     applies_to: &[Family::Grid, Family::Given],
     needs_truth: true,
@@ -52,7 +52,7 @@ impl fmt::Display for Changed {
         let (near, chance) = pair(self.cost_near_truth, self.chance_level);
         write!(
             f,
-            "The images look too different: even near the truth the cost is {near}. Shuffled pixels cost {chance}."
+            "The two photos look too different: near the truth the cost is {near}, no better than {chance} for shuffled pixels (lower is better)."
         )
     }
 }

@@ -81,8 +81,8 @@ impl fmt::Display for Frozen {
                 let (best, elsewhere) = pair(best, elsewhere);
                 write!(
                     f,
-                    "Height, pitch or roll are off, and not searched. With them free the cost is {best} near the truth, \
-                     below {elsewhere} elsewhere."
+                    "Height, pitch or roll are off, and the search keeps them fixed. With them free the truth would win: cost \
+                     {best} near it, {elsewhere} elsewhere (lower is better)."
                 )
             }
             _ => write!(

@@ -14,7 +14,7 @@ use crate::grid::Phase;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D8,
-    title: "the lowest cost is at the rim of the search",
+    title: "the search ended at its edge",
     advice: "raise --radius",
     applies_to: &[Family::Grid],
     needs_truth: false,
@@ -69,19 +69,19 @@ struct Rim {
 
 impl fmt::Display for Rim {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("The lowest cost is at the rim of the search: ")?;
         match self.is_position {
             true => write!(
                 f,
-                "{} from the reference, {} is searched.",
+                "The search ended at its edge: {} from the reference, where its coarse grid ends at {}.",
                 metres(self.distance_m),
                 metres(self.radius_m)
-            ),
+            )?,
             false => write!(
                 f,
-                "a yaw of {:.1}°, ±{:.1}° is searched.",
+                "The search ended at its edge: a yaw of {:.1}°, where its coarse grid ends at ±{:.1}°.",
                 self.yaw_deg, self.yaw_range_deg
-            ),
+            )?,
         }
+        f.write_str(" The minimum may lie outside.")
     }
 }

@@ -86,8 +86,8 @@ impl fmt::Display for Dragged {
             [&self.own_error, &self.error_without, &self.error].map(|e| metres(e.translation_m));
         write!(
             f,
-            "Reference {} dragged the fused pose: its own pose is {own} off. Without it the fused pose is {without} off, \
-             with it {fused}.",
+            "Reference {} dragged the fused pose: alone it puts the query {own} off. Without it the fused pose is {without} \
+             off, with it {fused}.",
             self.reference
         )
     }
@@ -125,7 +125,11 @@ impl fmt::Display for Resting {
             self.weight,
         )?;
         match &self.own_error {
-            Some(own) => write!(f, "Its own pose is {} off.", metres(own.translation_m)),
+            Some(own) => write!(
+                f,
+                "Alone it puts the query {} off.",
+                metres(own.translation_m)
+            ),
             None => f.write_str("Alone it has no pose."),
         }
     }

@@ -58,7 +58,7 @@ impl fmt::Display for Kept {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} kept the pose of {}, which is {} off. So {} was never asked.",
+            "{} kept the wrong pose of {}, {} off, because that method accepted it. Its fallback {} was not asked.",
             self.hybrid.label(),
             self.kept,
             metres(self.error.translation_m),
@@ -97,14 +97,14 @@ struct PassedOver {
 impl fmt::Display for PassedOver {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (right, kept) = pair(self.cost_passed_over, self.cost_kept);
-        let other = match self.passed_over == self.kept {
-            true => "Another",
-            false => "One",
-        };
         write!(
             f,
-            "A right pose of {} was passed over, cost {right}. {other} of {} was kept, cost {kept} (lower is better).",
+            "A right pose of {}, cost {right}, lost to a wrong one of {}, cost {kept} (lower is better).",
             self.passed_over, self.kept
-        )
+        )?;
+        match self.cost_passed_over < self.cost_kept {
+            true => f.write_str(" The prior, or the credit of features, decided."),
+            false => Ok(()),
+        }
     }
 }

@@ -58,7 +58,7 @@ impl fmt::Display for Overlap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The reference does not see what the query sees: {:.1} % of its points are in the query's true view.",
+            "The reference does not see what the query sees: {:.1} % of its cloud is in the query's true view.",
             100.0 * self.overlap
         )
     }

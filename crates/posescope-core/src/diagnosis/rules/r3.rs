@@ -69,7 +69,7 @@ impl fmt::Display for Matches {
         f.write_str(match self.lost_at {
             Step::View => "reference keypoints with a depth are out of the query's view.",
             Step::Detect => "visible reference keypoints were not detected in the query.",
-            Step::Match => "visible reference keypoints look more like something else.",
+            Step::Match => "visible reference keypoints lose their match to a wrong one.",
             Step::Ratio => "true nearest neighbours fail the ratio test.",
             Step::Unique => "true matches are not mutually best.",
         })

@@ -59,8 +59,7 @@ impl fmt::Display for Depths {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "Depths are missing or wrong. Of the matches on the true epipolar lines, {} have the right depth, {} a \
-             wrong one, {} none.",
+            "Too few depths are right: of the true matches, {} have the right depth, {} a wrong one, and {} none.",
             self.right, self.wrong, self.missing
         )
     }

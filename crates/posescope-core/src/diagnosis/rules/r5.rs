@@ -58,8 +58,8 @@ impl fmt::Display for Loose {
         match self.deviation_m {
             Some(deviation) => write!(
                 f,
-                "The {inliers} inliers do not fix the pose: it may move by {deviation:.2} m. {} of them are true matches.",
-                self.true_matches.inliers
+                "The {inliers} inliers leave the pose loose: its standard deviation is {deviation:.2} m, {FIXED_M} m is the limit. \
+                 They are too few or too close together."
             ),
             None => write!(f, "The {inliers} inliers leave the pose undetermined."),
         }

@@ -46,7 +46,7 @@ impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The right pose was found, {} from the truth, but refused. {}",
+            "The right pose was found, {} from the truth, but not accepted. {}",
             metres(self.error.translation_m),
             self.because
         )

@@ -64,11 +64,11 @@ impl fmt::Display for Ranked {
         match self.rank_of_right_place {
             Some(rank) => write!(
                 f,
-                "Retrieval ranked the right place {}, and only {} taken.",
+                "Retrieval ranked the right place {}, and only the first {} used.",
                 ordinal(rank),
                 match self.taken {
-                    1 => "1 was".to_owned(),
-                    taken => format!("{taken} were"),
+                    1 => "is".to_owned(),
+                    taken => format!("{taken} are"),
                 }
             )?,
             None => write!(
@@ -79,8 +79,8 @@ impl fmt::Display for Ranked {
             )?,
         }
         match self.first_distance_m {
-            Some(m) => write!(f, " It ranked {} first, {} away.", self.first, metres(m)),
-            None => write!(f, " It ranked {} first.", self.first),
+            Some(m) => write!(f, " Ranked 1st is {}, {} from the query.", self.first, metres(m)),
+            None => write!(f, " Ranked 1st is {}.", self.first),
         }
     }
 }

@@ -234,10 +234,12 @@ impl fmt::Display for CameraByMatches {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The query camera is suspect: from the true pose it explains {} matches as stated. {} would explain {}.",
+            "The query camera is suspect: at the truth it explains {} matches with the stated focal length of {:.0} px, and {} \
+             with {}.",
             self.explained,
+            self.stated.fx,
+            self.explained_otherwise,
             otherwise_stated(&self.camera, &self.stated),
-            self.explained_otherwise
         )
     }
 }
@@ -245,13 +247,9 @@ impl fmt::Display for CameraByMatches {
 /// In what a camera differs from the stated one, to the pixel.
 fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
     let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
-    let focal_length = format!(
-        "A focal length of {:.0} px instead of {:.0}",
-        camera.fx, stated.fx
-    );
     match centre(camera) == centre(stated) {
-        true => focal_length,
-        false => format!("{focal_length} and a centre at {}", centre(camera)),
+        true => format!("{:.0} px", camera.fx),
+        false => format!("{:.0} px and a centre at {}", camera.fx, centre(camera)),
     }
 }
 
@@ -443,8 +441,9 @@ impl fmt::Display for CameraByCost {
         let (stated, otherwise) = pair(self.cost_at_truth, self.cost_otherwise);
         write!(
             f,
-            "The query camera is suspect: the cost at the truth is {stated} as stated (lower is better). {} gives \
-             {otherwise}.",
+            "The query camera is suspect: at the truth the cost is {stated} with the stated focal length of {:.0} px, and \
+             {otherwise} with {} (lower is better).",
+            self.stated.fx,
             otherwise_stated(&self.camera, &self.stated)
         )
     }
