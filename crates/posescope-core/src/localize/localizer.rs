@@ -11,7 +11,7 @@ mod work;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use self::work::{Answer, MethodOutcome, Place, QueryWork};
+use self::work::{Answer, Estimated, MethodOutcome, Place, QueryWork};
 use super::observer::checkpoint;
 use super::single::estimate_traced;
 use super::{
@@ -415,7 +415,13 @@ impl<'a> Localizer<'a> {
                 };
                 // A fallback has the verdicts of the method that it fell back to.
                 let verdicts = outcome.fell_back.then(|| direct.result.diagnosis.clone());
-                self.judged(work, problem, method, outcome, evidence, times, verdicts)
+                let estimated = Estimated {
+                    outcome,
+                    evidence,
+                    times,
+                    verdicts,
+                };
+                self.judged(work, problem, method, estimated)
             }
             None => self.estimate(work, problem, method, observer)?,
         };
@@ -451,8 +457,13 @@ impl<'a> Localizer<'a> {
             }
             None => self.ask(asked, method, &mut trace)?,
         };
-        let times = timings.into_times();
-        Ok(self.judged(work, problem, method, outcome, evidence, times, None))
+        let estimated = Estimated {
+            outcome,
+            evidence,
+            times: timings.into_times(),
+            verdicts: None,
+        };
+        Ok(self.judged(work, problem, method, estimated))
     }
 
     /// What a method answers. A hybrid falls back where the pose of its first method is refused for a low

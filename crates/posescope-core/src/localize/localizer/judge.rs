@@ -1,14 +1,11 @@
 //! Judging what a method answered: is its pose accepted, and what is wrong with it?
 
-use super::work::{MethodOutcome, QueryWork};
+use super::work::{Estimated, MethodOutcome, QueryWork};
 use super::{Localizer, Request};
-use crate::diagnosis::{
-    Assessment, Diagnosis, Evidence, Grade, Subject, confidence, diagnose_ranking,
-};
-use crate::estimator::Outcome;
+use crate::diagnosis::{Assessment, Grade, Subject, confidence, diagnose_ranking};
 use crate::geometry::Pose;
+use crate::localize::QueryResult;
 use crate::localize::result::evaluate_as;
-use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::scene::Scene;
 
@@ -30,22 +27,20 @@ impl Localizer<'_> {
         result
     }
 
-    /// Refuses a pose of too low a confidence, and assesses the result. `verdicts` are those of another
-    /// method that answered the same, where they are known.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "an outcome and all that is known of it"
-    )]
+    /// Refuses a pose of too low a confidence, and assesses the result.
     pub(super) fn judged(
         &self,
         work: &QueryWork<'_>,
         problem: usize,
         method: Method,
-        estimated: Outcome,
-        evidence: Evidence,
-        times: StageTimes,
-        verdicts: Option<Vec<Diagnosis>>,
+        estimated: Estimated,
     ) -> MethodOutcome {
+        let Estimated {
+            outcome: estimated,
+            evidence,
+            times,
+            verdicts,
+        } = estimated;
         let solved = &work.problems[problem];
         let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
         let outcome = confidence::accepted(&subject, self.least_probability);

@@ -3,12 +3,24 @@
 use std::collections::BTreeMap;
 
 use super::Request;
-use crate::diagnosis::Evidence;
+use crate::diagnosis::{Diagnosis, Evidence};
 use crate::estimator::{self, Failure, Outcome};
 use crate::geometry::{Pose, PoseError};
 use crate::localize::{Agreement, QueryResult, References, StageTimes};
 use crate::method::Method;
 use crate::problem::{Problem, Query};
+
+/// What an estimator answered, before it is judged.
+pub(super) struct Estimated {
+    /// The answer.
+    pub(super) outcome: Outcome,
+    /// What verdicts need of its events.
+    pub(super) evidence: Evidence,
+    /// How long its stages took.
+    pub(super) times: StageTimes,
+    /// The verdicts of another method that answered the same, where they are known.
+    pub(super) verdicts: Option<Vec<Diagnosis>>,
+}
 
 /// What one method made of one problem.
 pub(super) struct MethodOutcome {
