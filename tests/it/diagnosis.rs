@@ -56,7 +56,24 @@ fn verdicts(
         translation_m: 0.5,
         rotation_deg: 5.0,
     };
-    diagnose(&subject.against(truth, tolerance))
+    let found = diagnose(&subject.against(truth, tolerance));
+    for finding in &found {
+        assert_plain(&finding.text);
+    }
+    found
+}
+
+/// At most two sentences of about twenty words, and the second may be the reason that a method reported.
+fn assert_plain(text: &str) {
+    let text = text.replace(" (lower is better)", "");
+    let sentences: Vec<&str> = text.split_inclusive(". ").collect();
+    let longest = sentences.iter().map(|one| one.split_whitespace().count());
+    assert!(sentences.len() <= 2, "{text}");
+    assert!(longest.max().unwrap_or(0) <= 22, "{text}");
+    assert!(
+        text.ends_with('.') && text.starts_with(char::is_uppercase),
+        "{text}"
+    );
 }
 
 fn codes(found: &[Diagnosis]) -> Vec<Code> {

@@ -127,7 +127,7 @@ impl fmt::Display for Unreached {
                 metres(self.radius_m)
             ),
             false => f.write_str(
-                "The search cannot end at the truth: too little of the cloud is in view there, or it leaves the disc.",
+                "The search cannot end at the truth: too little of the cloud is visible there, or it leaves the disc.",
             ),
         }
     }

@@ -52,7 +52,7 @@ impl fmt::Display for Changed {
         let (near, chance) = pair(self.cost_near_truth, self.chance_level);
         write!(
             f,
-            "The two photos look too different: near the truth the cost is {near}, no better than {chance} for shuffled pixels (lower is better)."
+            "The photos look too different: near the truth the cost is {near}, no better than {chance} for shuffled pixels (lower is better)."
         )
     }
 }

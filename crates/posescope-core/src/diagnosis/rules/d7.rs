@@ -87,7 +87,7 @@ impl fmt::Display for Frozen {
             }
             _ => write!(
                 f,
-                "No searched pose is right: the truth is {}, {:.1}° off in height, pitch and roll, which are not searched.",
+                "No searched pose is right: height, pitch and roll are not searched. The truth is {}, {:.1}° off in them.",
                 metres(self.frozen_error.translation_m),
                 self.frozen_error.rotation_deg
             ),

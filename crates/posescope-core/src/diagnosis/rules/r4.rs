@@ -59,7 +59,7 @@ impl fmt::Display for Depths {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "Too few depths are right: of the true matches, {} have the right depth, {} a wrong one, and {} none.",
+            "Too few depths are right: of the true matches, {} have the right depth, {} a wrong one, {} none.",
             self.right, self.wrong, self.missing
         )
     }

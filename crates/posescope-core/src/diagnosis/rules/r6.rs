@@ -81,7 +81,7 @@ impl fmt::Display for Missed {
         if let Some(trials) = self.trials {
             write!(f, " after {trials} trials")?;
         }
-        write!(f, ", and a pose near the truth has {near}.")
+        write!(f, ". A pose near the truth has {near}.")
     }
 }
 

@@ -185,8 +185,7 @@ impl fmt::Display for Cloud {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The cloud does not belong to the reference photo: {} matches fit the true pose with wrong depths, \
-             {} with the right one.",
+            "The cloud does not fit the reference photo: {} true matches have a wrong depth, {} the right one.",
             self.wrong_depth, self.right_depth
         )
     }
@@ -234,12 +233,12 @@ impl fmt::Display for CameraByMatches {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "The query camera is suspect: at the truth it explains {} matches with the stated focal length of {:.0} px, and {} \
-             with {}.",
-            self.explained,
+            "The query camera is suspect: its stated focal length is {:.0} px. With {} it explains {} matches at the truth, not \
+             {}.",
             self.stated.fx,
-            self.explained_otherwise,
             otherwise_stated(&self.camera, &self.stated),
+            self.explained_otherwise,
+            self.explained
         )
     }
 }
@@ -249,7 +248,7 @@ fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
     let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
     match centre(camera) == centre(stated) {
         true => format!("{:.0} px", camera.fx),
-        false => format!("{:.0} px and a centre at {}", camera.fx, centre(camera)),
+        false => format!("{:.0} px and another centre", camera.fx),
     }
 }
 
@@ -441,8 +440,8 @@ impl fmt::Display for CameraByCost {
         let (stated, otherwise) = pair(self.cost_at_truth, self.cost_otherwise);
         write!(
             f,
-            "The query camera is suspect: at the truth the cost is {stated} with the stated focal length of {:.0} px, and \
-             {otherwise} with {} (lower is better).",
+            "The query camera is suspect: its stated focal length is {:.0} px. With {} the cost at the truth falls from \
+             {stated} to {otherwise} (lower is better).",
             self.stated.fx,
             otherwise_stated(&self.camera, &self.stated)
         )
