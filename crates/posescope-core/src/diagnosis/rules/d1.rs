@@ -5,9 +5,9 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::search::{Search, TELLING_PIXELS};
 use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
 use crate::event::Stage;

@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::d2::At;
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::numbers::{ordinal, pair};
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::search::{Place, Search};
 use crate::diagnosis::starts::Starts;
 use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
@@ -90,7 +90,9 @@ fn by_given(search: &Search<'_, '_>) -> Option<Diagnosis> {
     let cost_at_result = search.result_cost?;
     let cost_near_truth = match search.rivals() {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
-        None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
+        None => search
+            .cost_at_truth()
+            .filter(|cost| *cost < cost_at_result)?,
     };
     Some(RULE.found(&Told {
         judge: search.judge?.name(),

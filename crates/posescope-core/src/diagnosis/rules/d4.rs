@@ -5,10 +5,10 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::numbers::metres;
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::search::Search;
 use crate::diagnosis::starts::Starts;
 use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
@@ -138,7 +138,9 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     match ask.family {
         Family::Starts => {
             let mut tried = Vec::from(wider);
-            tried.push(vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)]);
+            tried.push(vec![
+                ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg),
+            ]);
             tried.push(vec![ask.floor(0.2, 0.0)]);
             tried
         }

@@ -43,8 +43,7 @@ fn dragging(case: &FusionCase<'_>, error: PoseError) -> Option<Diagnosis> {
         .filter(|member| member.share.outcome == ShareOutcome::Kept)
         .filter_map(|member| Some((member, member.share.pose.as_ref()?)))
         .collect();
-    let is_right =
-        |pose: &Pose| (case.tolerance).contains(&PoseError::between(case.truth, pose));
+    let is_right = |pose: &Pose| (case.tolerance).contains(&PoseError::between(case.truth, pose));
     let without = |left_out: usize| {
         let others = kept.iter().enumerate().filter(|(at, _)| *at != left_out);
         let others: Vec<(f64, &Pose)> = others

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test, no_remedy};
 use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
 use crate::diagnosis::confidence::{self, Confidence, PoseConfidence};
+use crate::diagnosis::family::Family;
 use crate::diagnosis::{Diagnosis, Proof};
 
 pub(super) const RULE: Rule = Rule {

@@ -5,9 +5,9 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::{Diagnosis, Proof};
 use crate::event::Stage;
 
@@ -51,5 +51,8 @@ impl fmt::Display for Keypoints {
 }
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    vec![vec![ask.more_keypoints(0.2)], vec![ask.more_keypoints(0.05)]]
+    vec![
+        vec![ask.more_keypoints(0.2)],
+        vec![ask.more_keypoints(0.05)],
+    ]
 }

@@ -5,10 +5,10 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::matches::{Funnel, Step};
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::{Diagnosis, Proof};
 use crate::event::Stage;
 
@@ -82,12 +82,16 @@ pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
         vec![ask.more_keypoints(0.2)],
         vec![ask.more_keypoints(0.2), ask.ratio(0.06)],
     ];
-    tried.extend(match ask.family {
-        Family::Guided => vec![
-            ask.set("fb2.window", 2.0 * ask.params.fb2.window_px),
-            ask.set("fb2.least_probability", 0.0),
-        ],
-        _ => vec![ask.word("fb.accept", "paper")],
-    }.into_iter().map(|change| vec![change]));
+    tried.extend(
+        match ask.family {
+            Family::Guided => vec![
+                ask.set("fb2.window", 2.0 * ask.params.fb2.window_px),
+                ask.set("fb2.least_probability", 0.0),
+            ],
+            _ => vec![ask.word("fb.accept", "paper")],
+        }
+        .into_iter()
+        .map(|change| vec![change]),
+    );
     tried
 }

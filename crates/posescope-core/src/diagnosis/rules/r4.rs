@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::r3::FEW_MATCHES;
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::matches::Funnel;
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::{Diagnosis, Proof};
 use crate::event::Stage;
 
@@ -33,9 +33,8 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     let (wrong, missing) = (matches.wrong_depth, matches.no_depth);
     let lost = wrong + matches.lost_for_depth();
     let starved = right < FEW_MATCHES && lost >= FEW_MATCHES.min(matches.all_unique / 2);
-    let misled = wrong >= FEW_MATCHES
-        && wrong > right
-        && !case.would_accept(matches, &matches.true_ones());
+    let misled =
+        wrong >= FEW_MATCHES && wrong > right && !case.would_accept(matches, &matches.true_ones());
     let is_telling = matches.many_without_depth();
     ((starved || misled) && is_telling && !case.consensus_is_right()).then(|| {
         RULE.found(&Depths {

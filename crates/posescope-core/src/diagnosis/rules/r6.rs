@@ -5,10 +5,10 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Change, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::matches::Funnel;
-use crate::diagnosis::ask::{Ask, Change, Remedy};
 use crate::diagnosis::{Diagnosis, Proof};
 use crate::geometry::PoseError;
 use crate::solver::{Correspondence, refine};
@@ -77,7 +77,10 @@ struct Missed {
 impl fmt::Display for Missed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (inliers, near) = (self.inliers, self.supports_truth);
-        write!(f, "MLESAC missed the right pose: it ended with {inliers} inliers")?;
+        write!(
+            f,
+            "MLESAC missed the right pose: it ended with {inliers} inliers"
+        )?;
         if let Some(trials) = self.trials {
             write!(f, " after {trials} trials")?;
         }

@@ -5,11 +5,11 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::matches::Funnel;
 use crate::diagnosis::numbers::metres;
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::{Diagnosis, Proof};
 use crate::geometry::PoseError;
 

@@ -5,10 +5,10 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Code, DecidedAt, Rule, Test};
+use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::case::Case;
 use crate::diagnosis::family::Family;
 use crate::diagnosis::numbers::metres;
-use crate::diagnosis::ask::{Ask, Remedy};
 use crate::diagnosis::{Diagnosis, Proof};
 use crate::estimator::Failure;
 use crate::geometry::PoseError;

@@ -31,9 +31,8 @@ fn test(case: &RankingCase<'_>) -> Option<Diagnosis> {
         let pose = frame.world_from_camera.as_ref()?;
         Some((pose.translation.vector - case.truth.translation.vector).norm())
     };
-    let is_right_place = |frame: &RankedReference| {
-        distance(frame).is_some_and(|distance| distance <= case.radius_m)
-    };
+    let is_right_place =
+        |frame: &RankedReference| distance(frame).is_some_and(|distance| distance <= case.radius_m);
     let first_right = ranking.frames.iter().position(is_right_place);
     if first_right.is_some_and(|rank| rank < ranking.chosen) {
         return None;
@@ -79,7 +78,12 @@ impl fmt::Display for Ranked {
             )?,
         }
         match self.first_distance_m {
-            Some(m) => write!(f, " Ranked 1st is {}, {} from the query.", self.first, metres(m)),
+            Some(m) => write!(
+                f,
+                " Ranked 1st is {}, {} from the query.",
+                self.first,
+                metres(m)
+            ),
             None => write!(f, " Ranked 1st is {}.", self.first),
         }
     }

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::{Code, DecidedAt, Rule, Test, no_remedy};
 use crate::camera::Intrinsics;
 use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
 use crate::diagnosis::descent::{Descended, compass_search};
+use crate::diagnosis::family::Family;
 use crate::diagnosis::matches::TrueMatches;
 use crate::diagnosis::numbers::{metres, pair};
 use crate::diagnosis::search::{BEYOND_CHANCE, Search};
@@ -321,7 +321,10 @@ fn truth_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagno
     let error = case.subject.error().or_else(|| case.consensus_error())?;
     let judged = case.subject.evidence.judged.as_ref()?;
     let (inliers, total) = (matches.inliers(), matches.correspondences.len());
-    let is_fixed = || case.deviation_m(matches).is_some_and(|m| m < super::r5::FIXED_M);
+    let is_fixed = || {
+        case.deviation_m(matches)
+            .is_some_and(|m| m < super::r5::FIXED_M)
+    };
     let is_certain =
         judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= total && is_fixed();
     let supports_truth = matches.funnel.lifted;
@@ -392,7 +395,9 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
         .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
         .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
     let chance = search.shuffled_cost?;
-    let rival = near.map_or(f64::INFINITY, |near| near.cost).min(result_cost);
+    let rival = near
+        .map_or(f64::INFINITY, |near| near.cost)
+        .min(result_cost);
     // Far behind is no reason to stop: only with its own centre does another camera catch up.
     if best.cost >= cost_at_truth {
         return None;
