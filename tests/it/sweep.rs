@@ -154,6 +154,8 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
     .code(0);
     let mut command = posescope();
     command.args(["eval", "--failed"]).arg(&fine);
+    // It has no --out, so that a failure of this test would leave a run where it is started.
+    command.current_dir(sequence.path());
     let output = command.output().expect("it starts");
     assert_eq!(output.status.code(), Some(0));
     assert!(String::from_utf8_lossy(&output.stderr).contains("No query failed in"));
