@@ -151,3 +151,39 @@ impl FeatureBased {
         is_asked.then_some(self.params.radius_slack)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point2, Point3};
+
+    use super::*;
+    use crate::params::Params;
+
+    #[test]
+    fn inliers_at_one_place_are_accepted_as_one() {
+        let intrinsics = Intrinsics {
+            fx: 700.0,
+            fy: 700.0,
+            cx: 600.0,
+            cy: 180.0,
+            width: 1200,
+            height: 360,
+        };
+        let at = |x: f64, y: f64| Correspondence {
+            pixel: Point2::new(x, y),
+            point: Point3::new(0.0, 0.0, 10.0),
+        };
+        let inliers: Vec<usize> = (0..12).collect();
+        let spread: Vec<_> = (0..12).map(|i| at(90.0 * f64::from(i), 30.0)).collect();
+        let gathered = vec![at(300.0, 100.0); 12];
+        let mut params = Params::default();
+        let accepts = |params: &Params, all: &[Correspondence]| {
+            FeatureBased::new(params).would_accept(all, &inliers, &intrinsics)
+        };
+
+        assert!(accepts(&params, &spread));
+        assert!(!accepts(&params, &gathered));
+        params.fb.once = false;
+        assert!(accepts(&params, &gathered));
+    }
+}
