@@ -1,11 +1,12 @@
-//! Is anything believed that cannot be known, or doubted that is right?
+//! How often is a wrong pose trusted, and a right pose doubted?
 //!
-//! `cargo run -p posescope-diagnosis --bin believed -- --places 40` localises queries that show nothing
-//! of their place (grey, noise, mirrored, upside down, another town) without the truth, and counts the poses
-//! that are trusted: there should be none. Then it localises proper queries of all conditions against references
-//! of all, and counts failure verdicts on right poses, with the truth and without, and right poses of low
-//! confidence: there should be hardly any. Last, it counts the wrong poses that are trusted, at the limit of
-//! 0.95 and at 0.98.
+//! `cargo run -p posescope-diagnosis --bin believed -- --places 40` measures three things:
+//!
+//! 1. Queries that do not show their place (grey, noise, mirrored, upside down, another town), with the truth
+//!    withheld. It counts the poses that are trusted. None should be.
+//! 2. Queries of every condition against references of every condition. It counts right poses that carry a
+//!    failure verdict, with and without the truth, and right poses of low confidence. Few should.
+//! 3. Wrong poses that are trusted, at the limit of 0.95 and at 0.98.
 //!
 //! Options: `--places N` (40), `--seed N` (0), `--real yes` for the pairs of real photos below
 //! `POSESCOPE_DATA` instead of the street.
@@ -214,7 +215,7 @@ fn in_two_conditions(
     })
 }
 
-/// What is said of poses that are right, and of those that are wrong.
+/// Counts verdicts and confidences of right poses, and of wrong ones.
 fn graded(cases: &[Case]) -> Counts {
     let mut counts = Counts::new();
     for case in cases {

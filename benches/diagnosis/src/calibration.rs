@@ -163,7 +163,7 @@ fn named(names: &str) -> Result<Vec<Method>, String> {
     found.map_err(|name| format!("{name} has no probability"))
 }
 
-/// What is said of poses in pairs of real photos, which nothing was fitted on.
+/// The signals and the truth of poses of real photos. Nothing was fitted on these.
 fn of_real_pairs(methods: &[Method]) -> Result<Vec<Sample>, String> {
     let pairs = real_pairs::all()?;
     let conditions = ["real".to_owned(), "real".to_owned()];

@@ -48,7 +48,7 @@ impl Default for GuidedParams {
             scale_ratio: 1.6,
             mlesac: MlesacParams::default(),
             radius_slack: 0.1,
-            least_probability: 0.96,
+            least_probability: 0.9,
         }
     }
 }
