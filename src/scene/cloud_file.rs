@@ -57,10 +57,7 @@ impl MapCloud {
 
 /// Reads a cloud, whatever format it has.
 pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
-    let io = |source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = SceneError::io(path);
     let mut start = Vec::new();
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
@@ -92,10 +89,7 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
 fn content(path: &Path, expected: &str) -> SceneError {
     // Some libraries say it in several lines.
     let lines: Vec<&str> = expected.split_whitespace().collect();
-    SceneError::Content {
-        path: path.to_owned(),
-        expected: super::lines::excerpt_of(&lines.join(" "), 200),
-    }
+    SceneError::expected(path, super::lines::excerpt_of(&lines.join(" "), 200))
 }
 
 /// Says that a header promises more than the file can hold.

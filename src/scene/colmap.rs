@@ -50,20 +50,17 @@ fn model_folder(folder: &Path) -> Option<(PathBuf, &'static str)> {
 
 fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let Some((place, extension)) = model_folder(folder) else {
-        return Err(SceneError::Content {
-            path: folder.to_owned(),
-            expected: "cameras and images as .bin or .txt expected, none found".to_owned(),
-        });
+        return Err(SceneError::expected(
+            folder,
+            "cameras and images as .bin or .txt expected, none found",
+        ));
     };
     let listed_in = place.join(format!("images.{extension}"));
     let model = match extension {
         "bin" => binary::read(&place)?,
         _ => text::read(&place)?,
     };
-    let error = |expected: String| SceneError::Content {
-        path: listed_in.clone(),
-        expected,
-    };
+    let error = |expected: String| SceneError::expected(&listed_in, expected);
     let mut images = model.images;
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let photos = photo_folder(&place, &images).ok_or_else(|| {

@@ -93,24 +93,18 @@ type DepthImage = image::ImageBuffer<image::Luma<u16>, Vec<u16>>;
 fn read_depth(path: &Path) -> Result<DepthImage, SceneError> {
     let image = image::ImageReader::open(path)
         .and_then(image::ImageReader::with_guessed_format)
-        .map_err(|source| SceneError::Io {
-            path: path.to_owned(),
-            source,
-        })?
+        .map_err(SceneError::io(path))?
         .decode()
-        .map_err(|source| SceneError::Image {
-            path: path.to_owned(),
-            source,
-        })?;
+        .map_err(SceneError::image(path))?;
     match image {
         DynamicImage::ImageLuma16(depth) => Ok(depth),
-        other => Err(SceneError::Content {
-            path: path.to_owned(),
-            expected: format!(
+        other => Err(SceneError::expected(
+            path,
+            format!(
                 "a depth image of 16-bit grey values expected, {:?} found",
                 other.color()
             ),
-        }),
+        )),
     }
 }
 

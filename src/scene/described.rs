@@ -134,11 +134,11 @@ impl Source {
 
     fn error_at(&self, at: usize, expected: &str) -> SceneError {
         let before = &self.text.as_bytes()[..at.min(self.text.len())];
-        SceneError::Line {
-            path: self.path.clone(),
-            line: before.iter().filter(|byte| **byte == b'\n').count() + 1,
-            expected: expected.replace('\n', " "),
-        }
+        SceneError::line(
+            &self.path,
+            before.iter().filter(|byte| **byte == b'\n').count() + 1,
+            expected.replace('\n', " "),
+        )
     }
 
     fn error<T>(&self, value: &Spanned<T>, expected: &str) -> SceneError {
@@ -160,10 +160,8 @@ impl Source {
     fn files(&self, name: &Spanned<String>) -> Result<Vec<PathBuf>, SceneError> {
         let pattern = photo_file::within(self.folder(), name.get_ref())
             .map_err(|expected| self.error(name, &expected))?;
-        let files = pattern::files(&pattern).map_err(|source| SceneError::Io {
-            path: pattern.parent().unwrap_or(self.folder()).to_owned(),
-            source,
-        })?;
+        let files = pattern::files(&pattern)
+            .map_err(SceneError::io(pattern.parent().unwrap_or(self.folder())))?;
         if files.is_empty() {
             let expected = format!("files expected, `{}` names none", pattern.display());
             return Err(self.error(name, &expected));
@@ -347,12 +345,14 @@ impl Clouds for DescribedClouds {
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
         let path = self.place(index);
         let world_from_camera = || {
-            frame.world_from_camera.ok_or_else(|| SceneError::Content {
-                path: path.to_owned(),
-                expected: format!(
-                    "a cloud in the frame of the world, but frame {} has no pose in it",
-                    frame.name
-                ),
+            frame.world_from_camera.ok_or_else(|| {
+                SceneError::expected(
+                    path,
+                    format!(
+                        "a cloud in the frame of the world, but frame {} has no pose in it",
+                        frame.name
+                    ),
+                )
             })
         };
         match &self.clouds {

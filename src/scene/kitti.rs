@@ -67,10 +67,11 @@ impl KittiOdometry {
             None => CAMERAS
                 .into_iter()
                 .find(|camera| folder.join(camera).is_dir())
-                .ok_or_else(|| SceneError::Content {
-                    path: folder.to_owned(),
-                    expected: "an image folder expected (image_0, image_2, …), none found"
-                        .to_owned(),
+                .ok_or_else(|| {
+                    SceneError::expected(
+                        folder,
+                        "an image folder expected (image_0, image_2, …), none found",
+                    )
                 })?,
         };
         let images = folder.join(camera);
@@ -159,12 +160,11 @@ impl Scene for KittiOdometry {
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         let path = self.scan_path(frame);
         let Some(camera0_from_velodyne) = self.camera0_from_velodyne else {
-            return Err(SceneError::Content {
-                path: self.folder.join("calib.txt"),
-                expected: "a line `Tr:` expected (camera 0 from Velodyne), none found; \
-                           without it no frame can be a reference"
-                    .to_owned(),
-            });
+            return Err(SceneError::expected(
+                self.folder.join("calib.txt"),
+                "a line `Tr:` expected (camera 0 from Velodyne), none found; \
+                           without it no frame can be a reference",
+            ));
         };
         if !path.is_file() {
             return Err(SceneError::NoCloud {
@@ -204,10 +204,7 @@ fn frame_number(name: &str) -> usize {
 
 /// Names of the PNG files whose name is a number, in numeric order.
 fn frame_names(images: &Path) -> Result<Vec<String>, SceneError> {
-    let io = |source| SceneError::Io {
-        path: images.to_owned(),
-        source,
-    };
+    let io = SceneError::io(images);
     let mut by_number = BTreeMap::new();
     for entry in std::fs::read_dir(images).map_err(io)? {
         let path = entry.map_err(io)?.path();
@@ -220,10 +217,10 @@ fn frame_names(images: &Path) -> Result<Vec<String>, SceneError> {
         }
     }
     if by_number.is_empty() {
-        return Err(SceneError::Content {
-            path: images.to_owned(),
-            expected: "images NNNNNN.png expected, none found".to_owned(),
-        });
+        return Err(SceneError::expected(
+            images,
+            "images NNNNNN.png expected, none found",
+        ));
     }
     Ok(by_number.into_values().collect())
 }
@@ -241,11 +238,8 @@ impl Calibration {
             let Some((label, numbers)) = line.split_once(':') else {
                 continue;
             };
-            let matrix = parse_matrix(numbers).map_err(|expected| SceneError::Line {
-                path: path.to_owned(),
-                line: index + 1,
-                expected,
-            })?;
+            let matrix = parse_matrix(numbers)
+                .map_err(|expected| SceneError::line(path, index + 1, expected))?;
             matrices.insert(label.trim().to_owned(), matrix);
         }
         Ok(Self {
@@ -259,12 +253,12 @@ impl Calibration {
     }
 
     fn projection(&self, label: &str) -> Result<Matrix3x4<f64>, SceneError> {
-        self.matrix(label)
-            .copied()
-            .ok_or_else(|| SceneError::Content {
-                path: self.path.clone(),
-                expected: format!("a line `{label}:` expected (projection matrix), none found"),
-            })
+        self.matrix(label).copied().ok_or_else(|| {
+            SceneError::expected(
+                &self.path,
+                format!("a line `{label}:` expected (projection matrix), none found"),
+            )
+        })
     }
 }
 
@@ -288,11 +282,7 @@ fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Vec<Pose>, S
         }
         let pose = parse_matrix(line)
             .and_then(|matrix| pose_from_matrix(&matrix).map_err(|error| error.to_string()))
-            .map_err(|expected| SceneError::Line {
-                path: path.clone(),
-                line: index + 1,
-                expected,
-            })?;
+            .map_err(|expected| SceneError::line(&path, index + 1, expected))?;
         poses.push(pose);
     }
     expect_rows(poses.len(), last, &path, "poses")?;
@@ -306,10 +296,12 @@ fn read_times(path: &Path, last: usize) -> Result<Vec<f64>, SceneError> {
     }
     let mut times = Vec::new();
     for (index, line) in read_text(path)?.lines().enumerate() {
-        let time = line.trim().parse().map_err(|_| SceneError::Line {
-            path: path.to_owned(),
-            line: index + 1,
-            expected: format!("a time in seconds expected, `{}` found", line.trim()),
+        let time = line.trim().parse().map_err(|_| {
+            SceneError::line(
+                path,
+                index + 1,
+                format!("a time in seconds expected, `{}` found", line.trim()),
+            )
         })?;
         times.push(time);
     }
@@ -321,13 +313,13 @@ fn expect_rows(found: usize, last: usize, path: &Path, what: &str) -> Result<(),
     if found > last {
         return Ok(());
     }
-    Err(SceneError::Content {
-        path: path.to_owned(),
-        expected: format!(
+    Err(SceneError::expected(
+        path,
+        format!(
             "{what} up to frame {last} expected (line {}), {found} lines found",
             last + 1
         ),
-    })
+    ))
 }
 
 /// Twelve numbers, row by row.

@@ -20,10 +20,10 @@ pub(super) fn split_projection(
         .try_inverse()
         .filter(|_| k[(0, 0)] > 0.0 && k[(1, 1)] > 0.0);
     let Some(inverse) = inverse else {
-        return Err(SceneError::Content {
-            path: path.to_owned(),
-            expected: "a projection matrix with positive focal lengths expected".to_owned(),
-        });
+        return Err(SceneError::expected(
+            path,
+            "a projection matrix with positive focal lengths expected",
+        ));
     };
     let intrinsics = Intrinsics {
         fx: k[(0, 0)],
@@ -45,14 +45,8 @@ pub(super) fn read_scan(
     camera_from_velodyne: impl Fn(Point3<f64>) -> Point3<f64>,
 ) -> Result<Cloud, SceneError> {
     const BYTES_PER_POINT: usize = 16;
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
-    let content = |expected| SceneError::Content {
-        path: path.to_owned(),
-        expected,
-    };
+    let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let content = |expected: String| SceneError::expected(path, expected);
     if bytes.is_empty() {
         return Err(content("points expected, the scan is empty".to_owned()));
     }

@@ -69,32 +69,32 @@ fn day_of(drive: &Path) -> PathBuf {
 fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     let (drive, wanted) = split_camera(path);
     let found = CAMERAS.iter().find(|camera| drive.join(camera).is_dir());
-    let camera = wanted
-        .or(found.copied())
-        .ok_or_else(|| SceneError::Content {
-            path: drive.clone(),
-            expected: "an image folder expected (image_00, image_02, …), none found".to_owned(),
-        })?;
+    let camera = wanted.or(found.copied()).ok_or_else(|| {
+        SceneError::expected(
+            &drive,
+            "an image folder expected (image_00, image_02, …), none found",
+        )
+    })?;
     let photos = numbered(&drive.join(camera).join("data"), "png")?;
     let Some(first) = photos.values().next() else {
-        return Err(SceneError::Content {
-            path: drive.join(camera).join("data"),
-            expected: "images NNNNNNNNNN.png expected, none found".to_owned(),
-        });
+        return Err(SceneError::expected(
+            drive.join(camera).join("data"),
+            "images NNNNNNNNNN.png expected, none found",
+        ));
     };
     let day = day_of(&drive);
     let calibration = Calibration::read(&day, camera)?;
     let size = photo_file::dimensions(first)?;
     if size != calibration.size {
         let (width, height) = calibration.size;
-        return Err(SceneError::Content {
-            path: first.clone(),
-            expected: format!(
+        return Err(SceneError::expected(
+            first,
+            format!(
                 "a rectified image of {width}x{height} pixels expected, as in the drives called \
                  _sync, {}x{} found",
                 size.0, size.1
             ),
-        });
+        ));
     }
     let (intrinsics, camera_from_camera0) = split_projection(
         &calibration.projection,
@@ -159,10 +159,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
 
 /// The files of a folder whose name is a number, by it.
 fn numbered(folder: &Path, extension: &str) -> Result<BTreeMap<usize, PathBuf>, SceneError> {
-    let io = |source| SceneError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io = SceneError::io(folder);
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();

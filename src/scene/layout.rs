@@ -96,19 +96,19 @@ const CAMERA_FROM_VELODYNE: Matrix3<f64> =
     Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
 
 fn make_folder(folder: &Path) -> Result<(), SceneError> {
-    fs::create_dir_all(folder).map_err(io(folder))
+    fs::create_dir_all(folder).map_err(SceneError::io(folder))
 }
 
 /// Removes the files that an earlier drive has left: those whose name says that they are frames.
 fn remove_frames(folder: &Path, is_frame: impl Fn(&str) -> bool) -> Result<(), SceneError> {
-    for entry in fs::read_dir(folder).map_err(io(folder))? {
-        let path = entry.map_err(io(folder))?.path();
+    for entry in fs::read_dir(folder).map_err(SceneError::io(folder))? {
+        let path = entry.map_err(SceneError::io(folder))?.path();
         if path
             .file_name()
             .and_then(|name| name.to_str())
             .is_some_and(&is_frame)
         {
-            fs::remove_file(&path).map_err(io(&path))?;
+            fs::remove_file(&path).map_err(SceneError::io(&path))?;
         }
     }
     Ok(())
@@ -125,16 +125,13 @@ fn is_numbered(name: &str, digits: usize, extension: &str) -> bool {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
-    write_whole(path, bytes).map_err(io(path))
+    write_whole(path, bytes).map_err(SceneError::io(path))
 }
 
 fn write_photo(path: &Path, photo: &RgbImage) -> Result<(), SceneError> {
     let mut png = std::io::Cursor::new(Vec::new());
     let encoded = photo.write_to(&mut png, ImageFormat::Png);
-    encoded.map_err(|source| SceneError::Image {
-        path: path.to_owned(),
-        source,
-    })?;
+    encoded.map_err(SceneError::image(path))?;
     write(path, png.get_ref())
 }
 
@@ -158,10 +155,7 @@ fn write_depth(
         });
     let mut png = std::io::Cursor::new(Vec::new());
     let encoded = image.write_to(&mut png, ImageFormat::Png);
-    encoded.map_err(|source| SceneError::Image {
-        path: path.to_owned(),
-        source,
-    })?;
+    encoded.map_err(SceneError::image(path))?;
     write(path, png.get_ref())
 }
 
@@ -174,11 +168,4 @@ fn joined<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> String {
 /// Twelve numbers, row by row.
 fn row_by_row(matrix: &Matrix3x4<f64>) -> String {
     joined(&matrix.transpose())
-}
-
-fn io(path: &Path) -> impl FnOnce(std::io::Error) -> SceneError + '_ {
-    |source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    }
 }

@@ -58,10 +58,7 @@ impl TextFile {
 
     /// An error about the file as a whole.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
-        SceneError::Content {
-            path: self.path.clone(),
-            expected: expected.into(),
-        }
+        SceneError::expected(&self.path, expected)
     }
 
     /// The first `ROWS` lines as rows of numbers, such as a matrix that is a file of its own.
@@ -85,11 +82,7 @@ impl TextFile {
 impl<'a> Line<'a> {
     /// An error at this line.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
-        SceneError::Line {
-            path: self.path.to_owned(),
-            line: self.number,
-            expected: expected.into(),
-        }
+        SceneError::line(&self.path, self.number, expected)
     }
 
     /// The words between white space or commas.
@@ -190,10 +183,7 @@ pub(super) fn excerpt_of(text: &str, most: usize) -> String {
 
 /// The text of a file.
 pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
-    std::fs::read_to_string(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    std::fs::read_to_string(path).map_err(SceneError::io(path))
 }
 
 #[cfg(test)]

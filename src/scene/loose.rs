@@ -60,13 +60,13 @@ impl LoosePhotos {
         let names: Vec<String> = self.paths.iter().map(|path| Self::name(path)).collect();
         let twice = (1..names.len()).find(|&at| names[..at].contains(&names[at]));
         if let Some(twice) = twice {
-            return Err(SceneError::Content {
-                path: self.paths[twice].clone(),
-                expected: format!(
+            return Err(SceneError::expected(
+                &self.paths[twice],
+                format!(
                     "a name of its own expected, another photo is called {} too",
                     names[twice]
                 ),
-            });
+            ));
         }
         let photos = self.paths.iter().map(|path| self.loose_photo(path));
         Ok(Arc::new(LooseScene {
@@ -91,12 +91,12 @@ impl LoosePhotos {
                 true => (stored.1, stored.0),
                 false => stored,
             };
-            let (focal_px, how) = exif.focal_px(stored).ok_or_else(|| SceneError::Content {
-                path: path.to_owned(),
-                expected:
+            let (focal_px, how) = exif.focal_px(stored).ok_or_else(|| {
+                SceneError::expected(
+                    path,
                     "a focal length in EXIF expected, none found; --camera fx,fy,cx,cy, a camera \
-                           line of COLMAP or its cameras.txt says what the camera is"
-                        .to_owned(),
+                           line of COLMAP or its cameras.txt says what the camera is",
+                )
             })?;
             log::warn!(
                 "{}: a focal length of {focal_px:.0} px by EXIF ({how}), no distortion; --camera says more",
@@ -122,14 +122,10 @@ impl LoosePhotos {
         let (taken, distortion) = camera.of_photo(path, stored)?;
         let lens = match distortion == Default::default() {
             true => None,
-            false => {
-                Some(
-                    Lens::new(taken, distortion).map_err(|expected| SceneError::Content {
-                        path: path.to_owned(),
-                        expected,
-                    })?,
-                )
-            }
+            false => Some(
+                Lens::new(taken, distortion)
+                    .map_err(|expected| SceneError::expected(path, expected))?,
+            ),
         };
         Ok(photo(taken, lens, Orientation::NoTransforms))
     }
@@ -194,10 +190,7 @@ impl Scene for LooseScene {
             turned,
             ..
         } = &self.photos[frame];
-        let photo = Photo::read(path).map_err(|source| SceneError::Image {
-            path: path.clone(),
-            source,
-        })?;
+        let photo = Photo::read(path).map_err(SceneError::image(path))?;
         photo_file::expect_size(path, photo.dimensions(), *stored)?;
         let photo = match turned {
             Orientation::NoTransforms => photo,

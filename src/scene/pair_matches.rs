@@ -43,10 +43,7 @@ struct RawMatches {
 impl RawMatches {
     /// Checks that partners are there, and says so in terms of the file otherwise.
     fn checked(self, path: &Path) -> Result<Self, SceneError> {
-        let error = |expected: String| SceneError::Content {
-            path: path.to_owned(),
-            expected,
-        };
+        let error = |expected: String| SceneError::expected(path, expected);
         if self.partners.len() != self.first.len() {
             return Err(error(format!(
                 "a partner or none for each of {} keypoints expected, {} found",
@@ -108,10 +105,7 @@ impl MatchFolder {
     /// # Errors
     /// A folder that cannot be read or has no matches.
     pub fn open(folder: &Path) -> Result<Self, SceneError> {
-        let io = |source| SceneError::Io {
-            path: folder.to_owned(),
-            source,
-        };
+        let io = SceneError::io(folder);
         let mut files = Vec::new();
         for entry in std::fs::read_dir(folder).map_err(io)? {
             files.push(entry.map_err(io)?.path());
@@ -125,13 +119,13 @@ impl MatchFolder {
             name.ends_with(PAIR_ENDING)
         };
         if h5.is_empty() && !files.iter().any(is_pair) {
-            return Err(SceneError::Content {
-                path: folder.to_owned(),
-                expected: format!(
+            return Err(SceneError::expected(
+                folder,
+                format!(
                     "hloc's features and matches (.h5) or files such as \
                      QUERY_REFERENCE{PAIR_ENDING}.txt or .npz expected, none found"
                 ),
-            });
+            ));
         }
         let hloc = match h5.as_slice() {
             [] => None,

@@ -8,18 +8,12 @@ use crate::image::Photo;
 
 /// The size of an image \[px\], from its header alone.
 pub(super) fn dimensions(path: &Path) -> Result<(u32, u32), SceneError> {
-    image::image_dimensions(path).map_err(|source| SceneError::Image {
-        path: path.to_owned(),
-        source,
-    })
+    image::image_dimensions(path).map_err(SceneError::image(path))
 }
 
 /// Reads a photo, which must be of the camera's size.
 pub(super) fn read(path: &Path, camera: &Intrinsics) -> Result<Photo, SceneError> {
-    let photo = Photo::read(path).map_err(|source| SceneError::Image {
-        path: path.to_owned(),
-        source,
-    })?;
+    let photo = Photo::read(path).map_err(SceneError::image(path))?;
     expect_size(path, photo.dimensions(), (camera.width, camera.height))?;
     Ok(photo)
 }
@@ -33,13 +27,13 @@ pub(super) fn expect_size(
     if (width, height) == (expected_width, expected_height) {
         return Ok(());
     }
-    Err(SceneError::Content {
-        path: path.to_owned(),
-        expected: format!(
+    Err(SceneError::expected(
+        path,
+        format!(
             "{expected_width}x{expected_height} pixels expected, as its camera has, \
              {width}x{height} found"
         ),
-    })
+    ))
 }
 
 /// The path of a file that is named in a scene's own files, and lies in the scene's folder.

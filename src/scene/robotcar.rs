@@ -135,10 +135,8 @@ struct RobotCar {
 impl RobotCar {
     fn open(path: &Path, keeps_all: bool) -> Result<Self, SceneError> {
         let (traversal, wanted) = split_camera(path);
-        let expected = |path: PathBuf, expected: &str| SceneError::Content {
-            path,
-            expected: expected.to_owned(),
-        };
+        let expected =
+            |path: PathBuf, expected: &str| SceneError::expected(path, expected.to_owned());
         let there = CAMERAS
             .iter()
             .find(|camera| traversal.join(camera.folder).is_dir());
@@ -233,10 +231,7 @@ fn all_times(traversal: &Path, camera: &CameraKind) -> Result<Vec<u64>, SceneErr
         return Ok(times?.into_iter().collect());
     }
     let folder = traversal.join(camera.folder);
-    let io = |source| SceneError::Io {
-        path: folder.clone(),
-        source,
-    };
+    let io = SceneError::io(&folder);
     let mut times = BTreeSet::new();
     for entry in std::fs::read_dir(&folder).map_err(io)? {
         let name = entry.map_err(io)?.file_name();
@@ -275,10 +270,7 @@ impl Scene for RobotCar {
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let (_, path) = &self.photos[frame];
-        let raw = Photo::read(path).map_err(|source| SceneError::Image {
-            path: path.clone(),
-            source,
-        })?;
+        let raw = Photo::read(path).map_err(SceneError::image(path))?;
         let Intrinsics { width, height, .. } = self.model.intrinsics;
         photo_file::expect_size(path, raw.dimensions(), (width, height))?;
         let color = demosaiced(&raw.gray, self.camera.pattern);

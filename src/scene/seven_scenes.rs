@@ -132,11 +132,10 @@ fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<FrameFiles
         files.extend(frames_of(path, &prefix)?);
     }
     if files.is_empty() {
-        return Err(SceneError::Content {
-            path: folder.to_owned(),
-            expected: "folders seq-NN with frames frame-NNNNNN.color.png expected, none found"
-                .to_owned(),
-        });
+        return Err(SceneError::expected(
+            folder,
+            "folders seq-NN with frames frame-NNNNNN.color.png expected, none found",
+        ));
     }
     Ok((name, files))
 }
@@ -194,10 +193,7 @@ fn is_sequence(folder: &Path) -> bool {
 
 /// The frames of a sequence in the order of their numbers.
 fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<FrameFiles>, SceneError> {
-    let io = |source| SceneError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io = SceneError::io(folder);
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(io)? {
         let name = entry.map_err(io)?.file_name();
@@ -269,13 +265,13 @@ impl Cameras {
             });
         }
         if (width, height) != SIZE {
-            return Err(SceneError::Content {
-                path: folder.join("camera-intrinsics.txt"),
-                expected: format!(
+            return Err(SceneError::expected(
+                folder.join("camera-intrinsics.txt"),
+                format!(
                     "a 3x3 matrix expected, as the images have {width}x{height} pixels and the \
                      default is for 640x480"
                 ),
-            });
+            ));
         }
         log::info!(
             "{}: no camera-intrinsics.txt; the documented depth camera and the usual colour camera \

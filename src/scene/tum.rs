@@ -39,10 +39,10 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let photos = image_list(folder, "rgb.txt")?;
     let depths = image_list(folder, "depth.txt")?;
     let Some((_, first)) = photos.first() else {
-        return Err(SceneError::Content {
-            path: folder.join("rgb.txt"),
-            expected: "lines `time file` expected, none found".to_owned(),
-        });
+        return Err(SceneError::expected(
+            folder.join("rgb.txt"),
+            "lines `time file` expected, none found",
+        ));
     };
     let intrinsics = camera(folder, photo_file::dimensions(first)?)?;
     let truth = folder.join("groundtruth.txt");
@@ -74,12 +74,12 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     if let Some((first, last)) = trajectory.as_ref().and_then(Trajectory::range)
         && frames.iter().all(|frame| frame.world_from_camera.is_none())
     {
-        return Err(SceneError::Content {
-            path: truth,
-            expected: format!(
+        return Err(SceneError::expected(
+            truth,
+            format!(
                 "poses at the times of rgb.txt expected, but these are between {first} and {last}"
             ),
-        });
+        ));
     }
     let name = format!("tum/{}", folder_name(folder));
     let clouds = DepthImages {
@@ -126,13 +126,13 @@ fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, Scen
         );
         KINECT
     } else {
-        return Err(SceneError::Content {
+        return Err(SceneError::expected(
             path,
-            expected: format!(
+            format!(
                 "a file with fx fy cx cy expected, as the images have {width}x{height} pixels \
                  and the default is for 640x480"
             ),
-        });
+        ));
     };
     Ok(Intrinsics {
         fx,

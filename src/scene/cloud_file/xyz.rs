@@ -9,10 +9,7 @@ use crate::scene::SceneError;
 
 /// Reads the points. The first line may be a heading, or the number of points.
 pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
-    let io = |source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = SceneError::io(path);
     let mut cloud = MapCloud::default();
     for (index, line) in BufReader::new(File::open(path).map_err(io)?)
         .lines()
@@ -28,17 +25,13 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
             Err(_) if index == 0 => Ok(()),
             Err(expected) => Err(expected),
         }
-        .map_err(|expected| SceneError::Line {
-            path: path.to_owned(),
-            line: index + 1,
-            expected,
-        })?;
+        .map_err(|expected| SceneError::line(path, index + 1, expected))?;
     }
     if cloud.points.is_empty() {
-        return Err(SceneError::Content {
-            path: path.to_owned(),
-            expected: "lines `x y z` expected, none found".to_owned(),
-        });
+        return Err(SceneError::expected(
+            path,
+            "lines `x y z` expected, none found",
+        ));
     }
     Ok(cloud)
 }

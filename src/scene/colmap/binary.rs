@@ -110,10 +110,7 @@ struct BinaryFile {
 
 impl BinaryFile {
     fn open(path: &Path) -> Result<Self, SceneError> {
-        let io = |source| SceneError::Io {
-            path: path.to_owned(),
-            source,
-        };
+        let io = SceneError::io(path);
         let file = File::open(path).map_err(io)?;
         let size = file.metadata().map_err(io)?.len();
         Ok(Self {
@@ -126,10 +123,10 @@ impl BinaryFile {
 
     /// An error at the current place.
     fn error(&self, expected: impl Into<String>) -> SceneError {
-        SceneError::Content {
-            path: self.path.clone(),
-            expected: format!("byte {}: {}", self.size - self.left, expected.into()),
-        }
+        SceneError::expected(
+            &self.path,
+            format!("byte {}: {}", self.size - self.left, expected.into()),
+        )
     }
 
     fn take<const N: usize>(&mut self) -> Result<[u8; N], SceneError> {
@@ -182,10 +179,7 @@ impl BinaryFile {
         let offset = i64::try_from(bytes).map_err(|_| error(self))?;
         self.reader
             .seek_relative(offset)
-            .map_err(|source| SceneError::Io {
-                path: self.path.clone(),
-                source,
-            })?;
+            .map_err(SceneError::io(&self.path))?;
         self.left = left;
         Ok(())
     }

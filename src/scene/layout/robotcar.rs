@@ -194,10 +194,7 @@ impl DriveWriter for Writer {
         let path = self.folder.join(format!("stereo/centre/{time}.png"));
         let mut png = std::io::Cursor::new(Vec::new());
         let encoded = raw.write_to(&mut png, image::ImageFormat::Png);
-        encoded.map_err(|source| SceneError::Image {
-            path: path.clone(),
-            source,
-        })?;
+        encoded.map_err(SceneError::image(&path))?;
         write(&path, png.get_ref())?;
         let scanner = CAR_FROM_CAMERA * self.drive.scanner.coords;
         let in_car = |point: &Point3<f32>| CAR_FROM_CAMERA * point.cast::<f64>().coords;

@@ -28,10 +28,7 @@ impl CameraArgument {
         photo: &Path,
         (width, height): (u32, u32),
     ) -> Result<(Intrinsics, Distortion), SceneError> {
-        let error = |expected: String| SceneError::Content {
-            path: photo.to_owned(),
-            expected,
-        };
+        let error = |expected: String| SceneError::expected(photo, expected);
         match self {
             Self::Pinhole([fx, fy, cx, cy]) => {
                 let taken = Intrinsics {

@@ -120,10 +120,7 @@ impl HlocFiles {
 }
 
 fn content(path: &Path, expected: &dyn std::fmt::Display) -> SceneError {
-    SceneError::Content {
-        path: path.to_owned(),
-        expected: expected.to_string().replace('\n', " "),
-    }
+    SceneError::expected(path, expected.to_string().replace('\n', " "))
 }
 
 /// The name of a frame whose image goes by this name.

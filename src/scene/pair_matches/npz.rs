@@ -16,14 +16,8 @@ const MOST_BYTES: u64 = 16 * MOST_KEYPOINTS as u64 + 4096;
 
 /// Reads a file of matches.
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
-    let error = |expected: String| SceneError::Content {
-        path: path.to_owned(),
-        expected: expected.replace('\n', " "),
-    };
-    let file = File::open(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let error = |expected: String| SceneError::expected(path, expected.replace('\n', " "));
+    let file = File::open(path).map_err(SceneError::io(path))?;
     let mut archive =
         ZipArchive::new(file).map_err(|why| error(format!("an .npz archive expected: {why}")))?;
     let mut array = |name: &str| -> Result<Array, SceneError> {

@@ -57,10 +57,7 @@ pub(super) fn scan_files(traversal: &Path, sdk: &Sdk) -> Result<Vec<ScanFile>, S
             continue;
         }
         sdk.extrinsics(scanner.name())?;
-        let io = |source| SceneError::Io {
-            path: folder.clone(),
-            source,
-        };
+        let io = SceneError::io(&folder);
         for entry in std::fs::read_dir(&folder).map_err(io)? {
             let path = entry.map_err(io)?.path();
             let name = path.file_name().and_then(|name| name.to_str());
@@ -130,14 +127,8 @@ pub(super) fn gathered(
 /// The points of a scan in the scanner's frame: triples of numbers of eight bytes.
 fn read(file: &ScanFile) -> Result<Vec<Point3<f64>>, SceneError> {
     let path = &file.path;
-    let io = |source| SceneError::Io {
-        path: path.clone(),
-        source,
-    };
-    let error = |expected: String| SceneError::Content {
-        path: path.clone(),
-        expected,
-    };
+    let io = SceneError::io(path);
+    let error = |expected: String| SceneError::expected(path, expected);
     let size = std::fs::metadata(path).map_err(io)?.len();
     if size % 24 != 0 || size > LONGEST_SCAN {
         return Err(error(format!(

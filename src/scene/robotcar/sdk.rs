@@ -100,20 +100,17 @@ impl CameraModel {
     /// The same, for photos of a size, with the look-up table read.
     pub(super) fn for_photos_of(self, (width, height): (u32, u32)) -> Result<Self, SceneError> {
         let path = &self.table_path;
-        let bytes = std::fs::read(path).map_err(|source| SceneError::Io {
-            path: path.clone(),
-            source,
-        })?;
+        let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
         let pixels = width as usize * height as usize;
         if bytes.len() != pixels * 16 {
-            return Err(SceneError::Content {
-                path: path.clone(),
-                expected: format!(
+            return Err(SceneError::expected(
+                path,
+                format!(
                     "a look-up table for photos of {width}x{height} pixels expected, {} bytes, {} found",
                     pixels * 16,
                     bytes.len()
                 ),
-            });
+            ));
         }
         let number = |at: usize| {
             let bytes = bytes[8 * at..8 * at + 8].try_into().unwrap_or([0; 8]);

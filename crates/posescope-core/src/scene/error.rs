@@ -1,7 +1,7 @@
 //! What can be wrong with a scene: one clear line each, with file, place and what was expected.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A scene that cannot be used as asked.
 #[derive(Debug, thiserror::Error)]
@@ -102,4 +102,39 @@ pub enum SceneError {
         /// Which frames have one.
         hint: String,
     },
+}
+
+impl SceneError {
+    /// The error of a file that cannot be opened, read or written, for `map_err`.
+    pub fn io(path: &Path) -> impl Fn(io::Error) -> Self + Copy + '_ {
+        move |source| Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    /// The error of an image that cannot be decoded or encoded, for `map_err`.
+    pub fn image(path: &Path) -> impl Fn(image::ImageError) -> Self + Copy + '_ {
+        move |source| Self::Image {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    /// The error of a file with other content than `expected` says.
+    pub fn expected(path: impl Into<PathBuf>, expected: impl Into<String>) -> Self {
+        Self::Content {
+            path: path.into(),
+            expected: expected.into(),
+        }
+    }
+
+    /// The error of a line, counted from 1, that says something else than `expected`.
+    pub fn line(path: impl Into<PathBuf>, line: usize, expected: impl Into<String>) -> Self {
+        Self::Line {
+            path: path.into(),
+            line,
+            expected: expected.into(),
+        }
+    }
 }
