@@ -11,6 +11,7 @@ mod depth_image;
 mod described;
 mod estimates;
 mod file_scene;
+mod folder;
 mod frame_names;
 mod gps;
 mod kitti;
@@ -37,7 +38,6 @@ pub use posescope_street as street;
 
 pub use estimates::read_estimates;
 pub use gps::located;
-pub use kitti::KittiOdometry;
 pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};

@@ -14,15 +14,14 @@ mod text;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 pub(super) use self::camera::ModelCamera;
 use self::model::ModelImage;
 pub(super) use self::text::camera as camera_of_line;
-use super::file_scene::{Clouds, FileScene, Frame, folder_name};
-use super::lens::Lens;
-use super::{Entry, Scene, SceneError, photo_file};
-use crate::camera::Intrinsics;
+use super::file_scene::{Clouds, FileScene, Frame};
+use super::folder::{folder_name, within};
+use super::lens::developed_camera;
+use super::{Entry, Scene, SceneError};
 use crate::cloud::Cloud;
 
 pub(super) const ENTRY: Entry = Entry {
@@ -72,7 +71,8 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     })?;
     let mut cameras = BTreeMap::new();
     for (id, camera) in &model.cameras {
-        let camera = OpenCamera::new(camera).map_err(|why| error(format!("camera {id}: {why}")))?;
+        let camera = developed_camera(camera.intrinsics, camera.distortion)
+            .map_err(|why| error(format!("camera {id}: {why}")))?;
         cameras.insert(*id, camera);
     }
     let names = frame_names(&images).map_err(error)?;
@@ -80,8 +80,8 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let mut frames = Vec::with_capacity(listed);
     let mut observed = Vec::with_capacity(listed);
     for (image, name) in images.into_iter().zip(names) {
-        let photo = photo_file::within(&photos, &image.name).map_err(error)?;
-        let camera = cameras.get(&image.camera).ok_or_else(|| {
+        let photo = within(&photos, &image.name).map_err(error)?;
+        let (intrinsics, develop) = cameras.get(&image.camera).ok_or_else(|| {
             error(format!(
                 "image {}: one of the cameras of the model expected, {} found",
                 image.name, image.camera
@@ -90,11 +90,9 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
         if photo.is_file() {
             frames.push(Frame {
                 name,
-                photo,
-                intrinsics: camera.intrinsics,
-                lens: camera.lens.clone(),
+                develop: develop.clone(),
                 world_from_camera: Some(image.camera_from_world.inverse()),
-                time_s: None,
+                ..Frame::new(photo, *intrinsics)
             });
             observed.push(image.observed);
         }
@@ -124,37 +122,13 @@ fn scene_name(folder: &Path, photos: &Path) -> String {
     folder_name(common)
 }
 
-/// A camera as it is handed out.
-struct OpenCamera {
-    intrinsics: Intrinsics,
-    lens: Option<Arc<Lens>>,
-}
-
-impl OpenCamera {
-    fn new(camera: &ModelCamera) -> Result<Self, String> {
-        if camera.distortion == Default::default() {
-            return Ok(Self {
-                intrinsics: camera.intrinsics,
-                lens: None,
-            });
-        }
-        let lens = Lens::new(camera.intrinsics, camera.distortion)?;
-        Ok(Self {
-            intrinsics: lens.pinhole(),
-            lens: Some(Arc::new(lens)),
-        })
-    }
-}
-
 /// Where the photos are: `images` in the model's folder or up to two above it, or one of these itself.
 fn photo_folder(model: &Path, images: &[ModelImage]) -> Option<PathBuf> {
     let model = model.canonicalize().ok()?;
     let places = model.ancestors().take(3);
     let places = places.flat_map(|folder| [folder.join("images"), folder.to_owned()]);
     let holds_any = |place: &PathBuf| {
-        let paths = images
-            .iter()
-            .flat_map(|i| photo_file::within(place, &i.name));
+        let paths = images.iter().flat_map(|i| within(place, &i.name));
         // A whole project may have thousands: those that are not there are not looked for for long.
         paths.take(100).any(|path| path.is_file())
     };
@@ -190,11 +164,11 @@ struct ObservedPoints {
 }
 
 impl Clouds for ObservedPoints {
-    fn has(&self, frame: usize) -> bool {
-        !self.observed[frame].is_empty()
+    fn has(&self, index: usize) -> bool {
+        !self.observed[index].is_empty()
     }
 
-    fn place(&self, _frame: usize) -> &Path {
+    fn place<'a>(&'a self, _index: usize, _frame: &'a Frame) -> &'a Path {
         &self.listed_in
     }
 

@@ -42,16 +42,16 @@ pub(super) struct DepthImages {
 }
 
 impl Clouds for DepthImages {
-    fn has(&self, frame: usize) -> bool {
-        self.images[frame].is_some()
+    fn has(&self, index: usize) -> bool {
+        self.images[index].is_some()
     }
 
-    fn place(&self, frame: usize) -> &Path {
-        self.images[frame].as_deref().unwrap_or(&self.listed_in)
+    fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
+        self.images[index].as_deref().unwrap_or(&self.listed_in)
     }
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
-        let path = self.place(index);
+        let path = self.place(index, frame);
         let depth = read_depth(path)?;
         let (intrinsics, camera_from_depth) = match &self.camera {
             DepthCamera::Registered => (&frame.intrinsics, Pose::identity()),

@@ -26,8 +26,9 @@ use toml::Spanned;
 
 use self::poses::FramePoses;
 use super::cloud_file;
-use super::file_scene::{Clouds, FileScene, Frame, folder_name};
-use super::lens::{Distortion, Lens};
+use super::file_scene::{Clouds, Develop, FileScene, Frame};
+use super::folder::{folder_name, stem, within};
+use super::lens::{Distortion, developed_camera};
 use super::map_blocks::MapBlocks;
 use super::{Entry, Scene, SceneError, lines, photo_file, view_crop};
 use crate::camera::Intrinsics;
@@ -147,7 +148,7 @@ impl Source {
 
     /// The file of this name.
     fn file(&self, name: &Spanned<String>) -> Result<PathBuf, SceneError> {
-        let path = photo_file::within(self.folder(), name.get_ref())
+        let path = within(self.folder(), name.get_ref())
             .map_err(|expected| self.error(name, &expected))?;
         if !path.is_file() {
             let expected = format!("a file expected, `{}` is none", path.display());
@@ -158,10 +159,9 @@ impl Source {
 
     /// The files that a pattern names, in the order of their names.
     fn files(&self, name: &Spanned<String>) -> Result<Vec<PathBuf>, SceneError> {
-        let pattern = photo_file::within(self.folder(), name.get_ref())
+        let pattern = within(self.folder(), name.get_ref())
             .map_err(|expected| self.error(name, &expected))?;
-        let files = pattern::files(&pattern)
-            .map_err(SceneError::io(pattern.parent().unwrap_or(self.folder())))?;
+        let files = pattern::files(&pattern)?;
         if files.is_empty() {
             let expected = format!("files expected, `{}` names none", pattern.display());
             return Err(self.error(name, &expected));
@@ -180,7 +180,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         source.error_at(at, error.message())
     })?;
     let photos = source.files(&description.images)?;
-    let (intrinsics, lens) = camera(&source, &description.camera, &photos[0])?;
+    let (intrinsics, develop) = camera(&source, &description.camera, &photos[0])?;
     let poses = match &description.poses {
         Some(name) => poses::read(&source.file(name)?, &photos)?,
         None => {
@@ -201,15 +201,13 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         .into_iter()
         .zip(poses)
         .map(|(photo, FramePoses { pose, time_s })| Frame {
-            name: stem(&photo),
-            photo,
-            intrinsics,
-            lens: lens.clone(),
+            develop: develop.clone(),
             world_from_camera: match description.pose {
                 PoseMeaning::WorldFromCamera => pose,
                 PoseMeaning::CameraFromWorld => pose.map(|pose| pose.inverse()),
             },
             time_s,
+            ..Frame::new(photo, intrinsics)
         })
         .collect();
     Ok(Box::new(FileScene::new(name, frames, clouds)))
@@ -220,7 +218,7 @@ fn camera(
     source: &Source,
     described: &Spanned<CameraDescription>,
     first: &Path,
-) -> Result<(Intrinsics, Option<Arc<Lens>>), SceneError> {
+) -> Result<(Intrinsics, Option<Arc<dyn Develop>>), SceneError> {
     let (width, height) = photo_file::dimensions(first)?;
     let camera = described.get_ref();
     let taken = Intrinsics {
@@ -242,11 +240,7 @@ fn camera(
         p1: camera.p1,
         p2: camera.p2,
     };
-    if distortion == Distortion::default() {
-        return Ok((taken, None));
-    }
-    let lens = Lens::new(taken, distortion).map_err(|why| source.error(described, &why))?;
-    Ok((lens.pinhole(), Some(Arc::new(lens))))
+    developed_camera(taken, distortion).map_err(|why| source.error(described, &why))
 }
 
 fn clouds(
@@ -327,23 +321,23 @@ struct DescribedClouds {
 }
 
 impl Clouds for DescribedClouds {
-    fn has(&self, frame: usize) -> bool {
+    fn has(&self, index: usize) -> bool {
         match &self.clouds {
             Place::Map(_) => true,
-            Place::PerFrame(files, _) => files.get(frame).is_some_and(Option::is_some),
+            Place::PerFrame(files, _) => files.get(index).is_some_and(Option::is_some),
         }
     }
 
-    fn place(&self, frame: usize) -> &Path {
+    fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
         match &self.clouds {
-            Place::PerFrame(files, _) => files.get(frame).and_then(Option::as_deref),
+            Place::PerFrame(files, _) => files.get(index).and_then(Option::as_deref),
             Place::Map(_) => None,
         }
         .unwrap_or(&self.place)
     }
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
-        let path = self.place(index);
+        let path = self.place(index, frame);
         let world_from_camera = || {
             frame.world_from_camera.ok_or_else(|| {
                 SceneError::expected(
@@ -382,10 +376,4 @@ impl Clouds for DescribedClouds {
             }
         }
     }
-}
-
-/// What a file is called, without its folder and extension.
-fn stem(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
 }

@@ -1,10 +1,9 @@
-//! A scene whose photos are files: all that its reader has to say is what the frames are and where
-//! their clouds come from.
+//! A scene whose photos are files. Its reader says what the frames are and where their clouds come from.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::lens::Lens;
+use super::folder::stem;
 use super::{Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -17,23 +16,55 @@ pub(super) struct Frame {
     pub name: String,
     /// The photo.
     pub photo: PathBuf,
-    /// The camera, as the photo is handed out.
+    /// The camera of the developed photo.
     pub intrinsics: Intrinsics,
-    /// What takes the distortion out of the photo, if it has any.
-    pub lens: Option<Arc<Lens>>,
-    /// Where the camera stood, if that is known.
+    /// What makes the photo of the image in the file, if they differ.
+    pub develop: Option<Arc<dyn Develop>>,
+    /// The pose of the camera, if it is known.
     pub world_from_camera: Option<Pose>,
     /// When the photo was taken \[s\], if that is known.
     pub time_s: Option<f64>,
 }
 
+impl Frame {
+    /// A frame that is called as its photo is, without a pose and a time.
+    pub fn new(photo: PathBuf, intrinsics: Intrinsics) -> Self {
+        Self {
+            name: stem(&photo),
+            photo,
+            intrinsics,
+            develop: None,
+            world_from_camera: None,
+            time_s: None,
+        }
+    }
+}
+
+/// Makes photos of the images in their files: takes out distortion, for example.
+pub(super) trait Develop: Send + Sync {
+    /// The photo of an image.
+    fn developed(&self, image: Photo) -> Photo;
+
+    /// The size of the image in the file \[px\], given that of the photo.
+    fn size_in_file(&self, photo: (u32, u32)) -> (u32, u32) {
+        photo
+    }
+}
+
 /// Where the clouds of a scene come from.
 pub(super) trait Clouds: Send + Sync {
     /// Whether a frame has one.
-    fn has(&self, frame: usize) -> bool;
+    fn has(&self, index: usize) -> bool;
 
-    /// Where the cloud of a frame is or should be, for whoever looks for it.
-    fn place(&self, frame: usize) -> &Path;
+    /// The path that an error names when a frame has no cloud.
+    fn place<'a>(&'a self, _index: usize, frame: &'a Frame) -> &'a Path {
+        &frame.photo
+    }
+
+    /// What a frame without a cloud needs to have one, where that is more than the file at its place.
+    fn missing(&self) -> Option<&str> {
+        None
+    }
 
     /// The cloud of a frame that has one, in the camera's frame \[m\].
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError>;
@@ -99,19 +130,23 @@ impl<C: Clouds> Scene for FileScene<C> {
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let frame = &self.frames[frame];
-        let photo = photo_file::read(&frame.photo, &frame.intrinsics)?;
-        Ok(match &frame.lens {
-            Some(lens) => lens.undistorted(&photo),
-            None => photo,
-        })
+        let size = (frame.intrinsics.width, frame.intrinsics.height);
+        match &frame.develop {
+            Some(develop) => {
+                let image = photo_file::read(&frame.photo, develop.size_in_file(size))?;
+                Ok(develop.developed(image))
+            }
+            None => photo_file::read(&frame.photo, size),
+        }
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         if !self.clouds.has(frame) {
+            let missing = self.clouds.missing().map(str::to_owned);
             return Err(SceneError::NoCloud {
-                path: self.clouds.place(frame).to_owned(),
+                path: self.clouds.place(frame, &self.frames[frame]).to_owned(),
                 frame: self.names[frame].clone(),
-                hint: self.frames_with_cloud(),
+                hint: missing.unwrap_or_else(|| self.frames_with_cloud()),
             });
         }
         self.clouds.read(frame, &self.frames[frame])
@@ -125,13 +160,4 @@ impl<C: Clouds> Scene for FileScene<C> {
         let bytes: Vec<u8> = sizes.flat_map(u64::to_le_bytes).collect();
         posescope_core::scene::fingerprint(self, &bytes)
     }
-}
-
-/// What a folder is called, wherever it is named from.
-pub(super) fn folder_name(folder: &Path) -> String {
-    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    folder
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned())
-        .unwrap_or_default()
 }

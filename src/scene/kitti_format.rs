@@ -1,29 +1,92 @@
-//! What the two layouts of KITTI have in common: projection matrices and scans.
+//! What the two layouts of KITTI have in common: cameras, labelled lines, projection matrices and scans.
 
 use std::path::Path;
 
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::SceneError;
+use super::lines::{TextFile, numbers};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 
+/// A camera's folder of images below the folder of a drive.
+pub(super) struct Camera<'a> {
+    /// The drive.
+    pub folder: &'a Path,
+    /// The camera, if the path names one.
+    pub wanted: Option<&'static str>,
+    known: &'a [&'static str],
+}
+
+impl<'a> Camera<'a> {
+    /// Splits the path of a drive or of one of its cameras. The cameras are known in the order in which
+    /// one is chosen.
+    pub fn of_path(path: &'a Path, known: &'a [&'static str]) -> Self {
+        let last = path.file_name().and_then(|name| name.to_str());
+        let named = known.iter().find(|camera| last == Some(camera)).copied();
+        let (folder, wanted) = match (path.parent(), named) {
+            (Some(drive), Some(camera)) => (drive, Some(camera)),
+            _ => (path, None),
+        };
+        Self {
+            folder,
+            wanted,
+            known,
+        }
+    }
+
+    /// The camera's folder: the one that the path names, or the first that is there.
+    pub fn name(&self) -> Result<&'static str, SceneError> {
+        let mut known = self.known.iter().copied();
+        let found = || known.find(|camera| self.folder.join(camera).is_dir());
+        self.wanted.or_else(found).ok_or_else(|| {
+            let known = self.known.join(", ");
+            SceneError::expected(
+                self.folder,
+                format!("an image folder expected ({known}), none found"),
+            )
+        })
+    }
+}
+
+/// The numbers of the line `LABEL: …`.
+pub(super) fn labelled<const N: usize>(
+    file: &TextFile,
+    label: &str,
+) -> Result<[f64; N], SceneError> {
+    optional(file, label)?
+        .ok_or_else(|| file.error(format!("a line `{label}:` expected, none found")))
+}
+
+/// The numbers of the line `LABEL: …`, if there is one.
+pub(super) fn optional<const N: usize>(
+    file: &TextFile,
+    label: &str,
+) -> Result<Option<[f64; N]>, SceneError> {
+    for line in file.lines() {
+        if let Some((found, text)) = line.text.split_once(':')
+            && found.trim() == label
+        {
+            return numbers(text).map(Some).map_err(|why| line.error(why));
+        }
+    }
+    Ok(None)
+}
+
 /// The intrinsics of a projection matrix P = K [I | t], and the transform from the rectified camera 0.
 pub(super) fn split_projection(
-    projection: &Matrix3x4<f64>,
+    projection: &[f64; 12],
     (width, height): (u32, u32),
-    path: &Path,
+    file: &TextFile,
 ) -> Result<(Intrinsics, Pose), SceneError> {
+    let projection = Matrix3x4::from_row_slice(projection);
     let k: Matrix3<f64> = projection.fixed_columns::<3>(0).into_owned();
     let inverse = k
         .try_inverse()
         .filter(|_| k[(0, 0)] > 0.0 && k[(1, 1)] > 0.0);
     let Some(inverse) = inverse else {
-        return Err(SceneError::expected(
-            path,
-            "a projection matrix with positive focal lengths expected",
-        ));
+        return Err(file.error("a projection matrix with positive focal lengths expected"));
     };
     let intrinsics = Intrinsics {
         fx: k[(0, 0)],

@@ -19,8 +19,9 @@ use self::calibration::Calibration;
 use self::oxts::Packet;
 use self::sweep::Sweep;
 use super::argument::split_word;
-use super::file_scene::{Clouds, FileScene, Frame, folder_name};
-use super::kitti_format::{read_scan, split_projection};
+use super::file_scene::{Clouds, FileScene, Frame};
+use super::folder::{folder_name, numbered};
+use super::kitti_format::{Camera, read_scan};
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -31,8 +32,8 @@ pub(super) const ENTRY: Entry = Entry {
             with :uncorrected scans keep the distortion of the sweep",
     recognizes: |argument| {
         let (path, _) = split_word(argument, &[UNCORRECTED]);
-        let (drive, _) = split_camera(path);
-        day_of(&drive).join(calibration::CAMERAS).is_file()
+        let drive = Camera::of_path(path, &CAMERAS).folder;
+        day_of(drive).join(calibration::CAMERAS).is_file()
             && CAMERAS.iter().any(|camera| drive.join(camera).is_dir())
     },
     open: |argument| {
@@ -48,16 +49,6 @@ const UNCORRECTED: &str = "uncorrected";
 /// left, and those on the right.
 const CAMERAS: [&str; 4] = ["image_00", "image_02", "image_01", "image_03"];
 
-/// The drive's folder, and the camera if the path names one.
-fn split_camera(path: &Path) -> (PathBuf, Option<&'static str>) {
-    let last = path.file_name().and_then(|name| name.to_str());
-    let camera = CAMERAS.into_iter().find(|camera| last == Some(camera));
-    match (camera, path.parent()) {
-        (Some(camera), Some(drive)) => (drive.to_owned(), Some(camera)),
-        _ => (path.to_owned(), None),
-    }
-}
-
 /// The folder of the day, with the calibration.
 fn day_of(drive: &Path) -> PathBuf {
     match drive.canonicalize() {
@@ -67,40 +58,28 @@ fn day_of(drive: &Path) -> PathBuf {
 }
 
 fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
-    let (drive, wanted) = split_camera(path);
-    let found = CAMERAS.iter().find(|camera| drive.join(camera).is_dir());
-    let camera = wanted.or(found.copied()).ok_or_else(|| {
-        SceneError::expected(
-            &drive,
-            "an image folder expected (image_00, image_02, …), none found",
-        )
-    })?;
-    let photos = numbered(&drive.join(camera).join("data"), "png")?;
+    let camera = Camera::of_path(path, &CAMERAS);
+    let (drive, images) = (camera.folder, camera.name()?);
+    let photos = numbered::<usize>(&drive.join(images).join("data"), "png")?;
     let Some(first) = photos.values().next() else {
         return Err(SceneError::expected(
-            drive.join(camera).join("data"),
+            drive.join(images).join("data"),
             "images NNNNNNNNNN.png expected, none found",
         ));
     };
-    let day = day_of(&drive);
-    let calibration = Calibration::read(&day, camera)?;
-    let size = photo_file::dimensions(first)?;
-    if size != calibration.size {
-        let (width, height) = calibration.size;
+    let calibration = Calibration::read(&day_of(drive), images)?;
+    let intrinsics = calibration.intrinsics;
+    let (width, height) = photo_file::dimensions(first)?;
+    if (width, height) != (intrinsics.width, intrinsics.height) {
         return Err(SceneError::expected(
             first,
             format!(
-                "a rectified image of {width}x{height} pixels expected, as in the drives called \
-                 _sync, {}x{} found",
-                size.0, size.1
+                "a rectified image of {}x{} pixels expected, as in the drives called _sync, \
+                 {width}x{height} found",
+                intrinsics.width, intrinsics.height
             ),
         ));
     }
-    let (intrinsics, camera_from_camera0) = split_projection(
-        &calibration.projection,
-        size,
-        &day.join(calibration::CAMERAS),
-    )?;
     let packets = oxts::read(&drive.join("oxts"))?;
     if packets.is_empty() {
         log::warn!(
@@ -109,72 +88,37 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
         );
     }
     let world_from_camera0 = oxts::world_from_camera0(&packets, &calibration.camera0_from_imu());
-    let times = timestamps::read(&drive.join(camera).join("timestamps.txt"))?;
-    let frames: Vec<Frame> = photos
-        .iter()
-        .map(|(&number, photo)| Frame {
-            name: stem(photo),
-            photo: photo.clone(),
-            intrinsics,
-            lens: None,
-            world_from_camera: world_from_camera0
-                .get(&number)
-                .map(|pose| pose * camera_from_camera0.inverse()),
-            time_s: times.get(number).copied(),
-        })
-        .collect();
+    let times = timestamps::read(&drive.join(images).join("timestamps.txt"))?;
+    let folder = drive.join("velodyne_points");
     let scans = Scans {
-        folder: drive.join("velodyne_points"),
-        of_frames: scans(
-            &drive.join("velodyne_points"),
-            photos.keys(),
-            &packets,
-            correct,
-        )?,
-        camera_from_velodyne: camera_from_camera0 * calibration.camera0_from_velodyne,
+        of_frames: scans(&folder, photos.keys(), &packets, correct)?,
+        folder,
+        camera_from_velodyne: calibration.camera_from_camera0 * calibration.camera0_from_velodyne,
         velodyne_from_imu: calibration.velodyne_from_imu,
     };
-    if correct
-        && scans
-            .of_frames
-            .iter()
-            .flatten()
-            .any(|scan| scan.sweep.is_some())
-    {
+    let mut found = scans.of_frames.iter().flatten();
+    if correct && found.any(|scan| scan.sweep.is_some()) {
         log::info!(
             "{}: scans are corrected for the motion during the sweep; `:{UNCORRECTED}` after the \
              path leaves them as they are",
             drive.display()
         );
     }
-    let mut name = format!("kitti-raw/{}", folder_name(&drive));
-    if let Some(camera) = wanted {
+    let frames = photos.into_iter().map(|(number, photo)| Frame {
+        world_from_camera: world_from_camera0
+            .get(&number)
+            .map(|pose| pose * calibration.camera_from_camera0.inverse()),
+        time_s: times.get(number).copied(),
+        ..Frame::new(photo, intrinsics)
+    });
+    let mut name = format!("kitti-raw/{}", folder_name(drive));
+    if let Some(camera) = camera.wanted {
         name += &format!("/{camera}");
     }
     if !correct {
         name += &format!(":{UNCORRECTED}");
     }
-    Ok(Box::new(FileScene::new(name, frames, scans)))
-}
-
-/// The files of a folder whose name is a number, by it.
-fn numbered(folder: &Path, extension: &str) -> Result<BTreeMap<usize, PathBuf>, SceneError> {
-    let io = SceneError::io(folder);
-    let mut files = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(io)? {
-        let path = entry.map_err(io)?.path();
-        if path.extension().is_some_and(|found| found == extension)
-            && let Ok(number) = stem(&path).parse()
-        {
-            files.insert(number, path);
-        }
-    }
-    Ok(files)
-}
-
-fn stem(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
+    Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
 }
 
 /// The scans of frames, by position; none where the drive has no scans.
@@ -185,10 +129,9 @@ fn scans<'a>(
     correct: bool,
 ) -> Result<Vec<Option<Scan>>, SceneError> {
     let data = folder.join("data");
-    let files = if data.is_dir() {
-        numbered(&data, "bin")?
-    } else {
-        BTreeMap::new()
+    let files: BTreeMap<usize, PathBuf> = match data.is_dir() {
+        true => numbered(&data, "bin")?,
+        false => BTreeMap::new(),
     };
     let starts = timestamps::read(&folder.join("timestamps_start.txt"))?;
     let ends = timestamps::read(&folder.join("timestamps_end.txt"))?;
@@ -221,19 +164,18 @@ struct Scans {
 }
 
 impl Clouds for Scans {
-    fn has(&self, frame: usize) -> bool {
-        self.of_frames[frame].is_some()
+    fn has(&self, index: usize) -> bool {
+        self.of_frames[index].is_some()
     }
 
-    fn place(&self, frame: usize) -> &Path {
-        let scan = self.of_frames[frame].as_ref();
+    fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
+        let scan = self.of_frames[index].as_ref();
         scan.map_or(&self.folder, |scan| &scan.path)
     }
 
-    fn read(&self, index: usize, _frame: &Frame) -> Result<Cloud, SceneError> {
-        let sweep = self.of_frames[index]
-            .as_ref()
-            .and_then(|s| s.sweep.as_ref());
+    fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
+        let scan = self.of_frames[index].as_ref();
+        let sweep = scan.and_then(|scan| scan.sweep.as_ref());
         let into_camera = |point: Point3<f64>| {
             let point = match sweep {
                 Some(sweep) => sweep.corrected(&point, &self.velodyne_from_imu),
@@ -241,6 +183,6 @@ impl Clouds for Scans {
             };
             self.camera_from_velodyne * point
         };
-        read_scan(self.place(index), into_camera)
+        read_scan(self.place(index, frame), into_camera)
     }
 }

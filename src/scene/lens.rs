@@ -1,8 +1,11 @@
 //! Lens distortion, taken out of a photo when it is read: everything else speaks of pinholes.
 
+use std::sync::Arc;
+
 use nalgebra::Point2;
 use rayon::prelude::*;
 
+use super::file_scene::Develop;
 use crate::camera::Intrinsics;
 use crate::image::{GrayImage, Photo, RgbImage, cubic_interpolated};
 
@@ -135,26 +138,6 @@ impl Lens {
             })
     }
 
-    /// The photo as the pinhole would have taken it, by cubic convolution.
-    pub fn undistorted(&self, photo: &Photo) -> Photo {
-        match &photo.color {
-            Some(color) => {
-                let channel = |c: usize| {
-                    let values = color.pixels().map(|pixel| pixel.0[c]).collect();
-                    GrayImage::from_raw(color.width(), color.height(), values)
-                };
-                let channels =
-                    [0, 1, 2].map(|c| self.resampled(&channel(c).unwrap_or_default()).into_raw());
-                let [red, green, blue] = &channels;
-                let values = red.iter().zip(green).zip(blue);
-                let values = values.flat_map(|((r, g), b)| [*r, *g, *b]).collect();
-                let color = RgbImage::from_raw(color.width(), color.height(), values);
-                Photo::from_color(color.unwrap_or_default())
-            }
-            None => Photo::from_gray(self.resampled(&photo.gray)),
-        }
-    }
-
     fn resampled(&self, image: &GrayImage) -> GrayImage {
         let (width, height) = image.dimensions();
         let mut values = vec![0; width as usize * height as usize];
@@ -168,6 +151,40 @@ impl Lens {
         });
         GrayImage::from_raw(width, height, values).unwrap_or_default()
     }
+}
+
+impl Develop for Lens {
+    /// The photo as the pinhole would have taken it, by cubic convolution.
+    fn developed(&self, image: Photo) -> Photo {
+        match &image.color {
+            Some(color) => {
+                let channel = |c: usize| {
+                    let values = color.pixels().map(|pixel| pixel.0[c]).collect();
+                    GrayImage::from_raw(color.width(), color.height(), values)
+                };
+                let channels =
+                    [0, 1, 2].map(|c| self.resampled(&channel(c).unwrap_or_default()).into_raw());
+                let [red, green, blue] = &channels;
+                let values = red.iter().zip(green).zip(blue);
+                let values = values.flat_map(|((r, g), b)| [*r, *g, *b]).collect();
+                let color = RgbImage::from_raw(color.width(), color.height(), values);
+                Photo::from_color(color.unwrap_or_default())
+            }
+            None => Photo::from_gray(self.resampled(&image.gray)),
+        }
+    }
+}
+
+/// The camera of photos that a lens with distortion took, and what takes the distortion out of them.
+pub(super) fn developed_camera(
+    taken: Intrinsics,
+    distortion: Distortion,
+) -> Result<(Intrinsics, Option<Arc<dyn Develop>>), String> {
+    if distortion == Distortion::default() {
+        return Ok((taken, None));
+    }
+    let lens = Lens::new(taken, distortion)?;
+    Ok((lens.pinhole(), Some(Arc::new(lens))))
 }
 
 #[cfg(test)]
@@ -212,7 +229,7 @@ mod tests {
             distortion(0.15, 0.02, 0.001, -0.002),
         ] {
             let lens = Lens::new(CAMERA, coefficients).expect("can be undistorted");
-            let photo = lens.undistorted(&Photo::from_gray(taken(&lens, value)));
+            let photo = lens.developed(Photo::from_gray(taken(&lens, value)));
             let pinhole = lens.pinhole();
             for (x, y, gray) in photo.gray.enumerate_pixels() {
                 let at = pinhole.unproject(&Point2::new(f64::from(x), f64::from(y)), 1.0);
@@ -252,7 +269,7 @@ mod tests {
     fn colours_stay_together() {
         let lens = Lens::new(CAMERA, Distortion::default()).expect("a pinhole");
         let color = RgbImage::from_fn(320, 240, |x, y| Rgb([x as u8, y as u8, 77]));
-        let photo = lens.undistorted(&Photo::from_color(color.clone()));
+        let photo = lens.developed(Photo::from_color(color.clone()));
         assert_eq!(photo.color, Some(color));
     }
 }

@@ -1,5 +1,4 @@
-//! Photos of no scene: files that somebody wants localised in one, each with a camera, and nothing that
-//! says where they were taken.
+//! Photos of no scene: files that are localised in one, each with a camera and without a pose.
 
 mod camera;
 mod exif;
@@ -14,11 +13,12 @@ use serde::{Deserialize, Serialize};
 pub use camera::CameraArgument;
 
 use self::exif::Exif;
-use super::lens::Lens;
+use super::file_scene::{Clouds, Develop, FileScene, Frame};
+use super::folder::stem;
+use super::lens::developed_camera;
 use super::{Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
-use crate::geometry::Pose;
 use crate::image::Photo;
 
 /// What a command line says of loose photos.
@@ -37,10 +37,7 @@ impl LoosePhotos {
     /// What a photo is called in results, as photos of a scene are: by its file, without folder and
     /// ending.
     pub fn name(path: &Path) -> String {
-        path.file_stem()
-            .unwrap_or(path.as_os_str())
-            .to_string_lossy()
-            .into_owned()
+        stem(path)
     }
 
     /// The file of the photo that is called so.
@@ -68,41 +65,34 @@ impl LoosePhotos {
                 ),
             ));
         }
-        let photos = self.paths.iter().map(|path| self.loose_photo(path));
-        Ok(Arc::new(LooseScene {
-            photos: photos.collect::<Result<_, _>>()?,
-            names,
-        }))
+        let frames = self.paths.iter().map(|path| self.frame(path));
+        let frames = frames.collect::<Result<Vec<_>, _>>()?;
+        Ok(Arc::new(FileScene::new(
+            Self::NAME.to_owned(),
+            frames,
+            NoClouds,
+        )))
     }
 
-    fn loose_photo(&self, path: &Path) -> Result<LoosePhoto, SceneError> {
+    fn frame(&self, path: &Path) -> Result<Frame, SceneError> {
         let stored = photo_file::dimensions(path)?;
         let exif = Exif::read(path);
-        let photo = |taken: Intrinsics, lens: Option<Lens>, turned: Orientation| LoosePhoto {
-            path: path.to_owned(),
-            stored,
-            intrinsics: lens.as_ref().map_or(taken, Lens::pinhole),
-            lens,
-            turned,
-        };
+        let turned = exif.orientation();
         let Some(camera) = &self.camera else {
-            let turned = exif.orientation();
-            let (width, height) = match is_on_its_side(turned) {
-                true => (stored.1, stored.0),
-                false => stored,
-            };
             let (focal_px, how) = exif.focal_px(stored).ok_or_else(|| {
                 SceneError::expected(
                     path,
                     "a focal length in EXIF expected, none found; --camera fx,fy,cx,cy, a camera \
-                           line of COLMAP or its cameras.txt says what the camera is",
+                     line of COLMAP or its cameras.txt says what the camera is",
                 )
             })?;
             log::warn!(
                 "{}: a focal length of {focal_px:.0} px by EXIF ({how}), no distortion; --camera says more",
                 path.display()
             );
-            let taken = Intrinsics {
+            let turn = Turn(turned);
+            let (width, height) = turn.size_in_file(stored);
+            let intrinsics = Intrinsics {
                 fx: focal_px,
                 fy: focal_px,
                 cx: (f64::from(width) - 1.0) / 2.0,
@@ -110,118 +100,67 @@ impl LoosePhotos {
                 width,
                 height,
             };
-            return Ok(photo(taken, None, turned));
+            return Ok(Frame {
+                develop: Some(Arc::new(turn)),
+                ..Frame::new(path.to_owned(), intrinsics)
+            });
         };
         // A camera is calibrated on pixels as they are stored.
-        if exif.orientation() != Orientation::NoTransforms {
+        if turned != Orientation::NoTransforms {
             log::warn!(
                 "{}: EXIF says to turn this photo; it is taken as it is stored, as --camera is",
                 path.display()
             );
         }
         let (taken, distortion) = camera.of_photo(path, stored)?;
-        let lens = match distortion == Default::default() {
-            true => None,
-            false => Some(
-                Lens::new(taken, distortion)
-                    .map_err(|expected| SceneError::expected(path, expected))?,
-            ),
-        };
-        Ok(photo(taken, lens, Orientation::NoTransforms))
+        let (intrinsics, develop) = developed_camera(taken, distortion)
+            .map_err(|expected| SceneError::expected(path, expected))?;
+        Ok(Frame {
+            develop,
+            ..Frame::new(path.to_owned(), intrinsics)
+        })
     }
 }
 
-fn is_on_its_side(turned: Orientation) -> bool {
-    matches!(
-        turned,
-        Orientation::Rotate90
+/// Turns the image of a file so that up is up.
+struct Turn(Orientation);
+
+impl Develop for Turn {
+    fn developed(&self, image: Photo) -> Photo {
+        let turned = |mut image: DynamicImage| {
+            image.apply_orientation(self.0);
+            image
+        };
+        match image.color {
+            Some(color) => Photo::from_color(turned(color.into()).into_rgb8()),
+            None => Photo::from_gray(turned(image.gray.into()).into_luma8()),
+        }
+    }
+
+    fn size_in_file(&self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self.0 {
+            Orientation::Rotate90
             | Orientation::Rotate270
             | Orientation::Rotate90FlipH
-            | Orientation::Rotate270FlipH
-    )
+            | Orientation::Rotate270FlipH => (height, width),
+            _ => (width, height),
+        }
+    }
 }
 
-struct LooseScene {
-    names: Vec<String>,
-    photos: Vec<LoosePhoto>,
-}
+/// Loose photos are queries only.
+struct NoClouds;
 
-struct LoosePhoto {
-    path: PathBuf,
-    /// The size of the file's image \[px\].
-    stored: (u32, u32),
-    /// The camera, as the photo is handed out.
-    intrinsics: Intrinsics,
-    lens: Option<Lens>,
-    /// How the file's image is to be turned.
-    turned: Orientation,
-}
-
-impl Scene for LooseScene {
-    fn name(&self) -> &str {
-        LoosePhotos::NAME
-    }
-
-    fn frames(&self) -> &[String] {
-        &self.names
-    }
-
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.photos[frame].intrinsics
-    }
-
-    fn pose(&self, _frame: usize) -> Option<Pose> {
-        None
-    }
-
-    fn time_s(&self, _frame: usize) -> Option<f64> {
-        None
-    }
-
-    fn has_cloud(&self, _frame: usize) -> bool {
+impl Clouds for NoClouds {
+    fn has(&self, _index: usize) -> bool {
         false
     }
 
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let LoosePhoto {
-            path,
-            stored,
-            lens,
-            turned,
-            ..
-        } = &self.photos[frame];
-        let photo = Photo::read(path).map_err(SceneError::image(path))?;
-        photo_file::expect_size(path, photo.dimensions(), *stored)?;
-        let photo = match turned {
-            Orientation::NoTransforms => photo,
-            _ => self::turned(photo, *turned),
-        };
-        Ok(match lens {
-            Some(lens) => lens.undistorted(&photo),
-            None => photo,
-        })
+    fn missing(&self) -> Option<&str> {
+        Some("a loose photo is a query only")
     }
 
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        Err(SceneError::NoCloud {
-            path: self.photos[frame].path.clone(),
-            frame: self.names[frame].clone(),
-            hint: "a loose photo is a query only".to_owned(),
-        })
-    }
-}
-
-fn turned(photo: Photo, turned: Orientation) -> Photo {
-    match photo.color {
-        Some(color) => {
-            let mut image = DynamicImage::ImageRgb8(color);
-            image.apply_orientation(turned);
-            Photo::from_color(image.into_rgb8())
-        }
-        None => {
-            let mut image = DynamicImage::ImageLuma8(photo.gray);
-            image.apply_orientation(turned);
-            Photo::from_gray(image.into_luma8())
-        }
+    fn read(&self, _index: usize, _frame: &Frame) -> Result<Cloud, SceneError> {
+        Ok(Cloud::default())
     }
 }

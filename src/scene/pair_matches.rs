@@ -19,6 +19,7 @@ use posescope_core::foreign::MatchSource;
 
 use self::hloc::HlocFiles;
 use super::SceneError;
+use super::folder::entries;
 
 pub use self::text::write_matches;
 
@@ -105,12 +106,7 @@ impl MatchFolder {
     /// # Errors
     /// A folder that cannot be read or has no matches.
     pub fn open(folder: &Path) -> Result<Self, SceneError> {
-        let io = SceneError::io(folder);
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(folder).map_err(io)? {
-            files.push(entry.map_err(io)?.path());
-        }
-        files.sort();
+        let files = entries(folder)?;
         let has_ending =
             |path: &&PathBuf, ending: &str| path.extension().is_some_and(|e| e == ending);
         let h5: Vec<&PathBuf> = files.iter().filter(|path| has_ending(path, "h5")).collect();

@@ -14,18 +14,17 @@ mod sdk;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use self::bayer::{Pattern, demosaiced};
 use self::poses::{Track, first_and_last_motion, read_ins, read_odometry};
-use self::scans::{ScanFile, gathered, scan_files};
+use self::scans::{Scans, scan_files};
 use self::sdk::{CameraModel, Sdk};
 use super::argument::split_word;
-use super::file_scene::folder_name;
-use super::lines::TextFile;
+use super::file_scene::{Develop, FileScene, Frame};
+use super::folder::{folder_name, numbered};
+use super::lines::{Line, TextFile};
 use super::{Entry, Scene, SceneError, photo_file};
-use crate::camera::Intrinsics;
-use crate::cloud::Cloud;
-use crate::geometry::Pose;
 use crate::image::Photo;
 
 pub(super) const ENTRY: Entry = Entry {
@@ -43,7 +42,7 @@ pub(super) const ENTRY: Entry = Entry {
     },
     open: |argument| {
         let (path, word) = split_word(argument, &[ALL]);
-        Ok(Box::new(RobotCar::open(path, word.is_some())?))
+        open(path, word.is_some())
     },
 };
 
@@ -114,187 +113,123 @@ fn split_camera(path: &Path) -> (PathBuf, Option<&'static CameraKind>) {
     (path.to_owned(), None)
 }
 
-/// A traversal.
-struct RobotCar {
-    name: String,
-    names: Vec<String>,
-    /// Photos and their times \[µs\].
-    photos: Vec<(u64, PathBuf)>,
-    camera: &'static CameraKind,
-    model: CameraModel,
-    /// From the camera of the model to the vehicle.
-    vehicle_from_image: Pose,
-    sdk: Sdk,
-    /// The vehicle in the world, where the solution is good.
-    ins: Track,
-    /// How the vehicle moved, for scans.
-    motion: Track,
-    scans: Vec<ScanFile>,
-}
-
-impl RobotCar {
-    fn open(path: &Path, keeps_all: bool) -> Result<Self, SceneError> {
-        let (traversal, wanted) = split_camera(path);
-        let expected =
-            |path: PathBuf, expected: &str| SceneError::expected(path, expected.to_owned());
-        let there = CAMERAS
-            .iter()
-            .find(|camera| traversal.join(camera.folder).is_dir());
-        let camera = wanted.or(there).ok_or_else(|| {
-            expected(
-                traversal.clone(),
-                "photos in stereo/centre or mono_rear expected, none found",
-            )
-        })?;
-        let sdk = Sdk::find(&traversal).ok_or_else(|| {
-            expected(
-                traversal.clone(),
-                "the folders models and extrinsics of the SDK expected in the traversal's folder, beside \
-                 it, or in sdk or robotcar-dataset-sdk there",
-            )
-        })?;
-        let model = sdk.camera_model(camera.model)?;
-        let camera_from_vehicle = sdk.extrinsics(camera.extrinsics)?;
-        let vehicle_from_image = camera_from_vehicle.inverse() * model.camera_from_image;
-        let ins = match traversal.join("gps/ins.csv") {
-            file if file.is_file() => {
-                let vehicle_from_ins = sdk.extrinsics("ins")?;
-                read_ins(&file)?.moved_by(&vehicle_from_ins.inverse())
-            }
-            _ => {
-                log::warn!(
-                    "{}: no gps/ins.csv, so no frame can be a reference and nothing has an error",
-                    traversal.display()
-                );
-                Track::default()
-            }
-        };
-        let motion = match traversal.join("vo/vo.csv") {
-            file if file.is_file() => read_odometry(&file)?,
-            _ => ins.clone(),
-        };
-        let times = all_times(&traversal, camera)?;
-        let kept = match keeps_all {
-            true => times,
-            false => {
-                let track = if motion.is_empty() { &ins } else { &motion };
-                let moving = first_and_last_motion(track);
-                let is_moving =
-                    |time: &u64| moving.is_none_or(|(first, last)| (first..=last).contains(time));
-                times.into_iter().filter(is_moving).step_by(KEPT).collect()
-            }
-        };
-        let folder = traversal.join(camera.folder);
-        let photos: Vec<(u64, PathBuf)> = kept
-            .into_iter()
-            .map(|time| (time, folder.join(format!("{time}.png"))))
-            .filter(|(_, photo)| photo.is_file())
-            .collect();
-        let Some((_, first)) = photos.first() else {
-            return Err(expected(
-                folder,
-                "photos TIMESTAMP.png expected, one in ten while the car moves (or :all behind the path), \
-                 none found",
-            ));
-        };
-        let size = photo_file::dimensions(first)?;
-        let model = model.for_photos_of(size)?;
-        let scans = scan_files(&traversal, &sdk)?;
-        Ok(Self {
-            name: format!("robotcar/{}", folder_name(&traversal)),
-            names: photos.iter().map(|(time, _)| time.to_string()).collect(),
-            photos,
-            camera,
-            model,
-            vehicle_from_image,
-            sdk,
-            ins,
-            motion,
-            scans,
-        })
-    }
-}
-
-/// The times of all photos that were taken \[µs\]: as the list says, and otherwise of those that are there.
-fn all_times(traversal: &Path, camera: &CameraKind) -> Result<Vec<u64>, SceneError> {
-    let list = traversal.join(camera.timestamps);
-    if list.is_file() {
-        let file = TextFile::read(&list)?;
-        let times: Result<BTreeSet<u64>, SceneError> = file
-            .lines()
-            .map(|line| {
-                let word = line.words().next().unwrap_or_default();
-                let whole = word.parse::<u64>();
-                whole.map_err(|_| line.error("a line `timestamp chunk` expected"))
-            })
-            .collect();
-        return Ok(times?.into_iter().collect());
-    }
-    let folder = traversal.join(camera.folder);
-    let io = SceneError::io(&folder);
-    let mut times = BTreeSet::new();
-    for entry in std::fs::read_dir(&folder).map_err(io)? {
-        let name = entry.map_err(io)?.file_name();
-        let time = name.to_str().and_then(|name| name.strip_suffix(".png"));
-        times.extend(time.and_then(|time| time.parse::<u64>().ok()));
-    }
-    Ok(times.into_iter().collect())
-}
-
-impl Scene for RobotCar {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn frames(&self) -> &[String] {
-        &self.names
-    }
-
-    fn intrinsics(&self, _frame: usize) -> Intrinsics {
-        self.model.intrinsics
-    }
-
-    fn pose(&self, frame: usize) -> Option<Pose> {
-        let world_from_vehicle = self.ins.at(self.photos[frame].0)?;
-        Some(world_from_vehicle * self.vehicle_from_image)
-    }
-
-    fn time_s(&self, frame: usize) -> Option<f64> {
-        Some(self.photos[frame].0 as f64 / PER_SECOND)
-    }
-
-    fn has_cloud(&self, frame: usize) -> bool {
-        let time = self.photos[frame].0;
-        self.motion.at(time).is_some() && scans::any_around(&self.scans, time)
-    }
-
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let (_, path) = &self.photos[frame];
-        let raw = Photo::read(path).map_err(SceneError::image(path))?;
-        let Intrinsics { width, height, .. } = self.model.intrinsics;
-        photo_file::expect_size(path, raw.dimensions(), (width, height))?;
-        let color = demosaiced(&raw.gray, self.camera.pattern);
-        Ok(Photo::from_color(self.model.undistorted(&color)))
-    }
-
-    fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        let (time, path) = &self.photos[frame];
-        if !self.has_cloud(frame) {
-            return Err(SceneError::NoCloud {
-                path: path.clone(),
-                frame: self.names[frame].clone(),
-                hint: "scans of lms_front, lms_rear or ldmrs around its time, and vo/vo.csv or gps/ins.csv \
-                       that say how the car moved, are needed"
-                    .to_owned(),
-            });
-        }
-        gathered(
-            &self.scans,
-            &self.sdk,
-            &self.motion,
-            *time,
-            &self.vehicle_from_image.inverse(),
-            &self.model.intrinsics,
+fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
+    let (traversal, wanted) = split_camera(path);
+    let there = CAMERAS
+        .iter()
+        .find(|camera| traversal.join(camera.folder).is_dir());
+    let camera = wanted.or(there).ok_or_else(|| {
+        SceneError::expected(
+            &traversal,
+            "photos in stereo/centre or mono_rear expected, none found",
         )
+    })?;
+    let sdk = Sdk::find(&traversal).ok_or_else(|| {
+        SceneError::expected(
+            &traversal,
+            "the folders models and extrinsics of the SDK expected in the traversal's folder, beside \
+             it, or in sdk or robotcar-dataset-sdk there",
+        )
+    })?;
+    let model = sdk.camera_model(camera.model)?;
+    let camera_from_vehicle = sdk.extrinsics(camera.extrinsics)?;
+    let vehicle_from_image = camera_from_vehicle.inverse() * model.camera_from_image;
+    let ins = match traversal.join("gps/ins.csv") {
+        file if file.is_file() => {
+            let vehicle_from_ins = sdk.extrinsics("ins")?;
+            read_ins(&file)?.moved_by(&vehicle_from_ins.inverse())
+        }
+        _ => {
+            log::warn!(
+                "{}: no gps/ins.csv, so no frame can be a reference and nothing has an error",
+                traversal.display()
+            );
+            Track::default()
+        }
+    };
+    let motion = match traversal.join("vo/vo.csv") {
+        file if file.is_file() => read_odometry(&file)?,
+        _ => ins.clone(),
+    };
+    let driven = if motion.is_empty() { &ins } else { &motion };
+    let photos = photos(&traversal, camera, driven, keeps_all)?;
+    let Some((_, first)) = photos.first() else {
+        return Err(SceneError::expected(
+            traversal.join(camera.folder),
+            "photos TIMESTAMP.png expected, one in ten while the car moves (or :all behind the path), \
+             none found",
+        ));
+    };
+    let model = model.for_photos_of(photo_file::dimensions(first)?)?;
+    let intrinsics = model.intrinsics;
+    let develop: Arc<dyn Develop> = Arc::new(Sensor {
+        pattern: camera.pattern,
+        model,
+    });
+    let scans = Scans {
+        files: scan_files(&traversal, &sdk)?,
+        sdk,
+        motion,
+        times: photos.iter().map(|(time, _)| *time).collect(),
+        image_from_vehicle: vehicle_from_image.inverse(),
+    };
+    let frames = photos.into_iter().map(|(time, photo)| Frame {
+        develop: Some(Arc::clone(&develop)),
+        world_from_camera: ins
+            .at(time)
+            .map(|world_from_vehicle| world_from_vehicle * vehicle_from_image),
+        time_s: Some(time as f64 / PER_SECOND),
+        ..Frame::new(photo, intrinsics)
+    });
+    let name = format!("robotcar/{}", folder_name(&traversal));
+    Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
+}
+
+/// The photos that are kept and are there, with their times \[µs\].
+fn photos(
+    traversal: &Path,
+    camera: &CameraKind,
+    driven: &Track,
+    keeps_all: bool,
+) -> Result<Vec<(u64, PathBuf)>, SceneError> {
+    let folder = traversal.join(camera.folder);
+    let list = traversal.join(camera.timestamps);
+    let times = match list.is_file() {
+        true => times(&list)?,
+        false => numbered(&folder, "png")?.into_keys().collect(),
+    };
+    let moving = first_and_last_motion(driven);
+    let is_moving = |time: &u64| moving.is_none_or(|(first, last)| (first..=last).contains(time));
+    let kept: Vec<u64> = match keeps_all {
+        true => times.into_iter().collect(),
+        false => times.into_iter().filter(is_moving).step_by(KEPT).collect(),
+    };
+    let photos = kept
+        .into_iter()
+        .map(|time| (time, folder.join(format!("{time}.png"))));
+    Ok(photos.filter(|(_, photo)| photo.is_file()).collect())
+}
+
+/// The times of all photos that were taken \[µs\], as the list says.
+fn times(list: &Path) -> Result<BTreeSet<u64>, SceneError> {
+    let file = TextFile::read(list)?;
+    let time = |line: Line<'_>| {
+        let word = line.words().next().unwrap_or_default();
+        let time = word.parse::<u64>();
+        time.map_err(|_| line.error("a line `timestamp chunk` expected"))
+    };
+    file.lines().map(time).collect()
+}
+
+/// What stands between the image of a file and a pinhole's photo: one colour at each pixel, and the lens.
+struct Sensor {
+    pattern: Pattern,
+    model: CameraModel,
+}
+
+impl Develop for Sensor {
+    fn developed(&self, image: Photo) -> Photo {
+        let color = demosaiced(&image.gray, self.pattern);
+        Photo::from_color(self.model.undistorted(&color))
     }
 }

@@ -13,7 +13,8 @@ use nalgebra::{Matrix3, Matrix4, Translation3, UnitQuaternion};
 
 use super::argument::split_word;
 use super::depth_image::{DepthCamera, DepthImages};
-use super::file_scene::{FileScene, Frame, folder_name};
+use super::file_scene::{FileScene, Frame};
+use super::folder::{entries, folder_name};
 use super::lines::TextFile;
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
@@ -82,12 +83,9 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
         unknown += usize::from(world_from_depth.is_none());
         frames.push(Frame {
             name: file.name,
-            photo: file.photo,
-            intrinsics: cameras.photo,
-            lens: None,
             world_from_camera: world_from_depth
                 .map(|pose| pose * cameras.camera_from_posed.inverse()),
-            time_s: None,
+            ..Frame::new(file.photo, cameras.photo)
         });
         depths.push(file.depth);
     }
@@ -160,16 +158,20 @@ fn read_split(folder: &Path, split: &str) -> Result<Vec<u32>, SceneError> {
 
 /// The folders `seq-NN` by their numbers.
 fn subfolders(folder: &Path) -> Vec<(u32, PathBuf)> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let entries = entries(folder).unwrap_or_default();
     let mut found: Vec<(u32, PathBuf)> = entries
-        .filter_map(|entry| {
-            let name = entry.file_name();
-            let number = name.to_str()?.strip_prefix("seq-")?.parse().ok()?;
-            entry.path().is_dir().then(|| (number, entry.path()))
+        .into_iter()
+        .filter_map(|path| {
+            let number = file_name(&path)?.strip_prefix("seq-")?.parse().ok()?;
+            path.is_dir().then_some((number, path))
         })
         .collect();
     found.sort();
     found
+}
+
+fn file_name(path: &Path) -> Option<&str> {
+    path.file_name()?.to_str()
 }
 
 /// The number of a frame and which of its files this is: `frame-000025.color.png` is `000025`, `color`.
@@ -187,27 +189,19 @@ fn is_photo(name: &str) -> bool {
 }
 
 fn is_sequence(folder: &Path) -> bool {
-    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.any(|entry| entry.file_name().to_str().is_some_and(is_photo))
+    let entries = entries(folder).unwrap_or_default();
+    entries
+        .iter()
+        .any(|path| file_name(path).is_some_and(is_photo))
 }
 
-/// The frames of a sequence in the order of their numbers.
+/// The frames of a sequence in the order of their numbers. Of a photo in two formats the last by name is
+/// taken.
 fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<FrameFiles>, SceneError> {
-    let io = SceneError::io(folder);
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(io)? {
-        let name = entry.map_err(io)?.file_name();
-        names.extend(
-            name.to_str()
-                .filter(|name| is_photo(name))
-                .map(str::to_owned),
-        );
-    }
-    // Where a photo is there in two formats, one of them is taken whatever order the system lists.
-    names.sort();
+    let entries = entries(folder)?;
     let mut by_number = BTreeMap::new();
-    for name in &names {
-        let Some((number, _, _)) = file_parts(name) else {
+    for name in entries.iter().filter_map(|path| file_name(path)) {
+        let Some((number, _, _)) = file_parts(name).filter(|_| is_photo(name)) else {
             continue;
         };
         let depth = folder.join(format!("frame-{number}.depth.png"));

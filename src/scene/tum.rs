@@ -8,7 +8,8 @@
 use std::path::{Path, PathBuf};
 
 use super::depth_image::{DepthCamera, DepthImages};
-use super::file_scene::{FileScene, Frame, folder_name};
+use super::file_scene::{FileScene, Frame};
+use super::folder::{folder_name, within};
 use super::lines::TextFile;
 use super::trajectory::{Trajectory, associated};
 use super::{Entry, Scene, SceneError, photo_file};
@@ -63,12 +64,9 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let frames: Vec<Frame> = photos
         .into_iter()
         .map(|(time, photo)| Frame {
-            name: stem(&photo),
             world_from_camera: trajectory.as_ref().and_then(|all| all.at(time)),
-            photo,
-            intrinsics,
-            lens: None,
             time_s: Some(time),
+            ..Frame::new(photo, intrinsics)
         })
         .collect();
     if let Some((first, last)) = trajectory.as_ref().and_then(Trajectory::range)
@@ -101,7 +99,7 @@ fn image_list(folder: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>, SceneErr
                 .text
                 .split_once(char::is_whitespace)
                 .ok_or_else(|| line.error("a line `time file` expected, one word found"))?;
-            let path = photo_file::within(folder, name.trim()).map_err(|why| line.error(why))?;
+            let path = within(folder, name.trim()).map_err(|why| line.error(why))?;
             Ok((line.number(time)?, path))
         })
         .collect::<Result<Vec<_>, SceneError>>()?;
@@ -142,9 +140,4 @@ fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, Scen
         width,
         height,
     })
-}
-
-fn stem(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
 }

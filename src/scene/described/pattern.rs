@@ -1,25 +1,24 @@
 //! Files by a pattern: a path whose last part may have stars, which stand for anything.
 
 use std::cmp::Ordering;
-use std::io;
 use std::path::{Path, PathBuf};
+
+use super::super::SceneError;
+use super::super::folder::entries;
 
 /// The files that the pattern names: by number where they are called by numbers, such as times, and in
 /// natural order otherwise, `a2.png` before `a10.png`.
-pub(super) fn files(pattern: &Path) -> io::Result<Vec<PathBuf>> {
+pub(super) fn files(pattern: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let folder = match pattern.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
     let name = pattern.file_name().unwrap_or_default().to_string_lossy();
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
+    let mut found = entries(folder)?;
+    found.retain(|path| {
         let is_named = path.file_name().and_then(|found| found.to_str());
-        if is_named.is_some_and(|found| matches(&name, found)) && path.is_file() {
-            found.push(path);
-        }
-    }
+        is_named.is_some_and(|found| matches(&name, found)) && path.is_file()
+    });
     found.sort_by_cached_key(|path| natural(&path.to_string_lossy()));
     if found.iter().all(|path| number(path).is_some()) {
         found.sort_by(|a, b| number(a).partial_cmp(&number(b)).unwrap_or(Ordering::Equal));
@@ -54,26 +53,20 @@ fn matches(pattern: &str, name: &str) -> bool {
     true
 }
 
-/// A name in parts that compare as people order names: digits by their number.
-fn natural(name: &str) -> Vec<(String, usize, String)> {
-    let mut parts = Vec::new();
-    let mut rest = name;
-    while !rest.is_empty() {
-        let text = rest
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
-        let (text, after) = rest.split_at(text);
-        let digits = after
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(after.len());
-        let (digits, after) = after.split_at(digits);
-        let digits = digits.trim_start_matches('0');
-        parts.push((text.to_owned(), digits.len(), digits.to_owned()));
-        rest = after;
-    }
-    // Names that differ in leading zeros alone still have an order.
-    parts.push((name.to_owned(), 0, String::new()));
-    parts
+/// A name in runs of digits and of other characters, which compare as people order names: digits by
+/// their number, and before others. Names that differ in leading zeros alone compare by all their bytes.
+fn natural(name: &str) -> (Vec<(bool, usize, Vec<u8>)>, String) {
+    let is_digit = u8::is_ascii_digit;
+    let runs = name.as_bytes();
+    let runs = runs.chunk_by(|a, b| is_digit(a) == is_digit(b));
+    let key = |run: &[u8]| {
+        if !is_digit(&run[0]) {
+            return (true, 0, run.to_vec());
+        }
+        let zeros = run.iter().take_while(|digit| **digit == b'0').count();
+        (false, run.len() - zeros, run[zeros..].to_vec())
+    };
+    (runs.map(key).collect(), name.to_owned())
 }
 
 #[cfg(test)]

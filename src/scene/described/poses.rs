@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::super::SceneError;
+use super::super::folder::stem;
 use super::super::lines::{self, TextFile};
 use super::super::trajectory::Trajectory;
-use super::stem;
 use crate::geometry::Pose;
 
 /// What the file says of a photo.

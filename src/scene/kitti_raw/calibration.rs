@@ -5,7 +5,9 @@ use std::path::Path;
 use nalgebra::Matrix3x4;
 
 use super::super::SceneError;
+use super::super::kitti_format::{labelled, split_projection};
 use super::super::lines::TextFile;
+use crate::camera::Intrinsics;
 use crate::geometry::{Pose, pose_from_matrix};
 
 /// The file of the cameras.
@@ -15,10 +17,10 @@ const IMU: &str = "calib_imu_to_velo.txt";
 
 /// Where the sensors of a drive are, and one of its rectified cameras.
 pub(super) struct Calibration {
-    /// The size of the camera's rectified images \[px\].
-    pub size: (u32, u32),
-    /// From the rectified camera 0 to the camera's pixels.
-    pub projection: Matrix3x4<f64>,
+    /// The camera of its rectified images.
+    pub intrinsics: Intrinsics,
+    /// The camera from the rectified camera 0.
+    pub camera_from_camera0: Pose,
     /// The rectified camera 0 from the scanner.
     pub camera0_from_velodyne: Pose,
     /// The scanner from the IMU, whose axes are forward, left, up as well.
@@ -36,9 +38,11 @@ impl Calibration {
         let rectified_from_camera0 = pose(&cameras, "R_rect_00", None)?;
         let velodyne = TextFile::read(&day.join(VELODYNE))?;
         let imu = TextFile::read(&day.join(IMU))?;
+        let size = (width as u32, height as u32);
+        let (intrinsics, camera_from_camera0) = split_projection(&projection, size, &cameras)?;
         Ok(Self {
-            size: (width as u32, height as u32),
-            projection: Matrix3x4::from_row_slice(&projection),
+            intrinsics,
+            camera_from_camera0,
             camera0_from_velodyne: rectified_from_camera0 * pose(&velodyne, "R", Some("T"))?,
             velodyne_from_imu: pose(&imu, "R", Some("T"))?,
         })
@@ -48,18 +52,6 @@ impl Calibration {
     pub fn camera0_from_imu(&self) -> Pose {
         self.camera0_from_velodyne * self.velodyne_from_imu
     }
-}
-
-/// The numbers of the line `LABEL: …`.
-fn labelled<const N: usize>(file: &TextFile, label: &str) -> Result<[f64; N], SceneError> {
-    for line in file.lines() {
-        if let Some((found, numbers)) = line.text.split_once(':')
-            && found.trim() == label
-        {
-            return super::super::lines::numbers(numbers).map_err(|why| line.error(why));
-        }
-    }
-    Err(file.error(format!("a line `{label}:` expected, none found")))
 }
 
 /// The transform of a rotation and perhaps a translation.

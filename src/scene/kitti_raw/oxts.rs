@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::super::SceneError;
+use super::super::folder::numbered;
 use super::super::lines::TextFile;
 use crate::geometry::Pose;
 
@@ -35,7 +36,7 @@ pub(super) fn read(folder: &Path) -> Result<BTreeMap<usize, Packet>, SceneError>
     if !data.is_dir() {
         return Ok(BTreeMap::new());
     }
-    super::numbered(&data, "txt")?
+    numbered(&data, "txt")?
         .into_iter()
         .map(|(number, path)| {
             let file = TextFile::read(&path)?;

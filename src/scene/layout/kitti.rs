@@ -103,8 +103,7 @@ pub(super) fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>)
 mod tests {
     use super::*;
     use crate::geometry::Pose;
-    use crate::scene::KittiOdometry;
-    use crate::scene::Scene as _;
+    use crate::scene;
     use crate::scene::street::Size;
     use image::RgbImage;
     use nalgebra::{Translation3, UnitQuaternion};
@@ -150,7 +149,8 @@ mod tests {
         writer.frame(&shot).expect("writable");
 
         let folder = root.path().join("sequences/dusk");
-        let scene = KittiOdometry::open(&folder).unwrap_or_else(|e| panic!("{e}"));
+        let argument = folder.to_str().expect("a plain path");
+        let scene = scene::open(argument, None).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(scene.frames(), ["000001"]);
         assert_eq!(scene.intrinsics(0), intrinsics);
         assert_eq!(scene.time_s(0), Some(0.1));

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::Point3;
 
 use super::super::SceneError;
+use super::super::file_scene::{Clouds, Frame};
+use super::super::folder::numbered;
 use super::super::view_crop::in_view;
 use super::poses::Track;
 use super::sdk::Sdk;
-use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 
@@ -57,71 +58,84 @@ pub(super) fn scan_files(traversal: &Path, sdk: &Sdk) -> Result<Vec<ScanFile>, S
             continue;
         }
         sdk.extrinsics(scanner.name())?;
-        let io = SceneError::io(&folder);
-        for entry in std::fs::read_dir(&folder).map_err(io)? {
-            let path = entry.map_err(io)?.path();
-            let name = path.file_name().and_then(|name| name.to_str());
-            let time = name.and_then(|name| name.strip_suffix(".bin")?.parse().ok());
-            if let Some(time) = time {
-                files.push(ScanFile {
+        files.extend(
+            numbered(&folder, "bin")?
+                .into_iter()
+                .map(|(time, path)| ScanFile {
                     time,
                     scanner,
                     path,
-                });
-            }
-        }
+                }),
+        );
     }
     files.sort_by(|a, b| (a.time, &a.path).cmp(&(b.time, &b.path)));
     Ok(files)
 }
 
-fn around(files: &[ScanFile], time: u64) -> &[ScanFile] {
-    let first = files.partition_point(|file| file.time < time.saturating_sub(AROUND_US));
-    let last = files.partition_point(|file| file.time <= time.saturating_add(AROUND_US));
-    &files[first..last]
+/// The scans of a traversal, of which those around a frame make its cloud.
+pub(super) struct Scans {
+    /// By time.
+    pub files: Vec<ScanFile>,
+    pub sdk: Sdk,
+    /// How the vehicle moved.
+    pub motion: Track,
+    /// The times of the frames \[µs\].
+    pub times: Vec<u64>,
+    pub image_from_vehicle: Pose,
 }
 
-/// Whether there is a scan around a time.
-pub(super) fn any_around(files: &[ScanFile], time: u64) -> bool {
-    !around(files, time).is_empty()
-}
-
-/// The points that a camera has in view at a time, in its frame.
-pub(super) fn gathered(
-    files: &[ScanFile],
-    sdk: &Sdk,
-    motion: &Track,
-    time: u64,
-    image_from_vehicle: &Pose,
-    camera: &Intrinsics,
-) -> Result<Cloud, SceneError> {
-    let mut gathered: Vec<Point3<f64>> = Vec::new();
-    let Some(here) = motion.at(time) else {
-        return Ok(Cloud::default());
-    };
-    let mut mounts: Vec<(Scanner, Pose)> = Vec::new();
-    for file in around(files, time) {
-        let Some(there) = motion.at(file.time) else {
-            continue;
-        };
-        let now_from_then = here.inverse() * there;
-        if now_from_then.translation.vector.norm() > NEAR_M {
-            continue;
-        }
-        let known = mounts.iter().find(|(scanner, _)| *scanner == file.scanner);
-        let vehicle_from_scanner = match known {
-            Some((_, mount)) => *mount,
-            None => {
-                let mount = sdk.extrinsics(file.scanner.name())?;
-                mounts.push((file.scanner, mount));
-                mount
-            }
-        };
-        let image_from_scanner = image_from_vehicle * now_from_then * vehicle_from_scanner;
-        let points = read(file)?.into_iter();
-        gathered.extend(points.map(|point| image_from_scanner * point));
+impl Scans {
+    fn around(&self, time: u64) -> &[ScanFile] {
+        let before = |limit: u64| move |file: &ScanFile| file.time < limit;
+        let first = before(time.saturating_sub(AROUND_US));
+        let end = before(time.saturating_add(AROUND_US + 1));
+        &self.files[self.files.partition_point(first)..self.files.partition_point(end)]
     }
-    Ok(in_view(gathered.into_iter(), camera))
+}
+
+impl Clouds for Scans {
+    fn has(&self, index: usize) -> bool {
+        let time = self.times[index];
+        self.motion.at(time).is_some() && !self.around(time).is_empty()
+    }
+
+    fn missing(&self) -> Option<&str> {
+        Some(
+            "scans of lms_front, lms_rear or ldmrs around its time, and vo/vo.csv or gps/ins.csv \
+             that say how the car moved, are needed",
+        )
+    }
+
+    fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
+        let time = self.times[index];
+        let Some(here) = self.motion.at(time) else {
+            return Ok(Cloud::default());
+        };
+        let mut gathered: Vec<Point3<f64>> = Vec::new();
+        let mut mounts: Vec<(Scanner, Pose)> = Vec::new();
+        for file in self.around(time) {
+            let Some(there) = self.motion.at(file.time) else {
+                continue;
+            };
+            let now_from_then = here.inverse() * there;
+            if now_from_then.translation.vector.norm() > NEAR_M {
+                continue;
+            }
+            let known = mounts.iter().find(|(scanner, _)| *scanner == file.scanner);
+            let vehicle_from_scanner = match known {
+                Some((_, mount)) => *mount,
+                None => {
+                    let mount = self.sdk.extrinsics(file.scanner.name())?;
+                    mounts.push((file.scanner, mount));
+                    mount
+                }
+            };
+            let image_from_scanner = self.image_from_vehicle * now_from_then * vehicle_from_scanner;
+            let points = read(file)?.into_iter();
+            gathered.extend(points.map(|point| image_from_scanner * point));
+        }
+        Ok(in_view(gathered.into_iter(), &frame.intrinsics))
+    }
 }
 
 /// The points of a scan in the scanner's frame: triples of numbers of eight bytes.

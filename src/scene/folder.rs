@@ -1,0 +1,75 @@
+//! The files of a scene's folder, and what they are called.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+use std::str::FromStr;
+
+use super::SceneError;
+
+/// What a folder holds, in the order of the names.
+pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let io = SceneError::io(folder);
+    let paths = std::fs::read_dir(folder).map_err(io)?;
+    let mut paths = paths
+        .map(|entry| entry.map(|entry| entry.path()).map_err(io))
+        .collect::<Result<Vec<_>, _>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// The files of an extension whose stem is a number, by that number.
+pub(super) fn numbered<N: FromStr + Ord>(
+    folder: &Path,
+    extension: &str,
+) -> Result<BTreeMap<N, PathBuf>, SceneError> {
+    let files = entries(folder)?.into_iter().filter_map(|path| {
+        let number = stem(&path).parse().ok()?;
+        path.extension()
+            .is_some_and(|found| found == extension)
+            .then_some((number, path))
+    });
+    Ok(files.collect())
+}
+
+/// The name of a file without its folder and extension.
+pub(super) fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
+/// The name of a folder, also of one that is given as `.` or `..`.
+pub(super) fn folder_name(folder: &Path) -> String {
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let name = folder.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// The path of a file that is named in a scene's own files, and lies in the scene's folder.
+pub(super) fn within(folder: &Path, name: &str) -> Result<PathBuf, String> {
+    let leaves = |part: Component<'_>| !matches!(part, Component::Normal(_) | Component::CurDir);
+    let name = Path::new(name);
+    if name.as_os_str().is_empty() || name.components().any(leaves) {
+        return Err(format!(
+            "a file in the scene's folder expected, `{}` found",
+            name.display()
+        ));
+    }
+    Ok(folder.join(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_name_leads_out_of_the_folder() {
+        let folder = Path::new("scene");
+        assert_eq!(
+            within(folder, "./rgb/1.png"),
+            Ok(folder.join("./rgb/1.png"))
+        );
+        for name in ["../other.png", "rgb/../../other.png", "/etc/passwd", ""] {
+            assert!(within(folder, name).is_err(), "{name}");
+        }
+    }
+}
