@@ -24,6 +24,7 @@ mod loose;
 mod map_blocks;
 mod pair_matches;
 mod photo_file;
+mod pose_text;
 mod retriever;
 mod robotcar;
 mod seven_scenes;

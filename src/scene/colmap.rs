@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) use self::camera::ModelCamera;
 use self::model::ModelImage;
-pub(super) use self::text::camera as camera_of_line;
+pub(super) use self::text::{camera as camera_of_line, image_lines};
 use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{folder_name, within};
 use super::lens::developed_camera;

@@ -9,6 +9,7 @@ use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{folder_name, numbered};
 use super::kitti_format::{Camera, labelled, optional, read_scan, split_projection};
 use super::lines::TextFile;
+use super::pose_text::{PoseLines, by_line};
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, matrix_from_pose};
@@ -61,7 +62,8 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     };
     let frames = photos.into_iter().map(|(number, photo)| Frame {
         world_from_camera: poses
-            .get(number)
+            .as_ref()
+            .and_then(|poses| poses.get(number))
             .map(|world_from_camera0| world_from_camera0 * camera_from_camera0.inverse()),
         time_s: times_s.get(number).copied(),
         ..Frame::new(photo, intrinsics)
@@ -82,7 +84,7 @@ fn moved(camera0_from_velodyne: &Matrix3x4<f64>, camera_from_camera0: &Pose) -> 
 }
 
 /// Poses by frame number; none where the sequence has no pose file.
-fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Vec<Pose>, SceneError> {
+fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Option<PoseLines>, SceneError> {
     let candidates = [
         folder.join("poses.txt"),
         folder.join("../../poses").join(format!("{sequence}.txt")),
@@ -92,15 +94,12 @@ fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Vec<Pose>, S
             "{}: no pose file, so no frame can be a reference and nothing has an error",
             folder.display()
         );
-        return Ok(Vec::new());
+        return Ok(None);
     };
     let file = TextFile::read(&path)?;
-    let poses = file
-        .lines()
-        .map(|line| line.matrix_pose())
-        .collect::<Result<Vec<_>, _>>()?;
-    expect_rows(&file, "poses", poses.len(), last)?;
-    Ok(poses)
+    let poses = by_line(&file)?;
+    expect_rows(&file, "poses", poses.count(), last)?;
+    Ok(Some(poses))
 }
 
 /// Times by frame number \[s\]; none where the sequence has no `times.txt`.

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::SceneError;
-use super::lines::{TextFile, numbers};
+use super::lines::TextFile;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -68,7 +68,7 @@ pub(super) fn optional<const N: usize>(
         if let Some((found, text)) = line.text.split_once(':')
             && found.trim() == label
         {
-            return numbers(text).map(Some).map_err(|why| line.error(why));
+            return line.numbers_of(text).map(Some);
         }
     }
     Ok(None)

@@ -42,8 +42,7 @@ impl TextFile {
 
     /// The lines that are neither empty nor comments (`#`).
     pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
-        let is_said = |line: &Line<'_>| !line.text.is_empty() && !line.text.starts_with('#');
-        self.all_lines().filter(is_said)
+        self.all_lines().filter(Line::is_said)
     }
 
     /// All lines, the empty ones and comments too.
@@ -80,6 +79,11 @@ impl TextFile {
 }
 
 impl<'a> Line<'a> {
+    /// Whether the line is neither empty nor a comment (`#`).
+    pub fn is_said(&self) -> bool {
+        !self.text.is_empty() && !self.text.starts_with('#')
+    }
+
     /// An error at this line.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
         SceneError::line(&self.path, self.number, expected)
@@ -92,7 +96,12 @@ impl<'a> Line<'a> {
 
     /// As many finite numbers as are asked for, and nothing else.
     pub fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
-        numbers(self.text).map_err(|expected| self.error(expected))
+        self.numbers_of(self.text)
+    }
+
+    /// The finite numbers of a part of the line.
+    pub fn numbers_of<const N: usize>(&self, part: &str) -> Result<[f64; N], SceneError> {
+        numbers(part).map_err(|expected| self.error(expected))
     }
 
     /// A single finite number.

@@ -17,13 +17,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use self::bayer::{Pattern, demosaiced};
-use self::poses::{Track, first_and_last_motion, read_ins, read_odometry};
+use self::poses::{first_and_last_motion, read_ins, read_odometry};
 use self::scans::{Scans, scan_files};
 use self::sdk::{CameraModel, Sdk};
 use super::argument::split_word;
 use super::file_scene::{Develop, FileScene, Frame};
 use super::folder::{folder_name, numbered};
 use super::lines::{Line, TextFile};
+use super::trajectory::Trajectory;
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::image::Photo;
 
@@ -137,21 +138,25 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     let ins = match traversal.join("gps/ins.csv") {
         file if file.is_file() => {
             let vehicle_from_ins = sdk.extrinsics("ins")?;
-            read_ins(&file)?.moved_by(&vehicle_from_ins.inverse())
+            read_ins(&file)?.of_part(&vehicle_from_ins.inverse())
         }
         _ => {
             log::warn!(
                 "{}: no gps/ins.csv, so no frame can be a reference and nothing has an error",
                 traversal.display()
             );
-            Track::default()
+            Trajectory::default()
         }
     };
     let motion = match traversal.join("vo/vo.csv") {
         file if file.is_file() => read_odometry(&file)?,
         _ => ins.clone(),
     };
-    let driven = if motion.is_empty() { &ins } else { &motion };
+    let driven = if motion.samples().is_empty() {
+        &ins
+    } else {
+        &motion
+    };
     let photos = photos(&traversal, camera, driven, keeps_all)?;
     let Some((_, first)) = photos.first() else {
         return Err(SceneError::expected(
@@ -176,7 +181,7 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     let frames = photos.into_iter().map(|(time, photo)| Frame {
         develop: Some(Arc::clone(&develop)),
         world_from_camera: ins
-            .at(time)
+            .at(time as f64)
             .map(|world_from_vehicle| world_from_vehicle * vehicle_from_image),
         time_s: Some(time as f64 / PER_SECOND),
         ..Frame::new(photo, intrinsics)
@@ -189,7 +194,7 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
 fn photos(
     traversal: &Path,
     camera: &CameraKind,
-    driven: &Track,
+    driven: &Trajectory,
     keeps_all: bool,
 ) -> Result<Vec<(u64, PathBuf)>, SceneError> {
     let folder = traversal.join(camera.folder);
@@ -199,7 +204,8 @@ fn photos(
         false => numbered(&folder, "png")?.into_keys().collect(),
     };
     let moving = first_and_last_motion(driven);
-    let is_moving = |time: &u64| moving.is_none_or(|(first, last)| (first..=last).contains(time));
+    let is_moving =
+        |time: &u64| moving.is_none_or(|(first, last)| (first..=last).contains(&(*time as f64)));
     let kept: Vec<u64> = match keeps_all {
         true => times.into_iter().collect(),
         false => times.into_iter().filter(is_moving).step_by(KEPT).collect(),

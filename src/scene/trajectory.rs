@@ -1,11 +1,7 @@
-//! Poses by time, as the TUM RGB-D benchmark writes them: `time tx ty tz qx qy qz qw`.
-
-use std::path::Path;
+//! Poses by time.
 
 use nalgebra::{Translation3, UnitQuaternion};
 
-use super::SceneError;
-use super::lines::{Line, TextFile};
 use crate::geometry::Pose;
 
 /// How far apart in time two measurements of the same moment may be \[s\]; that of the benchmark's
@@ -19,52 +15,74 @@ const MOST_CANDIDATES: usize = 64;
 const INTERPOLATED_S: f64 = 0.1;
 
 /// Poses in the order of their times.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Trajectory {
     samples: Vec<(f64, Pose)>,
+    /// Between poses this far apart in time, what lies between is interpolated.
+    interpolated: f64,
+    /// How far from a pose in time it still holds.
+    same_moment: f64,
 }
 
 impl Trajectory {
-    /// Reads a file of `time tx ty tz qx qy qz qw` lines, in any order.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let file = TextFile::read(path)?;
-        let mut samples = file.lines().map(sample).collect::<Result<Vec<_>, _>>()?;
-        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Ok(Self { samples })
+    /// Poses by time \[s\], in any order.
+    pub fn in_seconds(samples: Vec<(f64, Pose)>) -> Self {
+        Self::new(samples, INTERPOLATED_S, SAME_MOMENT_S)
     }
 
-    /// The pose at a time \[s\]: between two samples where they are close, otherwise that of the
-    /// moment if there is one.
-    pub fn at(&self, time_s: f64) -> Option<Pose> {
-        let after = self.samples.partition_point(|(time, _)| *time < time_s);
+    /// Poses by time, in any order and any unit. Of two poses at the same time the first counts.
+    pub fn new(mut samples: Vec<(f64, Pose)>, interpolated: f64, same_moment: f64) -> Self {
+        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        samples.dedup_by_key(|(time, _)| *time);
+        Self {
+            samples,
+            interpolated,
+            same_moment,
+        }
+    }
+
+    /// The pose at a time: that of a sample, between two samples where they are close, otherwise that of
+    /// the moment if there is one.
+    pub fn at(&self, time: f64) -> Option<Pose> {
+        let after = self.samples.partition_point(|(other, _)| *other < time);
         let next = self.samples.get(after);
         let previous = after.checked_sub(1).and_then(|i| self.samples.get(i));
         if let (Some(previous), Some(next)) = (previous, next)
-            && next.0 - previous.0 <= INTERPOLATED_S
+            && next.0 > time
+            && next.0 - previous.0 <= self.interpolated
         {
-            let share = (time_s - previous.0) / (next.0 - previous.0);
+            let share = (time - previous.0) / (next.0 - previous.0);
             return Some(between(&previous.1, &next.1, share));
         }
         let nearest = [previous, next]
             .into_iter()
             .flatten()
-            .map(|(time, pose)| ((time - time_s).abs(), pose))
+            .map(|(other, pose)| ((other - time).abs(), pose))
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (nearest.0 <= SAME_MOMENT_S).then_some(*nearest.1)
+        (nearest.0 <= self.same_moment).then_some(*nearest.1)
     }
 
-    /// First and last time \[s\], unless there is no sample.
+    /// The poses with their times.
+    pub fn samples(&self) -> &[(f64, Pose)] {
+        &self.samples
+    }
+
+    /// The trajectory of something that is fixed to what moves.
+    pub fn of_part(mut self, body_from_part: &Pose) -> Self {
+        for (_, pose) in &mut self.samples {
+            *pose *= body_from_part;
+        }
+        self
+    }
+
+    /// First and last time, unless there is no sample.
     pub fn range(&self) -> Option<(f64, f64)> {
         Some((self.samples.first()?.0, self.samples.last()?.0))
     }
 }
 
-fn sample(line: Line<'_>) -> Result<(f64, Pose), SceneError> {
-    let [time, x, y, z, qx, qy, qz, qw] = line.numbers()?;
-    Ok((time, line.pose([x, y, z], [qx, qy, qz, qw])?))
-}
-
 /// The pose a share of the way from one to another.
-pub(super) fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
     // Opposite rotations have no way between them that is the shortest; either will do.
     let rotation: UnitQuaternion<f64> = from
@@ -110,9 +128,7 @@ mod tests {
                 Pose::from_parts(Translation3::new(10.0 * time, 0.0, 1.0), turn),
             )
         };
-        Trajectory {
-            samples: times.iter().map(sample).collect(),
-        }
+        Trajectory::in_seconds(times.iter().map(sample).collect())
     }
 
     #[test]
@@ -128,6 +144,14 @@ mod tests {
         assert_eq!(at(1.019), at(1.0));
         assert_eq!(at(-0.019), at(0.0));
         assert!(at(1.03).is_none() && at(0.5).is_none() && at(1.6).is_none());
+    }
+
+    #[test]
+    fn a_pose_at_the_time_of_a_sample_is_the_sample() {
+        let trajectory = trajectory(&[0.0, 0.03, 0.06]);
+        for (time, pose) in trajectory.samples() {
+            assert_eq!(trajectory.at(*time), Some(*pose));
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::depth_image::{DepthCamera, DepthImages};
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, within};
 use super::lines::TextFile;
+use super::pose_text::by_time;
 use super::trajectory::{Trajectory, associated};
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
@@ -48,7 +49,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let intrinsics = camera(folder, photo_file::dimensions(first)?)?;
     let truth = folder.join("groundtruth.txt");
     let trajectory = if truth.is_file() {
-        Some(Trajectory::read(&truth)?)
+        Some(Trajectory::in_seconds(by_time(&TextFile::read(&truth)?)?))
     } else {
         log::warn!(
             "{}: no groundtruth.txt, so no frame can be a reference and nothing has an error",

@@ -308,7 +308,7 @@ fn poses_that_cannot_be_read_end_with_one_line() {
         ),
         (
             "0.4 0 0 0 0 0 0 1\n0.5 0 0 0 0 0 9 1\n",
-            "poses.txt:2: `time x y z",
+            "poses.txt:2: a quaternion of length 1",
         ),
         (
             "77.4 0 0 0 0 0 0 1\n",

@@ -381,8 +381,8 @@ fn what_is_wrong_with_a_description_is_named_with_its_line() {
 #[test]
 fn poses_that_fit_no_photo_are_named() {
     for (poses, words) in [
-        ("", &["poses.txt", "8 numbers", "0 found"][..]),
-        ("1 2 3\n", &["poses.txt", "3 found"]),
+        ("", &["poses.txt", "none found"][..]),
+        ("1 2 3\n", &["poses.txt:1", "8 numbers", "3 words found"]),
         (
             "1 0 0 0 0 1 0 0 0 0 1 0\n",
             &["poses.txt", "3 images", "`img1`"],

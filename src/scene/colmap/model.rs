@@ -14,7 +14,7 @@ pub(super) struct Model {
 }
 
 /// An image of a model.
-pub(super) struct ModelImage {
+pub(in super::super) struct ModelImage {
     /// The file, below the folder of the photos.
     pub name: String,
     pub camera: u32,

@@ -67,13 +67,9 @@ fn points(path: &Path) -> Result<Points, SceneError> {
 fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     let file = TextFile::read(path)?;
     let mut images = Vec::new();
-    let mut lines = file.all_lines();
-    while let Some(line) = lines.next() {
-        if line.text.is_empty() || line.text.starts_with('#') {
-            continue;
-        }
+    for (line, features) in pairs_of_lines(&file) {
         let mut image = image(line)?;
-        if let Some(features) = lines.next() {
+        if let Some(features) = features {
             image.observed = observed(features, points)?;
         }
         images.push(image);
@@ -82,6 +78,19 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
         return Err(file.error("images expected, none found"));
     }
     Ok(images)
+}
+
+/// The line of each image, and the one of its features.
+fn pairs_of_lines(file: &TextFile) -> impl Iterator<Item = (Line<'_>, Option<Line<'_>>)> {
+    let mut lines = file.all_lines();
+    std::iter::from_fn(move || Some((lines.find(Line::is_said)?, lines.next())))
+}
+
+/// The images of a text, with the lines that name them, without what they observe.
+pub(in super::super) fn image_lines(
+    file: &TextFile,
+) -> impl Iterator<Item = (Line<'_>, Result<ModelImage, SceneError>)> {
+    pairs_of_lines(file).map(|(line, _)| (line, image(line)))
 }
 
 fn image(line: Line<'_>) -> Result<ModelImage, SceneError> {

@@ -4,84 +4,47 @@ use std::path::Path;
 
 use super::super::SceneError;
 use super::super::lines::{Line, TextFile};
-use super::super::trajectory::between;
+use super::super::trajectory::Trajectory;
 use super::sdk::transform;
 use crate::geometry::Pose;
 
 /// Between poses this far apart in time, what lies between is not interpolated \[µs\]: the INS measures
 /// every 20 ms, the stereo camera every 62 ms.
-const LONGEST_GAP_US: u64 = 500_000;
+const LONGEST_GAP_US: f64 = 500_000.0;
 /// Slower than this the car stands \[m/s\]; the noise of a standing INS is a tenth of it.
 const STANDS_M_S: f64 = 0.5;
 /// The status of rows that can be believed.
 const GOOD: [&str; 1] = ["INS_SOLUTION_GOOD"];
 
-/// Poses by time \[µs\], in ascending order.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Track {
-    samples: Vec<(u64, Pose)>,
-}
-
-impl Track {
-    fn new(mut samples: Vec<(u64, Pose)>) -> Self {
-        samples.sort_by_key(|(time, _)| *time);
-        samples.dedup_by_key(|(time, _)| *time);
-        Self { samples }
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.samples.is_empty()
-    }
-
-    /// The pose at a time, between two that are close.
-    pub(super) fn at(&self, time: u64) -> Option<Pose> {
-        let after = self.samples.partition_point(|(other, _)| *other < time);
-        let next = self.samples.get(after);
-        if let Some((_, pose)) = next.filter(|(other, _)| *other == time) {
-            return Some(*pose);
-        }
-        let (earlier, from) = self.samples.get(after.checked_sub(1)?)?;
-        let (later, to) = next?;
-        let gap = later - earlier;
-        (gap <= LONGEST_GAP_US).then(|| between(from, to, (time - earlier) as f64 / gap as f64))
-    }
-
-    /// The same track of something that is fixed to what moves.
-    pub(super) fn moved_by(&self, body_from_part: &Pose) -> Self {
-        let samples = self.samples.iter();
-        Self {
-            samples: samples
-                .map(|(time, pose)| (*time, pose * body_from_part))
-                .collect(),
-        }
-    }
+/// The trajectory of poses by time \[µs\].
+fn track(samples: Vec<(u64, Pose)>) -> Trajectory {
+    let samples = samples.into_iter().map(|(time, pose)| (time as f64, pose));
+    Trajectory::new(samples.collect(), LONGEST_GAP_US, 0.0)
 }
 
 /// When the car first moves and when it last stops \[µs\]; `None` where it never does.
-pub(super) fn first_and_last_motion(track: &Track) -> Option<(u64, u64)> {
+pub(super) fn first_and_last_motion(track: &Trajectory) -> Option<(f64, f64)> {
     /// Speeds are taken over at least this time \[µs\].
-    const OVER_US: u64 = 900_000;
-    let samples = &track.samples;
+    const OVER_US: f64 = 900_000.0;
+    let samples = track.samples();
+    let later = |at: usize| {
+        let mut after = samples[at..].iter();
+        after.find(|(later, _)| later - samples[at].0 >= OVER_US)
+    };
     let moves = |at: usize| {
         let (time, pose) = &samples[at];
-        let later = samples[at..]
-            .iter()
-            .find(|(later, _)| later - time >= OVER_US);
-        later.is_some_and(|(later, there)| {
+        later(at).is_some_and(|(later, there)| {
             let way_m = (there.translation.vector - pose.translation.vector).norm();
-            way_m / ((later - time) as f64 / super::PER_SECOND) > STANDS_M_S
+            way_m / ((later - time) / super::PER_SECOND) > STANDS_M_S
         })
     };
     let first = (0..samples.len()).find(|&at| moves(at))?;
     let last = (first..samples.len()).rev().find(|&at| moves(at))?;
-    let stop = samples[last..]
-        .iter()
-        .find(|(later, _)| later - samples[last].0 >= OVER_US)?;
-    Some((samples[first].0, stop.0))
+    Some((samples[first].0, later(last)?.0))
 }
 
 /// Reads `gps/ins.csv`: the INS in the world (north, east, down), where its status is good.
-pub(super) fn read_ins(path: &Path) -> Result<Track, SceneError> {
+pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
     let mut lines = file.lines();
     let header = lines
@@ -113,11 +76,11 @@ pub(super) fn read_ins(path: &Path) -> Result<Track, SceneError> {
         let time = microseconds(&line, word(&line, &words, time)?)?;
         samples.push((time, transform([north, east, down], [roll, pitch, yaw])));
     }
-    Ok(Track::new(samples))
+    Ok(track(samples))
 }
 
 /// Reads `vo/vo.csv`: the motion of the vehicle from one photo to the next, chained.
-pub(super) fn read_odometry(path: &Path) -> Result<Track, SceneError> {
+pub(super) fn read_odometry(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
     let mut pose = Pose::identity();
     let mut samples: Vec<(u64, Pose)> = Vec::new();
@@ -137,7 +100,7 @@ pub(super) fn read_odometry(path: &Path) -> Result<Track, SceneError> {
         pose *= transform([x, y, z], [roll, pitch, yaw]);
         samples.push((at.max(from), pose));
     }
-    Ok(Track::new(samples))
+    Ok(track(samples))
 }
 
 fn word<'a>(line: &Line<'_>, words: &[&'a str], column: usize) -> Result<&'a str, SceneError> {
@@ -166,20 +129,20 @@ mod tests {
             let way_m = 0.5 * tick.clamp(100, 300) as f64;
             (tick * 100_000, Pose::translation(way_m, 0.0, 0.0))
         };
-        let track = Track::new((0..400).map(sample).collect());
-        let (first, last) = first_and_last_motion(&track).expect("it moves");
-        assert!((9_000_000..=10_000_000).contains(&first), "{first}");
-        assert!((30_000_000..=31_000_000).contains(&last), "{last}");
-        let parked = Track::new((0..90).map(sample).collect());
+        let drive = track((0..400).map(sample).collect());
+        let (first, last) = first_and_last_motion(&drive).expect("it moves");
+        assert!((9e6..=10e6).contains(&first), "{first}");
+        assert!((30e6..=31e6).contains(&last), "{last}");
+        let parked = track((0..90).map(sample).collect());
         assert!(first_and_last_motion(&parked).is_none());
     }
 
     #[test]
     fn between_two_times_that_are_close_the_pose_is_between_too() {
         let pose = |x: f64| Pose::translation(x, 0.0, 0.0);
-        let track = Track::new(vec![(0, pose(0.0)), (100, pose(1.0)), (900_000, pose(9.0))]);
-        assert_eq!(track.at(25), Some(pose(0.25)));
-        assert_eq!(track.at(100), Some(pose(1.0)));
-        assert!(track.at(500).is_none() && track.at(1_000_000).is_none());
+        let track = super::track(vec![(0, pose(0.0)), (100, pose(1.0)), (900_000, pose(9.0))]);
+        assert_eq!(track.at(25.0), Some(pose(0.25)));
+        assert_eq!(track.at(100.0), Some(pose(1.0)));
+        assert!(track.at(500.0).is_none() && track.at(1e6).is_none());
     }
 }

@@ -7,8 +7,8 @@ use nalgebra::Point3;
 use super::super::SceneError;
 use super::super::file_scene::{Clouds, Frame};
 use super::super::folder::numbered;
+use super::super::trajectory::Trajectory;
 use super::super::view_crop::in_view;
-use super::poses::Track;
 use super::sdk::Sdk;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -78,7 +78,7 @@ pub(super) struct Scans {
     pub files: Vec<ScanFile>,
     pub sdk: Sdk,
     /// How the vehicle moved.
-    pub motion: Track,
+    pub motion: Trajectory,
     /// The times of the frames \[µs\].
     pub times: Vec<u64>,
     pub image_from_vehicle: Pose,
@@ -96,7 +96,7 @@ impl Scans {
 impl Clouds for Scans {
     fn has(&self, index: usize) -> bool {
         let time = self.times[index];
-        self.motion.at(time).is_some() && !self.around(time).is_empty()
+        self.motion.at(time as f64).is_some() && !self.around(time).is_empty()
     }
 
     fn missing(&self) -> Option<&str> {
@@ -108,13 +108,13 @@ impl Clouds for Scans {
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
         let time = self.times[index];
-        let Some(here) = self.motion.at(time) else {
+        let Some(here) = self.motion.at(time as f64) else {
             return Ok(Cloud::default());
         };
         let mut gathered: Vec<Point3<f64>> = Vec::new();
         let mut mounts: Vec<(Scanner, Pose)> = Vec::new();
         for file in self.around(time) {
-            let Some(there) = self.motion.at(file.time) else {
+            let Some(there) = self.motion.at(file.time as f64) else {
                 continue;
             };
             let now_from_then = here.inverse() * there;
