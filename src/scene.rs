@@ -73,20 +73,17 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
                 known: names(),
             }
         })?,
-        None => match ALL.iter().find(|entry| (entry.recognizes)(argument)) {
-            Some(entry) => entry,
-            None if !std::path::Path::new(argument).exists() => {
-                return Err(SceneError::NotFound {
-                    argument: argument.to_owned(),
-                });
-            }
-            None => {
-                return Err(SceneError::NotRecognized {
-                    argument: argument.to_owned(),
+        None => {
+            let found = ALL.iter().find(|entry| (entry.recognizes)(argument));
+            let argument = argument.to_owned();
+            found.ok_or_else(|| match std::path::Path::new(&argument).exists() {
+                true => SceneError::NotRecognized {
+                    argument,
                     known: names(),
-                });
-            }
-        },
+                },
+                false => SceneError::NotFound { argument },
+            })?
+        }
     };
     (entry.open)(argument)
 }

@@ -20,15 +20,15 @@ mod poses;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::Matrix3x4;
+use nalgebra::{Matrix3x4, Point3};
 use serde::Deserialize;
 use toml::Spanned;
 
 use self::poses::FramePoses;
 use super::cloud_file;
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
-use super::folder::{folder_name, stem, within};
-use super::lens::{Distortion, developed_camera};
+use super::folder::{folder_name, stem, warn_without_poses, within};
+use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
 use super::{Entry, Scene, SceneError, lines, photo_file, view_crop};
 use crate::camera::Intrinsics;
@@ -184,10 +184,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let poses = match &description.poses {
         Some(name) => poses::read(&source.file(name)?, &photos)?,
         None => {
-            log::warn!(
-                "{}: no poses, so no frame can be a reference and nothing has an error",
-                path.display()
-            );
+            warn_without_poses(path, "poses");
             vec![FramePoses::default(); photos.len()]
         }
     };
@@ -219,28 +216,17 @@ fn camera(
     described: &Spanned<CameraDescription>,
     first: &Path,
 ) -> Result<(Intrinsics, Option<Arc<dyn Develop>>), SceneError> {
-    let (width, height) = photo_file::dimensions(first)?;
     let camera = described.get_ref();
-    let taken = Intrinsics {
-        fx: camera.fx,
-        fy: camera.fy,
-        cx: camera.cx,
-        cy: camera.cy,
-        width,
-        height,
-    };
-    let is_length = |length: f64| length.is_finite() && length > 0.0;
-    if !is_length(camera.fx) || !is_length(camera.fy) || !(camera.cx + camera.cy).is_finite() {
-        let expected = "positive focal lengths fx, fy and a centre cx, cy expected";
-        return Err(source.error(described, expected));
-    }
+    let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
+    let error = |why: String| source.error(described, &why);
+    let taken = pinhole(numbers, photo_file::dimensions(first)?).map_err(error)?;
     let distortion = Distortion {
         k1: camera.k1,
         k2: camera.k2,
         p1: camera.p1,
         p2: camera.p2,
     };
-    developed_camera(taken, distortion).map_err(|why| source.error(described, &why))
+    developed_camera(taken, distortion).map_err(error)
 }
 
 fn clouds(
@@ -254,10 +240,7 @@ fn clouds(
             (path, Place::Map(OnceLock::new()))
         }
         (None, Some(clouds)) => (source.path.clone(), per_frame(source, clouds, photos)?),
-        (None, None) => (
-            source.path.clone(),
-            Place::PerFrame(Vec::new(), InCamera::World),
-        ),
+        (None, None) => (source.path.clone(), Place::PerFrame(Vec::new(), None)),
         (Some(name), Some(_)) => {
             return Err(source.error(name, "either `cloud` or `clouds` expected, both found"));
         }
@@ -283,35 +266,27 @@ fn per_frame(
             ),
         ));
     }
-    let frame = match (described.frame, &described.camera_from_cloud) {
-        (CloudFrame::World, None) => InCamera::World,
+    let camera_from_cloud = match (described.frame, &described.camera_from_cloud) {
+        (CloudFrame::World, None) => None,
         (CloudFrame::World, Some(matrix)) => {
             let expected = "either frame = \"world\" or camera_from_cloud expected, both found";
             return Err(source.error(matrix, expected));
         }
-        (CloudFrame::Camera, None) => InCamera::By(Pose::identity()),
+        (CloudFrame::Camera, None) => Some(Pose::identity()),
         (CloudFrame::Camera, Some(matrix)) => {
             let pose = pose_from_matrix(&Matrix3x4::from_row_slice(matrix.get_ref()));
-            InCamera::By(pose.map_err(|error| source.error(matrix, &error.to_string()))?)
+            Some(pose.map_err(|error| source.error(matrix, &error.to_string()))?)
         }
     };
-    Ok(Place::PerFrame(clouds, frame))
-}
-
-/// What takes a frame's own cloud into the camera's frame.
-enum InCamera {
-    /// A fixed transform.
-    By(Pose),
-    /// The frame's pose, as the cloud is in the frame of the world.
-    World,
+    Ok(Place::PerFrame(clouds, camera_from_cloud))
 }
 
 /// Where the clouds are.
 enum Place {
     /// In one file for all, which is read when the first is asked for.
     Map(OnceLock<MapBlocks>),
-    /// In a file each.
-    PerFrame(Vec<Option<PathBuf>>, InCamera),
+    /// In a file each, with what takes them into the camera's frame: none if they are in the world's.
+    PerFrame(Vec<Option<PathBuf>>, Option<Pose>),
 }
 
 struct DescribedClouds {
@@ -340,13 +315,9 @@ impl Clouds for DescribedClouds {
         let path = self.place(index, frame);
         let world_from_camera = || {
             frame.world_from_camera.ok_or_else(|| {
-                SceneError::expected(
-                    path,
-                    format!(
-                        "a cloud in the frame of the world, but frame {} has no pose in it",
-                        frame.name
-                    ),
-                )
+                let name = &frame.name;
+                let expected = format!("a pose of frame {name} in the world of its cloud expected");
+                SceneError::expected(path, expected)
             })
         };
         match &self.clouds {
@@ -361,17 +332,15 @@ impl Clouds for DescribedClouds {
                 let points = map.around_view(&world_from_camera()?, &frame.intrinsics);
                 Ok(view_crop::in_view(points, &frame.intrinsics))
             }
-            Place::PerFrame(_, frame_of_cloud) => {
-                let camera_from_cloud = match frame_of_cloud {
-                    InCamera::By(camera_from_cloud) => *camera_from_cloud,
-                    InCamera::World => world_from_camera()?.inverse(),
+            Place::PerFrame(_, camera_from_cloud) => {
+                let camera_from_cloud = match camera_from_cloud {
+                    Some(camera_from_cloud) => *camera_from_cloud,
+                    None => world_from_camera()?.inverse(),
                 };
                 let cloud = cloud_file::read(path)?;
-                let points = cloud.positions();
+                let in_camera = |point: Point3<f64>| (camera_from_cloud * point).cast();
                 Ok(Cloud {
-                    points: points
-                        .map(|point| (camera_from_cloud * point).cast())
-                        .collect(),
+                    points: cloud.positions().map(in_camera).collect(),
                 })
             }
         }

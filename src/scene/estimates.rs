@@ -5,7 +5,7 @@ use std::path::Path;
 use posescope_core::foreign::Estimates;
 
 use super::frame_names::FrameNames;
-use super::lines::{TextFile, excerpt_of};
+use super::lines::TextFile;
 use super::pose_text::{NamedPose, PoseLines, PoseText};
 use super::trajectory::{SAME_MOMENT_S, associated};
 use super::{Scene, SceneError};
@@ -21,9 +21,9 @@ pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, Scene
     let file = TextFile::read(if path.is_dir() { &in_folder } else { path })?;
     let names = FrameNames::new(scene);
     match PoseText::read(&file, Some(&names))? {
-        PoseText::ByTime(samples) => by_time(&file, samples, scene),
-        PoseText::ByLine(poses) => by_line(&file, &poses, scene),
-        PoseText::ByName(poses) => by_name(&file, poses, scene, &names),
+        PoseText::Timed(samples) => by_time(&file, samples, scene),
+        PoseText::Lines(poses) => by_line(&file, &poses, scene),
+        PoseText::Named(poses) => by_name(&file, poses, scene, &names),
     }
 }
 
@@ -114,13 +114,8 @@ fn by_name(
         }
     }
     if estimates.is_empty() {
-        return Err(file.error(format!(
-            "poses of the frames of {} expected, which are called such as `{}`; here they are called such \
-             as `{}`",
-            scene.name(),
-            scene.frames().first().map_or("", String::as_str),
-            excerpt_of(stranger.as_deref().unwrap_or_default(), 60)
-        )));
+        let called = stranger.as_deref().unwrap_or_default();
+        return Err(file.error(names.none_found("poses of the frames", called)));
     }
     Ok(estimates)
 }

@@ -57,6 +57,14 @@ pub(super) fn within(folder: &Path, name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(name))
 }
 
+/// Warns that a scene has queries only, as it has none of what gives it poses.
+pub(super) fn warn_without_poses(place: &Path, missing: &str) {
+    log::warn!(
+        "{}: no {missing}, so no frame can be a reference and nothing has an error",
+        place.display()
+    );
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

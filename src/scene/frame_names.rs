@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Scene;
+use super::lines::excerpt_of;
 
 /// The frames of a scene by what a file may call them.
 pub(super) struct FrameNames<'a> {
@@ -30,6 +31,17 @@ impl<'a> FrameNames<'a> {
         let by_stem = || self.stems.get(stem(name)).copied().flatten();
         let by_number = || self.scene.find(stem(name)).ok();
         whole.or_else(by_stem).or_else(by_number)
+    }
+
+    /// What is expected of a file that has something (`what`) of other frames only, one of which it calls
+    /// so.
+    pub fn none_found(&self, what: &str, called: &str) -> String {
+        format!(
+            "{what} of {} expected, which are called such as `{}`; here they are called such as `{}`",
+            self.scene.name(),
+            self.scene.frames().first().map_or("", String::as_str),
+            excerpt_of(called, 60)
+        )
     }
 }
 

@@ -1,5 +1,5 @@
-//! Rough positions of queries, for the choice of their references where nobody knows the truth or where
-//! it is not to be used: a table with a line of column names and a line per frame, between commas or
+//! Rough positions of queries, for the choice of their references where their poses are unknown or must
+//! not be used: a table with a line of column names and a line per frame, between commas or
 //! white space.
 //!
 //! Either `name x y z`, in the world of the scene \[m\], or `name latitude longitude`, perhaps with
@@ -13,13 +13,11 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 
 use super::frame_names::FrameNames;
-use super::lines::{Line, TextFile, excerpt_of};
+use super::lines::{Line, TextFile};
 use super::{Scene, SceneError};
 
-/// The mean radius of the earth \[m\]. The fit takes up what is left of it.
-const EARTH_RADIUS_M: f64 = 6_371_000.0;
-/// Frames with a pose that tie latitudes and longitudes to a world.
-const FEWEST_TIES: usize = 3;
+/// The radius of the earth at the equator \[m\], as KITTI's devkit takes it.
+pub(super) const EARTH_RADIUS_M: f64 = 6_378_137.0;
 
 /// A scene, some of whose frames are sought elsewhere than at their pose.
 struct Located {
@@ -39,10 +37,10 @@ pub fn located(
     path: &Path,
 ) -> Result<Arc<dyn Scene>, SceneError> {
     let file = TextFile::read(path)?;
-    let rows = Row::read_all(&file)?;
-    let world = match rows.first().map(|row| row.place) {
-        Some(Place::Geographic { .. }) => Some(tie(&file, &rows, &[queries.as_ref(), references])?),
-        _ => None,
+    let (kind, rows) = read_rows(&file)?;
+    let world = match kind {
+        Kind::World => None,
+        Kind::Geographic => Some(Tie::fit(&file, &rows, &[queries.as_ref(), references])?),
     };
     let names = FrameNames::new(queries.as_ref());
     let mut positions = BTreeMap::new();
@@ -50,10 +48,9 @@ pub fn located(
         let Some(frame) = names.find(row.name) else {
             continue;
         };
-        let position = match (row.place, &world) {
-            (Place::World(position), _) => position,
-            (Place::Geographic { .. }, Some(world)) => world.of(row.place),
-            (Place::Geographic { .. }, None) => continue,
+        let position = match &world {
+            None => row.place.into(),
+            Some(tie) => tie.of(row.place),
         };
         if positions.insert(frame, position).is_some() {
             let name = &queries.frames()[frame];
@@ -63,13 +60,8 @@ pub fn located(
         }
     }
     if positions.is_empty() {
-        return Err(file.error(format!(
-            "positions of the queries of {} expected, which are called such as `{}`; here they are called \
-             such as `{}`",
-            queries.name(),
-            queries.frames().first().map_or("", String::as_str),
-            excerpt_of(rows.first().map_or("", |row| row.name), 60)
-        )));
+        let called = rows.first().map_or("", |row| row.name);
+        return Err(file.error(names.none_found("positions of the queries", called)));
     }
     Ok(Arc::new(Located {
         scene: queries,
@@ -77,198 +69,140 @@ pub fn located(
     }))
 }
 
+/// What the numbers of a line are.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// x, y, z in the frame of the scene's poses \[m\].
+    World,
+    /// Latitude and longitude \[°\], and altitude \[m\].
+    Geographic,
+}
+
 /// A line of the table.
 struct Row<'a> {
     line: Line<'a>,
     name: &'a str,
-    place: Place,
+    place: [f64; 3],
 }
 
-/// Where something is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Place {
-    /// In the frame of the scene's poses \[m\].
-    World(Point3<f64>),
-    /// \[°\] and \[m\].
-    Geographic {
-        latitude: f64,
-        longitude: f64,
-        altitude: f64,
-    },
-}
-
-/// Where the columns are.
-enum Columns {
-    World([usize; 4]),
-    Geographic([usize; 3], Option<usize>),
-}
-
-impl Columns {
-    fn read(line: Line<'_>) -> Result<(Self, usize), SceneError> {
-        let words: Vec<String> = line.words().map(str::to_lowercase).collect();
-        let find = |called: &[&str]| {
-            let is_one = |word: &String| called.contains(&word.as_str());
-            words.iter().position(is_one)
-        };
-        let name = find(&["name", "frame", "image", "file", "filename"]);
-        let world = [find(&["x"]), find(&["y"]), find(&["z"])];
-        let geographic = [
-            find(&["latitude", "lat"]),
-            find(&["longitude", "lon", "lng"]),
-        ];
-        let altitude = find(&["altitude", "alt", "height"]);
-        let columns = match (name, world, geographic) {
-            (Some(name), [Some(x), Some(y), Some(z)], [None, None]) => Self::World([name, x, y, z]),
-            (Some(name), [None, None, None], [Some(latitude), Some(longitude)]) => {
-                Self::Geographic([name, latitude, longitude], altitude)
-            }
-            _ => {
-                return Err(line.error(
-                    "a first line with the columns `name x y z` or `name latitude longitude` \
-                     (and perhaps `altitude`) expected",
-                ));
-            }
-        };
-        Ok((columns, words.len()))
-    }
-}
-
-impl<'a> Row<'a> {
-    fn read_all(file: &'a TextFile) -> Result<Vec<Self>, SceneError> {
-        let mut lines = file.lines();
-        let Some(first) = lines.next() else {
-            return Err(file.error("positions expected, none found"));
-        };
-        let (columns, count) = Columns::read(first)?;
-        let rows = lines.map(|line| Self::read(line, &columns, count));
-        let rows = rows.collect::<Result<Vec<_>, _>>()?;
-        match rows.is_empty() {
-            true => Err(file.error("a line per frame below the names of columns expected")),
-            false => Ok(rows),
+fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
+    let mut lines = file.lines();
+    let Some(first) = lines.next() else {
+        return Err(file.error("positions expected, none found"));
+    };
+    let words: Vec<String> = first.words().map(str::to_lowercase).collect();
+    let find = |called: &[&str]| {
+        let is_one = |word: &String| called.contains(&word.as_str());
+        words.iter().position(is_one)
+    };
+    let name = find(&["name", "frame", "image", "file", "filename"]);
+    let world = [find(&["x"]), find(&["y"]), find(&["z"])];
+    let latitude = find(&["latitude", "lat"]);
+    let longitude = find(&["longitude", "lon", "lng"]);
+    let altitude = find(&["altitude", "alt", "height"]);
+    let (kind, name, columns) = match (name, world, [latitude, longitude]) {
+        (Some(name), [Some(_), Some(_), Some(_)], [None, None]) => (Kind::World, name, world),
+        (Some(name), [None, None, None], [Some(_), Some(_)]) => {
+            (Kind::Geographic, name, [latitude, longitude, altitude])
         }
-    }
-
-    fn read(line: Line<'a>, columns: &Columns, count: usize) -> Result<Self, SceneError> {
-        let words: Vec<&str> = line.words().collect();
-        if words.len() != count {
-            let found = words.len();
+        _ => {
+            return Err(first.error(
+                "a first line with the columns `name x y z` or `name latitude longitude` \
+                 (and perhaps `altitude`) expected",
+            ));
+        }
+    };
+    let mut rows = Vec::new();
+    for line in lines {
+        let found: Vec<&str> = line.words().collect();
+        if found.len() != words.len() {
+            let (count, found) = (words.len(), found.len());
             return Err(line.error(format!("{count} columns expected, {found} found")));
         }
-        let number = |at: usize| line.number(words[at]);
-        let (name, place) = match *columns {
-            Columns::World([name, x, y, z]) => {
-                let position = Point3::new(number(x)?, number(y)?, number(z)?);
-                (name, Place::World(position))
+        let mut place = [0.0; 3];
+        for (number, column) in place.iter_mut().zip(columns) {
+            if let Some(column) = column {
+                *number = line.number(found[column])?;
             }
-            Columns::Geographic([name, latitude, longitude], altitude) => {
-                let (latitude, longitude) = (number(latitude)?, number(longitude)?);
-                if latitude.abs() > 89.0 || longitude.abs() > 360.0 {
-                    return Err(line.error(format!(
-                        "a latitude and a longitude in degrees expected, {latitude} {longitude} found"
-                    )));
-                }
-                let altitude = altitude.map(number).transpose()?.unwrap_or(0.0);
-                let place = Place::Geographic {
-                    latitude,
-                    longitude,
-                    altitude,
-                };
-                (name, place)
-            }
-        };
-        Ok(Self {
-            line,
-            name: words[name],
-            place,
-        })
+        }
+        let [latitude, longitude, _] = place;
+        if kind == Kind::Geographic && (latitude.abs() > 89.0 || longitude.abs() > 360.0) {
+            return Err(line.error(format!(
+                "a latitude and a longitude in degrees expected, {latitude} {longitude} found"
+            )));
+        }
+        let name = found[name];
+        rows.push(Row { line, name, place });
+    }
+    match rows.is_empty() {
+        true => Err(file.error("a line per frame below the names of columns expected")),
+        false => Ok((kind, rows)),
     }
 }
 
-/// What takes latitudes and longitudes to a world.
+/// What takes latitudes, longitudes and altitudes to a world.
 struct Tie {
-    latitude: f64,
-    longitude: f64,
+    origin: [f64; 3],
     world_from_local: Similarity3<f64>,
 }
 
 impl Tie {
-    fn of(&self, place: Place) -> Point3<f64> {
-        self.world_from_local * local(place, self.latitude, self.longitude)
+    fn of(&self, place: [f64; 3]) -> Point3<f64> {
+        self.world_from_local * local(place, self.origin)
     }
-}
 
-/// East, north, up of a point \[m\].
-fn local(place: Place, latitude0: f64, longitude0: f64) -> Point3<f64> {
-    match place {
-        Place::World(position) => position,
-        Place::Geographic {
-            latitude,
-            longitude,
-            altitude,
-        } => {
-            let east = (longitude - longitude0).to_radians() * latitude0.to_radians().cos();
-            let north = (latitude - latitude0).to_radians();
-            Point3::new(EARTH_RADIUS_M * east, EARTH_RADIUS_M * north, altitude)
-        }
-    }
-}
-
-/// Fits the similarity that takes places to the poses of the frames that have both.
-fn tie(file: &TextFile, rows: &[Row<'_>], scenes: &[&dyn Scene]) -> Result<Tie, SceneError> {
-    let names: Vec<_> = scenes
-        .iter()
-        .map(|scene| (FrameNames::new(*scene), scene))
-        .collect();
-    let pose = |row: &Row<'_>| {
-        let mut poses = names
+    /// Fits the similarity that takes places to the poses of the frames that have both.
+    fn fit(file: &TextFile, rows: &[Row<'_>], scenes: &[&dyn Scene]) -> Result<Self, SceneError> {
+        let names: Vec<_> = scenes
             .iter()
-            .filter_map(|(names, scene)| scene.pose(names.find(row.name)?));
-        poses.next().map(|pose| pose.translation.vector)
-    };
-    let ties: Vec<(Place, Vector3<f64>)> = rows
-        .iter()
-        .filter_map(|row| Some((row.place, pose(row)?)))
-        .collect();
-    if ties.len() < FEWEST_TIES {
-        return Err(file.error(format!(
-            "{FEWEST_TIES} frames with a known pose or more expected, which tie latitudes and longitudes to \
-             the scene, {} found; or give x, y and z",
-            ties.len()
-        )));
+            .map(|scene| (FrameNames::new(*scene), scene))
+            .collect();
+        let pose = |row: &Row<'_>| {
+            let mut poses = names
+                .iter()
+                .filter_map(|(names, scene)| scene.pose(names.find(row.name)?));
+            poses.next().map(|pose| pose.translation.vector)
+        };
+        let ties: Vec<([f64; 3], Vector3<f64>)> = rows
+            .iter()
+            .filter_map(|row| Some((row.place, pose(row)?)))
+            .collect();
+        let [(origin, _), _, _, ..] = ties[..] else {
+            return Err(file.error(format!(
+                "3 frames with a known pose or more expected, which tie latitudes and longitudes to the \
+                 scene, {} found; or give x, y and z",
+                ties.len()
+            )));
+        };
+        let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = ties
+            .iter()
+            .map(|(place, world)| (local(*place, origin).coords, *world))
+            .collect();
+        let world_from_local = similarity(&pairs).ok_or_else(|| {
+            file.error("frames with a known pose at different places expected, which tie the file to the scene")
+        })?;
+        let squares = pairs.iter().map(|(from, to)| {
+            let at = world_from_local * Point3::from(*from);
+            (at.coords - to).norm_squared()
+        });
+        let rms = (squares.sum::<f64>() / pairs.len() as f64).sqrt();
+        log::info!(
+            "{} frames tie latitudes and longitudes to the scene, within {rms:.2} m (RMS) at a scale of {:.4}",
+            pairs.len(),
+            world_from_local.scaling()
+        );
+        Ok(Self {
+            origin,
+            world_from_local,
+        })
     }
-    let Some(&(
-        Place::Geographic {
-            latitude,
-            longitude,
-            ..
-        },
-        _,
-    )) = ties.first()
-    else {
-        return Err(file.error("latitudes and longitudes expected"));
-    };
-    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = ties
-        .iter()
-        .map(|(place, world)| (local(*place, latitude, longitude).coords, *world))
-        .collect();
-    let world_from_local = similarity(&pairs).ok_or_else(|| {
-        file.error("frames with a known pose at different places expected, which tie the file to the scene")
-    })?;
-    let squares = pairs.iter().map(|(from, to)| {
-        let at = world_from_local * Point3::from(*from);
-        (at.coords - to).norm_squared()
-    });
-    let rms = (squares.sum::<f64>() / pairs.len() as f64).sqrt();
-    log::info!(
-        "{} frames tie latitudes and longitudes to the scene, within {rms:.2} m (RMS) at a scale of {:.4}",
-        pairs.len(),
-        world_from_local.scaling()
-    );
-    Ok(Tie {
-        latitude,
-        longitude,
-        world_from_local,
-    })
+}
+
+/// East and north of an origin, and altitude \[m\].
+fn local([latitude, longitude, altitude]: [f64; 3], origin: [f64; 3]) -> Point3<f64> {
+    let east = (longitude - origin[1]).to_radians() * origin[0].to_radians().cos();
+    let north = (latitude - origin[0]).to_radians();
+    Point3::new(EARTH_RADIUS_M * east, EARTH_RADIUS_M * north, altitude)
 }
 
 /// The similarity that takes the first of each pair nearest to the second, by least squares (Umeyama,

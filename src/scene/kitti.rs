@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3x4, Point3, Vector3};
 
 use super::file_scene::{Clouds, FileScene, Frame};
-use super::folder::{folder_name, numbered};
+use super::folder::{folder_name, numbered, warn_without_poses};
 use super::kitti_format::{Camera, labelled, optional, read_scan, split_projection};
 use super::lines::TextFile;
 use super::pose_text::{PoseLines, by_line};
@@ -90,10 +90,7 @@ fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Option<PoseL
         folder.join("../../poses").join(format!("{sequence}.txt")),
     ];
     let Some(path) = candidates.into_iter().find(|path| path.is_file()) else {
-        log::warn!(
-            "{}: no pose file, so no frame can be a reference and nothing has an error",
-            folder.display()
-        );
+        warn_without_poses(folder, "pose file");
         return Ok(None);
     };
     let file = TextFile::read(&path)?;

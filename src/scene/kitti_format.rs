@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::SceneError;
+use super::lens::pinhole;
 use super::lines::TextFile;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -77,25 +78,16 @@ pub(super) fn optional<const N: usize>(
 /// The intrinsics of a projection matrix P = K [I | t], and the transform from the rectified camera 0.
 pub(super) fn split_projection(
     projection: &[f64; 12],
-    (width, height): (u32, u32),
+    size: (u32, u32),
     file: &TextFile,
 ) -> Result<(Intrinsics, Pose), SceneError> {
     let projection = Matrix3x4::from_row_slice(projection);
     let k: Matrix3<f64> = projection.fixed_columns::<3>(0).into_owned();
     let inverse = k
         .try_inverse()
-        .filter(|_| k[(0, 0)] > 0.0 && k[(1, 1)] > 0.0);
-    let Some(inverse) = inverse else {
-        return Err(file.error("a projection matrix with positive focal lengths expected"));
-    };
-    let intrinsics = Intrinsics {
-        fx: k[(0, 0)],
-        fy: k[(1, 1)],
-        cx: k[(0, 2)],
-        cy: k[(1, 2)],
-        width,
-        height,
-    };
+        .ok_or_else(|| file.error("a projection matrix with positive focal lengths expected"))?;
+    let camera = [k[(0, 0)], k[(1, 1)], k[(0, 2)], k[(1, 2)]];
+    let intrinsics = pinhole(camera, size).map_err(|why| file.error(why))?;
     let translation: Vector3<f64> = inverse * projection.column(3);
     let camera_from_camera0 =
         Pose::from_parts(Translation3::from(translation), UnitQuaternion::identity());
@@ -113,34 +105,25 @@ pub(super) fn read_scan(
     if bytes.is_empty() {
         return Err(content("points expected, the scan is empty".to_owned()));
     }
-    if bytes.len() % BYTES_PER_POINT != 0 {
+    let (records, []) = bytes.as_chunks::<BYTES_PER_POINT>() else {
         return Err(content(format!(
             "whole points of {BYTES_PER_POINT} bytes expected, {} bytes found; the file is cut off",
             bytes.len()
         )));
-    }
-    let mut points = Vec::with_capacity(bytes.len() / BYTES_PER_POINT);
-    for (index, record) in bytes.chunks_exact(BYTES_PER_POINT).enumerate() {
-        let coordinate = |axis: usize| {
-            let at = 4 * axis;
-            f64::from(f32::from_le_bytes([
-                record[at],
-                record[at + 1],
-                record[at + 2],
-                record[at + 3],
-            ]))
-        };
-        let point = Point3::new(coordinate(0), coordinate(1), coordinate(2));
-        if !point.iter().all(|value| value.is_finite()) {
+    };
+    let point = |(index, record): (usize, &[u8; BYTES_PER_POINT])| {
+        let (numbers, _) = record.as_chunks::<4>();
+        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(f32::from_le_bytes(numbers[axis])));
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
             return Err(content(format!(
-                "finite coordinates expected, point {index} (byte {}) is {}, {}, {}",
-                index * BYTES_PER_POINT,
-                point.x,
-                point.y,
-                point.z
+                "finite coordinates expected, point {index} (byte {}) is {x}, {y}, {z}",
+                index * BYTES_PER_POINT
             )));
         }
-        points.push(camera_from_velodyne(point).cast());
-    }
-    Ok(Cloud { points })
+        Ok(camera_from_velodyne(Point3::new(x, y, z)).cast())
+    };
+    let points = records.iter().enumerate().map(point);
+    Ok(Cloud {
+        points: points.collect::<Result<_, _>>()?,
+    })
 }

@@ -20,7 +20,7 @@ use self::oxts::Packet;
 use self::sweep::Sweep;
 use super::argument::split_word;
 use super::file_scene::{Clouds, FileScene, Frame};
-use super::folder::{folder_name, numbered};
+use super::folder::{folder_name, numbered, warn_without_poses};
 use super::kitti_format::{Camera, read_scan};
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::cloud::Cloud;
@@ -82,10 +82,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     }
     let packets = oxts::read(&drive.join("oxts"))?;
     if packets.is_empty() {
-        log::warn!(
-            "{}: no oxts packets, so no frame can be a reference and nothing has an error",
-            drive.display()
-        );
+        warn_without_poses(drive, "oxts packets");
     }
     let world_from_camera0 = oxts::world_from_camera0(&packets, &calibration.camera0_from_imu());
     let times = timestamps::read(&drive.join(images).join("timestamps.txt"))?;
@@ -97,7 +94,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
         velodyne_from_imu: calibration.velodyne_from_imu,
     };
     let mut found = scans.of_frames.iter().flatten();
-    if correct && found.any(|scan| scan.sweep.is_some()) {
+    if correct && found.any(|(_, sweep)| sweep.is_some()) {
         log::info!(
             "{}: scans are corrected for the motion during the sweep; `:{UNCORRECTED}` after the \
              path leaves them as they are",
@@ -142,19 +139,13 @@ fn scans<'a>(
             _ => sweep::USUAL_S,
         };
         let packet = packets.get(number).filter(|_| correct);
-        Some(Scan {
-            path,
-            sweep: packet.map(|packet| Sweep::new(packet, duration_s)),
-        })
+        Some((path, packet.map(|packet| Sweep::new(packet, duration_s))))
     };
     Ok(frames.map(scan).collect())
 }
 
 /// A scan and how the car moved while it was taken, if it is to be corrected.
-struct Scan {
-    path: PathBuf,
-    sweep: Option<Sweep>,
-}
+type Scan = (PathBuf, Option<Sweep>);
 
 struct Scans {
     folder: PathBuf,
@@ -170,12 +161,12 @@ impl Clouds for Scans {
 
     fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
         let scan = self.of_frames[index].as_ref();
-        scan.map_or(&self.folder, |scan| &scan.path)
+        scan.map_or(&self.folder, |(path, _)| path)
     }
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
         let scan = self.of_frames[index].as_ref();
-        let sweep = scan.and_then(|scan| scan.sweep.as_ref());
+        let sweep = scan.and_then(|(_, sweep)| sweep.as_ref());
         let into_camera = |point: Point3<f64>| {
             let point = match sweep {
                 Some(sweep) => sweep.corrected(&point, &self.velodyne_from_imu),

@@ -175,6 +175,27 @@ impl Develop for Lens {
     }
 }
 
+/// The camera `fx fy cx cy` \[px\] of photos of a size, with pixel centres at integers.
+pub(super) fn pinhole(
+    [fx, fy, cx, cy]: [f64; 4],
+    (width, height): (u32, u32),
+) -> Result<Intrinsics, String> {
+    let is_length = |length: f64| length.is_finite() && length > 0.0;
+    if !is_length(fx) || !is_length(fy) || !(cx + cy).is_finite() {
+        return Err(format!(
+            "positive focal lengths fx, fy and a centre cx, cy expected, {fx} {fy} {cx} {cy} found"
+        ));
+    }
+    Ok(Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    })
+}
+
 /// The camera of photos that a lens with distortion took, and what takes the distortion out of them.
 pub(super) fn developed_camera(
     taken: Intrinsics,

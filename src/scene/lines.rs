@@ -86,7 +86,7 @@ impl<'a> Line<'a> {
 
     /// An error at this line.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
-        SceneError::line(&self.path, self.number, expected)
+        SceneError::line(self.path, self.number, expected)
     }
 
     /// The words between white space or commas.

@@ -15,9 +15,8 @@ pub use camera::CameraArgument;
 use self::exif::Exif;
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::stem;
-use super::lens::developed_camera;
+use super::lens::{developed_camera, pinhole};
 use super::{Scene, SceneError, photo_file};
-use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::image::Photo;
 
@@ -75,15 +74,16 @@ impl LoosePhotos {
     }
 
     fn frame(&self, path: &Path) -> Result<Frame, SceneError> {
+        let error = |expected: String| SceneError::expected(path, expected);
         let stored = photo_file::dimensions(path)?;
         let exif = Exif::read(path);
         let turned = exif.orientation();
         let Some(camera) = &self.camera else {
             let (focal_px, how) = exif.focal_px(stored).ok_or_else(|| {
-                SceneError::expected(
-                    path,
+                error(
                     "a focal length in EXIF expected, none found; --camera fx,fy,cx,cy, a camera \
-                     line of COLMAP or its cameras.txt says what the camera is",
+                     line of COLMAP or its cameras.txt says what the camera is"
+                        .to_owned(),
                 )
             })?;
             log::warn!(
@@ -92,14 +92,9 @@ impl LoosePhotos {
             );
             let turn = Turn(turned);
             let (width, height) = turn.size_in_file(stored);
-            let intrinsics = Intrinsics {
-                fx: focal_px,
-                fy: focal_px,
-                cx: (f64::from(width) - 1.0) / 2.0,
-                cy: (f64::from(height) - 1.0) / 2.0,
-                width,
-                height,
-            };
+            let middle = |side: u32| (f64::from(side) - 1.0) / 2.0;
+            let camera = [focal_px, focal_px, middle(width), middle(height)];
+            let intrinsics = pinhole(camera, (width, height)).map_err(error)?;
             return Ok(Frame {
                 develop: Some(Arc::new(turn)),
                 ..Frame::new(path.to_owned(), intrinsics)
@@ -113,8 +108,7 @@ impl LoosePhotos {
             );
         }
         let (taken, distortion) = camera.of_photo(path, stored)?;
-        let (intrinsics, develop) = developed_camera(taken, distortion)
-            .map_err(|expected| SceneError::expected(path, expected))?;
+        let (intrinsics, develop) = developed_camera(taken, distortion).map_err(error)?;
         Ok(Frame {
             develop,
             ..Frame::new(path.to_owned(), intrinsics)

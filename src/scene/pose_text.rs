@@ -13,9 +13,9 @@ use crate::geometry::Pose;
 
 /// The poses of a file, `world_from_camera`.
 pub(super) enum PoseText<'a> {
-    ByTime(Vec<(f64, Pose)>),
-    ByLine(PoseLines),
-    ByName(Vec<NamedPose<'a>>),
+    Timed(Vec<(f64, Pose)>),
+    Lines(PoseLines),
+    Named(Vec<NamedPose<'a>>),
 }
 
 /// A pose by the name of its image.
@@ -33,12 +33,12 @@ impl<'a> PoseText<'a> {
         };
         let words = first.words().count();
         match (words, names) {
-            (12, _) => Ok(Self::ByLine(by_line(file)?)),
+            (12, _) => Ok(Self::Lines(by_line(file)?)),
             (8, Some(names)) if is_named(first, names) => {
                 let poses = file.lines().map(named);
-                Ok(Self::ByName(poses.collect::<Result<_, _>>()?))
+                Ok(Self::Named(poses.collect::<Result<_, _>>()?))
             }
-            (8, _) => Ok(Self::ByTime(by_time(file)?)),
+            (8, _) => Ok(Self::Timed(by_time(file)?)),
             (10.., Some(_)) => {
                 let poses = image_lines(file).map(|(line, image)| {
                     let image = image?;
@@ -48,7 +48,7 @@ impl<'a> PoseText<'a> {
                         world_from_camera: image.camera_from_world.inverse(),
                     })
                 });
-                Ok(Self::ByName(poses.collect::<Result<_, SceneError>>()?))
+                Ok(Self::Named(poses.collect::<Result<_, SceneError>>()?))
             }
             (_, names) => {
                 let named = match names {

@@ -22,7 +22,7 @@ use self::scans::{Scans, scan_files};
 use self::sdk::{CameraModel, Sdk};
 use super::argument::split_word;
 use super::file_scene::{Develop, FileScene, Frame};
-use super::folder::{folder_name, numbered};
+use super::folder::{folder_name, numbered, warn_without_poses};
 use super::lines::{Line, TextFile};
 use super::trajectory::Trajectory;
 use super::{Entry, Scene, SceneError, photo_file};
@@ -55,14 +55,9 @@ const KEPT: usize = 10;
 const PER_SECOND: f64 = 1e6;
 
 /// A camera that is read.
-#[derive(Debug)]
 struct CameraKind {
-    /// The folder of its photos.
+    /// The folder of its photos, in that of its rig.
     folder: &'static str,
-    /// The file with the times of all its photos.
-    timestamps: &'static str,
-    /// The extrinsics of its rig.
-    extrinsics: &'static str,
     /// Its model.
     model: &'static str,
     pattern: Pattern,
@@ -70,40 +65,35 @@ struct CameraKind {
 
 /// In the order in which one is chosen. The centre camera of the stereo rig pairs with the left one, at a
 /// wide baseline.
-const CAMERAS: &[CameraKind] = &[
+const CAMERAS: [CameraKind; 4] = [
     CameraKind {
         folder: "stereo/centre",
-        timestamps: "stereo.timestamps",
-        extrinsics: "stereo",
         model: "stereo_narrow_left",
         pattern: Pattern::Gbrg,
     },
-    CameraKind {
-        folder: "mono_rear",
-        timestamps: "mono_rear.timestamps",
-        extrinsics: "mono_rear",
-        model: "mono_rear",
-        pattern: Pattern::Rggb,
-    },
-    CameraKind {
-        folder: "mono_left",
-        timestamps: "mono_left.timestamps",
-        extrinsics: "mono_left",
-        model: "mono_left",
-        pattern: Pattern::Rggb,
-    },
-    CameraKind {
-        folder: "mono_right",
-        timestamps: "mono_right.timestamps",
-        extrinsics: "mono_right",
-        model: "mono_right",
-        pattern: Pattern::Rggb,
-    },
+    mono("mono_rear"),
+    mono("mono_left"),
+    mono("mono_right"),
 ];
+
+const fn mono(name: &'static str) -> CameraKind {
+    CameraKind {
+        folder: name,
+        model: name,
+        pattern: Pattern::Rggb,
+    }
+}
+
+impl CameraKind {
+    /// What the times and the extrinsics of the camera are filed under.
+    fn rig(&self) -> &'static str {
+        self.folder.split('/').next().unwrap_or_default()
+    }
+}
 
 /// The traversal's folder, and the camera if the path names one.
 fn split_camera(path: &Path) -> (PathBuf, Option<&'static CameraKind>) {
-    for camera in CAMERAS {
+    for camera in &CAMERAS {
         if path.ends_with(camera.folder) {
             let depth = Path::new(camera.folder).components().count();
             if let Some(traversal) = path.ancestors().nth(depth) {
@@ -132,19 +122,13 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
              it, or in sdk or robotcar-dataset-sdk there",
         )
     })?;
-    let model = sdk.camera_model(camera.model)?;
-    let camera_from_vehicle = sdk.extrinsics(camera.extrinsics)?;
-    let vehicle_from_image = camera_from_vehicle.inverse() * model.camera_from_image;
     let ins = match traversal.join("gps/ins.csv") {
         file if file.is_file() => {
             let vehicle_from_ins = sdk.extrinsics("ins")?;
             read_ins(&file)?.of_part(&vehicle_from_ins.inverse())
         }
         _ => {
-            log::warn!(
-                "{}: no gps/ins.csv, so no frame can be a reference and nothing has an error",
-                traversal.display()
-            );
+            warn_without_poses(&traversal, "gps/ins.csv");
             Trajectory::default()
         }
     };
@@ -165,7 +149,9 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
              none found",
         ));
     };
-    let model = model.for_photos_of(photo_file::dimensions(first)?)?;
+    let model = sdk.camera_model(camera.model, photo_file::dimensions(first)?)?;
+    let camera_from_vehicle = sdk.extrinsics(camera.rig())?;
+    let vehicle_from_image = camera_from_vehicle.inverse() * model.camera_from_image;
     let intrinsics = model.intrinsics;
     let develop: Arc<dyn Develop> = Arc::new(Sensor {
         pattern: camera.pattern,
@@ -173,7 +159,6 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     });
     let scans = Scans {
         files: scan_files(&traversal, &sdk)?,
-        sdk,
         motion,
         times: photos.iter().map(|(time, _)| *time).collect(),
         image_from_vehicle: vehicle_from_image.inverse(),
@@ -198,7 +183,7 @@ fn photos(
     keeps_all: bool,
 ) -> Result<Vec<(u64, PathBuf)>, SceneError> {
     let folder = traversal.join(camera.folder);
-    let list = traversal.join(camera.timestamps);
+    let list = traversal.join(format!("{}.timestamps", camera.rig()));
     let times = match list.is_file() {
         true => times(&list)?,
         false => numbered(&folder, "png")?.into_keys().collect(),

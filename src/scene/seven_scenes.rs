@@ -15,6 +15,7 @@ use super::argument::split_word;
 use super::depth_image::{DepthCamera, DepthImages};
 use super::file_scene::{FileScene, Frame};
 use super::folder::{entries, folder_name};
+use super::lens::pinhole;
 use super::lines::TextFile;
 use super::{Entry, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
@@ -38,13 +39,21 @@ const SPLITS: [&str; 2] = ["train", "test"];
 
 /// What a depth value of 1 means \[m\].
 const UNIT_M: f64 = 0.001;
-const SIZE: (u32, u32) = (640, 480);
-/// Focal length of the depth camera, as documented \[px\].
-const DEPTH_FOCAL_LENGTH: f64 = 585.0;
-/// Focal length of the colour camera \[px\].
-const COLOR_FOCAL_LENGTH: f64 = 525.0;
-/// The principal point of both, as documented \[px\].
-const CENTER: (f64, f64) = (320.0, 240.0);
+/// The colour camera.
+const COLOR: Intrinsics = Intrinsics {
+    fx: 525.0,
+    fy: 525.0,
+    cx: 320.0,
+    cy: 240.0,
+    width: 640,
+    height: 480,
+};
+/// The depth camera, as documented; its principal point is that of both.
+const DEPTH: Intrinsics = Intrinsics {
+    fx: 585.0,
+    fy: 585.0,
+    ..COLOR
+};
 
 /// The colour camera of a Kinect from its depth camera, rotation and translation \[m\]: the calibration
 /// of LIRIS.
@@ -63,32 +72,27 @@ const COLOR_FROM_DEPTH: (Matrix3<f64>, [f64; 3]) = (
     [-0.02555894, 0.00010110, 0.00203183],
 );
 
-/// A frame by its files, before they are read.
-struct FrameFiles {
-    name: String,
-    photo: PathBuf,
-    depth: Option<PathBuf>,
-    pose: PathBuf,
-}
-
 fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError> {
-    let (name, files) = listing(folder, split)?;
-    let size = photo_file::dimensions(&files[0].photo)?;
+    let (name, photos) = listing(folder, split)?;
+    let size = photo_file::dimensions(&photos[0].1)?;
     let cameras = Cameras::of(folder, size)?;
-    let mut unknown = 0;
-    let mut frames = Vec::with_capacity(files.len());
-    let mut depths = Vec::with_capacity(files.len());
-    for file in files {
-        let world_from_depth = read_pose(&file.pose)?;
-        unknown += usize::from(world_from_depth.is_none());
+    let mut frames = Vec::with_capacity(photos.len());
+    let mut depths = Vec::with_capacity(photos.len());
+    for (name, photo) in photos {
+        let number = file_name(&photo)
+            .and_then(file_parts)
+            .map_or("", |parts| parts.0);
+        let beside = |kind: &str| photo.with_file_name(format!("frame-{number}.{kind}"));
+        depths.push(Some(beside("depth.png")).filter(|path| path.is_file()));
         frames.push(Frame {
-            name: file.name,
-            world_from_camera: world_from_depth
-                .map(|pose| pose * cameras.camera_from_posed.inverse()),
-            ..Frame::new(file.photo, cameras.photo)
+            name,
+            world_from_camera: read_pose(&beside("pose.txt"))?
+                .map(|world_from_posed| world_from_posed * cameras.camera_from_posed.inverse()),
+            ..Frame::new(photo, cameras.photo)
         });
-        depths.push(file.depth);
     }
+    let has_no_pose = |frame: &&Frame| frame.world_from_camera.is_none();
+    let unknown = frames.iter().filter(has_no_pose).count();
     if unknown > 0 {
         log::warn!(
             "{}: {unknown} of {} frames have no pose",
@@ -105,9 +109,12 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
+/// A frame's name and its photo.
+type NamedPhoto = (String, PathBuf);
+
 /// The scene's name and its frames in order. Frames of a single sequence are called by their numbers,
 /// those of several by sequence and number.
-fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<FrameFiles>), SceneError> {
+fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<NamedPhoto>), SceneError> {
     if is_sequence(folder) {
         let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let scene = scene.parent().map(folder_name).unwrap_or_default();
@@ -197,21 +204,14 @@ fn is_sequence(folder: &Path) -> bool {
 
 /// The frames of a sequence in the order of their numbers. Of a photo in two formats the last by name is
 /// taken.
-fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<FrameFiles>, SceneError> {
-    let entries = entries(folder)?;
+fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<NamedPhoto>, SceneError> {
     let mut by_number = BTreeMap::new();
-    for name in entries.iter().filter_map(|path| file_name(path)) {
-        let Some((number, _, _)) = file_parts(name).filter(|_| is_photo(name)) else {
-            continue;
-        };
-        let depth = folder.join(format!("frame-{number}.depth.png"));
-        let frame = FrameFiles {
-            name: format!("{prefix}{number}"),
-            photo: folder.join(name),
-            depth: Some(depth).filter(|path| path.is_file()),
-            pose: folder.join(format!("frame-{number}.pose.txt")),
-        };
-        by_number.insert((number.len(), number), frame);
+    for photo in entries(folder)? {
+        let name = file_name(&photo).filter(|name| is_photo(name));
+        if let Some((number, _, _)) = name.and_then(file_parts) {
+            let frame = (format!("{prefix}{number}"), photo.clone());
+            by_number.insert((number.len(), number.to_owned()), frame);
+        }
     }
     Ok(by_number.into_values().collect())
 }
@@ -258,7 +258,7 @@ impl Cameras {
                 depth: DepthCamera::Registered,
             });
         }
-        if (width, height) != SIZE {
+        if (width, height) != (COLOR.width, COLOR.height) {
             return Err(SceneError::expected(
                 folder.join("camera-intrinsics.txt"),
                 format!(
@@ -272,41 +272,26 @@ impl Cameras {
              of the data set hold",
             folder.display()
         );
-        let camera = |focal_length| Intrinsics {
-            fx: focal_length,
-            fy: focal_length,
-            cx: CENTER.0,
-            cy: CENTER.1,
-            width,
-            height,
-        };
         let camera_from_depth = Pose::from_parts(
             Translation3::from(COLOR_FROM_DEPTH.1),
             UnitQuaternion::from_matrix(&COLOR_FROM_DEPTH.0),
         );
         Ok(Self {
-            photo: camera(COLOR_FOCAL_LENGTH),
+            photo: COLOR,
             camera_from_posed: camera_from_depth,
             depth: DepthCamera::Beside {
-                intrinsics: camera(DEPTH_FOCAL_LENGTH),
+                intrinsics: DEPTH,
                 camera_from_depth,
             },
         })
     }
 }
 
-fn read_intrinsics(path: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, SceneError> {
+fn read_intrinsics(path: &Path, size: (u32, u32)) -> Result<Intrinsics, SceneError> {
     let file = TextFile::read(path)?;
     let [[fx, skew, cx], [zero, fy, cy], last] = file.rows::<3, 3>()?;
-    if fx <= 0.0 || fy <= 0.0 || skew != 0.0 || zero != 0.0 || last != [0.0, 0.0, 1.0] {
+    if skew != 0.0 || zero != 0.0 || last != [0.0, 0.0, 1.0] {
         return Err(file.error("a matrix fx 0 cx, 0 fy cy, 0 0 1 expected"));
     }
-    Ok(Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    })
+    pinhole([fx, fy, cx, cy], size).map_err(|why| file.error(why))
 }

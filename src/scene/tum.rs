@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use super::depth_image::{DepthCamera, DepthImages};
 use super::file_scene::{FileScene, Frame};
-use super::folder::{folder_name, within};
+use super::folder::{folder_name, warn_without_poses, within};
+use super::lens::pinhole;
 use super::lines::TextFile;
 use super::pose_text::by_time;
 use super::trajectory::{Trajectory, associated};
@@ -51,10 +52,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let trajectory = if truth.is_file() {
         Some(Trajectory::in_seconds(by_time(&TextFile::read(&truth)?)?))
     } else {
-        log::warn!(
-            "{}: no groundtruth.txt, so no frame can be a reference and nothing has an error",
-            folder.display()
-        );
+        warn_without_poses(folder, "groundtruth.txt");
         None
     };
     let times = |list: &[(f64, PathBuf)]| list.iter().map(|(time, _)| *time).collect::<Vec<_>>();
@@ -111,20 +109,12 @@ fn image_list(folder: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>, SceneErr
 /// The camera of the folder, whose images are of this size.
 fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, SceneError> {
     let path = folder.join("calibration.txt");
-    let [fx, fy, cx, cy] = if path.is_file() {
+    if path.is_file() {
         let file = TextFile::read(&path)?;
         let [camera] = file.rows::<1, 4>()?;
-        if camera[0] <= 0.0 || camera[1] <= 0.0 {
-            return Err(file.error("fx fy cx cy with positive focal lengths expected"));
-        }
-        camera
-    } else if (width, height) == KINECT_SIZE {
-        log::info!(
-            "{}: no calibration.txt; the Kinect's default holds, f = 525, centre 319.5, 239.5",
-            folder.display()
-        );
-        KINECT
-    } else {
+        return pinhole(camera, (width, height)).map_err(|why| file.error(why));
+    }
+    if (width, height) != KINECT_SIZE {
         return Err(SceneError::expected(
             path,
             format!(
@@ -132,13 +122,10 @@ fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, Scen
                  and the default is for 640x480"
             ),
         ));
-    };
-    Ok(Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    })
+    }
+    log::info!(
+        "{}: no calibration.txt; the Kinect's default holds, f = 525, centre 319.5, 239.5",
+        folder.display()
+    );
+    pinhole(KINECT, KINECT_SIZE).map_err(|why| SceneError::expected(path, why))
 }

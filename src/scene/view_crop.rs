@@ -7,7 +7,7 @@ use super::depth_image;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 
-/// Nothing nearer than this is looked at \[m\]: the camera itself, or whoever carried it.
+/// Nothing nearer than this is looked at \[m\]: the camera itself, or the person who carried it.
 const NEAREST_M: f64 = 0.1;
 /// How far around a point something nearer is sought \[squares of the image\]: twice the gaps between
 /// the lines of a scanner with 32 beams.

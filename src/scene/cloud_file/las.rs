@@ -55,33 +55,31 @@ fn decoded(path: &Path, size: u64) -> Result<MapCloud, String> {
     }
 }
 
+/// Bytes at a place of a file.
+fn bytes_at<const N: usize>(file: &mut (impl Read + Seek), at: u64) -> Result<[u8; N], String> {
+    let mut bytes = [0; N];
+    let read = file.seek(SeekFrom::Start(at));
+    read.and_then(|_| file.read_exact(&mut bytes))
+        .map_err(|_| "a LAS file expected, it is cut off".to_owned())?;
+    Ok(bytes)
+}
+
 /// Compares the lengths of the records behind the points, which version 1.4 has, with the file.
 fn expect_extended_records(file: &mut (impl Read + Seek), size: u64) -> Result<(), String> {
-    let damaged = |_| "the header of a LAS file expected, it is cut off".to_owned();
-    let mut header = [0; 247];
-    // Older headers are shorter, and files with one may be.
-    let mut limited = file.take(247);
-    let mut filled = 0;
-    while let Ok(count @ 1..) = limited.read(&mut header[filled..]) {
-        filled += count;
-    }
-    let (major, minor) = (header[24], header[25]);
-    if (major, minor) < (1, 4) {
+    let version: [u8; 2] = bytes_at(file, 24)?;
+    if version < [1, 4] {
         return Ok(());
     }
-    let mut at = u64::from_le_bytes([0, 1, 2, 3, 4, 5, 6, 7].map(|i| header[235 + i]));
-    let count = u32::from_le_bytes([0, 1, 2, 3].map(|i| header[243 + i]));
+    let mut at = u64::from_le_bytes(bytes_at(file, 235)?);
+    let count = u32::from_le_bytes(bytes_at(file, 243)?);
     for _ in 0..count {
-        let mut record = [0; 60];
-        file.seek(SeekFrom::Start(at)).map_err(damaged)?;
-        file.read_exact(&mut record).map_err(damaged)?;
-        let length = u64::from_le_bytes([0, 1, 2, 3, 4, 5, 6, 7].map(|i| record[20 + i]));
-        let end = at
-            .checked_add(60)
-            .and_then(|start| start.checked_add(length));
-        at = end.filter(|end| *end <= size).ok_or_else(|| {
-            format!("a record of {length} bytes expected, but the file has only {size} bytes")
-        })?;
+        let length = u64::from_le_bytes(bytes_at(file, at.saturating_add(20))?);
+        at = at.saturating_add(60).saturating_add(length);
+        if at > size {
+            return Err(format!(
+                "a record of {length} bytes expected, but the file has only {size} bytes"
+            ));
+        }
     }
     Ok(())
 }
@@ -91,20 +89,15 @@ fn expect_extended_records(file: &mut (impl Read + Seek), size: u64) -> Result<(
 /// chunk begins with a point that is not compressed.
 fn expect_chunks(file: &mut (impl Read + Seek), size: u64, layout: &LazVlr) -> Result<(), String> {
     let damaged = |_| "compressed points expected, the file is cut off".to_owned();
-    let first = file.stream_position().map_err(damaged)? + 8;
-    let mut offset = [0; 8];
-    file.read_exact(&mut offset).map_err(damaged)?;
-    if i64::from_le_bytes(offset) < first as i64 {
-        file.seek(SeekFrom::End(-8)).map_err(damaged)?;
-        file.read_exact(&mut offset).map_err(damaged)?;
+    let start = file.stream_position().map_err(damaged)?;
+    let first = start + 8;
+    let mut table = i64::from_le_bytes(bytes_at(file, start)?);
+    if table < first as i64 {
+        table = i64::from_le_bytes(bytes_at(file, size.saturating_sub(8))?);
     }
-    let table = u64::try_from(i64::from_le_bytes(offset)).ok();
-    let table = table.filter(|table| *table >= first);
+    let table = u64::try_from(table).ok().filter(|table| *table >= first);
     if let Some(table) = table {
-        let mut counts = [0; 8];
-        file.seek(SeekFrom::Start(table)).map_err(damaged)?;
-        file.read_exact(&mut counts).map_err(damaged)?;
-        let chunks = u32::from_le_bytes([0, 1, 2, 3].map(|i| counts[4 + i]));
+        let chunks = u32::from_le_bytes(bytes_at(file, table.saturating_add(4))?);
         if u64::from(chunks) > size / LEAST_RECORD {
             return Err(format!(
                 "{chunks} chunks of points expected, but the file has only {size} bytes"
@@ -116,17 +109,19 @@ fn expect_chunks(file: &mut (impl Read + Seek), size: u64, layout: &LazVlr) -> R
         return Err("a table of the chunks of points expected, none found".to_owned());
     }
     let mut at = first;
+    let mut lengths = vec![0; 4 * layers as usize];
     let table = table.filter(|_| layers > 0).unwrap_or(first);
     while at < table {
         // The first point, the number of points, and the lengths of all layers.
         let lengths_at = at + layout.items_size() + 4;
         file.seek(SeekFrom::Start(lengths_at)).map_err(damaged)?;
-        let mut end = lengths_at + 4 * layers;
-        for _ in 0..layers {
-            let mut length = [0; 4];
-            file.read_exact(&mut length).map_err(damaged)?;
-            end += u64::from(u32::from_le_bytes(length));
-        }
+        file.read_exact(&mut lengths).map_err(damaged)?;
+        let (numbers, _) = lengths.as_chunks();
+        let length: u64 = numbers
+            .iter()
+            .map(|number| u64::from(u32::from_le_bytes(*number)))
+            .sum();
+        let end = lengths_at + 4 * layers + length;
         if end > size {
             return Err(format!(
                 "a chunk of points up to byte {end} expected, but the file has only {size} bytes"

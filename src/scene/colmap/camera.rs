@@ -1,6 +1,6 @@
 //! COLMAP's camera models.
 
-use super::super::lens::Distortion;
+use super::super::lens::{Distortion, pinhole};
 use crate::camera::Intrinsics;
 
 /// A camera of a model: as the photos were taken, pixel centres at integers.
@@ -62,12 +62,8 @@ impl ModelCamera {
             [fx, fy, cx, cy, k1, k2, p1, p2] => (fx, fy, cx, cy, [k1, k2, p1, p2]),
             _ => return Err(format!("parameters of {model} expected")),
         };
-        let is_camera =
-            parameters.iter().all(|parameter| parameter.is_finite()) && fx > 0.0 && fy > 0.0;
-        if !is_camera {
-            return Err(format!(
-                "finite parameters and positive focal lengths expected, {parameters:?} found"
-            ));
+        if !parameters.iter().all(|parameter| parameter.is_finite()) {
+            return Err(format!("finite parameters expected, {parameters:?} found"));
         }
         let size = |pixels: u64| u32::try_from(pixels).ok().filter(|pixels| *pixels > 0);
         let (Some(width), Some(height)) = (size(width), size(height)) else {
@@ -75,14 +71,7 @@ impl ModelCamera {
         };
         let [k1, k2, p1, p2] = distortion;
         Ok(Self {
-            intrinsics: Intrinsics {
-                fx,
-                fy,
-                cx: cx - 0.5,
-                cy: cy - 0.5,
-                width,
-                height,
-            },
+            intrinsics: pinhole([fx, fy, cx - 0.5, cy - 0.5], (width, height))?,
             distortion: Distortion { k1, k2, p1, p2 },
         })
     }

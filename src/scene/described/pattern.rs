@@ -33,24 +33,22 @@ fn number(path: &Path) -> Option<f64> {
 }
 
 fn matches(pattern: &str, name: &str) -> bool {
-    let Some((start, rest)) = pattern.split_once('*') else {
+    let parts: Vec<&str> = pattern.split('*').collect();
+    let [first, middle @ .., last] = parts.as_slice() else {
         return pattern == name;
     };
-    let Some(mut name) = name.strip_prefix(start) else {
+    let Some(mut rest) = name
+        .strip_prefix(first)
+        .and_then(|name| name.strip_suffix(last))
+    else {
         return false;
     };
-    // Each part between two stars where it is first found; the last at the end.
-    let mut parts = rest.split('*').peekable();
-    while let Some(part) = parts.next() {
-        if parts.peek().is_none() {
-            return name.ends_with(part);
-        }
-        match name.find(part) {
-            Some(at) => name = &name[at + part.len()..],
-            None => return false,
-        }
-    }
-    true
+    // Each part between two stars where it is first found.
+    middle.iter().all(|part| {
+        let found = rest.split_once(part);
+        rest = found.map_or(rest, |(_, after)| after);
+        found.is_some()
+    })
 }
 
 /// A name in runs of digits and of other characters, which compare as people order names: digits by

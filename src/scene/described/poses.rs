@@ -22,9 +22,9 @@ pub(super) struct FramePoses {
 pub(super) fn read(path: &Path, photos: &[PathBuf]) -> Result<Vec<FramePoses>, SceneError> {
     let file = TextFile::read(path)?;
     match PoseText::read(&file, None)? {
-        PoseText::ByTime(samples) => by_time(&file, Trajectory::in_seconds(samples), photos),
-        PoseText::ByLine(poses) => by_line(&file, &poses, photos),
-        PoseText::ByName(_) => Err(file.error("poses by time or by line expected")),
+        PoseText::Timed(samples) => by_time(&file, Trajectory::in_seconds(samples), photos),
+        PoseText::Lines(poses) => by_line(&file, &poses, photos),
+        PoseText::Named(_) => Err(file.error("poses by time or by line expected")),
     }
 }
 

@@ -7,11 +7,9 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::super::SceneError;
 use super::super::folder::numbered;
+use super::super::gps::EARTH_RADIUS_M;
 use super::super::lines::TextFile;
 use crate::geometry::Pose;
-
-/// The radius of the earth in the devkit's projection \[m\].
-const EARTH_RADIUS_M: f64 = 6_378_137.0;
 
 /// What a packet says, as far as it matters here. The frame of the IMU is x forward, y left, z up.
 #[derive(Clone, Debug)]

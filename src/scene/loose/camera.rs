@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use super::super::SceneError;
 use super::super::colmap::{ModelCamera, camera_of_line};
-use super::super::lens::Distortion;
+use super::super::lens::{Distortion, pinhole};
 use super::super::lines::{TextFile, excerpt, numbers};
 use crate::camera::Intrinsics;
 
@@ -30,33 +30,26 @@ impl CameraArgument {
     ) -> Result<(Intrinsics, Distortion), SceneError> {
         let error = |expected: String| SceneError::expected(photo, expected);
         match self {
-            Self::Pinhole([fx, fy, cx, cy]) => {
-                let taken = Intrinsics {
-                    fx: *fx,
-                    fy: *fy,
-                    cx: *cx,
-                    cy: *cy,
-                    width,
-                    height,
-                };
+            Self::Pinhole(camera @ [_, _, cx, cy]) => {
                 let is_inside =
                     (0.0..f64::from(width)).contains(cx) && (0.0..f64::from(height)).contains(cy);
-                match is_inside {
-                    true => Ok((taken, Distortion::default())),
-                    false => Err(error(format!(
+                if !is_inside {
+                    return Err(error(format!(
                         "{width}x{height} pixels found, but --camera has its centre at {cx},{cy}: \
                          fx,fy,cx,cy for photos of this size expected"
-                    ))),
+                    )));
                 }
+                let taken = pinhole(*camera, (width, height)).map_err(error)?;
+                Ok((taken, Distortion::default()))
             }
             Self::Line(line) => {
                 let camera = line_camera(line).map_err(error)?;
+                let Intrinsics {
+                    width: w,
+                    height: h,
+                    ..
+                } = camera.intrinsics;
                 of_size(&camera, (width, height)).ok_or_else(|| {
-                    let Intrinsics {
-                        width: w,
-                        height: h,
-                        ..
-                    } = camera.intrinsics;
                     error(format!(
                         "{w}x{h} pixels expected, as --camera says, {width}x{height} found"
                     ))
@@ -72,11 +65,8 @@ impl CameraArgument {
                     .iter()
                     .filter_map(|camera| of_size(camera, (width, height)))
                     .collect();
-                let is_one = |cameras: &[(Intrinsics, Distortion)]| {
-                    cameras.iter().all(|camera| *camera == cameras[0])
-                };
                 match fitting.as_slice() {
-                    [camera, ..] if is_one(&fitting) => Ok(*camera),
+                    [camera, rest @ ..] if rest.iter().all(|other| other == camera) => Ok(*camera),
                     [] => Err(file.error(format!(
                         "a camera of {width}x{height} pixels expected, as {} has, none of {} found",
                         photo.display(),

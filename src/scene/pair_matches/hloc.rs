@@ -94,19 +94,17 @@ impl HlocFiles {
         };
         let keypoints = |image: &str| {
             let name = self.images.get(image).ok_or_else(|| {
-                content(
-                    &self.features_path,
-                    &format!("the image `{image}` expected"),
-                )
+                let expected = format!("the image `{image}` expected");
+                content(&self.features_path, &expected)
             })?;
             let place = format!("{name}/keypoints");
-            let found = self.features.dataset(&place).map_err(|why| why.to_string());
+            let found = self.features.dataset(&place).map_err(said);
             let found = found.and_then(|set| positions(&set));
             found.map_err(|why| content(&self.features_path, &format!("{place}: {why}")))
         };
         let (first, second) = (keypoints(&stored[0])?, keypoints(&stored[1])?);
         let place = format!("{}/{}/matches0", stored[0], stored[1]);
-        let partners = self.matches.dataset(&place).map_err(|why| why.to_string());
+        let partners = self.matches.dataset(&place).map_err(said);
         let partners = partners
             .and_then(|set| partners_of(&set))
             .map_err(|why| content(&self.matches_path, &format!("{place}: {why}")))?;
@@ -117,6 +115,10 @@ impl HlocFiles {
         };
         found.checked(&self.matches_path).map(Some)
     }
+}
+
+fn said(why: hdf5_pure::Error) -> String {
+    why.to_string()
 }
 
 fn content(path: &Path, expected: &dyn std::fmt::Display) -> SceneError {
@@ -141,7 +143,6 @@ struct Found {
 
 /// Looks for groups that have keypoints or matches.
 fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), String> {
-    let said = |why: hdf5_pure::Error| why.to_string();
     let sets = group.datasets().map_err(said)?;
     if sets.iter().any(|name| name == "keypoints") {
         found.keypoints.push(path.join("/"));
@@ -166,7 +167,7 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
 
 /// Refuses what is larger than any photo's keypoints before it is read.
 fn check_size(set: &Dataset) -> Result<Vec<u64>, String> {
-    let shape = set.shape().map_err(|why| why.to_string())?;
+    let shape = set.shape().map_err(said)?;
     let count = shape
         .iter()
         .try_fold(1_u64, |all, &side| all.checked_mul(side));
@@ -182,7 +183,6 @@ fn positions(set: &Dataset) -> Result<Vec<[f32; 2]>, String> {
     let [_, 2] = check_size(set)?[..] else {
         return Err("positions expected, an array N × 2".to_owned());
     };
-    let said = |why: hdf5_pure::Error| why.to_string();
     let numbers: Vec<f32> = match set.element_size().map_err(said)? {
         // hloc stores halves, which the crate hands out as they are.
         2 => {
@@ -204,7 +204,7 @@ fn partners_of(set: &Dataset) -> Result<Vec<Option<usize>>, String> {
     let [_] = check_size(set)?[..] else {
         return Err("one number for each keypoint expected".to_owned());
     };
-    let numbers = set.read_i64().map_err(|why| why.to_string())?;
+    let numbers = set.read_i64().map_err(said)?;
     let partner = |number: i64| match number {
         -1 => Ok(None),
         _ => usize::try_from(number)

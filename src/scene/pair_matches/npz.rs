@@ -20,34 +20,30 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let file = File::open(path).map_err(SceneError::io(path))?;
     let mut archive =
         ZipArchive::new(file).map_err(|why| error(format!("an .npz archive expected: {why}")))?;
-    let mut array = |name: &str| -> Result<Array, SceneError> {
-        let said = |why: &dyn std::fmt::Display| error(format!("{name}: {why}"));
-        let entry = archive
-            .by_name(&format!("{name}.npy"))
-            .map_err(|why| said(&why))?;
+    let mut array = |name: &str| -> Result<Array, String> {
+        let entry = archive.by_name(&format!("{name}.npy"));
+        let entry = entry.map_err(|why| why.to_string())?;
         // The size that the archive announces may be wrong; no more than is allowed is read.
         let mut bytes = Vec::new();
         let read = entry.take(MOST_BYTES + 1).read_to_end(&mut bytes);
-        read.map_err(|why| said(&why))?;
+        read.map_err(|why| why.to_string())?;
         if bytes.len() as u64 > MOST_BYTES {
-            return Err(said(&format!(
-                "an array of at most {MOST_BYTES} bytes expected"
-            )));
+            return Err(format!("an array of at most {MOST_BYTES} bytes expected"));
         }
-        Array::parse(&bytes).map_err(|why| said(&why))
+        Array::parse(&bytes)
     };
-    let first = array("keypoints0")?.points();
-    let second = array("keypoints1")?.points();
-    let matches = array("matches")?;
-    let points = |found: Option<Vec<[f32; 2]>>, name: &str| {
-        found.ok_or_else(|| error(format!("{name}: positions expected, an array N × 2")))
+    let named = |name: &'static str| move |why: String| error(format!("{name}: {why}"));
+    let mut points = |name| {
+        array(name)
+            .and_then(|array| array.points())
+            .map_err(named(name))
     };
+    let (first, second) = (points("keypoints0")?, points("keypoints1")?);
+    let partners = array("matches").and_then(|array| array.partners());
     Ok(RawMatches {
-        first: points(first, "keypoints0")?,
-        second: points(second, "keypoints1")?,
-        partners: matches.partners().ok_or_else(|| {
-            error("matches: whole numbers expected, one for each keypoint".to_owned())
-        })?,
+        first,
+        second,
+        partners: partners.map_err(named("matches"))?,
     })
 }
 
@@ -101,24 +97,25 @@ impl Array {
         Ok(Self { shape, numbers })
     }
 
-    fn points(&self) -> Option<Vec<[f32; 2]>> {
-        let [_, 2] = self.shape.as_slice() else {
-            return None;
+    fn points(&self) -> Result<Vec<[f32; 2]>, String> {
+        let [_, 2] = self.shape[..] else {
+            return Err("positions expected, an array N × 2".to_owned());
         };
-        let pairs = self.numbers.chunks_exact(2);
-        Some(pairs.map(|pair| [pair[0] as f32, pair[1] as f32]).collect())
+        let (pairs, _) = self.numbers.as_chunks();
+        Ok(pairs.iter().map(|[x, y]| [*x as f32, *y as f32]).collect())
     }
 
-    fn partners(&self) -> Option<Vec<Option<usize>>> {
-        (self.shape.len() == 1).then_some(())?;
-        let numbers = self.numbers.iter();
-        numbers
-            .map(|&number| match number {
-                -1.0 => Some(None),
-                _ if number >= 0.0 && number.fract() == 0.0 => Some(Some(number as usize)),
-                _ => None,
-            })
-            .collect()
+    fn partners(&self) -> Result<Vec<Option<usize>>, String> {
+        let partner = |&number: &f64| match number {
+            -1.0 => Some(None),
+            _ if number >= 0.0 && number.fract() == 0.0 => Some(Some(number as usize)),
+            _ => None,
+        };
+        let partners = match self.shape[..] {
+            [_] => self.numbers.iter().map(partner).collect(),
+            _ => None,
+        };
+        partners.ok_or_else(|| "whole numbers expected, one for each keypoint".to_owned())
     }
 }
 

@@ -14,7 +14,7 @@ const LONGEST_GAP_US: f64 = 500_000.0;
 /// Slower than this the car stands \[m/s\]; the noise of a standing INS is a tenth of it.
 const STANDS_M_S: f64 = 0.5;
 /// The status of rows that can be believed.
-const GOOD: [&str; 1] = ["INS_SOLUTION_GOOD"];
+const GOOD: &str = "INS_SOLUTION_GOOD";
 
 /// The trajectory of poses by time \[µs\].
 fn track(samples: Vec<(u64, Pose)>) -> Trajectory {
@@ -56,25 +56,19 @@ pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
     };
     let time = column("timestamp")?;
     let status = column("ins_status")?;
+    let mut columns = [0; 6];
     let names = ["northing", "easting", "down", "roll", "pitch", "yaw"];
-    let columns = names.map(column);
-    let columns = columns.into_iter().collect::<Result<Vec<usize>, _>>()?;
+    for (place, name) in columns.iter_mut().zip(names) {
+        *place = column(name)?;
+    }
     let mut samples = Vec::new();
     for line in lines {
         let words: Vec<&str> = line.words().collect();
-        if !words
-            .get(status)
-            .is_some_and(|status| GOOD.contains(status))
-        {
+        if words.get(status) != Some(&GOOD) {
             continue;
         }
-        let mut numbers = [0.0; 6];
-        for (number, &column) in numbers.iter_mut().zip(&columns) {
-            *number = line.number(word(&line, &words, column)?)?;
-        }
-        let [north, east, down, roll, pitch, yaw] = numbers;
         let time = microseconds(&line, word(&line, &words, time)?)?;
-        samples.push((time, transform([north, east, down], [roll, pitch, yaw])));
+        samples.push((time, transform_at(&line, &words, columns)?));
     }
     Ok(track(samples))
 }
@@ -86,21 +80,26 @@ pub(super) fn read_odometry(path: &Path) -> Result<Trajectory, SceneError> {
     let mut samples: Vec<(u64, Pose)> = Vec::new();
     for line in file.lines().skip(1) {
         let words: Vec<&str> = line.words().collect();
-        let mut numbers = [0.0; 6];
-        for (number, column) in numbers.iter_mut().zip(2..) {
-            *number = line.number(word(&line, &words, column)?)?;
-        }
         // The columns are called source and destination; the motion is from the second to the first.
         let at = microseconds(&line, word(&line, &words, 0)?)?;
         let from = microseconds(&line, word(&line, &words, 1)?)?;
         if samples.is_empty() {
             samples.push((from.min(at), pose));
         }
-        let [x, y, z, roll, pitch, yaw] = numbers;
-        pose *= transform([x, y, z], [roll, pitch, yaw]);
+        pose *= transform_at(&line, &words, [2, 3, 4, 5, 6, 7])?;
         samples.push((at.max(from), pose));
     }
     Ok(track(samples))
+}
+
+/// The transform whose position, roll, pitch and yaw are in these columns.
+fn transform_at(line: &Line<'_>, words: &[&str], at: [usize; 6]) -> Result<Pose, SceneError> {
+    let mut numbers = [0.0; 6];
+    for (number, column) in numbers.iter_mut().zip(at) {
+        *number = line.number(word(line, words, column)?)?;
+    }
+    let [x, y, z, roll, pitch, yaw] = numbers;
+    Ok(transform([x, y, z], [roll, pitch, yaw]))
 }
 
 fn word<'a>(line: &Line<'_>, words: &[&'a str], column: usize) -> Result<&'a str, SceneError> {

@@ -20,53 +20,34 @@ const NEAR_M: f64 = 50.0;
 /// Bytes of a scan at most; a scan of the LMS has 13 kB.
 const LONGEST_SCAN: u64 = 1 << 26;
 
-/// A laser scanner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scanner {
-    /// In a plane: x, y, reflectance.
-    Lms(&'static str),
-    /// In space: x, y, z.
-    Ldmrs,
-}
-
-impl Scanner {
-    const ALL: [Self; 3] = [Self::Lms("lms_front"), Self::Lms("lms_rear"), Self::Ldmrs];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Lms(name) => name,
-            Self::Ldmrs => "ldmrs",
-        }
-    }
-}
+/// The laser scanners, and whether one scans in a plane (x, y, reflectance) or in space (x, y, z).
+const SCANNERS: [(&str, bool); 3] = [("lms_front", true), ("lms_rear", true), ("ldmrs", false)];
 
 /// A scan that is there.
-#[derive(Debug)]
 pub(super) struct ScanFile {
     /// When it was taken \[µs\].
     time: u64,
-    scanner: Scanner,
     path: PathBuf,
+    is_planar: bool,
+    vehicle_from_scanner: Pose,
 }
 
 /// All scans of a traversal, by time.
 pub(super) fn scan_files(traversal: &Path, sdk: &Sdk) -> Result<Vec<ScanFile>, SceneError> {
     let mut files = Vec::new();
-    for scanner in Scanner::ALL {
-        let folder = traversal.join(scanner.name());
+    for (scanner, is_planar) in SCANNERS {
+        let folder = traversal.join(scanner);
         if !folder.is_dir() {
             continue;
         }
-        sdk.extrinsics(scanner.name())?;
-        files.extend(
-            numbered(&folder, "bin")?
-                .into_iter()
-                .map(|(time, path)| ScanFile {
-                    time,
-                    scanner,
-                    path,
-                }),
-        );
+        let vehicle_from_scanner = sdk.extrinsics(scanner)?;
+        let scans = numbered(&folder, "bin")?.into_iter();
+        files.extend(scans.map(|(time, path)| ScanFile {
+            time,
+            path,
+            is_planar,
+            vehicle_from_scanner,
+        }));
     }
     files.sort_by(|a, b| (a.time, &a.path).cmp(&(b.time, &b.path)));
     Ok(files)
@@ -76,7 +57,6 @@ pub(super) fn scan_files(traversal: &Path, sdk: &Sdk) -> Result<Vec<ScanFile>, S
 pub(super) struct Scans {
     /// By time.
     pub files: Vec<ScanFile>,
-    pub sdk: Sdk,
     /// How the vehicle moved.
     pub motion: Trajectory,
     /// The times of the frames \[µs\].
@@ -112,7 +92,6 @@ impl Clouds for Scans {
             return Ok(Cloud::default());
         };
         let mut gathered: Vec<Point3<f64>> = Vec::new();
-        let mut mounts: Vec<(Scanner, Pose)> = Vec::new();
         for file in self.around(time) {
             let Some(there) = self.motion.at(file.time as f64) else {
                 continue;
@@ -121,16 +100,8 @@ impl Clouds for Scans {
             if now_from_then.translation.vector.norm() > NEAR_M {
                 continue;
             }
-            let known = mounts.iter().find(|(scanner, _)| *scanner == file.scanner);
-            let vehicle_from_scanner = match known {
-                Some((_, mount)) => *mount,
-                None => {
-                    let mount = self.sdk.extrinsics(file.scanner.name())?;
-                    mounts.push((file.scanner, mount));
-                    mount
-                }
-            };
-            let image_from_scanner = self.image_from_vehicle * now_from_then * vehicle_from_scanner;
+            let image_from_scanner =
+                self.image_from_vehicle * now_from_then * file.vehicle_from_scanner;
             let points = read(file)?.into_iter();
             gathered.extend(points.map(|point| image_from_scanner * point));
         }
@@ -142,29 +113,25 @@ impl Clouds for Scans {
 fn read(file: &ScanFile) -> Result<Vec<Point3<f64>>, SceneError> {
     let path = &file.path;
     let io = SceneError::io(path);
-    let error = |expected: String| SceneError::expected(path, expected);
     let size = std::fs::metadata(path).map_err(io)?.len();
     if size % 24 != 0 || size > LONGEST_SCAN {
-        return Err(error(format!(
-            "a scan of 24 bytes for each point expected, at most {LONGEST_SCAN}, {size} found"
-        )));
+        return Err(SceneError::expected(
+            path,
+            format!(
+                "a scan of 24 bytes for each point expected, at most {LONGEST_SCAN}, {size} found"
+            ),
+        ));
     }
     let bytes = std::fs::read(path).map_err(io)?;
-    let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap_or([0; 8]));
-    bytes
-        .chunks_exact(24)
-        .map(|point| {
-            let [x, y, third] = [0, 8, 16].map(|at| number(&point[at..at + 8]));
-            let z = match file.scanner {
-                // The third is the reflectance.
-                Scanner::Lms(_) => 0.0,
-                Scanner::Ldmrs => third,
-            };
-            let point = Point3::new(x, y, z);
-            let is_finite = point.iter().all(|value| value.is_finite());
-            is_finite
-                .then_some(point)
-                .ok_or_else(|| error("finite positions expected".to_owned()))
-        })
-        .collect()
+    let (points, _) = bytes.as_chunks::<24>();
+    let point = |point: &[u8; 24]| {
+        let (numbers, _) = point.as_chunks::<8>();
+        let [x, y, third] = [0, 1, 2].map(|at| f64::from_le_bytes(numbers[at]));
+        let z = if file.is_planar { 0.0 } else { third };
+        let is_finite = x.is_finite() && y.is_finite() && z.is_finite();
+        is_finite
+            .then_some(Point3::new(x, y, z))
+            .ok_or_else(|| SceneError::expected(path, "finite positions expected"))
+    };
+    points.iter().map(point).collect()
 }

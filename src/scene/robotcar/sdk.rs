@@ -1,12 +1,12 @@
 //! The calibration that comes with the SDK: `models` and `extrinsics`.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3x4, Rotation3, Translation3, UnitQuaternion};
 
 use super::super::SceneError;
+use super::super::lens::pinhole;
 use super::super::lines::TextFile;
 use crate::camera::Intrinsics;
 use crate::geometry::{Pose, pose_from_matrix};
@@ -40,8 +40,12 @@ impl Sdk {
         Ok(transform([x, y, z], [roll, pitch, yaw]))
     }
 
-    /// The model of a camera, with its look-up table.
-    pub(super) fn camera_model(&self, name: &str) -> Result<CameraModel, SceneError> {
+    /// The model of a camera whose photos are of this size, with its look-up table.
+    pub(super) fn camera_model(
+        &self,
+        name: &str,
+        size: (u32, u32),
+    ) -> Result<CameraModel, SceneError> {
         let file = TextFile::read(&self.folder.join(format!("models/{name}.txt")))?;
         let mut lines = file.lines();
         let mut next = || {
@@ -49,30 +53,41 @@ impl Sdk {
                 file.error("a line `fx fy cx cy` and four of a 4x4 matrix expected, it is cut off")
             })
         };
-        let [fx, fy, cx, cy] = next()?.numbers()?;
+        let intrinsics = pinhole(next()?.numbers()?, size).map_err(|why| file.error(why))?;
         let rows: Vec<[f64; 4]> = (0..3)
             .map(|_| next()?.numbers())
             .collect::<Result<_, _>>()?;
         let matrix = Matrix3x4::from_fn(|row, column| rows[row][column]);
         let camera_from_image =
             pose_from_matrix(&matrix).map_err(|error| file.error(error.to_string()))?;
-        let table = self
-            .folder
-            .join(format!("models/{name}_distortion_lut.bin"));
+        let table = format!("models/{name}_distortion_lut.bin");
         Ok(CameraModel {
-            intrinsics: Intrinsics {
-                fx,
-                fy,
-                cx,
-                cy,
-                width: 0,
-                height: 0,
-            },
+            intrinsics,
             camera_from_image,
-            table_path: table,
-            table: Arc::from([]),
+            table: read_table(&self.folder.join(table), size)?,
         })
     }
+}
+
+/// For each pixel of undistorted photos its place in the photo as it was taken \[px\]: in the file, all
+/// columns come first, then all rows.
+fn read_table(path: &Path, (width, height): (u32, u32)) -> Result<Vec<[f32; 2]>, SceneError> {
+    let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let pixels = width as usize * height as usize;
+    if bytes.len() != pixels * 16 {
+        return Err(SceneError::expected(
+            path,
+            format!(
+                "a look-up table for photos of {width}x{height} pixels expected, {} bytes, {} found",
+                pixels * 16,
+                bytes.len()
+            ),
+        ));
+    }
+    let (numbers, _) = bytes.as_chunks::<8>();
+    let (columns, rows) = numbers.split_at(pixels);
+    let place = |(x, y): (&[u8; 8], &[u8; 8])| [x, y].map(|n| f64::from_le_bytes(*n) as f32);
+    Ok(columns.iter().zip(rows).map(place).collect())
 }
 
 /// The SDK's transform of a position and roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll).
@@ -85,52 +100,16 @@ pub(super) fn transform(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pos
 }
 
 /// A camera, and what takes the distortion out of its photos.
-#[derive(Clone, Debug)]
 pub(super) struct CameraModel {
     /// The pinhole of undistorted photos.
     pub(super) intrinsics: Intrinsics,
     /// From x right, y down, z forward to the camera's axes.
     pub(super) camera_from_image: Pose,
-    table_path: PathBuf,
     /// For each pixel where it is in the photo as it was taken \[px\].
-    table: Arc<[[f32; 2]]>,
+    table: Vec<[f32; 2]>,
 }
 
 impl CameraModel {
-    /// The same, for photos of a size, with the look-up table read.
-    pub(super) fn for_photos_of(self, (width, height): (u32, u32)) -> Result<Self, SceneError> {
-        let path = &self.table_path;
-        let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
-        let pixels = width as usize * height as usize;
-        if bytes.len() != pixels * 16 {
-            return Err(SceneError::expected(
-                path,
-                format!(
-                    "a look-up table for photos of {width}x{height} pixels expected, {} bytes, {} found",
-                    pixels * 16,
-                    bytes.len()
-                ),
-            ));
-        }
-        let number = |at: usize| {
-            let bytes = bytes[8 * at..8 * at + 8].try_into().unwrap_or([0; 8]);
-            f64::from_le_bytes(bytes) as f32
-        };
-        // All columns come first, then all rows.
-        let table = (0..pixels)
-            .map(|pixel| [number(pixel), number(pixels + pixel)])
-            .collect();
-        Ok(Self {
-            intrinsics: Intrinsics {
-                width,
-                height,
-                ..self.intrinsics
-            },
-            table,
-            ..self
-        })
-    }
-
     /// The photo as a pinhole would have taken it; black where the lens saw nothing.
     pub(super) fn undistorted(&self, raw: &RgbImage) -> RgbImage {
         let (width, height) = raw.dimensions();
