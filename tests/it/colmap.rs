@@ -13,8 +13,9 @@ use posescope::problem::Problem;
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
-use crate::data;
+use crate::damage::Damage::{Bytes, Swap};
 use crate::small_sequence::wall;
+use crate::{damage, data};
 
 /// Which form a model is written in.
 #[derive(Clone, Copy, Debug)]
@@ -246,67 +247,57 @@ fn photos_that_are_not_there_are_left_out() {
 
 #[test]
 fn what_is_wrong_with_a_text_model_is_named_with_its_line() {
-    for (file, from, to, words) in [
-        (
-            "cameras.txt",
-            "PINHOLE 160",
-            "FOV 160",
-            &["cameras.txt:2", "`FOV`"][..],
-        ),
-        (
-            "cameras.txt",
-            "32.5",
-            "",
-            &["cameras.txt:2", "4 parameters of PINHOLE"],
-        ),
-        (
-            "cameras.txt",
-            "7 OPENCV",
-            "8 OPENCV",
-            &["images.txt", "b side/2.png", "7 found"],
-        ),
-        (
-            "images.txt",
-            "4 0.92",
-            "4 2.92",
-            &["images.txt:2", "length"],
-        ),
-        (
-            "images.txt",
-            "a/1.png",
-            "../1.png",
-            &["images.txt", "scene's folder"],
-        ),
-        (
-            "images.txt",
-            "1.5 2.5 30",
-            "1.5 30",
-            &["images.txt:5", "`x y point`"],
-        ),
-        (
-            "images.txt",
-            "2.5 30",
-            "2.5 31",
-            &["images.txt:5", "31 found"],
-        ),
-        (
-            "points3D.txt",
-            "10 0 0",
-            "10 0 nan",
-            &["points3D.txt:2", "nan"],
-        ),
-    ] {
-        let folder = TempDir::new().expect("a folder");
-        write(folder.path(), Form::Text);
-        let path = folder.path().join("sparse/0").join(file);
-        let text = fs::read_to_string(&path).expect("just written");
-        assert!(text.contains(from), "{from}");
-        fs::write(&path, text.replacen(from, to, 1)).expect("writable");
-        let error = error_of(folder.path());
-        for word in words {
-            assert!(error.contains(word), "`{word}` is missing in: {error}");
-        }
-    }
+    let [cameras, images, points] =
+        ["cameras", "images", "points3D"].map(|file| format!("sparse/0/{file}.txt"));
+    let write = |folder: &Path| {
+        write(folder, Form::Text);
+        folder.to_str().expect("a plain path").to_owned()
+    };
+    damage::expect(
+        write,
+        &[
+            (
+                &cameras,
+                Swap("PINHOLE 160", "FOV 160"),
+                &["cameras.txt:2", "`FOV`"],
+            ),
+            (
+                &cameras,
+                Swap("32.5", ""),
+                &["cameras.txt:2", "4 parameters of PINHOLE"],
+            ),
+            (
+                &cameras,
+                Swap("7 OPENCV", "8 OPENCV"),
+                &["images.txt", "b side/2.png", "7 found"],
+            ),
+            (
+                &images,
+                Swap("4 0.92", "4 2.92"),
+                &["images.txt:2", "length"],
+            ),
+            (
+                &images,
+                Swap("a/1.png", "../1.png"),
+                &["images.txt", "scene's folder"],
+            ),
+            (
+                &images,
+                Swap("1.5 2.5 30", "1.5 30"),
+                &["images.txt:5", "`x y point`"],
+            ),
+            (
+                &images,
+                Swap("2.5 30", "2.5 31"),
+                &["images.txt:5", "31 found"],
+            ),
+            (
+                &points,
+                Swap("10 0 0", "10 0 nan"),
+                &["points3D.txt:2", "nan"],
+            ),
+        ],
+    );
 }
 
 #[test]
@@ -331,17 +322,14 @@ fn a_binary_model_that_promises_more_than_it_has_is_refused_before_anything_is_m
 
 #[test]
 fn a_name_that_would_break_a_line_is_refused_in_one() {
-    let folder = TempDir::new().expect("a folder");
-    write(folder.path(), Form::Binary);
-    let path = folder.path().join("sparse/0/images.bin");
-    let mut bytes = fs::read(&path).expect("just written");
     // After the count, the number, seven of the pose, and the camera.
     let name = 8 + 4 + 7 * 8 + 4;
-    bytes[name] = b'\n';
-    fs::write(&path, bytes).expect("writable");
-    let error = error_of(folder.path());
-    assert!(error.contains("the name of an image expected"), "{error}");
-    assert_eq!(error.lines().count(), 1, "{error}");
+    let write = |folder: &Path| {
+        write(folder, Form::Binary);
+        folder.to_str().expect("a plain path").to_owned()
+    };
+    let words: &[&str] = &["the name of an image expected"];
+    damage::expect(write, &[("sparse/0/images.bin", Bytes(name, b"\n"), words)]);
 }
 
 /// What `images.txt` says of the features of an image: pixel and point.

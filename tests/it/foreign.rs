@@ -8,9 +8,11 @@ use std::process::Output;
 use posescope::diagnosis::Code;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
+use posescope::scene;
 use tempfile::TempDir;
 
 use crate::binary::posescope;
+use crate::damage;
 use crate::small_sequence::SmallSequence;
 
 fn results(output: &Output) -> Vec<QueryResult> {
@@ -271,30 +273,10 @@ fn a_run_folder_knows_the_other_system_and_all_that_reads_it_does_too() {
 }
 
 #[test]
-fn poses_that_cannot_be_read_end_with_one_line() {
-    let (sequence, _) = small();
+fn poses_that_cannot_be_read_are_named_with_their_line() {
+    let sequence = SmallSequence::write();
+    let scene = scene::open(text(&sequence.folder()), None).expect("our own");
     let file = sequence.path().join("poses.txt");
-    let given = format!("other={}", file.display());
-    let said = |content: &str| {
-        fs::write(&file, content).expect("writable");
-        let output = run(
-            text(&sequence.folder()),
-            &[
-                "--query",
-                "5",
-                "--reference",
-                "4",
-                "--method",
-                "mi",
-                "--estimates",
-                &given,
-            ],
-        );
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(3), "{message}");
-        assert_eq!(message.trim_end().lines().count(), 1, "{message}");
-        message
-    };
     for (content, words) in [
         ("", "poses expected, none found"),
         ("1 2 3\n", "poses.txt:1: TUM"),
@@ -308,7 +290,11 @@ fn poses_that_cannot_be_read_end_with_one_line() {
         ),
         (
             "0.4 0 0 0 0 0 0 1\n0.5 0 0 0 0 0 9 1\n",
-            "poses.txt:2: a quaternion of length 1",
+            "poses.txt:2: a quaternion of length 1 expected",
+        ),
+        (
+            "a.png 2 0 0 0 0 0 0\n",
+            "poses.txt:1: a quaternion of length 1 expected",
         ),
         (
             "77.4 0 0 0 0 0 0 1\n",
@@ -323,20 +309,47 @@ fn poses_that_cannot_be_read_end_with_one_line() {
             "poses.txt:3: a line `id qw",
         ),
     ] {
-        let message = said(content);
-        assert!(message.contains(words), "{content}: {message}");
+        fs::write(&file, content).expect("writable");
+        let read = scene::read_estimates(&file, scene.as_ref());
+        let error = read.expect_err(content).to_string();
+        damage::expect_words(&error, &[words]);
     }
-    for (given, words) in [
-        ("mi=poses.txt", "mi is a method of ours"),
-        ("poses.txt", "NAME=FILE expected"),
-        ("A B=poses.txt", "cannot name a method"),
+}
+
+#[test]
+fn a_number_that_is_a_frame_and_a_time_is_told_by_its_quaternion_and_then_as_a_frame() {
+    let sequence = SmallSequence::write();
+    let scene = scene::open(text(&sequence.folder()), None).expect("our own");
+    let file = sequence.path().join("poses.txt");
+    let frames = |content: &str| -> Vec<String> {
+        fs::write(&file, content).expect("writable");
+        let read = scene::read_estimates(&file, scene.as_ref());
+        let estimates = read.unwrap_or_else(|error| panic!("{error}"));
+        estimates.into_keys().collect()
+    };
+    // Frame 5 was taken at 0.5 s, and no frame at 5 s.
+    assert_eq!(frames("5 1 0 0 0 7 8 9\n"), ["000005"]);
+    assert_eq!(frames("5 1 0 0 0 0 0 1\n"), ["000005"]);
+    assert_eq!(frames("4 0 0 9 0 0 0 1\n0.5 0 0 9 0 0 0 1\n"), ["000005"]);
+    assert_eq!(frames("0.5 1 0 0 0 0 0 1\n"), ["000005"]);
+}
+
+#[test]
+fn an_unreadable_file_of_poses_is_bad_data_and_a_wrong_name_is_bad_usage() {
+    let sequence = SmallSequence::write();
+    let file = sequence.path().join("poses.txt");
+    fs::write(&file, "1 2 3\n").expect("writable");
+    let poses = format!("other={}", file.display());
+    for (given, code, words) in [
+        (poses.as_str(), 3, "poses.txt:1: TUM"),
+        ("mi=poses.txt", 2, "mi is a method of ours"),
+        ("poses.txt", 2, "NAME=FILE expected"),
+        ("A B=poses.txt", 2, "cannot name a method"),
     ] {
-        let output = run(
-            text(&sequence.folder()),
-            &["--query", "5", "--estimates", given],
-        );
+        let asked = ["--query", "5", "--reference", "4", "--estimates", given];
+        let output = run(text(&sequence.folder()), &asked);
         let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert_eq!(output.status.code(), Some(code), "{message}");
         assert!(message.contains(words), "{given}: {message}");
     }
 }

@@ -3,8 +3,9 @@
 use nalgebra::Point3;
 use posescope::scene::{self, Scene};
 
-use crate::data;
-use crate::small_sequence::SmallSequence;
+use crate::damage::Damage::{Bytes, Cut, Gone, Image, Swap, Text};
+use crate::small_sequence::{self, SmallSequence};
+use crate::{damage, data};
 
 fn open(path: &std::path::Path) -> Box<dyn Scene> {
     scene::open(path.to_str().expect("a plain path"), None).unwrap_or_else(|e| panic!("{e}"))
@@ -62,6 +63,80 @@ fn a_sequence_without_poses_still_yields_queries() {
     assert!(scene.query(0).is_ok());
     let error = scene.reference(0).expect_err("no pose").to_string();
     assert!(error.contains("000004 has no pose"), "{error}");
+}
+
+#[test]
+fn what_is_wrong_with_a_sequence_is_named() {
+    let (image, scan) = (
+        "sequences/42/image_0/000005.png",
+        "sequences/42/velodyne/000004.bin",
+    );
+    let (calibration, times, poses) = (
+        "sequences/42/calib.txt",
+        "sequences/42/times.txt",
+        "poses/42.txt",
+    );
+    let pose = "1 0 0 0 0 1 0 0 0 0 1 2\n";
+    let write = |root: &std::path::Path| {
+        small_sequence::write(root, &[4, 5, 7]);
+        let folder = root.join("sequences/42");
+        folder.to_str().expect("a plain path").to_owned()
+    };
+    damage::expect(
+        write,
+        &[
+            (
+                scan,
+                Cut(5),
+                &["velodyne/000004.bin", "16 bytes", "cut off"],
+            ),
+            (
+                scan,
+                Bytes(16 * 3 + 4, b"\x00\x00\xc0\x7f"),
+                &["velodyne/000004.bin", "point 3 (byte 48)", "NaN"],
+            ),
+            (scan, Text(""), &["velodyne/000004.bin", "empty"]),
+            (scan, Gone, &["velodyne/000004.bin", "2 frames have one"]),
+            (
+                image,
+                Image(80, 64),
+                &["image_0/000005.png", "160x64", "80x64"],
+            ),
+            (image, Cut(400), &["image_0/000005.png"]),
+            (
+                calibration,
+                Swap("P0: 100 0 80 0", "P0: 100 0 80"),
+                &["calib.txt:1", "12 numbers expected, 11 found"],
+            ),
+            (
+                calibration,
+                Swap("P0: 100", "P0: 0"),
+                &["calib.txt", "focal lengths"],
+            ),
+            (calibration, Swap("P0:", "P9:"), &["calib.txt", "`P0:`"]),
+            (
+                calibration,
+                Swap("Tr:", "T:"),
+                &["calib.txt", "`Tr:`", "reference"],
+            ),
+            (times, Swap("0.3", "soon"), &["times.txt:4", "`soon`"]),
+            (
+                times,
+                Text("0.1\n"),
+                &["times.txt", "frame 7", "1 lines found"],
+            ),
+            (
+                poses,
+                Text("1 0 0 0 0 1 0 0 0 0 1 0\n"),
+                &["poses/42.txt", "frame 7", "1 lines found"],
+            ),
+            (
+                poses,
+                Swap(pose, "1 0 0 0 0 2 0 0 0 0 1 2\n"),
+                &["poses/42.txt:3", "not a rotation"],
+            ),
+        ],
+    );
 }
 
 #[test]

@@ -13,8 +13,9 @@ use posescope::problem::Problem;
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
-use crate::data;
+use crate::damage::Damage::{Cut, Image, Text};
 use crate::small_sequence::{HEIGHT, WIDTH, scan_of_the_wall, wall};
+use crate::{damage, data};
 
 /// A rectification that swaps nothing, a scanner at the camera, and an IMU at the scanner.
 const CAMERAS: &str = "\
@@ -138,52 +139,46 @@ fn scans_are_corrected_unless_told_otherwise() {
 
 #[test]
 fn what_is_wrong_with_a_drive_is_named() {
-    let oxts = "2011_09_26_drive_0001_sync/oxts/data/0000000002.txt";
-    let times = "2011_09_26_drive_0001_sync/image_00/timestamps.txt";
-    for (file, content, words) in [
-        (
-            "calib_cam_to_cam.txt",
-            "a: 1\n",
-            &["calib_cam_to_cam.txt", "`P_rect_00:`"][..],
-        ),
-        (
-            "calib_velo_to_cam.txt",
-            "R: 1 0 0 0 2 0 0 0 1\nT: 0 0 0\n",
-            &["calib_velo_to_cam.txt", "not a rotation"],
-        ),
-        (
-            "calib_imu_to_velo.txt",
-            "R: 1 0 0 0 1 0 0 0 1\nT: 0 0\n",
-            &["calib_imu_to_velo.txt:2", "3 numbers expected, 2 found"],
-        ),
-        (
-            oxts,
-            "1 2 3\n",
-            &["0000000002.txt:1", "30 numbers expected, 3 found"],
-        ),
-        (times, "yesterday\n", &["timestamps.txt:1", "`yesterday`"]),
-    ] {
-        let day = TempDir::new().expect("a folder");
-        let drive = write(day.path());
-        fs::write(day.path().join(file), content).expect("writable");
-        let error = scene::open(text(&drive), None)
-            .err()
-            .expect("it is damaged");
-        let error = error.to_string();
-        for word in words {
-            assert!(error.contains(word), "`{word}` is missing in: {error}");
-        }
-    }
-}
-
-#[test]
-fn an_image_that_is_not_rectified_is_named() {
-    let day = TempDir::new().expect("a folder");
-    let drive = write(day.path());
-    let image = drive.join("image_00/data/0000000003.png");
-    wall(170, 64).save(image).expect("writable");
-    let error = scene::open(text(&drive), None).err().expect("too wide");
-    assert!(error.to_string().contains("160x64"), "{error}");
+    let drive = |file: &str| format!("2011_09_26_drive_0001_sync/{file}");
+    let [oxts, times, image, scan] = [
+        "oxts/data/0000000002.txt",
+        "image_00/timestamps.txt",
+        "image_00/data/0000000003.png",
+        "velodyne_points/data/0000000003.bin",
+    ]
+    .map(drive);
+    damage::expect(
+        |day| text(&write(day)).to_owned(),
+        &[
+            (
+                "calib_cam_to_cam.txt",
+                Text("a: 1\n"),
+                &["calib_cam_to_cam.txt", "`P_rect_00:`"],
+            ),
+            (
+                "calib_velo_to_cam.txt",
+                Text("R: 1 0 0 0 2 0 0 0 1\nT: 0 0 0\n"),
+                &["calib_velo_to_cam.txt", "not a rotation"],
+            ),
+            (
+                "calib_imu_to_velo.txt",
+                Text("R: 1 0 0 0 1 0 0 0 1\nT: 0 0\n"),
+                &["calib_imu_to_velo.txt:2", "3 numbers expected, 2 found"],
+            ),
+            (
+                &oxts,
+                Text("1 2 3\n"),
+                &["0000000002.txt:1", "30 numbers expected, 3 found"],
+            ),
+            (
+                &times,
+                Text("yesterday\n"),
+                &["timestamps.txt:1", "`yesterday`"],
+            ),
+            (&image, Image(170, 64), &["0000000003.png", "160x64"]),
+            (&scan, Cut(3), &["0000000003.bin", "cut off"]),
+        ],
+    );
 }
 
 /// The poses of camera 0 that were found by registering the scans, by frame number.

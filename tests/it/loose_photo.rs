@@ -11,6 +11,7 @@ use serde_json::Value as Json;
 use tempfile::TempDir;
 
 use crate::binary::posescope;
+use crate::damage;
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
 
 const CAMERA: &str = "100,100,80,32";
@@ -113,55 +114,59 @@ fn without_a_position_the_reference_that_looks_most_alike_is_taken() {
 
 #[test]
 fn what_is_no_photo_or_no_camera_of_it_is_told() {
+    let folder = TempDir::new().expect("a folder");
+    let path = photo(folder.path());
+    let (broken, gone) = (
+        folder.path().join("broken.png"),
+        folder.path().join("gone.png"),
+    );
+    fs::write(&broken, "no image").expect("writable");
+    for (paths, camera, words) in [
+        (
+            vec![&path],
+            None,
+            &["IMG_1.png", "EXIF", "--camera fx,fy,cx,cy"][..],
+        ),
+        (
+            vec![&path],
+            Some("900,900,640,480"),
+            &["IMG_1.png", "160x64", "640,480"],
+        ),
+        (
+            vec![&path],
+            Some("1 SIMPLE_PINHOLE 320 128 100 160 64"),
+            &["IMG_1.png", "320x128", "160x64"],
+        ),
+        (
+            vec![&path, &path],
+            Some(CAMERA),
+            &["IMG_1.png", "a name of its own"],
+        ),
+        (vec![&gone], Some(CAMERA), &["gone.png"]),
+        (vec![&broken], Some(CAMERA), &["broken.png"]),
+    ] {
+        let photos = LoosePhotos {
+            paths: paths.into_iter().cloned().collect(),
+            camera: camera.map(|camera| camera.parse().expect("a camera")),
+        };
+        let error = photos.open().err().expect("it is refused").to_string();
+        damage::expect_words(&error, words);
+    }
+}
+
+#[test]
+fn photos_without_a_camera_and_words_that_are_none_have_their_exit_codes() {
     let sequence = SmallSequence::write();
     let path = photo(sequence.path());
     let (scene, query) = (sequence.folder(), text(&path));
-    let against = ["--reference", "4", "--method", "mi"];
-    let refused = |words: &[&str], code, parts: &[&str]| {
-        refused(&scene, &[words, &against[..]].concat(), code, parts);
-    };
-    refused(
-        &["--query", query],
-        3,
-        &["IMG_1.png", "EXIF", "--camera fx,fy,cx,cy"],
-    );
-    refused(
-        &["--query", query, "--camera", "900,900,640,480"],
-        3,
-        &["IMG_1.png", "160x64", "640,480"],
-    );
-    refused(
-        &[
-            "--query",
-            query,
-            "--camera",
-            "1 SIMPLE_PINHOLE 320 128 100 160 64",
-        ],
-        3,
-        &["320x128", "160x64"],
-    );
-    refused(
-        &["--query", query, "--camera", "100,100"],
-        2,
-        &["4 numbers expected, 2 found"],
-    );
-    refused(
-        &["--query", "gone.png", "--camera", CAMERA],
-        3,
-        &["gone.png"],
-    );
-    refused(
-        &["--query", query, "--query", "5"],
-        2,
-        &["some of the queries are frames"],
-    );
-    let broken = sequence.path().join("broken.png");
-    fs::write(&broken, "no image").expect("writable");
-    refused(
-        &["--query", text(&broken), "--camera", CAMERA],
-        3,
-        &["broken.png"],
-    );
+    let against = ["--reference", "4", "--method", "mi", "--query", query];
+    for (words, code, part) in [
+        (&[][..], 3, "EXIF"),
+        (&["--camera", "100,100"], 2, "4 numbers expected, 2 found"),
+        (&["--query", "5"], 2, "some of the queries are frames"),
+    ] {
+        refused(&scene, &[&against[..], words].concat(), code, &[part]);
+    }
 }
 
 /// A JPEG whose EXIF says these.

@@ -9,6 +9,7 @@ mod command_line;
 mod compare_views;
 mod compute;
 mod conformance;
+mod damage;
 mod data;
 mod decisions;
 mod degrade;

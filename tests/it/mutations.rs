@@ -10,10 +10,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use posescope::foreign::MatchSource as _;
 use posescope::localize::QueryResult;
 use posescope::params::Params;
 use posescope::run::{FolderError, RunFolder, read_results, read_run};
-use posescope::scene::{self, IndexOptions, LoosePhotos, Retriever, Scene, SceneError};
+use posescope::scene::{
+    self, IndexOptions, LoosePhotos, MatchFolder, Retriever, Scene, SceneError,
+};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use tempfile::TempDir;
@@ -21,17 +24,19 @@ use tempfile::TempDir;
 use crate::binary::posescope;
 use crate::scene_formats::{Sample, samples};
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
-use crate::{colmap, scene_toml};
+use crate::{colmap, pair_matches, scene_toml};
 
 /// No damaged file takes as long, wherever it is read: longer is a hang.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// How many times each file is damaged, unless somebody asks for more.
-pub fn mutations(default: usize) -> usize {
+/// How many times the files of a reader are damaged, unless `POSESCOPE_MUTATIONS` asks for more.
+const MUTATIONS: usize = 50;
+
+fn mutations() -> usize {
     let asked = std::env::var("POSESCOPE_MUTATIONS").ok();
     asked
         .and_then(|count| count.parse().ok())
-        .unwrap_or(default)
+        .unwrap_or(MUTATIONS)
 }
 
 /// A file as it may arrive: cut off, with bytes or pieces of another, doubled, or not there.
@@ -75,12 +80,11 @@ fn damaged(whole: &[u8], random: &mut Pcg64Mcg) -> Option<Vec<u8>> {
 }
 
 /// Damages one file after the other, reads, and mends it. `read` says what it was told.
-fn mutate<E: Display>(
-    name: &str,
-    files: &[PathBuf],
-    count: usize,
-    mut read: impl FnMut() -> Result<(), Vec<E>>,
-) {
+fn mutate<E: Display>(name: &str, files: &[PathBuf], mut read: impl FnMut() -> Result<(), Vec<E>>) {
+    if is_left_out(name) {
+        return;
+    }
+    let count = mutations();
     let begun = Instant::now();
     let mut random = Pcg64Mcg::seed_from_u64(5);
     let (mut refused, mut slowest) = (0, Duration::ZERO);
@@ -154,17 +158,14 @@ fn read_all(argument: &str, format: &str, sound: usize) -> Result<(), Vec<SceneE
     }
 }
 
-/// Whether somebody asked for something else than this.
+/// Whether `POSESCOPE_MUTATED` asks for something else than this.
 fn is_left_out(name: &str) -> bool {
     std::env::var("POSESCOPE_MUTATED").is_ok_and(|asked| asked != name)
 }
 
 fn mutate_scene(name: &str, format: &str, sample: &Sample) {
-    if is_left_out(name) {
-        return;
-    }
     let sound = read_all(&sample.argument, format, 0).map_or_else(|errors| errors.len(), |()| 0);
-    mutate(name, &files(&sample.root), mutations(100), || {
+    mutate(name, &files(&sample.root), || {
         read_all(&sample.argument, format, sound)
     });
 }
@@ -185,9 +186,6 @@ fn no_damage_to_a_cloud_makes_its_reader_panic() {
     let folder = TempDir::new().expect("a folder");
     scene_toml::write(folder.path());
     for name in scene_toml::write_clouds(folder.path()) {
-        if is_left_out(&name) {
-            continue;
-        }
         scene_toml::with(folder.path(), "map.xyz", &name);
         let path = folder.path().join(&name);
         let argument = text(folder.path());
@@ -198,8 +196,23 @@ fn no_damage_to_a_cloud_makes_its_reader_panic() {
         assert!(read().is_ok(), "{name}");
         let small = fs::metadata(&path).expect("is there").len() < 1 << 20;
         assert!(small, "{name} makes this slow");
-        mutate(&name, std::slice::from_ref(&path), mutations(150), read);
+        mutate(&name, std::slice::from_ref(&path), read);
         scene_toml::write(folder.path());
+    }
+}
+
+#[test]
+fn no_damage_to_matches_makes_a_reader_panic() {
+    for (form, write) in pair_matches::FORMS {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path());
+        let read = || {
+            let found = MatchFolder::open(folder.path())
+                .and_then(|source| source.matches("000070", "000062"));
+            found.map(drop).map_err(|error| vec![error])
+        };
+        assert!(read().is_ok(), "{form}");
+        mutate(form, &files(folder.path()), read);
     }
 }
 
@@ -217,7 +230,7 @@ fn no_damage_to_a_run_folder_makes_its_reader_panic() {
     let run = read_run(&out).expect("our own");
     let names = ["run.toml", "results.jsonl", "timings.jsonl"];
     let files = names.map(|name| out.join(name));
-    mutate("a run folder", &files, mutations(1_000), || {
+    mutate("a run folder", &files, || {
         let read = || -> Result<(), FolderError> {
             read_run(&out)?;
             for result in read_results(&out)? {
@@ -261,12 +274,7 @@ fn no_damage_to_an_index_makes_its_reader_panic() {
         Ok(())
     };
     assert!(read().is_ok());
-    mutate(
-        "an index",
-        std::slice::from_ref(&path),
-        mutations(1_000),
-        read,
-    );
+    mutate("an index", std::slice::from_ref(&path), read);
 }
 
 #[test]
@@ -297,9 +305,7 @@ fn no_damage_to_a_table_of_poses_or_positions_makes_its_reader_panic() {
         fs::write(at(name), content).expect("writable");
         let read = || scene::read_estimates(&at(name), scene.as_ref()).map(drop);
         assert!(read().is_ok(), "{name}: {:?}", read());
-        mutate(name, &[at(name)], mutations(1_000), || {
-            read().map_err(|error| vec![error])
-        });
+        mutate(name, &[at(name)], || read().map_err(|error| vec![error]));
     }
     for (name, content) in [
         (
@@ -314,9 +320,7 @@ fn no_damage_to_a_table_of_poses_or_positions_makes_its_reader_panic() {
         fs::write(at(name), content).expect("writable");
         let read = || scene::located(Arc::clone(&scene), scene.as_ref(), &at(name)).map(drop);
         assert!(read().is_ok(), "{name}");
-        mutate(name, &[at(name)], mutations(1_000), || {
-            read().map_err(|error| vec![error])
-        });
+        mutate(name, &[at(name)], || read().map_err(|error| vec![error]));
     }
 }
 
@@ -346,7 +350,7 @@ fn no_damage_to_a_photo_or_its_camera_makes_their_reader_panic() {
             None => ("a photo with EXIF", &photo),
             Some(_) => ("cameras.txt", &cameras),
         };
-        mutate(name, std::slice::from_ref(file), mutations(300), || {
+        mutate(name, std::slice::from_ref(file), || {
             read().map_err(|error| vec![error])
         });
     }

@@ -14,8 +14,9 @@ use posescope::problem::Problem;
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
-use crate::data;
+use crate::damage::Damage::{Gone, Image, Text};
 use crate::small_sequence::wall;
+use crate::{damage, data};
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 480;
@@ -26,11 +27,6 @@ pub fn open(path: &Path) -> Box<dyn Scene> {
 
 fn open_argument(argument: &str) -> Box<dyn Scene> {
     scene::open(argument, None).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn error_of(path: &Path) -> String {
-    let opened = scene::open(path.to_str().expect("a plain path"), None);
-    opened.err().expect("it is damaged").to_string()
 }
 
 /// A slanted wall, whose depth grows to the right, with a pixel of each kind of invalid depth in the
@@ -147,65 +143,67 @@ fn a_tum_folder_may_name_its_camera() {
     fs::write(&calibration, "500.5 501 320 240\n").expect("writable");
     let camera = open(folder.path()).intrinsics(0);
     assert_eq!((camera.fx, camera.fy, camera.cy), (500.5, 501.0, 240.0));
-    fs::write(&calibration, "-500 501 320 240\n").expect("writable");
-    let error = error_of(folder.path());
-    assert!(error.contains("positive focal lengths"), "{error}");
 }
 
 #[test]
 fn what_is_wrong_with_a_tum_folder_is_named_with_its_line() {
-    for (file, text, words) in [
-        ("rgb.txt", "# none\n", &["rgb.txt: ", "`time file`"][..]),
-        ("rgb.txt", "1.0 rgb/1.png\nx y.png\n", &["rgb.txt:2", "`x`"]),
-        (
-            "rgb.txt",
-            "1.0 ../../1.png\n",
-            &["rgb.txt:1", "scene's folder"],
-        ),
-        ("rgb.txt", "1.0 rgb/none.png\n", &["rgb/none.png"]),
-        ("depth.txt", "1.0\n", &["depth.txt:1", "`time file`"]),
-        (
-            "groundtruth.txt",
-            "# t\n100 0 0 0 0 0 0\n",
-            &["groundtruth.txt:2", "8 numbers expected, 7 found"],
-        ),
-        (
-            "groundtruth.txt",
-            "100 0 0 0 0 0 0 2\n",
-            &["groundtruth.txt:1", "length 2.000"],
-        ),
-        (
-            "groundtruth.txt",
-            "7 0 0 0 0 0 0 1\n",
-            &["groundtruth.txt", "between 7 and 7"],
-        ),
-    ] {
-        let folder = TempDir::new().expect("a folder");
-        write_tum(folder.path());
-        fs::write(folder.path().join(file), text).expect("writable");
-        let error = error_of(folder.path());
-        for word in words {
-            assert!(error.contains(word), "`{word}` is missing in: {error}");
-        }
-    }
+    let write = |folder: &Path| {
+        write_tum(folder);
+        folder.to_str().expect("a plain path").to_owned()
+    };
+    let depth = "depth/100.011000.png";
+    damage::expect(
+        write,
+        &[
+            ("rgb.txt", Text("# none\n"), &["rgb.txt: ", "`time file`"]),
+            (
+                "rgb.txt",
+                Text("1.0 rgb/1.png\nx y.png\n"),
+                &["rgb.txt:2", "`x`"],
+            ),
+            (
+                "rgb.txt",
+                Text("1.0 ../../1.png\n"),
+                &["rgb.txt:1", "scene's folder"],
+            ),
+            ("rgb.txt", Text("1.0 rgb/none.png\n"), &["rgb/none.png"]),
+            ("depth.txt", Text("1.0\n"), &["depth.txt:1", "`time file`"]),
+            (
+                "groundtruth.txt",
+                Text("# t\n100 0 0 0 0 0 0\n"),
+                &["groundtruth.txt:2", "8 numbers expected, 7 found"],
+            ),
+            (
+                "groundtruth.txt",
+                Text("100 0 0 0 0 0 0 2\n"),
+                &["groundtruth.txt:1", "length 2.000"],
+            ),
+            (
+                "groundtruth.txt",
+                Text("7 0 0 0 0 0 0 1\n"),
+                &["groundtruth.txt", "between 7 and 7"],
+            ),
+            (
+                "calibration.txt",
+                Text("-500 501 320 240\n"),
+                &["calibration.txt", "positive focal lengths"],
+            ),
+            (depth, Image(WIDTH, HEIGHT), &[depth, "16-bit"]),
+            (depth, Gone, &[depth]),
+        ],
+    );
 }
 
 #[test]
-fn a_depth_image_of_another_kind_or_size_is_named() {
+fn a_depth_image_of_another_size_is_named() {
     let folder = TempDir::new().expect("a folder");
     write_tum(folder.path());
     let path = folder.path().join("depth/100.011000.png");
-    GrayImage::new(WIDTH, HEIGHT).save(&path).expect("writable");
-    let error = open(folder.path()).cloud(0).expect_err("8 bit").to_string();
-    assert!(error.contains("16-bit"), "{error}");
     ImageBuffer::<Luma<u16>, Vec<u16>>::new(320, 240)
         .save(&path)
         .expect("writable");
     let error = open(folder.path()).cloud(0).expect_err("small").to_string();
-    assert!(
-        error.contains("640x480") && error.contains("320x240"),
-        "{error}"
-    );
+    damage::expect_words(&error, &["640x480", "320x240"]);
 }
 
 #[test]
@@ -285,16 +283,34 @@ fn registered_depth_images_share_the_camera_of_the_photos() {
 fn a_pose_that_is_lost_is_none_and_one_that_is_wrong_is_named() {
     let folder = TempDir::new().expect("a folder");
     write_seven_scenes(folder.path());
-    let pose = folder.path().join("seq-01/frame-000001.pose.txt");
-    fs::write(&pose, "-inf -inf -inf -inf\n".repeat(4)).expect("writable");
+    let pose = "seq-01/frame-000001.pose.txt";
+    let lost = "-inf -inf -inf -inf\n".repeat(4);
+    fs::write(folder.path().join(pose), lost).expect("writable");
     assert!(open(folder.path()).pose(1).is_none());
-    fs::write(&pose, "1 0 0 0\n0 1 0\n").expect("writable");
-    let error = error_of(folder.path());
-    assert!(error.contains("pose.txt:2"), "{error}");
-    assert!(error.contains("4 numbers expected, 3 found"), "{error}");
-    fs::write(&pose, "1 0 0 0\n0 2 0 0\n0 0 1 0\n0 0 0 1\n").expect("writable");
-    let error = error_of(folder.path());
-    assert!(error.contains("not a rotation"), "{error}");
+    let write = |folder: &Path| {
+        write_seven_scenes(folder);
+        folder.to_str().expect("a plain path").to_owned()
+    };
+    damage::expect(
+        write,
+        &[
+            (
+                pose,
+                Text("1 0 0 0\n0 1 0\n"),
+                &["pose.txt:2", "4 numbers expected, 3 found"],
+            ),
+            (
+                pose,
+                Text("1 0 0 0\n0 2 0 0\n0 0 1 0\n0 0 0 1\n"),
+                &["pose.txt", "not a rotation"],
+            ),
+            (
+                "camera-intrinsics.txt",
+                Text("585 1 320\n0 585 240\n0 0 1\n"),
+                &["camera-intrinsics.txt", "fx 0 cx"],
+            ),
+        ],
+    );
 }
 
 #[test]

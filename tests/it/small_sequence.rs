@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 pub const WIDTH: u32 = 160;
 pub const HEIGHT: u32 = 64;
-pub const CALIBRATION: &str = "\
+const CALIBRATION: &str = "\
 P0: 100 0 80 0 0 100 32 0 0 0 1 0
 P2: 100 0 80 6 0 100 32 0 0 0 1 0
 Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0
@@ -26,31 +26,9 @@ impl SmallSequence {
 
     /// With these frames; each stands 1 m per frame number along the road.
     pub fn of(frames: &[usize]) -> Self {
-        let sequence = Self {
-            root: TempDir::new().expect("a temporary folder"),
-        };
-        let folder = sequence.folder();
-        for sub in ["image_0", "velodyne"] {
-            fs::create_dir_all(folder.join(sub)).expect("writable");
-        }
-        fs::create_dir_all(sequence.root.path().join("poses")).expect("writable");
-        fs::write(folder.join("calib.txt"), CALIBRATION).expect("writable");
-        let count = frames.iter().max().map_or(0, |last| last + 1);
-        let times: String = (0..count)
-            .map(|f| format!("{:.1}\n", f as f64 / 10.0))
-            .collect();
-        fs::write(folder.join("times.txt"), times).expect("writable");
-        let poses: String = (0..count)
-            .map(|frame| format!("1 0 0 0 0 1 0 0 0 0 1 {frame}\n"))
-            .collect();
-        fs::write(sequence.poses(), poses).expect("writable");
-        for name in frames.iter().map(|frame| format!("{frame:06}")) {
-            wall(WIDTH, HEIGHT)
-                .save(sequence.image(&name))
-                .expect("writable");
-            fs::write(sequence.scan(&name), scan_of_the_wall()).expect("writable");
-        }
-        sequence
+        let root = TempDir::new().expect("a temporary folder");
+        write(root.path(), frames);
+        Self { root }
     }
 
     pub fn folder(&self) -> PathBuf {
@@ -58,9 +36,6 @@ impl SmallSequence {
     }
     pub fn poses(&self) -> PathBuf {
         self.root.path().join("poses/42.txt")
-    }
-    pub fn calibration(&self) -> PathBuf {
-        self.folder().join("calib.txt")
     }
     pub fn image(&self, name: &str) -> PathBuf {
         self.folder().join(format!("image_0/{name}.png"))
@@ -70,6 +45,31 @@ impl SmallSequence {
     }
     pub fn path(&self) -> &Path {
         self.root.path()
+    }
+}
+
+/// Writes the sequence 42 with these frames below a folder.
+pub fn write(root: &Path, frames: &[usize]) {
+    let folder = root.join("sequences/42");
+    for sub in ["image_0", "velodyne"] {
+        fs::create_dir_all(folder.join(sub)).expect("writable");
+    }
+    fs::create_dir_all(root.join("poses")).expect("writable");
+    fs::write(folder.join("calib.txt"), CALIBRATION).expect("writable");
+    let count = frames.iter().max().map_or(0, |last| last + 1);
+    let times: String = (0..count)
+        .map(|f| format!("{:.1}\n", f as f64 / 10.0))
+        .collect();
+    fs::write(folder.join("times.txt"), times).expect("writable");
+    let poses: String = (0..count)
+        .map(|frame| format!("1 0 0 0 0 1 0 0 0 0 1 {frame}\n"))
+        .collect();
+    fs::write(root.join("poses/42.txt"), poses).expect("writable");
+    for frame in frames {
+        let image = folder.join(format!("image_0/{frame:06}.png"));
+        wall(WIDTH, HEIGHT).save(image).expect("writable");
+        let scan = folder.join(format!("velodyne/{frame:06}.bin"));
+        fs::write(scan, scan_of_the_wall()).expect("writable");
     }
 }
 
