@@ -3,21 +3,19 @@
 //! A new layout is one file, its `mod` line and its entry in [`LAYOUTS`].
 
 mod colmap;
-mod described;
 mod kitti;
-mod kitti_raw;
-mod robotcar;
-mod seven_scenes;
+mod toml;
 mod tum;
 
 use std::fs;
 use std::path::Path;
 
-use image::{ImageBuffer, ImageFormat, Luma, RgbImage};
+use image::{EncodableLayout, ImageBuffer, ImageFormat, Luma, PixelWithColorType, RgbImage};
 use nalgebra::{Matrix3, Matrix3x4, Point2, Point3};
 use posescope_core::files::write_whole;
 
 use super::SceneError;
+use super::folder::{entries, stem};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
@@ -81,15 +79,7 @@ pub struct Layout {
 }
 
 /// Every layout; the first is the default.
-pub const LAYOUTS: &[Layout] = &[
-    kitti::LAYOUT,
-    kitti_raw::LAYOUT,
-    robotcar::LAYOUT,
-    tum::LAYOUT,
-    seven_scenes::LAYOUT,
-    colmap::LAYOUT,
-    described::LAYOUT,
-];
+pub const LAYOUTS: &[Layout] = &[kitti::LAYOUT, tum::LAYOUT, colmap::LAYOUT, toml::LAYOUT];
 
 /// The rotation from the axes of scanners and cars (x forward, y left, z up) to those of cameras.
 const CAMERA_FROM_VELODYNE: Matrix3<f64> =
@@ -99,38 +89,31 @@ fn make_folder(folder: &Path) -> Result<(), SceneError> {
     fs::create_dir_all(folder).map_err(SceneError::io(folder))
 }
 
-/// Removes the files that an earlier drive has left: those whose name says that they are frames.
-fn remove_frames(folder: &Path, is_frame: impl Fn(&str) -> bool) -> Result<(), SceneError> {
-    for entry in fs::read_dir(folder).map_err(SceneError::io(folder))? {
-        let path = entry.map_err(SceneError::io(folder))?.path();
-        if path
-            .file_name()
-            .and_then(|name| name.to_str())
-            .is_some_and(&is_frame)
-        {
+/// Makes a folder for frames, and removes the frames (`NNNNNN.EXTENSION`) of an earlier drive.
+fn make_frame_folder(folder: &Path, extension: &str) -> Result<(), SceneError> {
+    make_folder(folder)?;
+    for path in entries(folder)? {
+        let stem = stem(&path);
+        let is_number = stem.len() == 6 && stem.bytes().all(|byte| byte.is_ascii_digit());
+        if is_number && path.extension().is_some_and(|found| found == extension) {
             fs::remove_file(&path).map_err(SceneError::io(&path))?;
         }
     }
     Ok(())
 }
 
-/// Whether a file is called by as many digits and this extension.
-fn is_numbered(name: &str, digits: usize, extension: &str) -> bool {
-    let number = name
-        .strip_suffix(extension)
-        .and_then(|name| name.strip_suffix('.'));
-    number.is_some_and(|number| {
-        number.len() == digits && number.bytes().all(|byte| byte.is_ascii_digit())
-    })
+fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), SceneError> {
+    write_whole(path, bytes.as_ref()).map_err(SceneError::io(path))
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
-    write_whole(path, bytes).map_err(SceneError::io(path))
-}
-
-fn write_photo(path: &Path, photo: &RgbImage) -> Result<(), SceneError> {
+/// Writes an image as PNG.
+fn write_image<P>(path: &Path, image: &ImageBuffer<P, Vec<P::Subpixel>>) -> Result<(), SceneError>
+where
+    P: PixelWithColorType,
+    [P::Subpixel]: EncodableLayout,
+{
     let mut png = std::io::Cursor::new(Vec::new());
-    let encoded = photo.write_to(&mut png, ImageFormat::Png);
+    let encoded = image.write_to(&mut png, ImageFormat::Png);
     encoded.map_err(SceneError::image(path))?;
     write(path, png.get_ref())
 }
@@ -153,10 +136,7 @@ fn write_depth(
                 0
             }])
         });
-    let mut png = std::io::Cursor::new(Vec::new());
-    let encoded = image.write_to(&mut png, ImageFormat::Png);
-    encoded.map_err(SceneError::image(path))?;
-    write(path, png.get_ref())
+    write_image(path, &image)
 }
 
 /// Numbers with as many digits as they need to be read as they were.

@@ -27,6 +27,7 @@ mod imports;
 mod interrupt;
 mod kitti;
 mod kitti_raw;
+mod layouts;
 mod lessons;
 mod looks;
 mod loose_photo;

@@ -8,11 +8,12 @@ use image::{Rgb, RgbImage};
 use nalgebra::{Point3, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::geometry::Pose;
-use posescope::scene::layout::{Drive, LAYOUTS, Shot};
+use posescope::scene::layout::{Drive, Shot};
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
-use crate::data;
+use crate::damage::Damage::{Cut, Gone, Text};
+use crate::{damage, data, layouts};
 
 const CAMERA: Intrinsics = Intrinsics {
     fx: 60.0,
@@ -53,8 +54,7 @@ pub fn write(root: &Path) -> PathBuf {
 
 /// The same drive, of which only some frames have photos and scans.
 pub fn write_part(root: &Path, frames: Range<usize>) -> PathBuf {
-    let layout = LAYOUTS.iter().find(|layout| layout.name == "robotcar");
-    let layout = layout.expect("is registered");
+    let layout = layouts::ROBOTCAR;
     let drive = Drive {
         intrinsics: CAMERA,
         names: (0..FRAMES).map(|frame| frame.to_string()).collect(),
@@ -228,26 +228,50 @@ fn the_cameras_of_the_sdk_stand_where_the_sdk_puts_them() {
 }
 
 #[test]
-fn what_is_missing_of_the_sdk_is_named() {
-    let folder = TempDir::new().expect("a folder");
-    let traversal = write(folder.path());
-    let table = folder
-        .path()
-        .join("sdk/models/stereo_narrow_left_distortion_lut.bin");
-    let whole = fs::read(&table).expect("readable");
-    fs::write(&table, &whole[..100]).expect("writable");
-    let error = scene::open(text(&traversal), None)
-        .err()
-        .expect("cut off")
-        .to_string();
-    assert!(error.contains("76800 bytes, 100 found"), "{error}");
-    fs::remove_dir_all(folder.path().join("sdk")).expect("is there");
-    let error = scene::open(text(&traversal), Some("robotcar"))
-        .err()
-        .expect("gone")
-        .to_string();
-    assert!(
-        error.contains("models and extrinsics of the SDK"),
-        "{error}"
+fn what_is_wrong_with_a_traversal_is_named() {
+    let lens = "sdk/models/stereo_narrow_left_distortion_lut.bin";
+    let write = |root: &Path| format!("{}:all", text(&write_part(root, 40..42)));
+    damage::expect(
+        write,
+        &[
+            (lens, Cut(76_700), &["76800 bytes, 100 found"]),
+            (
+                "sdk/models/stereo_narrow_left.txt",
+                Text("1 2 3 4\n0 0 1 0\n"),
+                &["stereo_narrow_left.txt", "cut off"],
+            ),
+            ("sdk/extrinsics/ldmrs.txt", Gone, &["extrinsics/ldmrs.txt"]),
+            (
+                "drive/stereo.timestamps",
+                Text("soon 1\n"),
+                &["stereo.timestamps:1", "`timestamp chunk`"],
+            ),
+            (
+                "drive/gps/ins.csv",
+                Text("a,b\n"),
+                &["ins.csv:1", "`timestamp`"],
+            ),
+            (
+                "drive/vo/vo.csv",
+                Text("a\n1,2,3\n"),
+                &["vo.csv:2", "columns"],
+            ),
+            (
+                "drive/stereo/centre/1004000000.png",
+                Cut(200),
+                &["1004000000.png"],
+            ),
+            (
+                "drive/ldmrs/1004000000.bin",
+                Cut(5),
+                &["1004000000.bin", "24 bytes"],
+            ),
+        ],
     );
+    let root = TempDir::new().expect("a folder");
+    let traversal = write_part(root.path(), 40..42);
+    fs::remove_dir_all(root.path().join("sdk")).expect("was written");
+    let opened = scene::open(text(&traversal), Some("robotcar"));
+    let error = opened.err().expect("no SDK").to_string();
+    damage::expect_words(&error, &["models and extrinsics of the SDK"]);
 }

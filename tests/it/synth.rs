@@ -12,15 +12,24 @@ use posescope::memo::Memo;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
+use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 use posescope::scene::{self, Scene};
 use posescope::trace::Trace;
 use tempfile::TempDir;
 
 use crate::binary::posescope;
+use crate::round_trips;
 
-/// Frames 0, 80, 160 … in half size.
-const FEW: [&str; 6] = ["--size", "half", "--every", "80", "--condition", "overcast"];
+/// Frames 0, 300 and 600 in half size.
+const FEW: [&str; 6] = [
+    "--size",
+    "half",
+    "--every",
+    "300",
+    "--condition",
+    "overcast",
+];
 
 fn synth(folder: &Path, extra: &[&str]) -> std::process::Output {
     let output = posescope().arg("synth").arg(folder).args(extra).output();
@@ -65,33 +74,17 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
 #[test]
 fn estimates_from_disk_are_those_from_memory() {
     let folder = TempDir::new().expect("a temporary folder");
-    let few = [
-        "--size",
-        "half",
-        "--every",
-        "9",
-        "--condition",
-        "overcast",
-        "-q",
-    ];
-    let output = synth(folder.path(), &few);
-    assert!(output.status.success() && output.stderr.is_empty());
-    let disk = open(folder.path());
     let street = Street::new("overcast", Size::Half).expect("is built in");
-    let of_all = street.traversal().frame_count();
-    assert_eq!(disk.frames().len(), of_all.div_ceil(9));
-    assert_eq!(disk.intrinsics(0), Size::Half.intrinsics());
-
-    let (query, reference) = (72, 63);
-    let at = |number: usize| disk.find(&number.to_string()).expect("is there");
+    let disk = round_trips::written(&LAYOUTS[0], &street, folder.path());
+    let [reference, query] = round_trips::WRITTEN;
     let problem = in_memory(&street, query, reference);
     let from_disk = Problem {
-        query: disk.query(at(query)).expect("is complete"),
-        reference: disk.reference(at(reference)).expect("is complete"),
+        query: disk.query(1).expect("is complete"),
+        reference: disk.reference(0).expect("is complete"),
         ..problem.clone()
     };
     assert_eq!(from_disk.query.photo.color, problem.query.photo.color);
-    assert_eq!(disk.time_s(at(query)), Some(7.2));
+    assert_eq!(disk.time_s(1), Some(7.2));
     for method in Method::PAPER {
         let estimate = |problem: &Problem| {
             let estimator = estimator::entry(method).make(&Params::default());
@@ -109,11 +102,15 @@ fn estimates_from_disk_are_those_from_memory() {
 #[test]
 fn the_command_line_runs_on_what_it_wrote() {
     let folder = TempDir::new().expect("a temporary folder");
-    assert!(synth(folder.path(), &FEW).status.success());
+    let output = synth(folder.path(), &[&FEW[..], &["-q"]].concat());
+    assert!(output.status.success() && output.stderr.is_empty());
+    let disk = open(folder.path());
+    assert_eq!(disk.frames(), ["000000", "000300", "000600"]);
+    assert_eq!(disk.intrinsics(0), Size::Half.intrinsics());
     let output = posescope()
         .arg("run")
         .arg(folder.path().join("sequences/overcast"))
-        .args(["--query", "80", "--reference", "160", "--radius", "100"])
+        .args(["--query", "300", "--reference", "600", "--radius", "1000"])
         .args(["--method", "fb", "-q", "--json", "-"])
         .output()
         .expect("the binary starts");
@@ -129,14 +126,7 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
         let written = posescope()
             .arg("synth")
             .arg(folder.path())
-            .args([
-                "--size",
-                "half",
-                "--every",
-                "300",
-                "--condition",
-                "overcast",
-            ])
+            .args(FEW)
             .env("RAYON_NUM_THREADS", threads)
             .output();
         assert!(written.expect("the binary starts").status.success());
@@ -208,6 +198,7 @@ fn wrong_arguments_name_the_right_ones() {
         (["--condition", "fog"], "overcast"),
         (["--size", "tiny"], "half"),
         (["--every", "0"], "--every"),
+        (["--layout", "robotcar"], "toml"),
     ];
     for (arguments, words) in cases {
         let output = synth(folder.path(), &arguments);

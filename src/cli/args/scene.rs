@@ -29,8 +29,8 @@ pub struct SynthArgs {
     /// DIR/poses/CONDITION.txt
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// The layout, by the name of the scene format that reads it. tum can say depths up to 13 m only,
-    /// 7scenes up to 65 m; colmap has some of each scan's points
+    /// The layout, by the name of the scene format that reads it. tum holds depths up to 13 m only;
+    /// colmap has some of each scan's points
     #[arg(
         long,
         value_name = "NAME",

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{Point2, Point3};
 
-use super::{Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_photo};
+use super::{Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_image};
 use crate::camera::Intrinsics;
 use crate::scene::SceneError;
 
@@ -65,7 +65,7 @@ impl DriveWriter for Writer {
         observed.insert(shot.index, some);
         drop(observed);
         let name = &self.drive.names[shot.index];
-        write_photo(&self.folder.join(format!("images/{name}.png")), shot.photo)
+        write_image(&self.folder.join(format!("images/{name}.png")), shot.photo)
     }
 
     fn finish(&self) -> Result<(), SceneError> {
@@ -99,8 +99,8 @@ impl DriveWriter for Writer {
             images.push('\n');
         }
         let model = self.folder.join("sparse/0");
-        write(&model.join("points3D.txt"), points.as_bytes())?;
-        write(&model.join("images.txt"), images.as_bytes())?;
-        write(&model.join("cameras.txt"), cameras.as_bytes())
+        write(&model.join("points3D.txt"), points)?;
+        write(&model.join("images.txt"), images)?;
+        write(&model.join("cameras.txt"), cameras)
     }
 }

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3x4, Point3, Vector3};
 
 use super::{
-    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, Shot, is_numbered, make_folder,
-    remove_frames, row_by_row, write, write_photo,
+    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, Shot, make_folder, make_frame_folder,
+    row_by_row, write, write_image,
 };
 use crate::camera::Intrinsics;
 use crate::geometry::matrix_from_pose;
@@ -37,14 +37,12 @@ impl Writer {
         let poses = root.join("poses");
         make_folder(&poses)?;
         for (kind, extension) in [(IMAGES, "png"), (SCANS, "bin")] {
-            let folder = folder.join(kind);
-            make_folder(&folder)?;
-            remove_frames(&folder, |name| is_numbered(name, 6, extension))?;
+            make_frame_folder(&folder.join(kind), extension)?;
         }
-        write(&folder.join("calib.txt"), calibration(&drive).as_bytes())?;
+        write(&folder.join("calib.txt"), calibration(&drive))?;
         let lines = drive.poses.iter().map(matrix_from_pose);
         let lines: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
-        write(&poses.join(format!("{name}.txt")), lines.as_bytes())?;
+        write(&poses.join(format!("{name}.txt")), lines)?;
         let times = drive.times_s.iter().map(|time| format!("{time:e}\n"));
         write(
             &folder.join("times.txt"),
@@ -79,7 +77,7 @@ impl DriveWriter for Writer {
         let scan = velodyne_bytes(shot.scan, &self.drive.scanner);
         // The scan first: where there is a photo, the frame is complete.
         write(&self.folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
-        write_photo(
+        write_image(
             &self.folder.join(IMAGES).join(format!("{name}.png")),
             shot.photo,
         )
@@ -87,7 +85,7 @@ impl DriveWriter for Writer {
 }
 
 /// A scan in the frame of its scanner, which is at this position in the camera's frame \[m\].
-pub(super) fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>) -> Vec<u8> {
+fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>) -> Vec<u8> {
     let velodyne_from_camera = CAMERA_FROM_VELODYNE.transpose();
     let mut bytes = Vec::new();
     for (position, reflectance) in scan {

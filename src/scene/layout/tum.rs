@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_depth, write_photo,
+    Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_depth, write_image,
 };
 use crate::camera::Intrinsics;
 use crate::scene::SceneError;
@@ -38,7 +38,7 @@ impl Writer {
                 "# {what}\n# timestamp filename\n{}",
                 lines.collect::<String>()
             );
-            write(&folder.join(format!("{images}.txt")), list.as_bytes())?;
+            write(&folder.join(format!("{images}.txt")), list)?;
         }
         let poses = drive.poses.iter().zip(&drive.times_s).map(|(pose, &time)| {
             let parts = pose
@@ -52,10 +52,10 @@ impl Writer {
             "# timestamp tx ty tz qx qy qz qw\n{}",
             poses.collect::<String>()
         );
-        write(&folder.join("groundtruth.txt"), truth.as_bytes())?;
+        write(&folder.join("groundtruth.txt"), truth)?;
         let Intrinsics { fx, fy, cx, cy, .. } = drive.intrinsics;
         let camera = joined(&[fx, fy, cx, cy]) + "\n";
-        write(&folder.join("calibration.txt"), camera.as_bytes())?;
+        write(&folder.join("calibration.txt"), camera)?;
         Ok(Self { folder, drive })
     }
 }
@@ -65,6 +65,6 @@ impl DriveWriter for Writer {
         let name = stem(self.drive.times_s[shot.index]);
         let depth = self.folder.join(format!("depth/{name}.png"));
         write_depth(&depth, &self.drive.intrinsics, 1.0 / 5000.0, shot.depth)?;
-        write_photo(&self.folder.join(format!("rgb/{name}.png")), shot.photo)
+        write_image(&self.folder.join(format!("rgb/{name}.png")), shot.photo)
     }
 }

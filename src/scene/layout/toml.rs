@@ -2,10 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{
-    Drive, DriveWriter, Layout, Shot, is_numbered, make_folder, remove_frames, row_by_row, write,
-    write_photo,
-};
+use super::{Drive, DriveWriter, Layout, Shot, make_frame_folder, row_by_row, write, write_image};
 use crate::geometry::matrix_from_pose;
 use crate::scene::SceneError;
 
@@ -24,13 +21,11 @@ impl Writer {
     fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
         let folder = root.join(name);
         for (kind, extension) in [("photos", "png"), ("scans", "ply")] {
-            let folder = folder.join(kind);
-            make_folder(&folder)?;
-            remove_frames(&folder, |name| is_numbered(name, 6, extension))?;
+            make_frame_folder(&folder.join(kind), extension)?;
         }
         let lines = drive.poses.iter().map(matrix_from_pose);
         let poses: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
-        write(&folder.join("poses.txt"), poses.as_bytes())?;
+        write(&folder.join("poses.txt"), poses)?;
         let camera = drive.intrinsics;
         let description = format!(
             "images = \"photos/*.png\"\nposes = \"poses.txt\"\n\n\
@@ -38,7 +33,7 @@ impl Writer {
              [clouds]\nfiles = \"scans/*.ply\"\n",
             camera.fx, camera.fy, camera.cx, camera.cy
         );
-        write(&folder.join("scene.toml"), description.as_bytes())?;
+        write(&folder.join("scene.toml"), description)?;
         Ok(Self {
             folder,
             names: drive.names,
@@ -60,6 +55,6 @@ impl DriveWriter for Writer {
             ply.extend(values.flat_map(|value| value.to_le_bytes()));
         }
         write(&self.folder.join(format!("scans/{name}.ply")), &ply)?;
-        write_photo(&self.folder.join(format!("photos/{name}.png")), shot.photo)
+        write_image(&self.folder.join(format!("photos/{name}.png")), shot.photo)
     }
 }

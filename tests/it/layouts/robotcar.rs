@@ -7,15 +7,16 @@ use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Luma, RgbImage};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion};
+use posescope::geometry::Pose;
+use posescope::scene::SceneError;
+use posescope::scene::layout::{Drive, DriveWriter, Layout, Shot};
 
-use super::{Drive, DriveWriter, Layout, Shot, make_folder, remove_frames, write};
-use crate::geometry::Pose;
-use crate::scene::SceneError;
+use super::{joined, make_folder, write};
 
-pub(super) const LAYOUT: Layout = Layout {
+pub const LAYOUT: Layout = Layout {
     name: "robotcar",
     place: |name| name.to_owned(),
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
+    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive))),
 };
 
 /// From x right, y down, z forward to the axes of the car: x forward, y right, z down; and so from the
@@ -61,28 +62,11 @@ fn six(pose: &Pose) -> [f64; 6] {
     [t.x, t.y, t.z, roll, pitch, yaw]
 }
 
-fn separated(numbers: &[f64], by: &str) -> String {
-    let words = numbers.iter().map(|number| format!("{number:e}"));
-    words.collect::<Vec<_>>().join(by)
-}
-
 impl Writer {
-    fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
+    fn create(root: &Path, name: &str, drive: Drive) -> Self {
         let folder = root.join(name);
-        for (sensor, extension) in [
-            ("stereo/centre", "png"),
-            ("ldmrs", "bin"),
-            ("lms_front", "bin"),
-        ] {
-            let folder = folder.join(sensor);
-            make_folder(&folder)?;
-            let is_time = |name: &str| {
-                let stem = name
-                    .strip_suffix(extension)
-                    .and_then(|name| name.strip_suffix('.'));
-                stem.is_some_and(|stem| stem.bytes().all(|byte| byte.is_ascii_digit()))
-            };
-            remove_frames(&folder, is_time)?;
+        for part in ["stereo/centre", "ldmrs", "lms_front", "gps", "vo"] {
+            make_folder(&folder.join(part));
         }
         let times = drive
             .times_s
@@ -94,31 +78,25 @@ impl Writer {
             "ldmrs.timestamps",
             "lms_front.timestamps",
         ] {
-            write(&folder.join(list), times.as_bytes())?;
-        }
-        for part in ["gps", "vo"] {
-            make_folder(&folder.join(part))?;
+            write(&folder.join(list), &times);
         }
         let writer = Self { folder, drive };
-        writer.sdk(&root.join("sdk"))?;
-        write(&writer.folder.join("gps/ins.csv"), writer.ins().as_bytes())?;
-        write(
-            &writer.folder.join("vo/vo.csv"),
-            writer.odometry().as_bytes(),
-        )?;
-        Ok(writer)
+        writer.sdk(&root.join("sdk"));
+        write(&writer.folder.join("gps/ins.csv"), writer.ins());
+        write(&writer.folder.join("vo/vo.csv"), writer.odometry());
+        writer
     }
 
-    fn sdk(&self, sdk: &Path) -> Result<(), SceneError> {
+    fn sdk(&self, sdk: &Path) {
         let (models, extrinsics) = (sdk.join("models"), sdk.join("extrinsics"));
-        make_folder(&models)?;
-        make_folder(&extrinsics)?;
+        make_folder(&models);
+        make_folder(&extrinsics);
         let camera = &self.drive.intrinsics;
         let model = format!(
             "{}\n0 0 1 0\n1 0 0 0\n0 1 0 0\n0 0 0 1\n",
-            separated(&[camera.fx, camera.fy, camera.cx, camera.cy], " ")
+            joined(&[camera.fx, camera.fy, camera.cx, camera.cy], " ")
         );
-        write(&models.join("stereo_narrow_left.txt"), model.as_bytes())?;
+        write(&models.join("stereo_narrow_left.txt"), model);
         let moved = |at: u32, by: u32, size: u32| f64::from((at + by).min(size - 1));
         let (width, height) = (camera.width, camera.height);
         let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -128,7 +106,7 @@ impl Writer {
         write(
             &models.join("stereo_narrow_left_distortion_lut.bin"),
             &table,
-        )?;
+        );
         let scanner = CAR_FROM_CAMERA * self.drive.scanner.coords;
         let ldmrs = [scanner.x, scanner.y, scanner.z, 0.0, 0.0, 0.0];
         for (sensor, numbers) in [
@@ -137,10 +115,9 @@ impl Writer {
             ("ldmrs", ldmrs),
             ("lms_front", LMS),
         ] {
-            let text = separated(&numbers, " ") + "\n";
-            write(&extrinsics.join(format!("{sensor}.txt")), text.as_bytes())?;
+            let text = joined(&numbers, " ") + "\n";
+            write(&extrinsics.join(format!("{sensor}.txt")), text);
         }
-        Ok(())
     }
 
     /// The car in north, east, down.
@@ -161,8 +138,8 @@ impl Writer {
                 .to_owned();
         for (time, car) in self.cars() {
             let [north, east, down, roll, pitch, yaw] = six(&(car * transform(INS)));
-            let place = separated(&[north, east, down], ",");
-            let angles = separated(&[roll, pitch, yaw], ",");
+            let place = joined(&[north, east, down], ",");
+            let angles = joined(&[roll, pitch, yaw], ",");
             text +=
                 &format!("{time},INS_SOLUTION_GOOD,51.76,-1.26,110,{place},30U,0,0,0,{angles}\n");
             text += &format!(
@@ -181,7 +158,7 @@ impl Writer {
                 continue;
             };
             let moved = six(&(from.inverse() * to));
-            text += &format!("{after},{before},{}\n", separated(&moved, ","));
+            text += &format!("{after},{before},{}\n", joined(&moved, ","));
         }
         text
     }
@@ -192,10 +169,7 @@ impl DriveWriter for Writer {
         let time = microseconds(self.drive.times_s[shot.index]);
         let raw = raw_photo(shot.photo);
         let path = self.folder.join(format!("stereo/centre/{time}.png"));
-        let mut png = std::io::Cursor::new(Vec::new());
-        let encoded = raw.write_to(&mut png, image::ImageFormat::Png);
-        encoded.map_err(SceneError::image(&path))?;
-        write(&path, png.get_ref())?;
+        raw.save(path).expect("writable");
         let scanner = CAR_FROM_CAMERA * self.drive.scanner.coords;
         let in_car = |point: &Point3<f32>| CAR_FROM_CAMERA * point.cast::<f64>().coords;
         let ldmrs = shot.scan.iter().flat_map(|(point, _)| {
@@ -203,14 +177,15 @@ impl DriveWriter for Writer {
             [point.x, point.y, point.z]
         });
         let bytes: Vec<u8> = ldmrs.flat_map(f64::to_le_bytes).collect();
-        write(&self.folder.join(format!("ldmrs/{time}.bin")), &bytes)?;
+        write(&self.folder.join(format!("ldmrs/{time}.bin")), bytes);
         let lms_from_car = transform(LMS).inverse();
         let in_plane = shot.scan.iter().filter_map(|(point, reflectance)| {
             let point = lms_from_car * Point3::from(in_car(point));
             (point.z.abs() < PLANE_M).then_some([point.x, point.y, f64::from(*reflectance)])
         });
         let bytes: Vec<u8> = in_plane.flatten().flat_map(f64::to_le_bytes).collect();
-        write(&self.folder.join(format!("lms_front/{time}.bin")), &bytes)
+        write(&self.folder.join(format!("lms_front/{time}.bin")), bytes);
+        Ok(())
     }
 }
 

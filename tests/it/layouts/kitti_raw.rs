@@ -5,19 +5,17 @@ use std::path::{Path, PathBuf};
 
 use chrono::DateTime;
 use nalgebra::Vector3;
+use posescope::camera::Intrinsics;
+use posescope::geometry::Pose;
+use posescope::scene::SceneError;
+use posescope::scene::layout::{Drive, DriveWriter, Layout, Shot};
 
-use super::{
-    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, Shot, is_numbered, joined, make_folder,
-    remove_frames, write, write_photo,
-};
-use crate::camera::Intrinsics;
-use crate::geometry::Pose;
-use crate::scene::SceneError;
+use super::{CAMERA_FROM_VELODYNE, joined, make_folder, write};
 
-pub(super) const LAYOUT: Layout = Layout {
+pub const LAYOUT: Layout = Layout {
     name: "kitti-raw",
     place: |name| format!("{name}/{name}_drive_0001_sync"),
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
+    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive))),
 };
 
 /// Radius of the earth in the devkit's projection \[m\].
@@ -36,20 +34,14 @@ fn stem(frame: usize) -> String {
 }
 
 impl Writer {
-    fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
+    fn create(root: &Path, name: &str, drive: Drive) -> Self {
         let day = root.join(name);
         let drive_folder = root.join((LAYOUT.place)(name));
-        for (sensor, extension) in [
-            ("image_02", "png"),
-            ("velodyne_points", "bin"),
-            ("oxts", "txt"),
-        ] {
-            let folder = drive_folder.join(sensor).join("data");
-            make_folder(&folder)?;
-            remove_frames(&folder, |name| is_numbered(name, 10, extension))?;
+        for sensor in ["image_02", "velodyne_points", "oxts"] {
+            make_folder(&drive_folder.join(sensor).join("data"));
             let times = drive.times_s.iter().map(|&time| timestamp(time) + "\n");
             let path = drive_folder.join(sensor).join("timestamps.txt");
-            write(&path, times.collect::<String>().as_bytes())?;
+            write(&path, times.collect::<String>());
         }
         let Intrinsics {
             fx,
@@ -67,31 +59,31 @@ impl Writer {
                  P_rect_0{number}: {fx:e} 0 {cx:e} 0 0 {fy:e} {cy:e} 0 0 0 1 0\n"
             );
         }
-        write(&day.join("calib_cam_to_cam.txt"), cameras.as_bytes())?;
-        let rotation = joined(&CAMERA_FROM_VELODYNE.transpose());
-        let scanner = joined(drive.scanner.coords.iter());
+        write(&day.join("calib_cam_to_cam.txt"), cameras);
+        let rotation = joined(&CAMERA_FROM_VELODYNE.transpose(), " ");
+        let scanner = joined(drive.scanner.coords.iter(), " ");
         let velodyne = format!("R: {rotation}\nT: {scanner}\n");
-        write(&day.join("calib_velo_to_cam.txt"), velodyne.as_bytes())?;
+        write(&day.join("calib_velo_to_cam.txt"), velodyne);
         let imu = format!("R: {one}\nT: 0 0 0\n");
-        write(&day.join("calib_imu_to_velo.txt"), imu.as_bytes())?;
+        write(&day.join("calib_imu_to_velo.txt"), imu);
         let writer = Self {
             drive_folder,
             drive,
         };
-        writer.packets()?;
-        Ok(writer)
+        writer.packets();
+        writer
     }
 
     /// The packets of all frames. The IMU is where the scanner is, and the world of the packets is the
     /// drive's with the axes of a car.
-    fn packets(&self) -> Result<(), SceneError> {
+    fn packets(&self) {
         let camera_from_imu = Pose::from_parts(
             self.drive.scanner.into(),
             nalgebra::UnitQuaternion::from_matrix(&CAMERA_FROM_VELODYNE),
         );
         let imu_pose = |pose: &Pose| camera_from_imu.inverse() * pose * camera_from_imu;
         let Some(first) = self.drive.poses.first().map(imu_pose) else {
-            return Ok(());
+            return;
         };
         let [latitude, longitude] = FIRST.map(f64::to_radians);
         let scale = latitude.cos() * EARTH_RADIUS_M;
@@ -107,10 +99,9 @@ impl Writer {
             numbers[2] = pose.translation.vector.z;
             numbers[3..6].copy_from_slice(&[roll, pitch, yaw]);
             let path = format!("oxts/data/{}.txt", stem(frame));
-            let text = joined(&numbers) + "\n";
-            write(&self.drive_folder.join(path), text.as_bytes())?;
+            let text = joined(&numbers, " ") + "\n";
+            write(&self.drive_folder.join(path), text);
         }
-        Ok(())
     }
 }
 
@@ -122,10 +113,17 @@ fn timestamp(time_s: f64) -> String {
 
 impl DriveWriter for Writer {
     fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
-        let scan = super::kitti::velodyne_bytes(shot.scan, &self.drive.scanner);
         let name = stem(shot.index);
         let file = |path: String| self.drive_folder.join(path);
-        write(&file(format!("velodyne_points/data/{name}.bin")), &scan)?;
-        write_photo(&file(format!("image_02/data/{name}.png")), shot.photo)
+        let records = shot.scan.iter().flat_map(|(position, reflectance)| {
+            let from_scanner = position.cast::<f64>() - self.drive.scanner;
+            let position: Vector3<f32> = (CAMERA_FROM_VELODYNE.transpose() * from_scanner).cast();
+            [position.x, position.y, position.z, *reflectance]
+        });
+        let scan: Vec<u8> = records.flat_map(f32::to_le_bytes).collect();
+        write(&file(format!("velodyne_points/data/{name}.bin")), scan);
+        let photo = file(format!("image_02/data/{name}.png"));
+        shot.photo.save(photo).expect("writable");
+        Ok(())
     }
 }
