@@ -1,6 +1,6 @@
 //! The fitted coefficients of each method's probability.
 //!
-//! `cargo run -p posescope-diagnosis --bin calibration` fits them, prints them in this form and shows how well
+//! `cargo run -p posescope-studies -- calibration` fits them, prints them in this form and shows how well
 //! they hold on conditions that they were not fitted on.
 
 use crate::method::Method;

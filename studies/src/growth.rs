@@ -1,0 +1,214 @@
+use std::sync::Arc;
+
+use cpu_time::ProcessTime;
+use posescope::camera::Intrinsics;
+use posescope::cost::{Cost, MutualInformation, MutualInformationParams};
+use posescope::features::{SurfParams, nearest_neighbours, surf};
+use posescope::image::{FloatImage, GrayImage};
+use posescope::render::{ColoredPoint, Scorer};
+use posescope_studies::{PAIR, poses_of_a_disc, registered_cost, seen_by};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
+
+use crate::Failure;
+use crate::numbers::{median, print_table};
+
+const POINTS: [usize; 8] = [
+    2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000,
+];
+/// Sides of the photo, as multiples of what they are.
+const SCALES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
+const BINS: [usize; 7] = [4, 8, 16, 32, 64, 128, 256];
+const KEYPOINTS: [usize; 6] = [500, 1_000, 2_000, 5_000, 10_000, 20_000];
+/// Every so many poses of the disc are scored.
+const EVERY: usize = 4;
+
+/// How does the time of the stages grow with points, pixels, bins and keypoints?
+///
+/// Everything runs on one thread, and times are the processor's. The pair is one of the street, or the one that
+/// POSESCOPE_SCENE and POSESCOPE_PAIR name.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Rounds, of which the median counts.
+    #[arg(long, default_value_t = 5)]
+    rounds: usize,
+}
+
+pub fn run(options: &Options) -> Result<(), Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build_global()?;
+    let rounds = options.rounds;
+    by_points(rounds);
+    by_size(rounds);
+    by_bins(rounds);
+    by_keypoints(rounds);
+    Ok(())
+}
+
+fn row(of: impl ToString, times: impl IntoIterator<Item = f64>) -> Vec<String> {
+    let times = times.into_iter().map(|time| format!("{time:.3}"));
+    [of.to_string()].into_iter().chain(times).collect()
+}
+
+/// A hypothesis of PM and one of MI \[µs\].
+fn of_both(
+    points: &[ColoredPoint],
+    query: &Arc<FloatImage>,
+    intrinsics: &Intrinsics,
+    rounds: usize,
+) -> [f64; 2] {
+    let costs = ["pm", "mi"].map(registered_cost);
+    costs.map(|cost| hypothesis(points, query, intrinsics, cost.as_ref(), rounds))
+}
+
+/// A hypothesis over the points of the cloud.
+fn by_points(rounds: usize) {
+    let (query, cloud) = seen_by(registered_cost("pm").as_ref());
+    let rows = POINTS.map(|count| {
+        let points = dense(&cloud.points, count);
+        row(
+            count,
+            of_both(&points, &query, &PAIR.query.intrinsics, rounds),
+        )
+    });
+    print_table(
+        &["points", "PM, a hypothesis (µs)", "MI, a hypothesis (µs)"],
+        &rows,
+    );
+}
+
+/// So many points. More than there are come from copies that stand a few centimetres aside.
+fn dense(points: &[ColoredPoint], count: usize) -> Vec<ColoredPoint> {
+    const ASIDE_M: f32 = 0.05;
+    let mut rng = Pcg64::seed_from_u64(4);
+    let mut point = |i: usize| {
+        let mut point = points[i * points.len() / count];
+        if count > points.len() {
+            for coordinate in point.position.coords.iter_mut() {
+                *coordinate += rng.random_range(-ASIDE_M..ASIDE_M);
+            }
+        }
+        point
+    };
+    (0..count).map(&mut point).collect()
+}
+
+/// A hypothesis over the pixels of the photo.
+fn by_size(rounds: usize) {
+    let (query, cloud) = seen_by(registered_cost("pm").as_ref());
+    let rows = SCALES.map(|scale| {
+        let intrinsics = scaled(&PAIR.query.intrinsics, scale);
+        let back = |at: u32, size: u32| ((f64::from(at) / scale) as u32).min(size - 1);
+        let pixel = |x, y| *query.get_pixel(back(x, query.width()), back(y, query.height()));
+        let query = FloatImage::from_fn(intrinsics.width, intrinsics.height, pixel);
+        row(
+            intrinsics.area(),
+            of_both(&cloud.points, &Arc::new(query), &intrinsics, rounds),
+        )
+    });
+    print_table(
+        &["pixels", "PM, a hypothesis (µs)", "MI, a hypothesis (µs)"],
+        &rows,
+    );
+}
+
+fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
+    let side = |side: u32| (f64::from(side) * scale) as u32;
+    Intrinsics {
+        fx: intrinsics.fx * scale,
+        fy: intrinsics.fy * scale,
+        cx: (intrinsics.cx + 0.5) * scale - 0.5,
+        cy: (intrinsics.cy + 0.5) * scale - 0.5,
+        width: side(intrinsics.width),
+        height: side(intrinsics.height),
+    }
+}
+
+/// A hypothesis of MI over the bins of its histogram.
+fn by_bins(rounds: usize) {
+    let rows = BINS.map(|bins| {
+        let params = MutualInformationParams {
+            bins,
+            ..MutualInformationParams::default()
+        };
+        let cost = MutualInformation::new(&params);
+        let (query, cloud) = seen_by(&cost);
+        let intrinsics = &PAIR.query.intrinsics;
+        row(
+            bins,
+            [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)],
+        )
+    });
+    print_table(&["bins", "MI, a hypothesis (µs)"], &rows);
+}
+
+/// Finding, describing and matching features over their number.
+///
+/// The photos are enlarged twice and made grainy, and nearly everything counts as a feature, so that there are
+/// enough.
+fn by_keypoints(rounds: usize) {
+    let photos = [&PAIR.query.photo.gray, &PAIR.reference.photo.gray].map(enlarged);
+    let params = |max_keypoints| SurfParams {
+        threshold: 1.0,
+        max_keypoints,
+        ..SurfParams::default()
+    };
+    let most = params(KEYPOINTS[KEYPOINTS.len() - 1]);
+    let [query, reference] = photos
+        .each_ref()
+        .map(|photo| surf(photo, &most).descriptors);
+    let known = query.len().min(reference.len());
+    let rows = KEYPOINTS
+        .into_iter()
+        .filter(|&count| count <= known)
+        .map(|count| {
+            let found = processor_s(rounds, || surf(&photos[0], &params(count)));
+            let matched = processor_s(rounds, || {
+                nearest_neighbours(&query[..count], &reference[..count])
+            });
+            row(count, [1e3 * found, 1e3 * matched])
+        });
+    let head = [
+        "keypoints in each photo",
+        "SURF of a photo (ms)",
+        "matching one way (ms)",
+    ];
+    print_table(&head, &rows.collect::<Vec<_>>());
+}
+
+/// Processor time of one hypothesis \[µs\].
+fn hypothesis(
+    points: &[ColoredPoint],
+    query: &Arc<FloatImage>,
+    intrinsics: &Intrinsics,
+    cost: &dyn Cost,
+    rounds: usize,
+) -> f64 {
+    let poses: Vec<_> = poses_of_a_disc().into_iter().step_by(EVERY).collect();
+    let scorer = Scorer::new(points, Arc::clone(query), intrinsics, 1, cost);
+    scorer.score(&poses[..1]);
+    1e6 * processor_s(rounds, || scorer.score(&poses)) / poses.len() as f64
+}
+
+/// The median of some rounds \[s\].
+fn processor_s<T>(rounds: usize, mut work: impl FnMut() -> T) -> f64 {
+    median((0..rounds).map(|_| {
+        let begun = ProcessTime::now();
+        std::hint::black_box(work());
+        begun.elapsed().as_secs_f64()
+    }))
+}
+
+/// Twice as wide and high, a pixel between two their mean, with grain: enlarging alone adds no blobs.
+fn enlarged(photo: &GrayImage) -> GrayImage {
+    const GRAIN: i32 = 24;
+    let mut rng = Pcg64::seed_from_u64(5);
+    let (width, height) = photo.dimensions();
+    let at = |x: u32, y: u32| i32::from(photo.get_pixel(x.min(width - 1), y.min(height - 1)).0[0]);
+    GrayImage::from_fn(2 * width, 2 * height, |x, y| {
+        let ([left, right], [top, bottom]) = ([x / 2, x.div_ceil(2)], [y / 2, y.div_ceil(2)]);
+        let mean = (at(left, top) + at(right, top) + at(left, bottom) + at(right, bottom)) / 4;
+        [(mean + rng.random_range(-GRAIN..=GRAIN)).clamp(0, 255) as u8].into()
+    })
+}

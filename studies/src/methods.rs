@@ -1,0 +1,301 @@
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Instant;
+
+use posescope::diagnosis::{Evidence, Subject, confidence};
+use posescope::estimator;
+use posescope::geometry::PoseError;
+use posescope::method::Method;
+use posescope::params::Params;
+use posescope::scene::Scene;
+use posescope::scene::street::{Size, Street};
+use posescope::trace::Trace;
+
+use crate::Failure;
+use crate::cases::{Case, Plan};
+use crate::numbers::{SUMMARY, at_places, mean, median, percent, print_table, summary};
+use crate::truth;
+
+/// How well do methods do, each with settings of its own, on the street and on other scenes?
+///
+/// Prints a row for each method and pair of conditions (the reference's → the query's), scene or distance of the
+/// start: shares of the queries, medians over all of them, those without a pose counted as infinitely wrong, and RMSE
+/// over those with one.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Measure on so many places of the street, one out of each of as many equal stretches of the route.
+    #[arg(long)]
+    street: Option<usize>,
+    /// Measure on so many pairs of the street whose distances are spread evenly up to the radius.
+    #[arg(long)]
+    starts: Option<usize>,
+    /// Measure on all pairs of frames of a scene.
+    #[arg(long)]
+    scene: Option<String>,
+    /// Poses that are better than those of --scene: lines of a frame's name and a 3 × 4 matrix.
+    #[arg(long)]
+    truth: Option<PathBuf>,
+    /// A method and its settings, as "mi6 mi6.yaws=1"; repeatable.
+    #[arg(long, default_values = ["fb", "pm", "mi", "hy"])]
+    method: Vec<Asked>,
+    /// Pairs of conditions: all, equal, other, the conditions of which all pairs are taken, as overcast,night, or pairs
+    /// of the reference's and the query's, as overcast-night.
+    #[arg(long, default_value = "equal", value_delimiter = ',')]
+    cells: Vec<String>,
+    /// Take photos of the street in half size.
+    #[arg(long)]
+    half: bool,
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// The uncertainty radius, and how far a reference is from its query at most [m].
+    #[arg(long, default_value_t = 10.0)]
+    radius: f64,
+    /// How far the frames of a pair of --scene are apart at least [m].
+    #[arg(long, default_value_t = 0.0)]
+    from: f64,
+    /// Take references of the street at least so far away, which show nothing that the query shows [m].
+    #[arg(long)]
+    unrelated: Option<f64>,
+    /// Print each method's shares by the condition of reference and query too, and what MI's cost is at the truth.
+    #[arg(long)]
+    matrices: bool,
+}
+
+/// A method with its settings, as it was asked for.
+#[derive(Clone)]
+struct Asked {
+    label: String,
+    method: Method,
+    params: Params,
+}
+
+impl FromStr for Asked {
+    type Err = Failure;
+
+    fn from_str(text: &str) -> Result<Self, Failure> {
+        let mut words = text.split_whitespace();
+        let method = words
+            .next()
+            .ok_or("the name of a method expected")?
+            .parse()?;
+        let mut params = Params::default();
+        words.try_for_each(|assignment| params.assign(assignment))?;
+        Ok(Self {
+            label: text.to_owned(),
+            method,
+            params,
+        })
+    }
+}
+
+/// What a method made of a case.
+struct Measured {
+    rows: Vec<String>,
+    method: usize,
+    error: Option<PoseError>,
+    seconds: f64,
+    /// Normalised mutual information of the true pose, the pose found, and shuffled pixels; asked of MI alone.
+    information: Option<[f64; 3]>,
+}
+
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let plan = Plan {
+        seed: options.seed,
+        from_m: options.from,
+        radius_m: options.radius,
+        unrelated_m: options.unrelated,
+    };
+    let measured = match (&options.scene, options.street, options.starts) {
+        (Some(path), None, None) => {
+            let scene = truth::open(path, options.truth.as_deref())?;
+            at_places(scene.frames().len(), |at| {
+                measure(&plan.pairs(scene.as_ref(), at)?, options)
+            })?
+        }
+        (None, street, starts) if street.is_some() != starts.is_some() => {
+            let cells = cells(&options.cells)?;
+            let size = if options.half { Size::Half } else { Size::Full };
+            let mut scenes = BTreeMap::new();
+            for name in cells.iter().flatten() {
+                scenes.insert(name.clone(), Street::new(name, size)?);
+            }
+            let scene = |name: &String| &scenes[name] as &dyn Scene;
+            let pairs: Vec<[&dyn Scene; 2]> = cells
+                .iter()
+                .map(|cell| cell.each_ref().map(scene))
+                .collect();
+            let places = street.or(starts).unwrap_or(0);
+            at_places(places, |place| {
+                let cases = match street {
+                    Some(_) => plan.at_place(place, places, &pairs)?,
+                    None => plan.of_start(place, places, 6, pairs[0])?,
+                };
+                measure(&cases, options)
+            })?
+        }
+        _ => return Err("one of --street N, --starts N and --scene PATH".into()),
+    };
+    let measured: Vec<Measured> = measured.into_iter().flatten().collect();
+    print(&measured, options);
+    if options.matrices {
+        print_matrices(&measured, options)?;
+    }
+    Ok(())
+}
+
+/// Pairs of conditions, the reference's and the query's.
+fn cells(words: &[String]) -> Result<Vec<[String; 2]>, Failure> {
+    let pairs_of = |conditions: &[String]| -> Vec<[String; 2]> {
+        let pair = |a: &String| {
+            conditions
+                .iter()
+                .map(|b| [a.clone(), b.clone()])
+                .collect::<Vec<_>>()
+        };
+        conditions.iter().flat_map(pair).collect()
+    };
+    let conditions: Vec<String> = Street::conditions().map(str::to_owned).collect();
+    let all = pairs_of(&conditions);
+    Ok(match words {
+        [word] if word == "all" => all,
+        [word] if word == "equal" => all.into_iter().filter(|[a, b]| a == b).collect(),
+        [word] if word == "other" => all.into_iter().filter(|[a, b]| a != b).collect(),
+        words if words.iter().all(|word| conditions.contains(word)) => pairs_of(words),
+        words => {
+            let pair = |word: &String| {
+                let (a, b) = word
+                    .split_once('-')
+                    .ok_or(format!("{word} is no pair of conditions"))?;
+                Ok([a.to_owned(), b.to_owned()])
+            };
+            words.iter().map(pair).collect::<Result<_, String>>()?
+        }
+    })
+}
+
+fn measure(cases: &[Case], options: &Options) -> Result<Vec<Measured>, Failure> {
+    let mut measured = Vec::new();
+    for case in cases {
+        for (method, asked) in options.method.iter().enumerate() {
+            let problem = &case.problem;
+            let started = Instant::now();
+            let mut evidence = Evidence::default();
+            let estimator = estimator::entry(asked.method).make(&asked.params);
+            let outcome = estimator.estimate(problem, &mut Trace::to(&mut evidence))?;
+            let subject = Subject::new(problem, asked.method, &asked.params, &outcome, &evidence);
+            let outcome = confidence::accepted(&subject, None);
+            let seconds = started.elapsed().as_secs_f64();
+            let error = outcome.pose.as_ref().ok();
+            let information = || {
+                let at_truth = estimator.score_at(problem, &case.truth)?.cost?;
+                let found = outcome.cost?;
+                let costs = [at_truth, found.best, found.shuffled.unwrap_or(1.0)];
+                Some(costs.map(|cost| 1.0 - cost))
+            };
+            let is_asked = options.matrices && asked.method == Method::MI;
+            measured.push(Measured {
+                rows: case.rows.clone(),
+                method,
+                error: error.map(|pose| PoseError::between(&case.truth, pose)),
+                seconds,
+                information: is_asked.then(information).flatten(),
+            });
+        }
+    }
+    Ok(measured)
+}
+
+fn print(measured: &[Measured], options: &Options) {
+    let mut groups: BTreeMap<(&str, usize), Vec<&Measured>> = BTreeMap::new();
+    for one in measured {
+        for row in &one.rows {
+            groups.entry((row, one.method)).or_default().push(one);
+        }
+    }
+    let rows = groups.iter().map(|((row, method), own)| {
+        let names = vec![
+            row.trim_start().to_owned(),
+            options.method[*method].label.clone(),
+        ];
+        let errors: Vec<_> = own.iter().map(|one| one.error).collect();
+        let time = format!("{:.2} s", mean(own.iter().map(|one| one.seconds)));
+        [names, summary(&errors), vec![time]].concat()
+    });
+    let head = ["", "method"]
+        .into_iter()
+        .chain(SUMMARY.split(','))
+        .chain(["time"]);
+    print_table(&head.collect::<Vec<_>>(), &rows.collect::<Vec<_>>());
+}
+
+/// A table for each method, of the reference's condition (rows) by the query's (columns), and one that asks why MI
+/// fails where it does: whether its search missed the truth's minimum, or the truth costs more than the pose found.
+fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failure> {
+    let cells = cells(&options.cells)?;
+    let mut conditions: Vec<&String> = cells.iter().flatten().collect();
+    conditions.dedup();
+    conditions.sort_by_key(|name| Street::conditions().position(|known| known == name.as_str()));
+    conditions.dedup();
+    let matrix = |method: usize, cell: &dyn Fn(&[&Measured]) -> String| {
+        let rows = conditions.iter().map(|reference| {
+            let cells = conditions.iter().map(|query| {
+                let name = format!("{reference} → {query}");
+                let is_here = |one: &&Measured| one.method == method && one.rows[0] == name;
+                cell(&measured.iter().filter(is_here).collect::<Vec<_>>())
+            });
+            [format!("**{reference}**")]
+                .into_iter()
+                .chain(cells)
+                .collect()
+        });
+        let head = ["".to_owned()]
+            .into_iter()
+            .chain(conditions.iter().map(|name| (*name).clone()));
+        print_table(&head.collect::<Vec<_>>(), &rows.collect::<Vec<_>>());
+    };
+    let off = |one: &&Measured| one.error.map_or(f64::INFINITY, |error| error.translation_m);
+    for (method, asked) in options.method.iter().enumerate() {
+        println!(
+            "{}: poses within 10 m / 2 m / 1 m, and the median error of the poses found\n",
+            asked.label
+        );
+        matrix(method, &|here| {
+            let within = |limit| {
+                percent(
+                    here.iter().filter(|one| off(one) < limit).count(),
+                    here.len(),
+                )
+            };
+            let [ten, two, one] = [10.0, 2.0, 1.0].map(within);
+            let found = median(here.iter().map(off).filter(|metres| metres.is_finite()));
+            format!("{ten:.0} / {two:.0} / {one:.0} %, {found:.2} m")
+        });
+    }
+    let Some(mi) = options
+        .method
+        .iter()
+        .position(|asked| asked.method == Method::MI)
+    else {
+        return Ok(());
+    };
+    println!(
+        "Normalised mutual information at the true pose / at the pose found / of shuffled pixels (medians); of the \
+         poses more than 2 m off, those that cost more than the truth + those that cost less\n"
+    );
+    matrix(mi, &|here| {
+        let known = || {
+            here.iter()
+                .filter_map(|one| Some((off(one), one.information?)))
+        };
+        let [truth, found, chance] =
+            [0, 1, 2].map(|k| median(known().map(|(_, values)| values[k])));
+        let far = || known().filter(|(metres, _)| *metres >= 2.0);
+        let missed = far().filter(|(_, [truth, found, _])| truth > found).count();
+        format!(
+            "{truth:.2} / {found:.2} / {chance:.2}; {missed} + {}",
+            far().count() - missed
+        )
+    });
+    Ok(())
+}
