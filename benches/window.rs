@@ -12,7 +12,6 @@ use egui_kittest::Harness;
 use nalgebra::Point3;
 use posescope::app::{self, App, Arrangement, Command, KnownResults, Results, Setup};
 use posescope::cloud::Cloud;
-use posescope::geometry::Pose;
 use posescope::localize::QueryResult;
 use posescope::run::{QueryCamera, ScenePair};
 use posescope::scene::{self, Scene, SceneError};
@@ -139,19 +138,6 @@ fn scrubbing(bencher: Bencher) {
     with_window(|window| scrub(bencher, window, draw));
 }
 
-/// A part of the window has all the room.
-#[divan::bench(args = ["images", "synthetic", "space", "surface", "histogram", "ransac", "report", "log"], sample_count = 60, sample_size = 1)]
-fn own_scrubbing_of(bencher: Bencher, view: &str) {
-    with_window(|window| {
-        let name = app::views::find(view).expect("a view");
-        window.state_mut().send(Command::Maximize(Some(name)));
-        window.step();
-        scrub(bencher, window, draw_own);
-        window.state_mut().send(Command::Maximize(None));
-        window.step();
-    });
-}
-
 /// The results of the window's query, repeated over the frames of its scene: a run folder of so many.
 struct ManyResults {
     folder: tempfile::TempDir,
@@ -265,30 +251,5 @@ fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
         batch.state_mut().send(Command::Maximize(Some(name)));
         batch.run_steps(3);
         bencher.bench_local(|| draw_own(&mut batch));
-    });
-}
-
-/// The camera in hand moves: until costs and pictures of both methods are painted.
-#[divan::bench(sample_count = 30, sample_size = 1)]
-fn what_if(bencher: Bencher) {
-    with_window(|window| {
-        let loaded = window.state().app_state().run().loaded.clone();
-        let loaded = loaded.expect("the run is over");
-        let start = loaded.problems[0].reference.world_from_camera;
-        let mut moves = 0;
-        bencher.bench_local(|| {
-            moves += 1;
-            let pose = start * Pose::translation(0.0, 0.0, 0.05 * f64::from(moves));
-            let is_answered = |window: &Window| {
-                let state = window.state().app_state();
-                state.probe().is_some_and(|probe| probe.pose == pose)
-            };
-            window.state_mut().send(Command::TakeCamera(Some(pose)));
-            while !is_answered(window) {
-                window.step();
-                std::thread::sleep(std::time::Duration::from_millis(1));
-            }
-            draw(window);
-        });
     });
 }

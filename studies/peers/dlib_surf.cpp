@@ -2,7 +2,7 @@
 //
 //   c++ -O3 -march=native -DNDEBUG -std=c++17 dlib_surf.cpp -ldlib -lblas -o dlib_surf && ./dlib_surf FILE WIDTH HEIGHT THRESHOLD
 //
-// answers each line of its input with a line of JSON, as the bench `peers` does.
+// answers each line of its input with a line of JSON, as `studies peers` does.
 #include <dlib/array2d.h>
 #include <dlib/image_keypoint.h>
 

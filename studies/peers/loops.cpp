@@ -2,7 +2,7 @@
 //
 //   c++ -O3 -march=native -std=c++17 loops.cpp -o loops && ./loops FOLDER
 //
-// reads names of stages, one a line, and answers each with a line of JSON, as the bench `peers` does.
+// reads names of stages, one a line, and answers each with a line of JSON, as `studies peers` does.
 //   plain_1  each point falls on its nearest pixel, whatever lies before it: no depth test
 //   depth_1  the nearest point of a pixel is seen: one buffer of depths, cleared for each hypothesis
 //   depth_3  the same, each point a square of 3 x 3 pixels

@@ -119,24 +119,6 @@ def opencv_matching(folder):
     return {f"OpenCV {cv2.__version__} BFMatcher": run}
 
 
-def opencv_p3p(folder):
-    import cv2
-    import numpy as np
-
-    numbers = np.fromfile(folder / "p3p.f64").reshape(-1, 6, 3)[:2000]
-    camera = np.eye(3)
-    problems = [(points.copy(), (bearings[:, :2] / bearings[:, 2:]).copy()) for bearings, points in ((n[:3], n[3:]) for n in numbers)]
-
-    def run():
-        def solve():
-            return sum(cv2.solveP3P(points, pixels, camera, None, cv2.SOLVEPNP_AP3P)[0] for points, pixels in problems)
-
-        seconds, solutions = timed(solve)
-        return seconds, len(problems), {"solutions": int(solutions)}
-
-    return {f"OpenCV {cv2.__version__} AP3P, asked from Python": run}
-
-
 def poses(folder, meta, case):
     import numpy as np
 
@@ -222,7 +204,7 @@ def measure(program, environment, folder, only, rounds):
         ("SURF, turning", "keypoint", "surf", {"dlib": of(dlib, "surf")}),
         ("SURF, upright", "keypoint", "surf_upright", {}),
         ("matching, one way", "pair", "match", faiss_matching(folder) | opencv_matching(folder)),
-        ("P3P", "problem", "p3p", opencv_p3p(folder)),
+        ("P3P", "problem", "p3p", {}),
         *((f"robust pose, {case.split('_')[1]} % false of {case.split('_')[2]}", "problem", case, poselib_poses(folder, meta, case)) for case in meta["cases"]),
         ("FB, whole", "query", "fb", {}),
         ("PM, whole", "query", "pm", {}),

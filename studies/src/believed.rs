@@ -57,7 +57,7 @@ impl Counts {
             [vec![kind.to_owned()], cells.to_vec()].concat()
         });
         println!("\n## {title}\n");
-        print_table(&["", "fb", "pm", "mi", "hy"], &rows.collect::<Vec<_>>());
+        print_table(",fb,pm,mi,hy", &rows.collect::<Vec<_>>());
     }
 }
 

@@ -383,16 +383,7 @@ fn judge(title: &str, samples: &[Sample]) {
             ]);
         }
     }
-    print_table(
-        &[
-            "judged on",
-            "poses",
-            "within 1 m",
-            "calibration error",
-            "AUC",
-        ],
-        &rows,
-    );
+    print_table("judged on,poses,within 1 m,calibration error,AUC", &rows);
     println!("Other pairs, all methods, by tenths: probability said / share within 1 m\n");
     for (said, was) in tenths(&scored(samples, "all", false)).map(said_and_was) {
         println!("- {said:.3} / {was:.3}");

@@ -105,8 +105,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             rows.push([names, summary(&errors)].concat());
         }
     }
-    let head = ["method", "fusion"].into_iter().chain(SUMMARY.split(','));
-    print_table(&head.collect::<Vec<_>>(), &rows);
+    print_table(&format!("method,fusion,{SUMMARY}"), &rows);
     Ok(())
 }
 

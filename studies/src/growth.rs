@@ -72,10 +72,7 @@ fn by_points(rounds: usize) {
             of_both(&points, &query, &PAIR.query.intrinsics, rounds),
         )
     });
-    print_table(
-        &["points", "PM, a hypothesis (µs)", "MI, a hypothesis (µs)"],
-        &rows,
-    );
+    print_table("points,PM (µs),MI (µs)", &rows);
 }
 
 /// So many points. More than there are come from copies that stand a few centimetres aside.
@@ -107,10 +104,7 @@ fn by_size(rounds: usize) {
             of_both(&cloud.points, &Arc::new(query), &intrinsics, rounds),
         )
     });
-    print_table(
-        &["pixels", "PM, a hypothesis (µs)", "MI, a hypothesis (µs)"],
-        &rows,
-    );
+    print_table("pixels,PM (µs),MI (µs)", &rows);
 }
 
 fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
@@ -140,7 +134,7 @@ fn by_bins(rounds: usize) {
             [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)],
         )
     });
-    print_table(&["bins", "MI, a hypothesis (µs)"], &rows);
+    print_table("bins,MI (µs)", &rows);
 }
 
 /// Finding, describing and matching features over their number.
@@ -169,12 +163,11 @@ fn by_keypoints(rounds: usize) {
             });
             row(count, [1e3 * found, 1e3 * matched])
         });
-    let head = [
-        "keypoints in each photo",
-        "SURF of a photo (ms)",
-        "matching one way (ms)",
-    ];
-    print_table(&head, &rows.collect::<Vec<_>>());
+    let rows: Vec<_> = rows.collect();
+    print_table(
+        "keypoints,SURF of a photo (ms),matching one way (ms)",
+        &rows,
+    );
 }
 
 /// Processor time of one hypothesis \[µs\].

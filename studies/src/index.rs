@@ -62,27 +62,10 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                 Ok(cells.split_whitespace().map(str::to_owned).collect())
             };
             let rows: Result<Vec<Vec<String>>, Failure> = options.frames.iter().map(row).collect();
-            let head = [
-                "frames",
-                "vocabulary (s)",
-                "words (s)",
-                "lists (s)",
-                "building, by the clock (s)",
-                "most memory (MB)",
-                "file (MB)",
-                "opening (s)",
-                "index open (MB)",
-                "query (ms)",
-                "… median, by the clock",
-                "… 95 %",
-                "verified (ms)",
-                "… median, by the clock",
-                "… 95 %",
-                "own memory (MB)",
-                "pages (MB)",
-                "found",
-            ];
-            print_table(&head, &rows?);
+            const HEAD: &str = "frames,vocabulary (s),words (s),lists (s),building by the clock (s),most \
+                memory (MB),file (MB),opening (s),index open (MB),query (ms),… by the clock,… 95 % of them,verified (ms),\
+                … by the clock,… 95 % of them,own memory (MB),pages (MB),found";
+            print_table(HEAD, &rows?);
         }
     }
     Ok(())

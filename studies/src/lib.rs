@@ -5,4 +5,4 @@ mod problems;
 pub mod stages;
 
 pub use pair::{PAIR, poses_of_a_disc, registered_cost, seen_by};
-pub use problems::{Outliers, P3pProblem, p3p_problems};
+pub use problems::Outliers;

@@ -222,11 +222,10 @@ fn print(measured: &[Measured], options: &Options) {
         let time = format!("{:.2} s", mean(own.iter().map(|one| one.seconds)));
         [names, summary(&errors), vec![time]].concat()
     });
-    let head = ["", "method"]
-        .into_iter()
-        .chain(SUMMARY.split(','))
-        .chain(["time"]);
-    print_table(&head.collect::<Vec<_>>(), &rows.collect::<Vec<_>>());
+    print_table(
+        &format!(",method,{SUMMARY},time"),
+        &rows.collect::<Vec<_>>(),
+    );
 }
 
 /// A table for each method, of the reference's condition (rows) by the query's (columns), and one that asks why MI
@@ -249,10 +248,8 @@ fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failur
                 .chain(cells)
                 .collect()
         });
-        let head = ["".to_owned()]
-            .into_iter()
-            .chain(conditions.iter().map(|name| (*name).clone()));
-        print_table(&head.collect::<Vec<_>>(), &rows.collect::<Vec<_>>());
+        let columns: String = conditions.iter().map(|name| format!(",{name}")).collect();
+        print_table(&columns, &rows.collect::<Vec<_>>());
     };
     let off = |one: &&Measured| one.error.map_or(f64::INFINITY, |error| error.translation_m);
     for (method, asked) in options.method.iter().enumerate() {

@@ -24,14 +24,11 @@ pub fn at_places<T: Send>(
     (0..places).into_par_iter().map(one).collect()
 }
 
-/// Prints a Markdown table.
-pub fn print_table<H: AsRef<str>>(head: &[H], rows: &[Vec<String>]) {
-    let head: Vec<&str> = head.iter().map(AsRef::as_ref).collect();
-    println!(
-        "| {} |\n|:--|{}",
-        head.join(" | "),
-        "--:|".repeat(head.len() - 1)
-    );
+/// Prints a Markdown table. Commas are between the names of its columns.
+pub fn print_table(head: &str, rows: &[Vec<String>]) {
+    let columns = head.split(',').count();
+    println!("| {} |", head.replace(',', " | "));
+    println!("|:--|{}", "--:|".repeat(columns - 1));
     for row in rows {
         println!("| {} |", row.join(" | "));
     }
@@ -47,10 +44,11 @@ pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
 
 /// The value below which a share of all lies; no number where there is none.
 pub fn percentile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1) as f64;
-    let found = values.get((last * share).round() as usize);
-    found.copied().unwrap_or(f64::NAN)
+    let index = (values.len().saturating_sub(1) as f64 * share).round() as usize;
+    match values.is_empty() {
+        true => f64::NAN,
+        false => *values.select_nth_unstable_by(index, f64::total_cmp).1,
+    }
 }
 
 /// The middle one, of an even number the upper one.

@@ -6,8 +6,8 @@ use cpu_time::ProcessTime;
 use posescope::features::surf;
 use posescope::geometry::Pose;
 use posescope::robust::MlesacParams;
-use posescope_studies::stages::{P3P_PROBLEMS, TRIALS, turning, with_stage};
-use posescope_studies::{Outliers, PAIR, p3p_problems, poses_of_a_disc, registered_cost, seen_by};
+use posescope_studies::stages::{TRIALS, turning, with_stage};
+use posescope_studies::{Outliers, PAIR, poses_of_a_disc, registered_cost, seen_by};
 use serde_json::json;
 
 use crate::Failure;
@@ -82,12 +82,6 @@ fn export(folder: &Path) -> Result<(), Failure> {
         "poses",
         &mut poses.iter().flat_map(|pose| rows_of(&pose.inverse())),
     )?;
-    let problems = p3p_problems(P3P_PROBLEMS);
-    let numbers = problems.iter().flat_map(|(bearings, points)| {
-        let bearings = bearings.iter().flat_map(|bearing| bearing.data.0[0]);
-        bearings.chain(points.iter().flat_map(|point| point.coords.data.0[0]))
-    });
-    doubles("p3p", &mut { numbers })?;
     for (name, case) in Outliers::cases() {
         let numbers = (0..TRIALS).flat_map(|trial| {
             let (correspondences, truth) = case.draw(trial);

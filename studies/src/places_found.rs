@@ -1,14 +1,15 @@
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use posescope::features::{Features, surf};
+use posescope::geometry::PoseError;
 use posescope::params::Params;
 use posescope::retrieval::{Index, Ranked, RetrievalParams};
 use posescope::scene::{self, IndexOptions, Retriever, Scene};
 use rayon::prelude::*;
 
 use crate::Failure;
-use crate::numbers::{percent, print_table};
+use crate::numbers::{median, percent, print_table};
 
 /// A retrieved frame shows the place of the query within this distance \[m\].
 const PLACE_M: f64 = 5.0;
@@ -40,16 +41,13 @@ pub struct Options {
     index: Option<PathBuf>,
 }
 
-/// How the queries of a scene were answered.
-#[derive(Default)]
-struct Tally {
-    queries: usize,
-    /// In the top 1 and the top 5, by the scores alone and after verification.
-    found: [[usize; 2]; 2],
-    /// Whose first frame is verified.
-    verified: usize,
-    inliers: Vec<usize>,
-    times: Vec<Duration>,
+/// How a query was answered.
+struct Answer {
+    /// Whether its place is in the top 1 and the top 5, by the scores alone and after verification.
+    is_found: [[bool; 2]; 2],
+    /// Inliers of the first frame, if it is verified.
+    inliers: Option<usize>,
+    ms: f64,
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
@@ -90,25 +88,18 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             0 => held_out.clone(),
             _ => evenly_spread(queries.frames().len(), options.queries),
         };
-        let tally = ask(
+        let answers = ask(
             &index,
             &params,
             references.as_ref(),
             queries.as_ref(),
             &frames,
         )?;
-        rows.push(tally.row(queries.name()));
+        rows.push(row(queries.name(), &answers));
     }
-    let head = [
-        "query",
-        "queries",
-        "top 1",
-        "top 5",
-        "verified: top 1",
-        "top 5",
-        "first is verified",
-    ];
-    print_table(&[&head[..], &["its inliers", "time"]].concat(), &rows);
+    const HEAD: &str =
+        "query,queries,top 1,top 5,verified: top 1,top 5,first is verified,its inliers,time (ms)";
+    print_table(HEAD, &rows);
     let counts = index.description().counts;
     println!(
         "{} frames of {}, {} words",
@@ -125,44 +116,58 @@ fn ask(
     references: &dyn Scene,
     queries: &dyn Scene,
     frames: &[usize],
-) -> Result<Tally, Failure> {
+) -> Result<Vec<Answer>, Failure> {
     let detector = params.retrieval.surf(&params.surf);
-    let features: Vec<Features> = frames
+    let unverified = RetrievalParams {
+        verify: 0,
+        ..params.retrieval
+    };
+    let features = frames
         .par_iter()
-        .map(|&frame| Ok(surf(&queries.photo(frame)?.gray, &detector)))
-        .collect::<Result<_, scene::SceneError>>()?;
-    let mut tally = Tally::default();
-    for (&frame, features) in frames.iter().zip(&features) {
-        let Some(truth) = queries.pose(frame) else {
-            continue;
-        };
+        .map(|&frame| Ok(surf(&queries.photo(frame)?.gray, &detector)));
+    let features: Result<Vec<Features>, scene::SceneError> = features.collect();
+    let known = frames
+        .iter()
+        .zip(features?)
+        .filter_map(|(&frame, features)| Some((queries.pose(frame)?, features)));
+    let answers = known.map(|(truth, features)| {
         let is_there = |ranked: &Ranked| {
-            references.pose(ranked.frame).is_some_and(|pose| {
-                (pose.translation.vector - truth.translation.vector).norm() <= PLACE_M
-            })
+            let pose = references.pose(ranked.frame);
+            pose.is_some_and(|pose| PoseError::between(&truth, &pose).translation_m <= PLACE_M)
         };
-        tally.queries += 1;
-        let unverified = RetrievalParams {
-            verify: 0,
-            ..params.retrieval
-        };
-        for (row, retrieval) in [unverified, params.retrieval].iter().enumerate() {
-            let started = Instant::now();
-            let ranked = index.query(features, retrieval, |_| true).ranked;
-            if row == 1 {
-                tally.times.push(started.elapsed());
-                if let Some(found) = ranked.first().and_then(|first| first.verification()) {
-                    tally.verified += 1;
-                    tally.inliers.push(found.inliers);
-                }
-            }
-            for (column, top) in [1, 5].into_iter().enumerate() {
-                let found = ranked.iter().take(top).any(is_there);
-                tally.found[row][column] += usize::from(found);
-            }
+        let by_scores = index.query(&features, &unverified, |_| true).ranked;
+        let started = Instant::now();
+        let verified = index.query(&features, &params.retrieval, |_| true).ranked;
+        let first = verified.first().and_then(|first| first.verification());
+        Answer {
+            ms: 1e3 * started.elapsed().as_secs_f64(),
+            inliers: first.map(|found| found.inliers),
+            is_found: [by_scores, verified]
+                .map(|ranked| [1, 5].map(|top| ranked.iter().take(top).any(is_there))),
         }
+    });
+    Ok(answers.collect())
+}
+
+fn row(name: &str, answers: &[Answer]) -> Vec<String> {
+    let share = |is_so: &dyn Fn(&&Answer) -> bool| {
+        let count = answers.iter().filter(is_so).count();
+        format!("{:.1} %", percent(count, answers.len()))
+    };
+    let mut row = vec![name.to_owned(), answers.len().to_string()];
+    for (ranking, top) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        row.push(share(&|answer| answer.is_found[ranking][top]));
     }
-    Ok(tally)
+    row.push(share(&|answer| answer.inliers.is_some()));
+    let inliers = answers
+        .iter()
+        .filter_map(|answer| Some(answer.inliers? as f64));
+    row.push(format!("{:.0}", median(inliers)));
+    row.push(format!(
+        "{:.1}",
+        median(answers.iter().map(|answer| answer.ms))
+    ));
+    row
 }
 
 /// So many of the frames, at equal distances.
@@ -171,22 +176,4 @@ fn evenly_spread(frames: usize, count: usize) -> Vec<usize> {
     (0..count)
         .map(|i| (2 * i + 1) * frames / (2 * count))
         .collect()
-}
-
-impl Tally {
-    fn row(mut self, name: &str) -> Vec<String> {
-        let share = |count: usize| format!("{:.1} %", percent(count, self.queries));
-        let mut row = vec![name.to_owned(), self.queries.to_string()];
-        row.extend(self.found.as_flattened().iter().map(|&count| share(count)));
-        row.push(share(self.verified));
-        self.times.sort_unstable();
-        self.inliers.sort_unstable();
-        let inliers = self.inliers.get(self.inliers.len() / 2);
-        let time = self.times.get(self.times.len() / 2);
-        row.push(inliers.map_or("–".to_owned(), usize::to_string));
-        row.push(time.map_or("–".to_owned(), |time| {
-            format!("{:.1} ms", 1e3 * time.as_secs_f64())
-        }));
-        row
-    }
 }

@@ -200,7 +200,7 @@ fn report(
             rows.push(row);
         }
     }
-    print_table(&["fault", "fb", "pm", "mi", "hy"], &rows);
+    print_table("fault,fb,pm,mi,hy", &rows);
     println!(
         "As expected: {hits} of {all} ({:.1} %), {only_unsure} of them unsure without a verdict; with H1 for each \
          hybrid that kept a wrong pose {} ({:.1} %); {barely_trusted} more if poses were trusted from 0.98 on; false \

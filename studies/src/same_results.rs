@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -28,59 +28,46 @@ pub struct Options {
 /// Compares every pair of files and returns the number of results that differ.
 pub fn run(Options { a, b }: &Options) -> Result<usize, Failure> {
     let (files_a, files_b) = (result_files(a)?, result_files(b)?);
-    let mut differing = 0;
-    let mut compared = 0;
-    for name in files_a
-        .keys()
-        .chain(files_b.keys().filter(|name| !files_a.contains_key(*name)))
-    {
+    let (mut compared, mut differing) = (0, 0);
+    let names: BTreeSet<&String> = files_a.keys().chain(files_b.keys()).collect();
+    for name in names {
         let (Some(file_a), Some(file_b)) = (files_a.get(name), files_b.get(name)) else {
             let side = if files_a.contains_key(name) { a } else { b };
             println!("{name}: only in {}", side.display());
             differing += 1;
             continue;
         };
-        let (results_a, results_b) = (read(file_a)?, read(file_b)?);
-        let found = differences(&results_a, &results_b);
+        let results = read(file_a)?;
+        let found = differences(&results, &read(file_b)?);
         for (result, lines) in &found {
             println!("{}", format!("{name} {result}").trim_start());
-            for line in lines {
-                println!("    {line}");
-            }
+            lines.iter().for_each(|line| println!("    {line}"));
         }
+        compared += results.len();
         differing += found.len();
-        compared += results_a.len();
     }
     println!("{compared} results compared, {differing} differ");
     Ok(differing)
 }
 
-/// The `results.jsonl` files of a place, by the path of their folder below it.
+/// The `results.jsonl` files of a place, by the name of their folder in it.
 fn result_files(place: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
-    if place.is_file() {
-        return Ok(BTreeMap::from([(String::new(), place.to_owned())]));
-    }
-    let mut found = BTreeMap::new();
-    let own = place.join("results.jsonl");
-    if own.is_file() {
-        found.insert(String::new(), own);
-        return Ok(found);
-    }
-    let entries = fs::read_dir(place).map_err(|error| format!("{}: {error}", place.display()))?;
-    for entry in entries.flatten() {
-        let file = entry.path().join("results.jsonl");
-        if file.is_file() {
-            found.insert(entry.file_name().to_string_lossy().into_owned(), file);
+    for own in [place.to_owned(), place.join("results.jsonl")] {
+        if own.is_file() {
+            return Ok(BTreeMap::from([(String::new(), own)]));
         }
     }
-    match found.is_empty() {
-        true => Err(format!(
-            "{}: no results.jsonl in it or one folder down",
-            place.display()
-        )
-        .into()),
-        false => Ok(found),
+    let told = |error: &dyn std::fmt::Display| format!("{}: {error}", place.display());
+    let entries = fs::read_dir(place).map_err(|error| told(&error))?.flatten();
+    let files = entries.map(|entry| (entry.file_name(), entry.path().join("results.jsonl")));
+    let found: BTreeMap<String, PathBuf> = files
+        .filter(|(_, file)| file.is_file())
+        .map(|(name, file)| (name.to_string_lossy().into_owned(), file))
+        .collect();
+    if found.is_empty() {
+        return Err(told(&"no results.jsonl in it or one folder down").into());
     }
+    Ok(found)
 }
 
 /// The results of a file, by what identifies them.
@@ -88,26 +75,25 @@ fn read(file: &Path) -> Result<BTreeMap<String, Value>, Failure> {
     let text = fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
     let mut results = BTreeMap::new();
     for (index, line) in text.lines().enumerate() {
-        let place = || format!("{}:{}", file.display(), index + 1);
-        let result: Value =
-            serde_json::from_str(line).map_err(|error| format!("{}: {error}", place()))?;
+        let told =
+            |error: &dyn std::fmt::Display| format!("{}:{}: {error}", file.display(), index + 1);
+        let result: Value = serde_json::from_str(line).map_err(|error| told(&error))?;
         let name = identity(&result);
         if results.insert(name.clone(), result).is_some() {
-            return Err(format!("{}: a second result of {name}", place()).into());
+            return Err(told(&format!("a second result of {name}")).into());
         }
     }
     Ok(results)
 }
 
 fn identity(result: &Value) -> String {
-    let words = IDENTITY
-        .split(' ')
-        .filter_map(|key| result.get(key))
-        .filter(|value| !value.is_null());
-    let words = words.map(|value| match value {
-        Value::String(text) => text.clone(),
-        other => other.to_string(),
-    });
+    let values = IDENTITY.split(' ').filter_map(|key| result.get(key));
+    let words = values
+        .filter(|value| !value.is_null())
+        .map(|value| match value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        });
     words.collect::<Vec<_>>().join(" ")
 }
 

@@ -9,7 +9,7 @@ use posescope::problem::Problem;
 use posescope::scene::{self, Scene};
 
 use crate::Failure;
-use crate::numbers::{mean, percentile, print_table};
+use crate::numbers::{mean, percent, percentile, print_table};
 
 /// Frames that stand for a scene.
 const FRAMES: usize = 10;
@@ -30,11 +30,11 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    let mut head = vec![String::new()];
+    let mut head = String::new();
     let mut rows: Vec<Vec<String>> = Vec::new();
     for argument in &options.scenes {
         let scene = scene::open(argument, None)?;
-        head.push(scene.name().to_owned());
+        head += &format!(",{}", scene.name());
         for (at, (name, figure)) in statistics(scene.as_ref())?.into_iter().enumerate() {
             if rows.len() == at {
                 rows.push(vec![name]);
@@ -57,66 +57,69 @@ fn statistics(scene: &dyn Scene) -> Result<Rows, Failure> {
         .map(|&frame| Ok(scene.photo(frame)?.gray))
         .collect::<Result<Vec<_>, Failure>>()?;
 
-    let mut rows = Rows::new();
-    grey_values(&photos, &mut rows);
-    gradients(&photos, &mut rows);
-    let slopes = photos.iter().map(spectrum_slope);
-    rows.push((
-        "power spectrum, slope".into(),
-        format!("{:.2}", mean(slopes)),
-    ));
-    let keypoints = photos
+    let mut grey: Vec<f64> = photos
         .iter()
-        .map(|photo| surf(photo, &SurfParams::default()).keypoints.len() as f64);
-    rows.push(("SURF keypoints".into(), format!("{:.0}", mean(keypoints))));
-    rows.push((
-        "image within 4 px of a LiDAR point".into(),
-        percent(lidar_share(scene, &frames)?),
-    ));
+        .flat_map(|photo| photo.iter().copied().map(f64::from))
+        .collect();
+    let average = mean(grey.iter().copied());
+    let deviation = mean(grey.iter().map(|value| (value - average).powi(2))).sqrt();
+    let shares =
+        [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| format!("{:.0}", percentile(&mut grey, share)));
+    let mut gradients: Vec<f64> = photos.iter().flat_map(gradients).collect();
+    let [steep, half, most] = [
+        mean(gradients.iter().copied()),
+        percentile(&mut gradients, 0.5),
+        percentile(&mut gradients, 0.9),
+    ];
+    let keypoints = |photo| surf(photo, &SurfParams::default()).keypoints.len() as f64;
+    let covered = lidar_share(scene, &frames)?;
+    let mut rows: Rows = [
+        (
+            "grey value, mean ± deviation",
+            format!("{average:.0} ± {deviation:.0}"),
+        ),
+        ("… at 5, 25, 50, 75, 95 %", shares.join(", ")),
+        (
+            "gradient, mean / median / 90 %",
+            format!("{steep:.1} / {half:.1} / {most:.1}"),
+        ),
+        (
+            "power spectrum, slope",
+            format!("{:.2}", mean(photos.iter().map(spectrum_slope))),
+        ),
+        (
+            "SURF keypoints",
+            format!("{:.0}", mean(photos.iter().map(keypoints))),
+        ),
+        (
+            "image within 4 px of a LiDAR point, %",
+            figure(mean(covered), 0),
+        ),
+    ]
+    .map(|(name, figure)| (name.to_owned(), figure))
+    .into();
     for distance_m in DISTANCES_M {
         pairs(scene, &frames, distance_m, &mut rows)?;
     }
     Ok(rows)
 }
 
-fn grey_values(photos: &[GrayImage], rows: &mut Rows) {
-    let mut values: Vec<f64> = photos
-        .iter()
-        .flat_map(|photo| photo.pixels().map(|pixel| f64::from(pixel.0[0])))
-        .collect();
-    let average = mean(values.iter().copied());
-    let variance = mean(values.iter().map(|value| (value - average).powi(2)));
-    let shares = [0.05, 0.25, 0.5, 0.75, 0.95];
-    let percentiles = shares.map(|share| format!("{:.0}", percentile(&mut values, share)));
-    rows.push((
-        "grey value, mean ± deviation".into(),
-        format!("{average:.0} ± {:.0}", variance.sqrt()),
-    ));
-    rows.push(("… at 5, 25, 50, 75, 95 %".into(), percentiles.join(", ")));
+/// A number with so many digits; a dash where nothing is known.
+fn figure(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        "–".to_owned()
+    } else {
+        format!("{value:.digits$}")
+    }
 }
 
 /// Magnitudes of central differences.
-fn gradients(photos: &[GrayImage], rows: &mut Rows) {
-    let mut magnitudes = Vec::new();
-    for photo in photos {
-        let at = |x: u32, y: u32| f64::from(photo.get_pixel(x, y).0[0]);
-        for y in 1..photo.height() - 1 {
-            for x in 1..photo.width() - 1 {
-                let dx = at(x + 1, y) - at(x - 1, y);
-                let dy = at(x, y + 1) - at(x, y - 1);
-                magnitudes.push(dx.hypot(dy) / 2.0);
-            }
-        }
-    }
-    rows.push((
-        "gradient, mean / median / 90 %".into(),
-        format!(
-            "{:.1} / {:.1} / {:.1}",
-            mean(magnitudes.iter().copied()),
-            percentile(&mut magnitudes, 0.5),
-            percentile(&mut magnitudes, 0.9)
-        ),
-    ));
+fn gradients(photo: &GrayImage) -> Vec<f64> {
+    let at = |x: u32, y: u32| f64::from(photo.get_pixel(x, y).0[0]);
+    let magnitude = |x, y| (at(x + 1, y) - at(x - 1, y)).hypot(at(x, y + 1) - at(x, y - 1)) / 2.0;
+    let rows = 1..photo.height() - 1;
+    rows.flat_map(|y| (1..photo.width() - 1).map(move |x| magnitude(x, y)))
+        .collect()
 }
 
 /// Slope of log power over log frequency along the rows, between 1/64 and 1/4 cycles per pixel;
@@ -143,20 +146,19 @@ fn spectrum_slope(photo: &GrayImage) -> f64 {
             *sum += cosine * cosine + sine * sine;
         }
     }
-    let points: Vec<(f64, f64)> = cycles
-        .iter()
-        .zip(&power)
+    let points = cycles.iter().zip(&power);
+    let points: Vec<(f64, f64)> = points
         .map(|(cycles, power)| (cycles.ln(), power.ln()))
         .collect();
     let (x, y) = (
-        mean(points.iter().map(|point| point.0)),
-        mean(points.iter().map(|point| point.1)),
+        mean(points.iter().map(|p| p.0)),
+        mean(points.iter().map(|p| p.1)),
     );
     let covariance: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
     covariance / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
-/// Share of the pixels that have a projected scan point within 4 px.
+/// Share of the pixels that have a projected scan point within 4 px \[%\].
 fn lidar_share(scene: &dyn Scene, frames: &[usize]) -> Result<Vec<f64>, Failure> {
     const REACH: i64 = 4;
     let mut shares = Vec::new();
@@ -180,7 +182,7 @@ fn lidar_share(scene: &dyn Scene, frames: &[usize]) -> Result<Vec<f64>, Failure>
             }
         }
         let count = covered.iter().filter(|pixel| **pixel).count();
-        shares.push(count as f64 / covered.len() as f64);
+        shares.push(percent(count, covered.len()));
     }
     Ok(shares)
 }
@@ -201,11 +203,8 @@ fn pairs(
         let photo = scene.photo(reference)?;
         let [q, r] = [&query_frame.photo.gray, &photo.gray]
             .map(|gray| surf(gray, &SurfParams::default()).descriptors);
-        let matches = classify(
-            &nearest_neighbours(&q, &r),
-            &nearest_neighbours(&r, &q),
-            MAX_RATIO,
-        );
+        let [there, back] = [nearest_neighbours(&q, &r), nearest_neighbours(&r, &q)];
+        let matches = classify(&there, &back, MAX_RATIO);
         let kept = matches.iter().flatten();
         let kept = kept.filter(|found| found.verdict == MatchVerdict::Candidate);
         survivors.push(kept.count() as f64);
@@ -223,17 +222,16 @@ fn pairs(
         let score = direct.score_at(&problem, &truth);
         information.extend(score.and_then(|score| score.cost).map(|cost| 1.0 - cost));
     }
-    let median = |values: &mut Vec<f64>, digits: usize| match values.is_empty() {
-        true => "–".to_owned(),
-        false => format!("{:.digits$}", percentile(values, 0.5)),
-    };
-    let mut row = |what: &str, value: String| {
-        rows.push((format!("{distance_m:.0} m apart: {what}"), value));
-    };
-    row("unique matches, ratio 0.8", median(&mut survivors, 0));
-    row("FB, inliers", median(&mut inliers, 0));
-    row("FB, error [m]", median(&mut errors, 2));
-    row("NMI at the true pose", median(&mut information, 3));
+    let found = [
+        ("unique matches, ratio 0.8", survivors, 0),
+        ("FB, inliers", inliers, 0),
+        ("FB, error [m]", errors, 2),
+        ("NMI at the true pose", information, 3),
+    ];
+    for (what, mut values, digits) in found {
+        let name = format!("{distance_m:.0} m apart: {what}");
+        rows.push((name, figure(percentile(&mut values, 0.5), digits)));
+    }
     Ok(())
 }
 
@@ -250,12 +248,4 @@ fn ahead(scene: &dyn Scene, frame: usize, distance_m: f64) -> Option<usize> {
         .filter(|(deviation, _)| *deviation <= distance_m / 6.0)
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, other)| other)
-}
-
-fn percent(shares: Vec<f64>) -> String {
-    if shares.is_empty() {
-        "–".to_owned()
-    } else {
-        format!("{:.0} %", 100.0 * mean(shares))
-    }
 }

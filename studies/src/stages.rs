@@ -12,10 +12,11 @@ use posescope::solver::p3p;
 use posescope::trace::Trace;
 use serde_json::{Value, json};
 
-use super::{Outliers, PAIR, p3p_problems, poses_of_a_disc, registered_cost, seen_by};
+use super::problems::{Outliers, p3p_problems};
+use super::{PAIR, poses_of_a_disc, registered_cost, seen_by};
 
 /// Problems of the stage `p3p`.
-pub const P3P_PROBLEMS: usize = 20_000;
+const P3P_PROBLEMS: usize = 20_000;
 /// Trials of each case of robust estimation.
 pub const TRIALS: u64 = 10;
 
