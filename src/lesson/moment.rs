@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::event::{Event, Stage};
+use crate::event::Event;
 use crate::method::Method;
 use crate::session::{BreakAt, Breakpoint, Breakpoints, Run};
 use crate::trace::Record;
@@ -95,8 +95,6 @@ impl Moment {
 pub struct Watch {
     moment: Moment,
     breakpoints: Breakpoints,
-    /// The methods whose stages are open, the outermost first.
-    methods: Vec<Method>,
 }
 
 impl Watch {
@@ -108,34 +106,22 @@ impl Watch {
         };
         Self {
             breakpoints: Breakpoints::new(breakpoint),
-            methods: Vec::new(),
             moment,
         }
     }
 
     /// Whether this record is the moment. Every record must be shown.
     pub fn is_reached(&mut self, record: &Record) -> bool {
-        if let Event::StageStarted(started) = &record.event
-            && let Stage::Estimator(method) = started.stage
-        {
-            self.methods.push(method);
-        }
-        let is_reached = match &self.moment {
+        match &self.moment {
             Moment::Start => true,
             Moment::End => false,
             Moment::At(_) => self.breakpoints.reached(record).is_some(),
             Moment::After { method, stage } => {
-                let is_of = |method| self.methods.contains(&method);
+                let is_of = |method| record.methods.contains(&method);
                 matches!(&record.event, Event::StageEnded(ended) if ended.stage.name() == *stage)
                     && method.is_none_or(is_of)
             }
-        };
-        if let Event::StageEnded(ended) = &record.event
-            && matches!(ended.stage, Stage::Estimator(_))
-        {
-            self.methods.pop();
         }
-        is_reached
     }
 }
 

@@ -322,8 +322,6 @@ posescope_core::serde_as_text!(Breakpoint);
 #[derive(Clone, Debug, Default)]
 pub struct Breakpoints {
     watched: Vec<Watched>,
-    /// The methods whose stages are open, the outermost first.
-    methods: Vec<Method>,
 }
 
 #[derive(Clone, Debug)]
@@ -344,7 +342,6 @@ impl Breakpoints {
                     was_true: false,
                 })
                 .collect(),
-            methods: Vec::new(),
         }
     }
 
@@ -360,17 +357,10 @@ impl Breakpoints {
 
     /// The first breakpoint that an event reaches, as it was written. Every event must be shown.
     pub fn reached(&mut self, record: &Record) -> Option<String> {
-        if let Event::StageStarted(StageStarted {
-            stage: Stage::Estimator(method),
-        }) = record.event
-        {
-            self.methods.push(method);
-        }
-        let methods = &self.methods;
         let mut reached = None;
         for watched in &mut self.watched {
             let Breakpoint { text, method, at } = &watched.breakpoint;
-            if method.is_some_and(|method| !methods.contains(&method)) {
+            if method.is_some_and(|method| !record.methods.contains(&method)) {
                 continue;
             }
             let fires = match at {
@@ -395,13 +385,11 @@ impl Breakpoints {
         }
         if let Event::StageEnded(ended) = &record.event
             && matches!(ended.stage, Stage::Estimator(_))
+            && record.methods.len() == 1
         {
-            self.methods.pop();
-            if self.methods.is_empty() {
-                // The next estimator's numbers are others.
-                for watched in &mut self.watched {
-                    watched.was_true = false;
-                }
+            // The next estimator's numbers are others.
+            for watched in &mut self.watched {
+                watched.was_true = false;
             }
         }
         reached
@@ -447,15 +435,17 @@ impl Sink for StopAtBreakpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::event::{MinimumAssessed, PoseRefined};
-    use crate::event::{ProjectedCloud, StageEnded};
+    use crate::event::{MinimumAssessed, PoseRefined, ProjectedCloud};
     use crate::geometry::Pose;
     use crate::grid::Offset;
+    use crate::history::History;
+    use crate::trace::Trace;
 
     fn record(event: impl Into<Event>) -> Record {
         Record {
             index: 0,
             depth: 1,
+            methods: Default::default(),
             event: event.into(),
         }
     }
@@ -480,25 +470,20 @@ mod tests {
 
     #[test]
     fn a_stage_is_reached_in_the_method_that_was_named() {
-        let started = |stage| record(StageStarted { stage });
-        let ended = |stage| {
-            record(StageEnded {
-                stage,
-                succeeded: true,
-                reused: false,
+        fn feature_based(trace: &mut Trace<'_>) -> Result<(), Cancelled> {
+            trace.stage(Stage::Estimator(Method::FB), |trace| {
+                trace.stage(Stage::Consensus, |_| Ok(()))
             })
-        };
-        let run = [
-            started(Stage::Estimator(Method::FB)),
-            started(Stage::Consensus),
-            ended(Stage::Consensus),
-            ended(Stage::Estimator(Method::FB)),
-            started(Stage::Estimator(Method::HY)),
-            started(Stage::Estimator(Method::FB)),
-            started(Stage::Consensus),
-        ];
+        }
+        let mut history = History::default();
+        let mut trace = Trace::to(&mut history);
+        feature_based(&mut trace).expect("not cancelled");
+        trace
+            .stage(Stage::Estimator(Method::HY), feature_based)
+            .expect("not cancelled");
+        let run = history.records();
         let at = |text| -> Vec<usize> {
-            let reached = reached(&[text], &run);
+            let reached = reached(&[text], run);
             (0..run.len()).filter(|i| reached[*i].is_some()).collect()
         };
         assert_eq!(at("ransac"), [1, 6]);

@@ -24,22 +24,32 @@ mod fanout;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use arrayvec::ArrayVec;
 pub use fanout::Fanout;
 
 use crate::event::{DebugEvent, Event, KindSet, Stage, StageEnded, StageStarted};
+use crate::method::Method;
 
 /// The observer asked the run to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run was cancelled")]
 pub struct Cancelled;
 
+/// Estimators within each other that a [`Record`] knows of: a hybrid and its part are two.
+const MOST_METHODS: usize = 3;
+
+/// The estimators that run within each other, the outermost first.
+pub type OpenMethods = ArrayVec<Method, MOST_METHODS>;
+
 /// One event with its place in the run.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// Position among the events that were delivered, from 0.
+    /// Position among the events of the run, from 0. Events that no sink wants count too.
     pub index: u64,
     /// How many stages are open around the event; a stage's own start and end count it.
     pub depth: usize,
+    /// The estimators whose stages are open; an estimator's own start and end count it.
+    pub methods: OpenMethods,
     /// What happened.
     pub event: Event,
 }
@@ -77,8 +87,10 @@ struct Observer<'a> {
     sink: &'a mut dyn Sink,
     attention: Option<&'a AtomicBool>,
     wanted: KindSet,
-    delivered: u64,
+    /// The index of the next event.
+    next: u64,
     depth: usize,
+    methods: OpenMethods,
     /// Whether the stage that is open and innermost used a remembered result.
     reused: bool,
 }
@@ -108,8 +120,9 @@ impl<'a> Trace<'a> {
                 sink,
                 attention,
                 wanted,
-                delivered: 0,
+                next: 0,
                 depth: 0,
+                methods: OpenMethods::new(),
                 reused: false,
             }),
         }
@@ -125,8 +138,9 @@ impl<'a> Trace<'a> {
             return Ok(());
         };
         observer.attend_if_asked()?;
-        if observer.wanted.contains(E::KIND) {
-            observer.deliver(make().into())?;
+        match observer.wanted.contains(E::KIND) {
+            true => observer.deliver(make().into())?,
+            false => observer.next += 1,
         }
         Ok(())
     }
@@ -167,19 +181,20 @@ impl<'a> Trace<'a> {
         stage: Stage,
         body: impl FnOnce(&mut Self) -> Result<T, X>,
     ) -> Result<T, X> {
+        let mut around = 0;
         if let Some(observer) = &mut self.observer {
             observer.attend_if_asked()?;
-            observer.depth += 1;
-            observer.reused = false;
+            around = observer.methods.len();
+            observer.open_stage(stage);
             // A sink that cancels at the start of a stage has still seen it begin, so it sees it end.
             if let Err(cancelled) = observer.deliver(StageStarted { stage }.into()) {
-                let _ = observer.end_stage(stage, false);
+                let _ = observer.end_stage(stage, false, around);
                 return Err(cancelled.into());
             }
         }
         let outcome = body(self);
         if let Some(observer) = &mut self.observer {
-            let told = observer.end_stage(stage, outcome.is_ok());
+            let told = observer.end_stage(stage, outcome.is_ok(), around);
             if outcome.is_ok() {
                 told?;
             }
@@ -200,31 +215,48 @@ impl<'a> Trace<'a> {
             return body(&mut Trace::to(second));
         };
         let attention = observer.attention;
-        let mut onward = Onward(observer);
+        let first = observer.next;
+        let mut onward = Onward { observer, first };
         let mut both = Fanout::new(vec![second, &mut onward]);
-        match attention {
-            Some(flag) => body(&mut Trace::watched(&mut both, flag)),
-            None => body(&mut Trace::to(&mut both)),
-        }
+        let mut inner = Trace::new(&mut both, attention);
+        let outcome = body(&mut inner);
+        let told = inner.observer.map_or(0, |inner| inner.next);
+        observer.next = first + told;
+        outcome
     }
 }
 
 /// Passes the events of an inner trace on to the observer of the outer one.
-struct Onward<'t, 'a>(&'t mut Observer<'a>);
+struct Onward<'t, 'a> {
+    observer: &'t mut Observer<'a>,
+    /// The index that the first event of the inner trace has in the outer one.
+    first: u64,
+}
 
 impl Sink for Onward<'_, '_> {
     fn wanted(&self) -> KindSet {
-        self.0.wanted
+        self.observer.wanted
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        let depth = self.0.depth + record.depth;
-        self.0.deliver_at(depth, record.event.clone())
+        let Observer {
+            sink,
+            depth,
+            methods,
+            ..
+        } = self.observer;
+        let methods = methods.iter().chain(&record.methods).copied();
+        sink.accept(&Record {
+            index: self.first + record.index,
+            depth: *depth + record.depth,
+            methods: methods.take(MOST_METHODS).collect(),
+            event: record.event.clone(),
+        })
     }
 
     fn attend(&mut self) -> Result<(), Cancelled> {
-        self.0.sink.attend()?;
-        self.0.wanted = self.0.sink.wanted();
+        self.observer.sink.attend()?;
+        self.observer.wanted = self.observer.sink.wanted();
         Ok(())
     }
 }
@@ -246,8 +278,18 @@ impl Observer<'_> {
         Ok(())
     }
 
-    /// Tells the end of the innermost stage, and closes it whatever the sink says.
-    fn end_stage(&mut self, stage: Stage, succeeded: bool) -> Result<(), Cancelled> {
+    fn open_stage(&mut self, stage: Stage) {
+        self.depth += 1;
+        self.reused = false;
+        if let Stage::Estimator(method) = stage {
+            // Where there is no room for more, the outer ones stay.
+            let _ = self.methods.try_push(method);
+        }
+    }
+
+    /// Tells the end of the innermost stage, and closes it whatever the sink says. That many estimators are
+    /// open `around` it.
+    fn end_stage(&mut self, stage: Stage, succeeded: bool, around: usize) -> Result<(), Cancelled> {
         let ended = StageEnded {
             stage,
             succeeded,
@@ -255,20 +297,18 @@ impl Observer<'_> {
         };
         let told = self.deliver(ended.into());
         self.depth -= 1;
+        self.methods.truncate(around);
         told
     }
 
     fn deliver(&mut self, event: Event) -> Result<(), Cancelled> {
-        self.deliver_at(self.depth, event)
-    }
-
-    fn deliver_at(&mut self, depth: usize, event: Event) -> Result<(), Cancelled> {
         let record = Record {
-            index: self.delivered,
-            depth,
+            index: self.next,
+            depth: self.depth,
+            methods: self.methods.clone(),
             event,
         };
-        self.delivered += 1;
+        self.next += 1;
         self.sink.accept(&record)
     }
 }
@@ -419,10 +459,57 @@ mod tests {
     }
 
     #[test]
-    fn records_are_numbered_without_gaps() {
-        let mut sink = RecordingSink::wanting(KindSet::of(&[Kind::ProjectedCloud]));
-        two_stages(&mut Trace::to(&mut sink)).expect("not cancelled");
-        let indices: Vec<_> = sink.records.iter().map(|r| r.index).collect();
-        assert_eq!(indices, [0, 1, 2, 3, 4]);
+    fn an_event_has_the_same_number_whoever_listens() {
+        let indices = |wanted, second| {
+            let mut sink = RecordingSink::wanting(wanted);
+            let mut trace = Trace::to(&mut sink);
+            let told = match second {
+                Some(wanted) => trace.heard_by(&mut RecordingSink::wanting(wanted), two_stages),
+                None => two_stages(&mut trace),
+            };
+            told.expect("not cancelled");
+            two_stages(&mut trace).expect("not cancelled");
+            sink.records.iter().map(|r| r.index).collect::<Vec<_>>()
+        };
+        for second in [None, Some(KindSet::ALL), Some(KindSet::NONE)] {
+            assert_eq!(
+                indices(KindSet::ALL, second),
+                [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
+            );
+            assert_eq!(indices(KindSet::NONE, second), [0, 2, 3, 4, 5, 7, 8, 9]);
+        }
+    }
+
+    #[test]
+    fn a_record_names_the_estimators_around_it() {
+        fn nested(trace: &mut Trace<'_>, methods: &[Method]) -> Result<(), Cancelled> {
+            match methods {
+                [] => two_stages(trace),
+                [method, inner @ ..] => {
+                    trace.stage(Stage::Estimator(*method), |trace| nested(trace, inner))
+                }
+            }
+        }
+        let around = |methods: &[Method]| {
+            let mut sink = RecordingSink::wanting(KindSet::NONE);
+            let mut trace = Trace::to(&mut sink);
+            nested(&mut trace, methods).expect("not cancelled");
+            trace
+                .stage(Stage::Fuse, |trace| {
+                    trace.heard_by(&mut RecordingSink::wanting(KindSet::ALL), |trace| {
+                        nested(trace, methods)
+                    })
+                })
+                .expect("not cancelled");
+            let depths = sink.records.iter().map(|record| record.methods.len());
+            depths.collect::<Vec<_>>()
+        };
+        let [fb, mi, hy] = [Method::FB, Method::MI, Method::HY];
+        let once = [1, 2, 2, 2, 2, 2, 2, 1];
+        assert_eq!(around(&[hy, fb]), [&once[..], &[0], &once, &[0]].concat());
+        // Those that are deeper than a record knows leave the others as they are.
+        let deep = [1, 2, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 2, 1];
+        let around = around(&[hy, fb, mi, fb, mi]);
+        assert_eq!(around, [&deep[..], &[0], &deep, &[0]].concat());
     }
 }
