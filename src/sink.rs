@@ -6,6 +6,6 @@ mod progress;
 #[cfg(feature = "rerun")]
 pub mod rerun;
 
-pub use events::{EventLines, SceneNames};
+pub use events::{SceneNames, write_event};
 #[cfg(feature = "cli")]
 pub use progress::Progress;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use posescope::method::Method;
 use posescope::problem::Problem;
-use posescope::sink::{EventLines, SceneNames};
+use posescope::sink::{SceneNames, write_event};
 use posescope::trace::Record;
 
 use super::failure::CliError;
@@ -18,7 +18,7 @@ pub struct EventExport {
     file: File,
     scenes: SceneNames,
     /// What was told of the query at work.
-    lines: EventLines<Vec<u8>>,
+    lines: Vec<u8>,
     broken: Option<io::Error>,
 }
 
@@ -37,7 +37,7 @@ impl EventExport {
             path: path.to_owned(),
             file: file.map_err(CliError::io(path))?,
             scenes: SceneNames::default(),
-            lines: EventLines::to(Vec::new()),
+            lines: Vec::new(),
             broken: None,
         })
     }
@@ -59,17 +59,16 @@ impl EventExport {
     /// Takes an event. The first error is kept, and nothing is taken after it.
     pub fn accept(&mut self, record: &Record, problem: &Problem, method: Method) {
         if self.broken.is_none() {
-            let written = self.lines.write(&self.scenes, problem, method, record);
+            let written = write_event(&mut self.lines, &self.scenes, problem, method, record);
             self.broken = written.err();
         }
     }
 
     /// The query at work is done: what was told of it is written.
     pub fn end_query(&mut self) {
-        let told = std::mem::replace(&mut self.lines, EventLines::to(Vec::new()));
+        let told = std::mem::take(&mut self.lines);
         if self.broken.is_none() {
-            let written = told.close().and_then(|told| self.file.write_all(&told));
-            self.broken = written.err();
+            self.broken = self.file.write_all(&told).err();
         }
     }
 

@@ -1,5 +1,6 @@
 //! `--events`: every event as data.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -79,8 +80,28 @@ fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
             .iter()
             .any(|event| event["kind"] == "ReferencesFused")
     );
+    for event in &events {
+        let kind = event["kind"].as_str().expect("a name");
+        let documented = documented(kind);
+        for field in event.as_object().expect("an object").keys() {
+            assert!(documented.contains(field.as_str()), "{kind}: {field}");
+        }
+    }
     // Nothing is as large as a picture.
     assert!(text.lines().all(|line| line.len() < 200_000));
+}
+
+/// The fields that the documentation has for a kind of event.
+fn documented(kind: &str) -> BTreeSet<&'static str> {
+    let mut rows = include_str!("../../docs/results.md").lines();
+    let row = rows.find(|row| {
+        let first = row.strip_prefix("| `");
+        first.is_some_and(|row| row.split('|').next().unwrap_or("").contains(kind))
+    });
+    let words = row.unwrap_or_else(|| panic!("{kind}")).split('`');
+    let of_all = ["scene", "query", "reference", "radius_m", "method"];
+    let of_all = of_all.into_iter().chain(["index", "depth", "kind"]);
+    of_all.chain(words.skip(1).step_by(2)).collect()
 }
 
 /// What a run over the first queries tells, in this folder, with these words more; but for what it remembers

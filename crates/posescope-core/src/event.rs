@@ -1,8 +1,13 @@
 //! What the estimators tell: one struct per event, one line in the list of kinds.
 //!
-//! Large payloads are shared (`Arc`), so keeping an event is cheap.
+//! Large payloads are shared (`Arc`), so keeping an event is cheap. Written as data, an event has one array for
+//! each property of what it has many of, and of a picture or a cloud the number of its pixels or points.
+
+mod columns;
 
 use std::sync::Arc;
+
+use serde::{Serialize, Serializer};
 
 use crate::depth::LiftedMatch;
 use crate::features::{FeatureState, Features, Match, MatchVerdict};
@@ -17,7 +22,8 @@ use crate::retrieval::ReferenceRanking;
 use crate::robust::{Acceptance, Counted, Trial};
 
 /// One of the two photos of a problem.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
     /// The query photo.
     Query,
@@ -92,6 +98,12 @@ impl Stage {
     }
 }
 
+impl Serialize for Stage {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 /// An event type: convertible into [`Event`], with its kind.
 pub trait DebugEvent: Into<Event> + Sized {
     /// The kind of this type.
@@ -136,7 +148,8 @@ impl KindSet {
 macro_rules! events {
     ($($name:ident),+ $(,)?) => {
         /// Anything that an estimator tells.
-        #[derive(Clone, Debug)]
+        #[derive(Clone, Debug, Serialize)]
+        #[serde(tag = "kind")]
         #[allow(missing_docs, reason = "each variant is named after the struct it holds")]
         pub enum Event { $($name($name)),+ }
 
@@ -195,14 +208,14 @@ events! {
 }
 
 /// A stage begins.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StageStarted {
     /// The stage.
     pub stage: Stage,
 }
 
 /// A stage is over.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StageEnded {
     /// The stage.
     pub stage: Stage,
@@ -213,18 +226,20 @@ pub struct StageEnded {
 }
 
 /// SURF features of one photo.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct FeaturesDetected {
     /// The photo that the features are of.
     pub side: Side,
     /// Keypoints and descriptors.
+    #[serde(flatten, serialize_with = "columns::features")]
     pub features: Arc<Features>,
 }
 
 /// What matching decided about each query keypoint.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct MatchesDecided {
     /// One per query keypoint, in their order; `None` where the reference has no feature.
+    #[serde(flatten, serialize_with = "columns::decisions")]
     pub decisions: Arc<[Option<Match>]>,
 }
 
@@ -237,7 +252,7 @@ impl MatchesDecided {
 }
 
 /// The cloud was projected into the reference photo.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ProjectedCloud {
     /// Points of the scan.
     pub points: usize,
@@ -246,9 +261,10 @@ pub struct ProjectedCloud {
 }
 
 /// Depths of the unique matches.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct DepthsLifted {
     /// One per unique match, in the order of the query keypoints.
+    #[serde(flatten, serialize_with = "columns::lifted")]
     pub matches: Arc<[LiftedMatch]>,
 }
 
@@ -261,16 +277,18 @@ impl DepthsLifted {
 }
 
 /// One trial of MLESAC.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct HypothesisTried {
     /// Sample, likelihood, support.
+    #[serde(flatten)]
     pub trial: Trial,
 }
 
 /// The best hypothesis after refinement on its inliers.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct PoseRefined {
     /// The query camera in the reference camera's frame.
+    #[serde(serialize_with = "columns::rows")]
     pub reference_from_query: Pose,
     /// Correspondences with a residual within the threshold, for this pose.
     pub inliers: usize,
@@ -281,9 +299,10 @@ pub struct PoseRefined {
 }
 
 /// Whether the consensus was accepted, and why.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ConsensusJudged {
     /// The test for more inliers than chance explains.
+    #[serde(flatten)]
     pub acceptance: Acceptance,
     /// What it counted.
     pub counted: Counted,
@@ -294,28 +313,31 @@ pub struct ConsensusJudged {
 }
 
 /// Every query feature with the state it ended in.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct FeaturesClassified {
     /// One per query keypoint, in their order.
+    #[serde(flatten, serialize_with = "columns::states")]
     pub states: Arc<[FeatureState]>,
 }
 
 /// The matches that a pose is judged by after features were matched again where it says they must be.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct MatchesGuided {
     /// The last match with a depth of each query feature that has one, in the order of the features.
+    #[serde(flatten, serialize_with = "columns::lifted")]
     pub matches: Arc<[LiftedMatch]>,
 }
 
 /// The cloud took the reference photo's grey values.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct CloudColored {
     /// The coloured points, and how many were left out and why.
+    #[serde(rename = "points", serialize_with = "columns::points")]
     pub cloud: Arc<ColoredCloud>,
 }
 
 /// One hypothesis of the grid search.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PoseScored {
     /// Part of the search.
     pub phase: Phase,
@@ -332,16 +354,18 @@ pub struct PoseScored {
 }
 
 /// One phase of the grid search is complete.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct PhaseSearched {
     /// The cost and coverage surfaces.
+    #[serde(flatten, serialize_with = "columns::surface")]
     pub surface: Arc<ScoredLattice>,
     /// The best offset, if any hypothesis had a cost.
     pub best: Option<Offset>,
 }
 
 /// Why a synthetic view was rendered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Moment {
     /// It is the view at the reference pose.
     Start,
@@ -352,7 +376,7 @@ pub enum Moment {
 }
 
 /// A synthetic view and its comparison with the query.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ViewRendered {
     /// Why it was rendered.
     pub moment: Moment,
@@ -361,11 +385,12 @@ pub struct ViewRendered {
     /// Where the camera is.
     pub offset: Offset,
     /// The view, its cost and what made it.
+    #[serde(flatten, serialize_with = "columns::comparison")]
     pub comparison: Arc<Comparison>,
 }
 
 /// How the minimum of the search compares with other poses.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MinimumAssessed {
     /// Where the minimum is.
     pub offset: Offset,
@@ -380,43 +405,49 @@ pub struct MinimumAssessed {
 }
 
 /// Which way the hybrid went.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BranchTaken {
     /// The method whose pose the hybrid returns.
+    #[serde(rename = "taken")]
     pub method: Method,
     /// Why FB's pose was kept or not.
     pub why: String,
 }
 
 /// Several references gave a pose each, and a fusion made one of them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ReferencesFused {
     /// The fusion's name.
     pub fusion: &'static str,
     /// What each reference alone gave, and its weight, in the order of the references.
+    #[serde(flatten, serialize_with = "columns::shares")]
     pub shares: Arc<[Share]>,
     /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
+    #[serde(rename = "world_from_camera", serialize_with = "columns::rows_if_any")]
     pub pose: Option<Pose>,
 }
 
 /// Frames were ranked by what they look like, and the first of them became references.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ReferencesRanked {
     /// The best frames with their scores, and what verification made of them.
+    #[serde(flatten, serialize_with = "columns::ranking")]
     pub ranking: Arc<ReferenceRanking>,
     /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
     /// read.
+    #[serde(skip)]
     pub photos: Arc<[Option<Arc<Photo>>]>,
 }
 
 /// A step downhill by the derivatives of a smooth cost.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DescentStepped {
     /// The copy of the photos, 0 the finest; each is twice as coarse as the one below.
     pub level: usize,
     /// Number of the step on this level, from 1.
     pub step: usize,
     /// The query camera in the reference camera's frame, after the step.
+    #[serde(serialize_with = "columns::rows")]
     pub reference_from_camera: Pose,
     /// The smooth cost there.
     pub smooth_cost: f64,
@@ -425,19 +456,21 @@ pub struct DescentStepped {
 }
 
 /// Several starts were refined side by side.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct StartsRefined {
     /// The directions in which they moved.
     pub freedoms: Freedoms,
     /// Where each started and ended, the best first: that of least cost, where none of those that cost
     /// about as little is likelier.
+    #[serde(flatten, serialize_with = "columns::refinements")]
     pub refinements: Arc<[Refined]>,
 }
 
 /// The poses of several methods were refined under one cost and compared.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct CandidatesJudged {
     /// The candidates, the answer first.
+    #[serde(flatten, serialize_with = "columns::candidates")]
     pub candidates: Arc<[JudgedPose]>,
     /// How far the answer is below the costs of the coarse positions, in robust standard deviations.
     pub deviations: f64,

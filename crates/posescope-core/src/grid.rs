@@ -16,6 +16,7 @@ pub use lattice::{Lattice, LatticeTooLarge, MOST_CELLS};
 pub use scored::ScoredLattice;
 
 use nalgebra::{Translation3, Vector3};
+use serde::{Serialize, Serializer};
 
 use crate::describe::parameters;
 use crate::geometry::{Pose, yaw};
@@ -85,14 +86,19 @@ pub fn least_covered(coverage_floor: f64, covered_at_reference: u32) -> u32 {
 }
 
 /// Where a camera is, seen from the reference camera.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Offset {
     /// To the reference camera's right \[m\].
     pub right_m: f64,
     /// To its front \[m\].
     pub forward_m: f64,
-    /// About its up axis, positive to the left \[rad\].
+    /// About its up axis, positive to the left \[rad\]; written as data in degrees.
+    #[serde(rename = "yaw_deg", serialize_with = "in_degrees")]
     pub yaw_rad: f64,
+}
+
+fn in_degrees<S: Serializer>(angle_rad: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(angle_rad.to_degrees())
 }
 
 bits_of_fields!(Offset {
@@ -120,6 +126,12 @@ impl Offset {
             Translation3::from(Vector3::new(self.right_m, 0.0, self.forward_m)),
             yaw(self.yaw_rad),
         )
+    }
+}
+
+impl Serialize for Phase {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 

@@ -42,15 +42,17 @@ const MOST_METHODS: usize = 3;
 pub type OpenMethods = ArrayVec<Method, MOST_METHODS>;
 
 /// One event with its place in the run.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize)]
 pub struct Record {
     /// Position among the events of the run, from 0. Events that no sink wants count too.
     pub index: u64,
     /// How many stages are open around the event; a stage's own start and end count it.
     pub depth: usize,
     /// The estimators whose stages are open; an estimator's own start and end count it.
+    #[serde(skip)]
     pub methods: OpenMethods,
     /// What happened.
+    #[serde(flatten)]
     pub event: Event,
 }
 

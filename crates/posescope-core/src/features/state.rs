@@ -55,4 +55,14 @@ impl FeatureState {
     pub fn name(&self) -> &'static str {
         Self::NAMES[self.index()]
     }
+
+    /// What decided the state: a ratio, a rival's index, pixels.
+    pub fn number(&self) -> f64 {
+        match *self {
+            Self::RatioFailed { ratio } => f64::from(ratio),
+            Self::NotUnique { rival } => rival as f64,
+            Self::NoDepth { distance_px } => distance_px,
+            Self::Outlier { residual_px } | Self::Inlier { residual_px } => residual_px,
+        }
+    }
 }

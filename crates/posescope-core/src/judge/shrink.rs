@@ -6,7 +6,7 @@ use crate::geometry::Pose;
 use crate::render::MOST_AT_A_TIME;
 
 /// In which directions a pose may move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 pub enum Freedoms {
     /// Right, forward, yaw: what the coarse lattice has.
     Plane,

@@ -2,7 +2,7 @@
 
 /// What a hypothesis is worth. The support always comes with the cost, because a mean over whatever
 /// is left in view rewards looking away.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Score {
     /// The cost over the covered pixels; `None` where they decide nothing.
     pub cost: Option<f64>,

@@ -48,7 +48,7 @@ impl AcceptanceRule {
 }
 
 /// The verdict of [`inliers_beyond_chance`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Acceptance {
     /// The inliers judged.
     pub inliers: usize,

@@ -1,23 +1,28 @@
 //! What MLESAC tells on the way and in the end.
 
+use serde::Serialize;
+
 use super::likelihood::LikelihoodScore;
 use super::params::SAMPLE;
 use crate::geometry::Pose;
 use crate::solver::Refinement;
 
 /// A pose and how well it explains the correspondences.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Hypothesis {
     /// `camera_from_points`.
+    #[serde(skip)]
     pub pose: Pose,
     /// Its likelihood, mixing and number of inliers.
+    #[serde(flatten)]
     pub score: LikelihoodScore,
 }
 
 /// One random sample, told to the observer of [`super::mlesac()`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Trial {
     /// Number of the trial, from 0.
+    #[serde(rename = "trial")]
     pub index: usize,
     /// The correspondences drawn.
     pub sample: [usize; SAMPLE],

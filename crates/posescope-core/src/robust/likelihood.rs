@@ -14,11 +14,12 @@ use crate::solver::Correspondence;
 const NEGLIGIBLE: f64 = 1e-5;
 
 /// How well a pose explains all correspondences.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct LikelihoodScore {
     /// Logarithm of the likelihood of the residuals, each a density per px².
     pub log_likelihood: f64,
     /// γ, the estimated share of true matches.
+    #[serde(skip)]
     pub mixing: f64,
     /// Correspondences within the inlier threshold.
     pub inliers: usize,

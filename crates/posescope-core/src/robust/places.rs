@@ -3,7 +3,8 @@
 use nalgebra::Point2;
 
 /// What is counted where a consensus is held against chance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Counted {
     /// Every correspondence.
     Correspondences,
