@@ -26,8 +26,8 @@ pub use pausing::RunMode;
 pub use run::{Explaining, Part, Run, Span, StageBar};
 pub use task::{Task, TaskScenes, command_line};
 
-use message::Message;
-use pausing::Control;
+use message::{Message, Outbox};
+use pausing::{Command, Control, PausingObserver};
 
 /// What a session is doing.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl RunState {
 ///
 /// Dropping a session cancels its run and does not wait for the thread.
 pub struct Session {
-    control: Arc<Control>,
+    control: Control,
     inbox: Receiver<Message>,
     run: Run,
     chosen: Option<References>,
@@ -80,11 +80,15 @@ impl Session {
         breakpoints: Breakpoints,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Self {
-        let control = Arc::new(Control::new(mode, breakpoints));
         // Unbounded: a full queue that nobody drains would keep a cancelled worker waiting.
-        let (outbox, inbox) = mpsc::channel();
+        let (messages, inbox) = mpsc::channel();
+        let outbox = Outbox {
+            messages,
+            wake: Arc::new(wake),
+        };
+        let (control, observer) = PausingObserver::new(mode, breakpoints, outbox.clone());
         let run = Run::of(&job.task);
-        job::spawn(job, Arc::clone(&control), outbox, Arc::new(wake));
+        job::spawn(job, observer, outbox);
         Self {
             control,
             inbox,
@@ -160,23 +164,23 @@ impl Session {
 
     /// Goes on in another way; a paused run goes on at once, a running one pauses soon.
     pub fn set_mode(&self, mode: RunMode) {
-        self.control.set_mode(mode);
+        self.control.send(Command::Go(mode));
     }
 
     /// Replaces the breakpoints.
     pub fn set_breakpoints(&self, breakpoints: Breakpoints) {
-        self.control.set_breakpoints(breakpoints);
+        self.control.send(Command::Breakpoints(breakpoints));
     }
 
     /// Asks the run to stop, and does not wait for it. It says [`RunState::Cancelled`] when it has:
     /// an estimator looks up after 256 hypotheses, one trial or one pass over an image.
     pub fn cancel(&self) {
-        self.control.cancel();
+        self.control.send(Command::Cancel);
     }
 }
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.control.cancel();
+        self.cancel();
     }
 }

@@ -2,12 +2,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::mpsc::Sender;
 use std::thread;
 
 use super::index_file::IndexFile;
-use super::message::Message;
-use super::pausing::{Control, PausingObserver};
+use super::message::{Message, Outbox};
+use super::pausing::PausingObserver;
 use super::task::Task;
 use crate::localize::{
     ChoiceError, Chooser, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking,
@@ -80,21 +79,14 @@ impl JobError {
 
 /// Starts the worker. Nobody joins it: it ends by itself, or at the next event or checkpoint after a
 /// cancel.
-pub(super) fn spawn(
-    job: Job,
-    control: Arc<Control>,
-    outbox: Sender<Message>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-) {
-    let mut observer =
-        PausingObserver::new(Arc::clone(&control), outbox.clone(), Arc::clone(&wake));
-    let choices = outbox.clone();
+pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
+    let worker = outbox.clone();
     let started = thread::Builder::new()
         .name("estimator".to_owned())
         .spawn(move || {
             let on_choice = |chosen: &References| {
                 // The session may be gone; the next event finds out.
-                let _ = choices.send(Message::Chosen(chosen.clone()));
+                let _ = worker.send(Message::Chosen(chosen.clone()));
             };
             let outcome = catch_unwind(AssertUnwindSafe(|| job.work(0, &mut observer, on_choice)));
             let last_words = match outcome {
@@ -106,13 +98,12 @@ pub(super) fn spawn(
                 }
             };
             // Nobody to tell: the session was dropped.
-            let _ = observer.send(last_words);
+            let _ = worker.send(last_words);
         });
     if let Err(error) = started {
         let _ = outbox.send(Message::Broke(format!(
             "no thread could be started: {error}"
         )));
-        wake();
     }
 }
 
