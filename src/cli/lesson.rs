@@ -9,7 +9,7 @@ use posescope::estimator;
 use posescope::lesson::{Lesson, OpenSetting, Page, PageTurner};
 use posescope::method::Method;
 use posescope::scene::Scene;
-use posescope::sink::rerun::{Identity, Recorder, Targets, Views};
+use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::LessonArgs;
 use super::demo_settings;
@@ -169,8 +169,6 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
     };
     let targets = Targets {
         save: Some(path.to_owned()),
-        // A page may speak of any of them.
-        views: Views::All,
         ..Targets::default()
     };
     let asked = settings

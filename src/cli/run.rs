@@ -133,7 +133,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         eprintln!("Stopped at {breakpoint}");
     }
     let is_interrupted = interrupt.is_raised();
-    // A recording that is served stays until somebody ends that.
+    // Only the files are left to close: the next Ctrl-C ends the process.
     interrupt.release();
     let closed = observer.recorder.map_or(Ok(()), Recorder::close);
     let told = observer.events.map_or(Ok(()), EventExport::close);
@@ -277,8 +277,6 @@ impl Plan<'_> {
             save: recording.save.clone(),
             connect: recording.connect.clone(),
             spawn: recording.spawn,
-            serve: recording.serve,
-            views: recording.views.into(),
         };
         if targets.is_none() {
             return Ok(None);

@@ -19,7 +19,6 @@ mod file;
 mod fusion;
 mod indexed;
 mod layout;
-mod recorded;
 mod recorder;
 mod recording;
 mod report;
@@ -35,7 +34,7 @@ pub use checkup::{CheckupError, record_checkup};
 pub use comparison::{ComparisonError, record_comparison};
 pub use error::RecordError;
 pub use recorder::Recorder;
-pub use targets::{Identity, Targets, Views};
+pub use targets::{Identity, Targets};
 
 use crate::palette::Rgb;
 

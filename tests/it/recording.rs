@@ -9,14 +9,15 @@ use std::sync::Arc;
 use posescope::cost;
 use posescope::diagnosis::{Evidence, Subject, Tolerance};
 use posescope::estimator::{self, Direct};
-use posescope::event::{Kind, KindSet, ReferencesRanked, Stage};
+use posescope::event::{Kind, KindSet, PhaseSearched, ReferencesRanked, Stage, ViewRendered};
 use posescope::features::FeatureState;
 use posescope::geometry::Pose;
+use posescope::history::History;
 use posescope::localize::{LocalizeObserver as _, StageTimes, evaluate, localize_by};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
-use posescope::sink::rerun::{Identity, Recorder, Targets, Views, entities};
+use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
 use posescope::trace::{Cancelled, Fanout, Sink as _, Trace};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
@@ -457,46 +458,33 @@ fn a_whole_recording_wants_every_kind_and_a_repeating_hybrid_hardly_any() {
 }
 
 #[test]
-fn views_of_bests_that_last_are_shown_or_all_if_asked_for() {
+fn the_best_of_every_phase_and_one_in_ten_of_all_bests_are_shown() {
     let folder = tempfile::tempdir().expect("a folder");
-    let evals_of = |views, name| {
-        let path = folder.path().join(name);
-        let targets = Targets {
-            save: Some(path.clone()),
-            views,
-            ..Targets::default()
-        };
-        let opened = Recorder::open(&targets, &identity(), &[Method::PM]);
-        let mut recorder = opened.expect("a writable file");
-        run(&mut recorder, &[Method::PM], &Params::default());
-        recorder.close().expect("a whole recording");
-        let chunks = chunks(&path);
-        ["pm/synthetic", "pm/best"].map(|entity| {
-            let of_entity =
-                |chunk: &&Chunk| chunk.entity_path().to_string().trim_start_matches('/') == entity;
-            let columns = chunks.iter().filter(of_entity);
-            let columns = columns.flat_map(|chunk| chunk.timelines().values());
-            let evals = columns.filter(|column| column.timeline().name().as_str() == EVAL);
-            let evals: BTreeSet<i64> = evals
-                .flat_map(|column| column.times_raw().to_vec())
-                .collect();
-            evals
-        })
-    };
-    let [all, bests] = evals_of(Views::All, "all.rrd");
-    let [lasting, bests_told] = evals_of(Views::Lasting, "lasting.rrd");
-    assert_eq!(all, bests, "each best has its view");
-    assert_eq!(bests_told, bests, "a curve leaves nothing out");
-    assert!(lasting.is_subset(&all));
-    assert!(2 * lasting.len() < all.len(), "{lasting:?} of {all:?}");
-    // The first and the last one, and each that nothing better followed for a while.
-    assert!(lasting.contains(&0) && lasting.last() == all.last());
-    for (&best, &next) in all.iter().zip(all.iter().skip(1)) {
-        assert!(
-            next - best < 8 || lasting.contains(&best),
-            "{best}, then {next}"
-        );
+    let path = recorded(&folder, "run.rrd", &[Method::PM], &Params::default());
+    let chunks = chunks(&path);
+    let evals = |entity| BTreeSet::from_iter(times(&chunks, entity, EVAL));
+    let [shown, bests]: [BTreeSet<i64>; 2] = ["pm/synthetic", "pm/best"].map(evals);
+    assert!(shown.is_subset(&bests));
+    assert!(3 * shown.len() < bests.len(), "{shown:?} of {bests:?}");
+    assert!(shown.contains(&0) && shown.last() == bests.last());
+    let ordered: Vec<i64> = bests.iter().copied().collect();
+    for ten in ordered.windows(10) {
+        assert!(ten.iter().any(|best| shown.contains(best)), "{ten:?}");
     }
+    assert_eq!(shown, evals("pm/residual"));
+
+    let mut history = History::default();
+    estimator::entry(Method::PM)
+        .make(&Params::default())
+        .estimate(&solvable(), &mut Trace::to(&mut history))
+        .expect("not cancelled");
+    let mut phases = 0;
+    for (at, _) in history.all::<PhaseSearched>() {
+        let best = history.latest::<ViewRendered>(at).expect("a start");
+        assert!(shown.contains(&(best.evaluation as i64)), "{best:?}");
+        phases += 1;
+    }
+    assert!(phases >= 4, "{phases}");
 }
 
 #[cfg(target_os = "linux")]
@@ -678,23 +666,4 @@ fn frames_of_two_scenes_are_told_apart_in_a_recording() {
     for words in ["# Query night ", "Against snow ", "reference snow "] {
         assert!(told.contains(words), "{words}");
     }
-}
-
-#[test]
-fn the_command_line_says_which_views_are_shown() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let [usual, lasting, all] = [None, Some("lasting"), Some("all")].map(|views| {
-        let path = folder.path().join("run.rrd");
-        let mut command = crate::binary::posescope();
-        command.args(["run", "street", "--query", "70", "--reference", "62", "-q"]);
-        command.args(["--method", "mi", "--radius", "5"]);
-        command.args(views.into_iter().flat_map(|views| ["--views", views]));
-        command.arg("--save").arg(&path).assert().success();
-        let chunks = chunks(&path);
-        let synthetic = |chunk: &&Chunk| chunk.entity_path().to_string() == "/mi/synthetic";
-        let views = chunks.iter().filter(synthetic).map(Chunk::num_rows);
-        views.sum::<usize>()
-    });
-    assert_eq!(usual, lasting);
-    assert!(2 <= lasting && 3 * lasting < 2 * all, "{lasting} of {all}");
 }

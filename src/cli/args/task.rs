@@ -1,13 +1,11 @@
 //! The arguments of what localises: `run` and `view`, and what they ask of a query.
 
-use std::net::IpAddr;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use posescope::run::Protocol;
 use posescope::scene::CameraArgument;
 use posescope::session::{Breakpoint, Task};
-use posescope::sink::rerun::Views;
 
 use super::positive;
 use super::protocol::ProtocolArgs;
@@ -147,32 +145,6 @@ pub struct RecordingArgs {
     /// Start a Rerun viewer and send the recording to it
     #[arg(long)]
     pub spawn: bool,
-    /// Serve the recording, so that viewers can connect to this process; at 127.0.0.1, which other
-    /// machines do not reach, unless an address is given
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1")]
-    pub serve: Option<IpAddr>,
-    /// Which poses that were the best of a search so far the recording shows by their synthetic views
-    #[arg(long, value_enum, default_value_t)]
-    pub views: ViewsArg,
-}
-
-/// Which synthetic views are recorded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ViewsArg {
-    /// Those that stayed the best for a while
-    #[default]
-    Lasting,
-    /// All, in a recording half as large again
-    All,
-}
-
-impl From<ViewsArg> for Views {
-    fn from(views: ViewsArg) -> Self {
-        match views {
-            ViewsArg::Lasting => Self::Lasting,
-            ViewsArg::All => Self::All,
-        }
-    }
 }
 
 /// What a scene argument may be, format by format.

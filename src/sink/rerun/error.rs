@@ -33,14 +33,6 @@ pub enum RecordError {
     /// No viewer could be started.
     #[error("cannot start a Rerun viewer: {0}")]
     Spawn(String),
-    /// The port is not free.
-    #[error("cannot serve the recording on port {port}: {source}")]
-    Serve {
-        /// The port that others hold.
-        port: u16,
-        /// What the system said.
-        source: io::Error,
-    },
     /// Nothing can be recorded beside the run.
     #[error("cannot start the thread that records: {0}")]
     Thread(#[source] io::Error),

@@ -12,6 +12,8 @@ pub(super) struct EventContext<'a> {
     pub(super) problem: &'a Problem,
     /// The estimator that tells; inside the hybrid the one that it runs.
     pub(super) method: Method,
+    /// Hypotheses of the estimator in earlier runs: the timeline `eval` goes on where they ended.
+    pub(super) evals: i64,
     /// What is drawn at (0, 0, 0).
     pub(super) origin: Origin,
 }

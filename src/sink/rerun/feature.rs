@@ -33,14 +33,8 @@ pub(super) struct FeatureContext {
 }
 
 impl FeatureContext {
-    /// Records one event; `evals` is the number of trials of earlier runs.
-    pub(super) fn tell(
-        &mut self,
-        event: &Event,
-        evals: i64,
-        context: &EventContext<'_>,
-        stream: &mut Stream,
-    ) {
+    /// Records one event.
+    pub(super) fn tell(&mut self, event: &Event, context: &EventContext<'_>, stream: &mut Stream) {
         match event {
             Event::FeaturesDetected(detected) => self.detected(detected, context, stream),
             Event::MatchesDecided(decided) => {
@@ -52,7 +46,7 @@ impl FeatureContext {
             | Event::MatchesGuided(MatchesGuided { matches }) => {
                 self.lifted = Arc::clone(matches);
             }
-            Event::HypothesisTried(tried) => self.tried(tried, evals, stream),
+            Event::HypothesisTried(tried) => self.tried(tried, context.evals, stream),
             Event::PoseRefined(refined) => {
                 self.reference_from_query = Some(refined.reference_from_query);
             }

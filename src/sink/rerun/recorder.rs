@@ -1,14 +1,15 @@
 //! The recorder: a sink that has a run recorded on a thread of its own.
 
+use std::collections::BTreeSet;
 use std::panic;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use super::recorded::Recorded;
 use super::recording::Recording;
 use super::{Identity, RecordError, Targets};
+use crate::estimator;
 use crate::event::{Event, Kind, KindSet, Stage};
 use crate::geometry::Pose;
 use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
@@ -33,10 +34,10 @@ pub struct Recorder {
     writer: Option<Writer>,
     /// Whether the recording takes nothing more.
     is_broken: Arc<AtomicBool>,
-    /// Of the query at work.
-    recorded: Recorded,
+    /// The estimators that told all they tell of the query at work, by reference.
+    recorded: BTreeSet<(usize, Method)>,
     reference: usize,
-    /// Whether the method at work can only repeat what was recorded before.
+    /// Whether the method at work is a hybrid that only repeats what its parts told.
     is_repetition: bool,
 }
 
@@ -67,7 +68,7 @@ impl Recorder {
         Ok(Self {
             writer: Some(Writer { tasks, thread }),
             is_broken,
-            recorded: Recorded::default(),
+            recorded: BTreeSet::new(),
             reference: 0,
             is_repetition: false,
         })
@@ -85,7 +86,7 @@ impl Recorder {
         self.tell(move |recording| recording.show_page(&markdown));
     }
 
-    /// Completes the recording. With [`Targets::serve`] it goes on serving and does not return.
+    /// Completes the recording.
     ///
     /// # Errors
     /// The first error of the whole run.
@@ -138,7 +139,7 @@ impl Drop for Recorder {
 
 impl LocalizeObserver for Recorder {
     fn begin_query(&mut self, query_index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        self.recorded = Recorded::default();
+        self.recorded.clear();
         self.is_repetition = false;
         let (problems, truth) = (problems.to_vec(), truth.copied());
         self.tell(move |recording| recording.begin_query(query_index, problems, truth));
@@ -147,7 +148,10 @@ impl LocalizeObserver for Recorder {
     fn begin_method(&mut self, reference_index: usize, method: Method) {
         self.reference = reference_index;
         // Decided once: while a hybrid runs, its own parts are recorded one after the other.
-        self.is_repetition = self.recorded.are_all_of(reference_index, method);
+        let parts = estimator::find(method).and_then(|entry| entry.hybrid());
+        let was_recorded = |method| self.recorded.contains(&(reference_index, method));
+        self.is_repetition =
+            parts.is_some_and(|parts| was_recorded(parts.first) && was_recorded(parts.second));
         self.tell(move |recording| recording.begin_method(reference_index, method));
     }
 
@@ -185,13 +189,16 @@ impl Sink for Recorder {
         if self.is_broken() {
             return Ok(());
         }
-        if let Event::StageStarted(started) = &record.event
-            && let Stage::Estimator(method) = started.stage
+        let teller = record.methods.last();
+        let is_repeated =
+            teller.is_some_and(|method| self.recorded.contains(&(self.reference, *method)));
+        if let Event::StageEnded(ended) = &record.event
+            && let Stage::Estimator(method) = ended.stage
         {
-            self.recorded.insert(self.reference, method);
+            self.recorded.insert((self.reference, method));
         }
-        let event = record.event.clone();
-        self.tell(move |recording| recording.accept(&event));
+        let record = record.clone();
+        self.tell(move |recording| recording.accept(&record, is_repeated));
         Ok(())
     }
 }

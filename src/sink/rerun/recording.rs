@@ -10,11 +10,10 @@ use super::direct::DirectContext;
 use super::event_context::EventContext;
 use super::feature::FeatureContext;
 use super::fusion::FusionTables;
-use super::recorded::Recorded;
 use super::scene::{self, Origin, PlacedCamera};
 use super::story::{self, BesideTruth};
 use super::stream::Stream;
-use super::{Identity, RecordError, Targets, Views, blueprint, entities, report, retrieval};
+use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
 use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
 use crate::localize::{PoseReport, QueryResult};
@@ -24,6 +23,7 @@ use crate::palette;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::{ColoredCloud, color_cloud};
+use crate::trace::Record;
 
 /// A recording into which runs are put, one query after the other.
 ///
@@ -39,9 +39,8 @@ pub(super) struct Recording {
     is_laid_out: bool,
     /// Whether the pages of a lesson are shown.
     has_pages: bool,
-    views: Views,
     query: CurrentQuery,
-    /// Hypotheses of each method in earlier runs: `eval` goes on where the last run ended.
+    /// Hypotheses of each estimator in earlier runs.
     evals: BTreeMap<Method, i64>,
 }
 
@@ -53,29 +52,20 @@ struct CurrentQuery {
     results: Vec<QueryResult>,
     reference: usize,
     method: Option<Method>,
-    /// Estimators that were recorded.
-    recorded: Recorded,
     clouds: BTreeSet<usize>,
     stages: Vec<Stage>,
+    /// The estimators whose stages are open, the outermost first.
     estimators: Vec<ActiveEstimator>,
     fusion: FusionTables,
     /// Estimators that were shown at their result and at the truth.
     beside_truth: Vec<Method>,
     /// Ranked frames that have a picture.
     ranked: usize,
-    /// Events that the method at work has told.
-    told: i64,
-    /// Events of the estimators that were recorded, by reference.
-    lengths: BTreeMap<(usize, Method), i64>,
 }
 
 /// An estimator whose events come in.
+#[derive(Default)]
 struct ActiveEstimator {
-    method: Method,
-    /// Whether all its events were recorded before.
-    is_repetition: bool,
-    /// Events of the method at work before its first.
-    began: i64,
     hypotheses: i64,
     feature: FeatureContext,
     direct: DirectContext,
@@ -102,7 +92,6 @@ impl Recording {
             origin: None,
             is_laid_out: false,
             has_pages: false,
-            views: targets.views,
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
@@ -125,15 +114,11 @@ impl Recording {
         self.stream.log(entities::LESSON, &page);
     }
 
-    /// Completes the recording. With [`Targets::serve`] it goes on serving and does not return.
+    /// Completes the recording.
     ///
     /// # Errors
     /// The first error of the whole run.
     pub(super) fn close(mut self) -> Result<(), RecordError> {
-        // A run that was stopped ends no stage.
-        for estimator in &mut self.query.estimators {
-            estimator.direct.show(estimator.method, &mut self.stream);
-        }
         self.lay_out_story();
         self.stream.close()
     }
@@ -149,49 +134,42 @@ impl Recording {
         origin
     }
 
-    /// Sends the layout, as soon as it is known whether the references of the first query were
-    /// ranked: `ranked` frames have a picture.
-    fn lay_out(&mut self, ranked: usize) {
-        let Some(first) = self.query.problems.first() else {
-            return;
-        };
-        if self.is_laid_out {
-            return;
+    /// Sends the layout, as soon as it is known whether the references of the first query were ranked.
+    fn lay_out(&mut self) {
+        if !self.is_laid_out && !self.query.problems.is_empty() {
+            self.is_laid_out = true;
+            self.send_layout(Focus::default());
         }
-        self.is_laid_out = true;
-        let input = blueprint::LayoutInput {
-            methods: &self.methods,
-            first,
-            references: self.query.problems.len(),
-            ranked,
-            focus: Focus::default(),
-            has_pages: self.has_pages,
-        };
-        blueprint::send(&mut self.stream, &input);
     }
 
     /// Sends the layout again, now that it is known what went wrong.
     fn lay_out_story(&mut self) {
-        let Some(first) = self.query.problems.first() else {
-            return;
-        };
-        // A lesson tells its story itself, from the beginning.
-        if self.query.results.is_empty() || self.stream.is_broken() || self.has_pages {
-            return;
-        }
         let CurrentQuery {
+            problems,
             truth,
             results,
             beside_truth,
-            ranked,
             ..
         } = &self.query;
+        // A lesson tells its story itself, from the beginning.
+        if results.is_empty() || self.stream.is_broken() || self.has_pages {
+            return;
+        }
+        if let Some(first) = problems.first() {
+            self.send_layout(story::focus(first, truth.as_ref(), results, beside_truth));
+        }
+    }
+
+    fn send_layout(&mut self, focus: Focus) {
+        let Some(first) = self.query.problems.first() else {
+            return;
+        };
         let input = blueprint::LayoutInput {
             methods: &self.methods,
             first,
             references: self.query.problems.len(),
-            ranked: *ranked,
-            focus: story::focus(first, truth.as_ref(), results, beside_truth),
+            ranked: self.query.ranked,
+            focus,
             has_pages: self.has_pages,
         };
         blueprint::send(&mut self.stream, &input);
@@ -275,16 +253,8 @@ impl Recording {
     }
 
     fn stage_started(&mut self, stage: Stage) {
-        if let Stage::Estimator(method) = stage {
-            let is_first = self.query.recorded.insert(self.query.reference, method);
-            self.query.estimators.push(ActiveEstimator {
-                method,
-                is_repetition: !is_first,
-                began: self.query.told - 1,
-                hypotheses: 0,
-                feature: FeatureContext::default(),
-                direct: DirectContext::new(self.views),
-            });
+        if matches!(stage, Stage::Estimator(_)) {
+            self.query.estimators.push(ActiveEstimator::default());
         }
         self.query.stages.push(stage);
         self.stream.advance();
@@ -297,21 +267,10 @@ impl Recording {
         if let Some(estimator) = self.query.estimators.last_mut() {
             estimator.feature.tell_trials(&mut self.stream);
         }
-        if matches!(stage, Stage::Estimator(_))
-            && let Some(mut estimator) = self.query.estimators.pop()
+        if let Stage::Estimator(method) = stage
+            && let Some(estimator) = self.query.estimators.pop()
         {
-            estimator.direct.show(estimator.method, &mut self.stream);
-            let key = (self.query.reference, estimator.method);
-            let told = self.query.told - estimator.began;
-            if estimator.is_repetition {
-                // Not all of it was told again, but it happened.
-                let length = self.query.lengths.get(&key).copied().unwrap_or(told);
-                self.query.told = estimator.began + length;
-                self.stream.set_lockstep(Some(self.query.told - 1));
-            } else {
-                self.query.lengths.insert(key, told);
-                *self.evals.entry(estimator.method).or_default() += estimator.hypotheses;
-            }
+            *self.evals.entry(method).or_default() += estimator.hypotheses;
         }
         if !succeeded {
             self.say(&format!("{path} stopped here"), TextLogLevel::WARN);
@@ -372,20 +331,11 @@ impl Recording {
         let path = narration::stages(&self.query.stages);
         self.say(&format!("{path}: {words}"), TextLogLevel::INFO);
         self.query.ranked = event.ranking.pictured().len();
-        self.lay_out(self.query.ranked);
+        self.lay_out();
     }
 
-    fn tell(&mut self, event: &Event) {
-        let Some(estimator) = self.query.estimators.last_mut() else {
-            return;
-        };
-        if matches!(event, Event::HypothesisTried(_) | Event::PoseScored(_)) {
-            estimator.hypotheses += 1;
-        }
-        if estimator.is_repetition {
-            return;
-        }
-        let told_method = estimator.method;
+    /// Records an event of an estimator.
+    fn tell(&mut self, method: Method, event: &Event) {
         if let Some(words) = narration::sentence(event) {
             self.stream.advance();
             let path = narration::stages(&self.query.stages);
@@ -409,17 +359,16 @@ impl Recording {
         let context = EventContext {
             reference: index,
             problem,
-            method: told_method,
+            method,
+            evals: self.evals.get(&method).copied().unwrap_or(0),
             origin,
         };
-        let evals = self.evals.get(&told_method).copied().unwrap_or(0);
         if let Some(estimator) = self.query.estimators.last_mut() {
-            estimator
-                .feature
-                .tell(event, evals, &context, &mut self.stream);
-            estimator
-                .direct
-                .tell(event, evals, &context, &mut self.stream);
+            if matches!(event, Event::HypothesisTried(_) | Event::PoseScored(_)) {
+                estimator.hypotheses += 1;
+            }
+            estimator.feature.tell(event, &context, &mut self.stream);
+            estimator.direct.tell(event, &context, &mut self.stream);
         }
     }
 }
@@ -475,10 +424,9 @@ impl Recording {
     }
 
     pub(super) fn begin_method(&mut self, reference_index: usize, method: Method) {
-        self.lay_out(0);
+        self.lay_out();
         self.query.reference = reference_index;
         self.query.method = Some(method);
-        self.query.told = 0;
         self.query.stages.clear();
         self.query.estimators.clear();
     }
@@ -506,18 +454,19 @@ impl Recording {
         self.stream.flush_blocking();
     }
 
-    pub(super) fn accept(&mut self, event: &Event) {
+    /// Records an event. Of an estimator that tells again what it told before, only the stages are.
+    pub(super) fn accept(&mut self, record: &Record, is_repeated: bool) {
         if self.stream.is_broken() {
             return;
         }
-        self.stream.set_lockstep(Some(self.query.told));
-        self.query.told += 1;
-        match event {
-            Event::StageStarted(started) => self.stage_started(started.stage),
-            Event::StageEnded(ended) => self.stage_ended(ended.stage, ended.succeeded),
-            Event::ReferencesFused(event) => self.fused(event),
-            Event::ReferencesRanked(event) => self.ranked(event),
-            event => self.tell(event),
+        self.stream.set_lockstep(Some(record.index));
+        match (&record.event, record.methods.last()) {
+            (Event::StageStarted(started), _) => self.stage_started(started.stage),
+            (Event::StageEnded(ended), _) => self.stage_ended(ended.stage, ended.succeeded),
+            (Event::ReferencesFused(event), _) => self.fused(event),
+            (Event::ReferencesRanked(event), _) => self.ranked(event),
+            (event, Some(method)) if !is_repeated => self.tell(*method, event),
+            _ => {}
         }
     }
 }

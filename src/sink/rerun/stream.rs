@@ -31,7 +31,6 @@ pub(super) struct Stream {
     error: Option<RecordError>,
     /// A viewer went away while the file is well: what is left goes to the file.
     viewer_lost: bool,
-    serves: bool,
     /// Whether somebody looks on while it grows.
     is_live: bool,
     now: Now,
@@ -40,8 +39,7 @@ pub(super) struct Stream {
 }
 
 /// Where a row stands on each timeline.
-#[derive(Clone, Copy)]
-pub(super) struct Now {
+struct Now {
     query: i64,
     step: i64,
     eval: Option<i64>,
@@ -67,8 +65,7 @@ impl Stream {
             file,
             error: None,
             viewer_lost: false,
-            serves: targets.serve.is_some(),
-            is_live: targets.connect.is_some() || targets.spawn || targets.serve.is_some(),
+            is_live: targets.connect.is_some() || targets.spawn,
             now: Now {
                 query: 0,
                 step: -1,
@@ -107,25 +104,13 @@ impl Stream {
     }
 
     /// From here on the rows belong to this event of its estimator, or to none.
-    pub(super) fn set_lockstep(&mut self, event: Option<i64>) {
-        self.now.lockstep = event;
+    pub(super) fn set_lockstep(&mut self, event: Option<u64>) {
+        self.now.lockstep = event.map(|event| event as i64);
     }
 
     /// Goes on to the next decision of the timeline.
     pub(super) fn advance(&mut self) {
         self.now.step += 1;
-    }
-
-    /// Where rows stand that are recorded now.
-    pub(super) fn now(&self) -> Now {
-        self.now
-    }
-
-    /// Records as of an earlier time.
-    pub(super) fn as_of(&mut self, then: Now, record: impl FnOnce(&mut Self)) {
-        let now = std::mem::replace(&mut self.now, then);
-        record(self);
-        self.now = now;
     }
 
     /// Records something as of now.
@@ -205,12 +190,6 @@ impl Stream {
     pub(super) fn close(mut self) -> Result<(), RecordError> {
         self.flush_blocking();
         let finished = self.file.as_ref().map_or(Ok(()), RecordingFile::finish);
-        if self.serves {
-            log::warn!("serving the recording to viewers; press Ctrl-C to end");
-            loop {
-                std::thread::park();
-            }
-        }
         self.error.map_or(finished, Err)
     }
 

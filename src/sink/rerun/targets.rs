@@ -1,13 +1,10 @@
-//! Where a recording goes, what of it, and what it is known by.
+//! Where a recording goes, and what it is known by.
 
-use std::io;
-use std::net::{IpAddr, TcpListener};
 use std::path::PathBuf;
 
 use rerun::external::re_uri::RedapUri;
-use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::{GrpcSink, LogSink};
-use rerun::{DEFAULT_CONNECT_URL, DEFAULT_SERVER_PORT, ServerOptions, SpawnError, SpawnOptions};
+use rerun::{DEFAULT_CONNECT_URL, SpawnError, SpawnOptions};
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::error::RecordError;
@@ -24,22 +21,6 @@ pub struct Targets {
     pub connect: Option<String>,
     /// Whether to start a viewer.
     pub spawn: bool,
-    /// The address at which the recording is served to viewers that connect to this process.
-    pub serve: Option<IpAddr>,
-    /// Which synthetic views go there.
-    pub views: Views,
-}
-
-/// Which of the poses that were the best of a search so far are shown by their synthetic views. The start and the
-/// result are in any case, and so is what every hypothesis costs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Views {
-    /// Those that stayed the best for the next seven hypotheses or to the end of a phase. Of a search that goes
-    /// down a slope, every second hypothesis is better than all before.
-    #[default]
-    Lasting,
-    /// All of them.
-    All,
 }
 
 /// What the stable id of a recording follows from.
@@ -108,7 +89,7 @@ pub(super) struct OpenTargets {
 impl Targets {
     /// Whether there is no target at all.
     pub fn is_none(&self) -> bool {
-        self.save.is_none() && self.connect.is_none() && !self.spawn && self.serve.is_none()
+        self.save.is_none() && self.connect.is_none() && !self.spawn
     }
 
     /// Opens all targets.
@@ -126,9 +107,6 @@ impl Targets {
         }
         if self.spawn {
             sinks.push(Box::new(spawn()?));
-        }
-        if let Some(address) = self.serve {
-            sinks.push(Box::new(serve(address)?));
         }
         Ok(OpenTargets { sinks, file })
     }
@@ -168,16 +146,6 @@ fn spawn() -> Result<Viewer, RecordError> {
         })
     })?;
     connect(&format!("rerun+http://127.0.0.1:{}/proxy", viewer.port))
-}
-
-/// Serves at one address only. Web pages of other origins are refused by Rerun's server.
-fn serve(address: IpAddr) -> Result<GrpcServerSink, RecordError> {
-    let port = DEFAULT_SERVER_PORT;
-    let refused = |source| RecordError::Serve { port, source };
-    // The server would find out on its own thread, and only log it.
-    TcpListener::bind((address, port)).map_err(refused)?;
-    GrpcServerSink::new(&address.to_string(), port, ServerOptions::default())
-        .map_err(|error| refused(io::Error::other(error)))
 }
 
 #[cfg(test)]
