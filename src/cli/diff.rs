@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use posescope::measure::{Change, Migration, RunComparison, Tolerance, read_rows};
-use posescope::run::read_run;
+use posescope::run::{FolderError, read_results, read_run};
 use posescope::sink::rerun::{Targets, record_comparison};
 
 use super::args::DiffArgs;
@@ -62,7 +62,16 @@ pub fn record(
         save: Some(save.clone()),
         ..Targets::default()
     };
-    record_comparison(&targets, before, after, &text(comparison))?;
+    let name = |run: &Path| {
+        let name = run.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    };
+    let results = |run: &Path| read_results(run)?.collect::<Result<Vec<_>, FolderError>>();
+    let (names, results) = (
+        [name(before), name(after)],
+        [results(before)?, results(after)?],
+    );
+    record_comparison(&targets, names, &results, &text(comparison))?;
     if !terminal.is_quiet() {
         eprintln!("Recording: {0} (open it with `rerun {0}`)", save.display());
     }

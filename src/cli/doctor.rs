@@ -24,7 +24,9 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
             save: Some(path.clone()),
             ..Targets::default()
         };
-        record_checkup(&targets, scene.as_ref(), &found.compared)?;
+        let frames = found.compared.iter().map(|&frame| scene.reference(frame));
+        let frames = frames.collect::<Result<Vec<_>, _>>()?;
+        record_checkup(&targets, scene.name(), &frames)?;
     }
     if !terminal.is_quiet() {
         let text = report(scene.as_ref(), &found, terminal.width());

@@ -11,7 +11,7 @@ use posescope::measure::KnownError;
 use posescope::run::{DrawError, FolderError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::session::JobError;
-use posescope::sink::rerun::{CheckupError, ComparisonError, RecordError};
+use posescope::sink::rerun::RecordError;
 use posescope::trace::Cancelled;
 
 const DONE: u8 = 0;
@@ -139,24 +139,6 @@ impl From<RunError> for CliError {
             RunError::Choice(error) => error.into(),
             RunError::Cancelled(cancelled) => Self::Stopped(cancelled),
             RunError::Folder(error) => error.into(),
-        }
-    }
-}
-
-impl From<CheckupError> for CliError {
-    fn from(error: CheckupError) -> Self {
-        match error {
-            CheckupError::Scene(error) => error.into(),
-            CheckupError::Record(error) => error.into(),
-        }
-    }
-}
-
-impl From<ComparisonError> for CliError {
-    fn from(error: ComparisonError) -> Self {
-        match error {
-            ComparisonError::Folder(error) => error.into(),
-            ComparisonError::Record(error) => error.into(),
         }
     }
 }

@@ -30,8 +30,8 @@ mod surface;
 mod targets;
 mod viewer;
 
-pub use checkup::{CheckupError, record_checkup};
-pub use comparison::{ComparisonError, record_comparison};
+pub use checkup::record_checkup;
+pub use comparison::record_comparison;
 pub use error::RecordError;
 pub use recorder::Recorder;
 pub use targets::{Identity, Targets};

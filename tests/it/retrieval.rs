@@ -92,7 +92,6 @@ fn an_index_is_built_once_and_finds_the_reference() {
         entities::RETRIEVAL_PLACES.to_owned(),
         entities::rank(0),
         entities::rank_part(0, "matches"),
-        entities::rank_part(0, "outline"),
     ] {
         assert!(shown.contains_key(&entity), "{entity} is missing");
     }

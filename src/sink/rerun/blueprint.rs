@@ -92,24 +92,24 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         has_pages,
     } = *input;
     let viewpoints = &Viewpoints(first);
-    let mut words: Vec<BlueprintNode> = vec![
-        BlueprintView::new("TextDocument", "Report", entities::REPORT).into(),
-        BlueprintView::new("TextLog", "Log", entities::LOG).into(),
-        BlueprintView::new("StateTimeline", "Stages", "stage").into(),
+    let document = |name, origin: &str| view("TextDocument", name, origin);
+    let mut words = vec![
+        document("Report", entities::REPORT),
+        view("TextLog", "Log", entities::LOG),
+        view("StateTimeline", "Stages", "stage"),
     ];
     if references > 1 {
-        words.push(BlueprintView::new("TextDocument", "Fusion", entities::FUSION_TABLE).into());
+        words.push(document("Fusion", entities::FUSION_TABLE));
     }
     if ranked > 0 {
-        words.push(BlueprintView::new("TextDocument", "Ranking", entities::RETRIEVAL_TABLE).into());
+        words.push(document("Ranking", entities::RETRIEVAL_TABLE));
     }
     let mut left = vec![
         (3.0, overview(viewpoints, &focus.places).into()),
         (2.0, BlueprintNode::Tabs(words)),
     ];
     if has_pages {
-        let page = BlueprintView::new("TextDocument", "Lesson", entities::LESSON);
-        left.insert(0, (4.0, page.into()));
+        left.insert(0, (4.0, document("Lesson", entities::LESSON)));
     }
     let left = BlueprintNode::Column(left);
     let mut rows = Vec::new();
@@ -123,43 +123,34 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         Some(first) if focus.wrong.contains(first) => 1.8,
         _ => 1.2,
     };
-    let direct: Vec<BlueprintNode> = direct
-        .into_iter()
+    let direct = direct.into_iter();
+    let direct: Vec<_> = direct
         .map(|method| direct_row(method, focus, viewpoints))
         .collect();
     // Three rows would leave too little height for the photos.
     if rows.is_empty() {
-        rows.extend(direct.into_iter().map(|row| (1.0, row)));
+        rows = equal(direct);
     } else if !direct.is_empty() {
         rows.push((share, BlueprintNode::Tabs(direct)));
     }
-    let methods = BlueprintNode::Column(rows);
-    let right = if ranked > 0 {
-        BlueprintNode::Tabs(vec![row("Methods", vec![(1.0, methods)]), ranks(ranked)])
-    } else {
-        methods
-    };
+    let mut right = BlueprintNode::Column(rows);
+    if ranked > 0 {
+        let methods = row("Methods", equal([right]));
+        right = BlueprintNode::Tabs(vec![methods, ranks(ranked)]);
+    }
     row("posescope", vec![(2.0, left), (3.0, right)])
 }
 
 /// The ranked frames, the best at the top left.
 fn ranks(ranked: usize) -> BlueprintNode {
-    let view = |rank: usize| -> (f32, BlueprintNode) {
+    let frame = |rank: &usize| {
         let name = format!("Rank {} (query above)", rank + 1);
-        (
-            1.0,
-            BlueprintView::new("2D", name, entities::rank(rank)).into(),
-        )
+        view("2D", name, entities::rank(*rank))
     };
     let ranks: Vec<usize> = (0..ranked).collect();
-    let rows = ranks.chunks(RANKS_PER_ROW).map(|chunk| {
-        let views = chunk.iter().map(|&rank| view(rank)).collect();
-        (1.0, row("ranks", views))
-    });
-    row(
-        "Retrieval",
-        vec![(1.0, BlueprintNode::Column(rows.collect()))],
-    )
+    let rows = ranks.chunks(RANKS_PER_ROW);
+    let rows = rows.map(|chunk| row("ranks", equal(chunk.iter().map(frame))));
+    row("Retrieval", equal([BlueprintNode::Column(equal(rows))]))
 }
 
 fn overview(viewpoints: &Viewpoints<'_>, places: &[[f64; 3]]) -> BlueprintView {
@@ -175,38 +166,25 @@ fn overview(viewpoints: &Viewpoints<'_>, places: &[[f64; 3]]) -> BlueprintView {
 }
 
 fn feature_row() -> BlueprintNode {
-    let keypoints = BlueprintView::new("2D", "Query", "query");
     let photo = BlueprintView::new("2D", "Matches (query above reference)", "fb/matches/0").of([
         "+ $origin/**".to_owned(),
         format!("- $origin/{}/**", FeatureState::NAMES[0]),
         format!("- $origin/{}/**", FeatureState::NAMES[1]),
     ]);
+    let photos = BlueprintNode::Tabs(vec![photo.into(), view("2D", "Query", "query")]);
+    let [inliers, likelihood] =
+        ["inliers", "log likelihood"].map(|what| format!("RANSAC {what} (timeline eval)"));
     let numbers = BlueprintNode::Tabs(vec![
-        plot("RANSAC best", entities::RANSAC_BEST).into(),
-        plot("RANSAC inliers (timeline eval)", entities::RANSAC_INLIERS).into(),
-        plot(
-            "RANSAC log likelihood (timeline eval)",
-            entities::RANSAC_LIKELIHOOD,
-        )
-        .into(),
+        plot("RANSAC best", entities::RANSAC_BEST),
+        plot(inliers, entities::RANSAC_INLIERS),
+        plot(likelihood, entities::RANSAC_LIKELIHOOD),
     ]);
     let funnel = BlueprintNode::Tabs(vec![
-        BlueprintView::new("TextDocument", "Funnel", entities::FUNNEL_TABLE).into(),
-        BlueprintView::new("BarChart", "Funnel chart", entities::FUNNEL).into(),
+        view("TextDocument", "Funnel", entities::FUNNEL_TABLE),
+        view("BarChart", "Funnel chart", entities::FUNNEL),
     ]);
-    row(
-        "FB",
-        vec![
-            (
-                3.0,
-                BlueprintNode::Tabs(vec![photo.into(), keypoints.into()]),
-            ),
-            (
-                2.0,
-                BlueprintNode::Column(vec![(1.0, numbers), (1.0, funnel)]),
-            ),
-        ],
-    )
+    let numbers = BlueprintNode::Column(equal([numbers, funnel]));
+    row("FB", vec![(3.0, photos), (2.0, numbers)])
 }
 
 fn direct_row(method: Method, focus: &Focus, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
@@ -214,89 +192,65 @@ fn direct_row(method: Method, focus: &Focus, viewpoints: &Viewpoints<'_>) -> Blu
     if !focus.beside_truth.contains(&method) {
         return search;
     }
-    let name = method.name().to_uppercase();
+    let name = method.label();
     // What the search compares lies beside what it should have found.
-    let at = |place: &str, what: &str| -> BlueprintNode {
+    let at = |place: &str, what: &str| {
         let pictures = match has_histogram(method) {
             true => ["synthetic", "joint_histogram"],
             false => ["synthetic", "residual"],
         };
-        let view = |part: &str| {
+        BlueprintNode::Column(equal(pictures.map(|part| {
             let title = format!("{name} at the {what}: {}", part.replace('_', " "));
             let origin = entities::direct(method, &format!("{place}/{part}"));
-            (1.0, BlueprintView::new("2D", title, origin).into())
-        };
-        BlueprintNode::Column(pictures.map(view).into())
+            view("2D", title, origin)
+        })))
     };
     let beside = row(
         &format!("{name}: result beside truth"),
-        vec![
-            (1.0, at(entities::AT_RESULT, "result")),
-            (1.0, at(entities::AT_TRUTH, "truth")),
-        ],
+        equal([
+            at(entities::AT_RESULT, "result"),
+            at(entities::AT_TRUTH, "truth"),
+        ]),
     );
-    row(
-        &name,
-        vec![(1.0, BlueprintNode::Tabs(vec![beside, search]))],
-    )
+    row(&name, equal([BlueprintNode::Tabs(vec![beside, search])]))
 }
 
 /// The search of a direct method, step by step.
 fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
-    let name = method.name().to_uppercase();
-    let image = |what: &str, part: &str| -> BlueprintNode {
-        BlueprintView::new(
-            "2D",
-            format!("{name} {what}"),
-            entities::direct(method, part),
-        )
-        .into()
-    };
-    let query: BlueprintNode = BlueprintView::new("2D", "Query", entities::QUERY_IMAGE).into();
-    let comparison = match has_histogram(method) {
-        false => BlueprintNode::Tabs(vec![
-            image("residual", "residual"),
-            image("weights", "weights"),
-        ]),
-        true => BlueprintNode::Tabs(vec![
+    let name = method.label();
+    let of = |part: &str| entities::direct(method, part);
+    let image = |what: &str, part: &str| view("2D", format!("{name} {what}"), of(part));
+    let comparison = BlueprintNode::Tabs(match has_histogram(method) {
+        false => vec![image("residual", "residual"), image("weights", "weights")],
+        true => vec![
             image(
                 "joint histogram (right: synthetic, up: query)",
                 "joint_histogram",
             ),
-            plot(
-                format!("{name} entropy"),
-                entities::direct(method, "entropy"),
-            )
-            .into(),
-        ]),
-    };
+            plot(format!("{name} entropy"), of("entropy")),
+        ],
+    });
+    let query = view("2D", "Query", entities::QUERY_IMAGE);
     let views = BlueprintNode::Tabs(vec![image("synthetic", "synthetic"), query]);
+    let yaw = entities::yaw_curve(method);
     let maps = BlueprintNode::Tabs(vec![
         map(method, "cost", viewpoints).into(),
-        BlueprintView::new(
-            "BarChart",
-            format!("{name} yaw [°]"),
-            entities::yaw_curve(method),
-        )
-        .into(),
+        view("BarChart", format!("{name} yaw [°]"), yaw),
         map(method, "coverage", viewpoints).into(),
-        plot(format!("{name} best"), entities::direct(method, "best")).into(),
-        plot(
-            format!("{name} cost (timeline eval)"),
-            entities::direct(method, "cost"),
-        )
-        .into(),
+        plot(format!("{name} best"), of("best")),
+        plot(format!("{name} cost (timeline eval)"), of("cost")),
     ]);
-    row(
-        &format!("{name}: search"),
-        vec![
-            (
-                3.0,
-                BlueprintNode::Column(vec![(1.0, views), (1.0, comparison)]),
-            ),
-            (2.0, maps),
-        ],
-    )
+    let views = BlueprintNode::Column(equal([views, comparison]));
+    row(&format!("{name}: search"), vec![(3.0, views), (2.0, maps)])
+}
+
+fn view(class: &'static str, name: impl Into<String>, origin: impl Into<String>) -> BlueprintNode {
+    BlueprintView::new(class, name, origin).into()
+}
+
+/// Nodes with equal shares.
+fn equal(nodes: impl IntoIterator<Item = BlueprintNode>) -> Vec<(f32, BlueprintNode)> {
+    nodes.into_iter().map(|node| (1.0, node)).collect()
 }
 
 fn row(name: &str, children: Vec<(f32, BlueprintNode)>) -> BlueprintNode {
@@ -308,7 +262,7 @@ fn row(name: &str, children: Vec<(f32, BlueprintNode)>) -> BlueprintNode {
 
 /// A surface of the grid search, seen from above.
 fn map(method: Method, part: &str, viewpoints: &Viewpoints<'_>) -> BlueprintView {
-    let name = format!("{} {part}", method.name().to_uppercase());
+    let name = format!("{} {part}", method.label());
     BlueprintView::new("3D", name, "/")
         .of([
             format!("+ /{}/**", entities::search(method, part)),
@@ -321,11 +275,11 @@ fn map(method: Method, part: &str, viewpoints: &Viewpoints<'_>) -> BlueprintView
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
 }
 
-fn plot(name: impl Into<String>, origin: impl Into<String>) -> BlueprintView {
-    BlueprintView::new("TimeSeries", name, origin).with(
-        "PlotLegend",
-        PlotLegend::new().with_corner(Corner2D::LeftBottom),
-    )
+fn plot(name: impl Into<String>, origin: impl Into<String>) -> BlueprintNode {
+    let legend = PlotLegend::new().with_corner(Corner2D::LeftBottom);
+    BlueprintView::new("TimeSeries", name, origin)
+        .with("PlotLegend", legend)
+        .into()
 }
 
 /// Points of view, fixed to the first reference camera.

@@ -1,5 +1,7 @@
 //! A recording of some frames with their clouds, to see whether they fit together.
 
+use std::sync::Arc;
+
 use rerun::{Points2D, Radius, ViewCoordinates};
 
 use super::encode::jpeg;
@@ -8,55 +10,39 @@ use super::stream::Stream;
 use super::{Identity, RecordError, Targets, entities};
 use crate::palette;
 use crate::picture;
+use crate::problem::ReferenceTuple;
 use crate::render::{RenderParams, color_cloud};
-use crate::scene::{Scene, SceneError};
-
-/// Why a scene could not be recorded.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckupError {
-    /// A frame cannot be read.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The recording cannot be written.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-}
 
 /// Records frames of a scene: each with its camera, photo and cloud in the world, and with its cloud on its
 /// photo.
 ///
 /// # Errors
-/// [`CheckupError`].
+/// [`RecordError`].
 pub fn record_checkup(
     targets: &Targets,
-    scene: &dyn Scene,
-    frames: &[usize],
-) -> Result<(), CheckupError> {
-    let names = frames.iter().map(|&frame| scene.frames()[frame].clone());
+    scene: &str,
+    frames: &[Arc<ReferenceTuple>],
+) -> Result<(), RecordError> {
     let identity = Identity {
-        scene: scene.name().to_owned(),
-        references: names.collect(),
+        scene: scene.to_owned(),
+        references: frames.iter().map(|frame| frame.name.clone()).collect(),
         ..Identity::default()
     };
     let mut stream = Stream::open(targets, &identity)?;
     stream.log_static(entities::WORLD, &ViewCoordinates::RDF());
-    let mut origin = None;
-    for (index, &frame) in frames.iter().enumerate() {
-        let tuple = scene.reference(frame)?;
-        let place = tuple.world_from_camera.translation.vector;
-        let origin = *origin.get_or_insert(Origin(place));
+    let first = frames
+        .first()
+        .map(|frame| frame.world_from_camera.translation.vector);
+    let origin = Origin(first.unwrap_or_default());
+    for (index, tuple) in frames.iter().enumerate() {
         stream.set_query(index);
         stream.advance();
-        match jpeg(&picture::photo(&tuple.photo)) {
-            Ok(photo) => {
-                stream.log_image("check/photo", Ok(photo.clone()));
-                scene::log_reference(&mut stream, index, &tuple, &tuple.name, Ok(photo), origin);
-            }
-            Err(why) => stream.log_image("check/photo", Err(why)),
-        }
+        let photo = || jpeg(&picture::photo(&tuple.photo));
+        stream.log_image("check/photo", photo());
+        scene::log_reference(&mut stream, index, tuple, &tuple.name, photo(), origin);
         let params = RenderParams::default();
         let colored = color_cloud(&tuple.cloud, &tuple.photo.gray, &tuple.intrinsics, &params);
-        scene::log_cloud(&mut stream, index, &tuple, &colored, origin);
+        scene::log_cloud(&mut stream, index, tuple, &colored, origin);
         let seen = tuple.cloud.points.iter().filter_map(|point| {
             let pixel = tuple.intrinsics.project(&point.cast())?;
             let is_in_view = tuple.intrinsics.contains(&pixel);
@@ -76,6 +62,5 @@ pub fn record_checkup(
         stream.log("check/photo/cloud", &points);
         stream.flush();
     }
-    stream.close()?;
-    Ok(())
+    stream.close()
 }

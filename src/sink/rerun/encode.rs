@@ -59,32 +59,11 @@ fn indexed_bytes(picture: &Indexed) -> Result<Vec<u8>, png::EncodingError> {
     // nothing. The thorough packer takes three times as long and saves 7 to 21 kB of a view's pictures.
     encoder.set_deflate_compression(png::DeflateCompression::FdeflateUltraFast);
     encoder.set_filter(png::Filter::Up);
-    let packed: Vec<u8>;
-    // Four pixels a byte where that is enough.
-    let rows = if palette.len() <= 4 {
-        encoder.set_depth(png::BitDepth::Two);
-        packed = indices
-            .chunks((*width).max(1) as usize)
-            .flat_map(|row| row.chunks(4).map(quarters))
-            .collect();
-        &packed
-    } else {
-        encoder.set_depth(png::BitDepth::Eight);
-        indices
-    };
+    encoder.set_depth(png::BitDepth::Eight);
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(rows)?;
+    writer.write_image_data(indices)?;
     writer.finish()?;
     Ok(bytes)
-}
-
-/// Up to four indices below 4 as one byte, the first in the upper bits.
-fn quarters(indices: &[u8]) -> u8 {
-    let places = (0..4).map(|place| 6 - 2 * place);
-    indices
-        .iter()
-        .zip(places)
-        .fold(0, |byte, (index, place)| byte | index << place)
 }
 
 #[cfg(test)]

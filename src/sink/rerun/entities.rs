@@ -150,8 +150,7 @@ pub fn rank(rank: usize) -> String {
     format!("retrieval/rank/{rank}")
 }
 
-/// What is drawn on a ranked frame: its verified `matches`, the `outline` of the part of the query
-/// that has them with the place where the affine transform puts it, a `label`.
+/// What is drawn on a ranked frame: its verified `matches`, a `label`.
 pub fn rank_part(rank: usize, part: &str) -> String {
     format!("retrieval/rank/{rank}/{part}")
 }

@@ -11,12 +11,10 @@ use super::stream::Stream;
 use crate::event::ReferencesRanked;
 use crate::geometry::Pose;
 use crate::image::Photo;
-use crate::palette::{self, Rgb};
+use crate::palette;
 use crate::picture;
 use crate::problem::Query;
-use crate::retrieval::{
-    Criterion, Geometry, RankedReference, ReferenceRanking, Verification, VerifiedMatch,
-};
+use crate::retrieval::{Criterion, Geometry, RankedReference, ReferenceRanking, VerifiedMatch};
 
 /// Width of a canvas at most \[px\]: ten of them weigh as much as one photo of full size.
 const CANVAS_WIDTH: u32 = 480;
@@ -46,9 +44,8 @@ pub(super) fn tell(event: &ReferencesRanked, context: &RankingContext<'_>, strea
         let label = photo_pair.label(&label(ranking, rank, reference), is_chosen);
         stream.log(&entities::rank_part(rank, "label"), &label);
         if let Some(found) = reference.ranked.verification() {
-            let part = |name: &str| entities::rank_part(rank, name);
-            stream.log(&part("matches"), &photo_pair.matches(&found.matches));
-            stream.log(&part("outline"), &photo_pair.outline(found));
+            let matches = photo_pair.matches(&found.matches);
+            stream.log(&entities::rank_part(rank, "matches"), &matches);
         }
     }
 }
@@ -100,18 +97,9 @@ impl PhotoPair {
             let below = self.of_reference(&found.reference_pixel);
             [self.of_query(&found.query_pixel), below]
         };
-        lines(matches.iter().map(ends), palette::TRUTH, 0.75)
-    }
-
-    /// The part of the query that has matches, and where the affine transform puts it.
-    fn outline(&self, found: &Verification) -> LineStrips2D {
-        let Some(corners) = corners(&found.matches) else {
-            return LineStrips2D::clear_fields();
-        };
-        let in_query = corners.map(|corner| self.of_query(&corner));
-        let in_reference =
-            corners.map(|corner| self.of_reference(&found.reference_from_query.apply(&corner)));
-        lines([in_query, in_reference], palette::STATES[2], 1.0)
+        LineStrips2D::new(matches.iter().map(ends))
+            .with_colors([super::color(palette::TRUTH)])
+            .with_radii([Radius::new_ui_points(0.75)])
     }
 
     /// Words on the seam between the photos.
@@ -130,59 +118,22 @@ impl PhotoPair {
     }
 }
 
-fn lines<const N: usize>(
-    strips: impl IntoIterator<Item = [[f32; 2]; N]>,
-    color: Rgb,
-    radius: f32,
-) -> LineStrips2D {
-    LineStrips2D::new(strips)
-        .with_colors([super::color(color)])
-        .with_radii([Radius::new_ui_points(radius)])
-}
-
-/// The corners of the box around the query's matched features, the first one again at the end.
-fn corners(matches: &[VerifiedMatch]) -> Option<[Point2<f64>; 5]> {
-    let first = matches.first()?.query_pixel;
-    let (least, greatest) = matches.iter().fold((first, first), |(least, greatest), m| {
-        (least.inf(&m.query_pixel), greatest.sup(&m.query_pixel))
-    });
-    let corner = |x: f64, y: f64| Point2::new(x, y);
-    Some([
-        corner(least.x, least.y),
-        corner(greatest.x, least.y),
-        corner(greatest.x, greatest.y),
-        corner(least.x, greatest.y),
-        corner(least.x, least.y),
-    ])
-}
-
 /// Where the ranked frames are.
 fn places(ranking: &ReferenceRanking, origin: Origin) -> Points3D {
-    let known: Vec<_> = ranking
-        .frames
-        .iter()
-        .enumerate()
-        .filter_map(|(rank, reference)| Some((rank, reference, reference.world_from_camera?)))
-        .collect();
-    Points3D::new(
-        known
-            .iter()
-            .map(|(.., pose)| origin.place(&pose.translation.vector)),
-    )
-    .with_colors(known.iter().map(|(rank, ..)| {
-        super::color(if *rank < ranking.chosen {
-            palette::REFERENCE
-        } else {
-            palette::UNDECIDED
-        })
-    }))
-    .with_radii([Radius::new_ui_points(4.0)])
-    .with_labels(
-        known
-            .iter()
-            .map(|(rank, reference, _)| label(ranking, *rank, reference)),
-    )
-    .with_show_labels(false)
+    let known = || {
+        let ranked = ranking.frames.iter().enumerate();
+        ranked.filter_map(|(rank, frame)| Some((rank, frame, frame.world_from_camera?)))
+    };
+    Points3D::new(known().map(|(.., pose)| origin.place(&pose.translation.vector)))
+        .with_colors(known().map(|(rank, ..)| {
+            super::color(match rank < ranking.chosen {
+                true => palette::REFERENCE,
+                false => palette::UNDECIDED,
+            })
+        }))
+        .with_radii([Radius::new_ui_points(4.0)])
+        .with_labels(known().map(|(rank, frame, _)| label(ranking, rank, frame)))
+        .with_show_labels(false)
 }
 
 fn label(ranking: &ReferenceRanking, rank: usize, reference: &RankedReference) -> String {
@@ -244,7 +195,7 @@ mod tests {
     use nalgebra::{Matrix2, Vector2};
 
     use super::*;
-    use crate::retrieval::{Affine, Ranked};
+    use crate::retrieval::{Affine, Ranked, Verification};
 
     fn matched(query: [f64; 2], reference: [f64; 2]) -> VerifiedMatch {
         VerifiedMatch {
@@ -291,16 +242,6 @@ mod tests {
         let small = Photo::from_gray(GrayImage::new(96, 30));
         let photo_pair = PhotoPair::of(&small, &small);
         assert_eq!(photo_pair.picture.dimensions(), (96, 64));
-    }
-
-    #[test]
-    fn the_outline_holds_all_matches() {
-        let [low, _, high, ..] = corners(&verification().matches).expect("there are matches");
-        assert_eq!(
-            (low, high),
-            (Point2::new(10.0, 20.0), Point2::new(30.0, 40.0))
-        );
-        assert!(corners(&[]).is_none());
     }
 
     #[test]

@@ -30,16 +30,11 @@ pub(super) struct CostRange {
 impl CostRange {
     /// The range of the hypotheses that have a say; `None` where none has.
     pub(super) fn of(surface: &ScoredLattice) -> Option<Self> {
-        let mut costs = (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
-        let first = costs.next()?;
-        let one = Self {
-            least: first,
-            greatest: first,
-        };
-        Some(costs.fold(one, |range, cost| Self {
-            least: range.least.min(cost),
-            greatest: range.greatest.max(cost),
-        }))
+        let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
+        Some(Self {
+            least: costs().reduce(f64::min)?,
+            greatest: costs().reduce(f64::max)?,
+        })
     }
 
     /// 1 for the least cost, 0 for the greatest.
