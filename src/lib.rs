@@ -42,6 +42,7 @@ mod palette;
 mod picture;
 #[cfg(feature = "rerun")]
 mod place;
+mod relation;
 #[cfg(feature = "rerun")]
 pub mod report;
 pub mod run;

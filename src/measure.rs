@@ -27,7 +27,8 @@ mod tables;
 mod timings;
 mod triage;
 
-pub use diff::{Change, Difference, RunComparison, Tolerance};
+pub use crate::relation::Relation;
+pub use diff::{Change, Difference, RunComparison};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
 pub use gate::{Gate, GateResult};

@@ -16,8 +16,8 @@ use posescope_core::files::write_whole;
 
 use crate::localize::{LocalizeError, Localizer, QueryResult, Request};
 use crate::measure::{
-    Change, GateResult, Measures, Row, RunComparison, Table, Tolerance, measure, plots,
-    read_gate_results, read_rows, tables,
+    Change, GateResult, Measures, Row, RunComparison, Table, measure, plots, read_gate_results,
+    read_rows, tables,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -218,7 +218,7 @@ fn held_against(
 ) -> Result<Baseline, FolderError> {
     let run_before = read_run(before)?;
     let rows_before = read_rows(before)?;
-    let comparison = RunComparison::of(&rows_before, rows, &Tolerance::default());
+    let comparison = RunComparison::of(&rows_before, rows, &RunComparison::TOLERANCE);
     for one in &comparison.differences {
         // Rows and results are the same lines.
         let at = rows.iter().position(|row| *row == one.after);

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use posescope::measure::{Change, Migration, RunComparison, Tolerance, read_rows};
+use posescope::diagnosis::Tolerance;
+use posescope::measure::{Change, Migration, RunComparison, read_rows};
 use posescope::run::{FolderError, read_results, read_run};
 use posescope::sink::rerun::{Targets, record_comparison};
 
@@ -16,8 +17,8 @@ use super::terminal::Terminal;
 /// Runs the command.
 pub fn diff(args: &DiffArgs, terminal: &Terminal) -> Result<(), CliError> {
     let tolerance = Tolerance {
-        metres: args.tolerance_m,
-        degrees: args.tolerance_deg,
+        translation_m: args.tolerance_m,
+        rotation_deg: args.tolerance_deg,
     };
     for run in [&args.before, &args.after] {
         read_run(run)?;

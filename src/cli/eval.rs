@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use posescope::localize::{Ranking, Selection};
 use posescope::measure::{
-    Change, Gate, KnownFailures, Report, Row, RunComparison, Tolerance, read_rows, write_report,
+    Change, Gate, KnownFailures, Report, Row, RunComparison, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -396,6 +396,6 @@ fn against(before: &Path, folder: &Path, only_again: bool) -> Result<RunComparis
     Ok(RunComparison::of(
         &rows_before,
         &rows,
-        &Tolerance::default(),
+        &RunComparison::TOLERANCE,
     ))
 }

@@ -4,25 +4,7 @@ use std::collections::BTreeMap;
 
 use super::metrics::Row;
 use super::migration::{Migration, migrations};
-use crate::diagnosis::{Code, Grade};
-
-/// Changes of a pose's error that are not worth mentioning.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance {
-    /// Change of the translation error \[m\].
-    pub metres: f64,
-    /// Change of the geodesic rotation error \[°\].
-    pub degrees: f64,
-}
-
-impl Default for Tolerance {
-    fn default() -> Self {
-        Self {
-            metres: 0.1,
-            degrees: 0.5,
-        }
-    }
-}
+use crate::diagnosis::{Code, Grade, Tolerance};
 
 /// What happened to a query from one run to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -78,7 +60,13 @@ pub struct RunComparison {
 }
 
 impl RunComparison {
-    /// Compares two runs.
+    /// Changes of a pose's error up to this are not worth mentioning, unless the user says otherwise.
+    pub const TOLERANCE: Tolerance = Tolerance {
+        translation_m: 0.1,
+        rotation_deg: 0.5,
+    };
+
+    /// Compares two runs. Changes of an error up to the tolerance are none.
     pub fn of(before: &[Row], after: &[Row], tolerance: &Tolerance) -> Self {
         let key = |row: &Row| format!("{:?}/{}/{}", row.group(), row.query, row.method);
         let mut others: BTreeMap<String, &Row> = after.iter().map(|row| (key(row), row)).collect();
@@ -137,9 +125,9 @@ fn change(was: bool, is: bool, before: &Row, after: &Row, tolerance: &Tolerance)
     let metres = after.translation_m - before.translation_m;
     let degrees = after.rotation_deg - before.rotation_deg;
     // Where one error grows and the other shrinks, the bad news counts.
-    if metres > tolerance.metres || degrees > tolerance.degrees {
+    if metres > tolerance.translation_m || degrees > tolerance.rotation_deg {
         Some(Change::Worse)
-    } else if metres < -tolerance.metres || degrees < -tolerance.degrees {
+    } else if metres < -tolerance.translation_m || degrees < -tolerance.rotation_deg {
         Some(Change::Better)
     } else {
         None
@@ -152,7 +140,7 @@ mod tests {
     use super::*;
 
     fn compare(before: &[Row], after: &[Row]) -> RunComparison {
-        RunComparison::of(before, after, &Tolerance::default())
+        RunComparison::of(before, after, &RunComparison::TOLERANCE)
     }
 
     #[test]

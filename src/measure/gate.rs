@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::metrics::Measures;
 use crate::diagnosis::Code;
 use crate::method::Method;
+use crate::relation::Relation;
 
 /// What a gate looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,14 +26,6 @@ enum Metric {
     Share(Code),
     MedianConfidence,
     MedianSeconds,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Relation {
-    AtLeast,
-    Above,
-    AtMost,
-    Below,
 }
 
 /// A condition such as `success@mi >= 0.9`, `recall@0.5m,5deg@fb >= 0.8` or `share(D3)@mi <= 0.05`.
@@ -69,20 +62,15 @@ impl FromStr for Gate {
                  median(confidence) or median(time) in seconds, and the comparison >=, >, <= or <"
             )
         };
-        let (sign, relation) = [
-            (">=", Relation::AtLeast),
-            ("<=", Relation::AtMost),
-            (">", Relation::Above),
-            ("<", Relation::Below),
-        ]
-        .into_iter()
-        .find(|(sign, _)| text.contains(sign))
-        .ok_or_else(expected)?;
-        let (left, right) = text.split_once(sign).ok_or_else(expected)?;
-        let (metric, method) = left.trim().rsplit_once('@').ok_or_else(expected)?;
-        let limit: f64 = right.trim().parse().map_err(|_| expected())?;
+        let (left, relation, right) = Relation::split(text).ok_or_else(expected)?;
+        let (metric, method) = left.rsplit_once('@').ok_or_else(expected)?;
+        let limit: f64 = right.parse().map_err(|_| expected())?;
         let method = Method::called(method).map_err(|_| expected())?;
-        if !limit.is_finite() {
+        let is_unordered = matches!(
+            relation,
+            Relation::Is | Relation::IsNot | Relation::Contains
+        );
+        if is_unordered || !limit.is_finite() {
             return Err(expected());
         }
         Ok(Self {
@@ -134,19 +122,16 @@ impl Gate {
             // How far on the good side; what is missing is on the worst.
             let margin = value.map_or(f64::NEG_INFINITY, |value| match self.relation {
                 Relation::AtLeast | Relation::Above => value - self.limit,
-                Relation::AtMost | Relation::Below => self.limit - value,
+                _ => self.limit - value,
             });
             if worst.as_ref().is_none_or(|(known, ..)| margin < *known) {
                 worst = Some((margin, value, one.group.to_string()));
             }
         }
-        let Some((margin, value, group)) = worst else {
+        let Some((_, value, group)) = worst else {
             return self.result(false, format!("the run has no results of {}", self.method));
         };
-        let passed = match self.relation {
-            Relation::AtLeast | Relation::AtMost => margin >= 0.0,
-            Relation::Above | Relation::Below => margin > 0.0,
-        };
+        let passed = value.is_some_and(|value| self.relation.holds(value, self.limit));
         let found = value.map_or("no figure".to_owned(), |value| format!("{value:.4}"));
         self.result(passed, format!("{found} ({group})"))
     }

@@ -7,6 +7,7 @@ use crate::estimator;
 use crate::event::{Event, Stage, StageStarted};
 use crate::grid::Phase;
 use crate::method::Method;
+use crate::relation::Relation;
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Record, Sink};
 
@@ -125,38 +126,6 @@ const QUANTITIES: &[Quantity] = &[
     },
 ];
 
-/// How a number is compared with a bound.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Comparator {
-    Less,
-    LessOrEqual,
-    Greater,
-    GreaterOrEqual,
-    Equal,
-}
-
-impl Comparator {
-    /// The longer sign of two that begin alike comes first.
-    const ALL: [(&'static str, Self); 6] = [
-        ("<=", Self::LessOrEqual),
-        (">=", Self::GreaterOrEqual),
-        ("==", Self::Equal),
-        ("<", Self::Less),
-        (">", Self::Greater),
-        ("=", Self::Equal),
-    ];
-
-    fn holds(self, left: f64, right: f64) -> bool {
-        match self {
-            Self::Less => left < right,
-            Self::LessOrEqual => left <= right,
-            Self::Greater => left > right,
-            Self::GreaterOrEqual => left >= right,
-            Self::Equal => left == right,
-        }
-    }
-}
-
 /// What a breakpoint waits for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BreakAt {
@@ -171,7 +140,7 @@ pub enum BreakAt {
 pub struct Crossing {
     /// Position in the table of quantities.
     quantity: usize,
-    comparator: Comparator,
+    relation: Relation,
     bound: f64,
 }
 
@@ -262,10 +231,7 @@ impl FromStr for Breakpoint {
             text: text.to_owned(),
             expected,
         };
-        let comparison = Comparator::ALL.iter().find_map(|(sign, comparator)| {
-            let (name, bound) = text.split_once(sign)?;
-            Some((name.trim(), *comparator, bound.trim()))
-        });
+        let comparison = Relation::split(text);
         let scoped = comparison.map_or(text, |(name, ..)| name);
         let (method, name) = match scoped.split_once('.') {
             Some((method, name)) => {
@@ -278,7 +244,10 @@ impl FromStr for Breakpoint {
         };
         let at =
             match comparison {
-                Some((_, comparator, bound)) => {
+                Some((_, relation, bound)) => {
+                    if relation == Relation::Contains {
+                        return Err(refuse("numbers are compared by = != < <= > >=".to_owned()));
+                    }
                     let quantity = QUANTITIES
                         .iter()
                         .position(|quantity| quantity.name == name)
@@ -293,7 +262,7 @@ impl FromStr for Breakpoint {
                         .ok_or_else(|| refuse(format!("`{bound}` is no number")))?;
                     BreakAt::Crossing(Crossing {
                         quantity,
-                        comparator,
+                        relation,
                         bound,
                     })
                 }
@@ -371,7 +340,7 @@ impl Breakpoints {
                 BreakAt::Crossing(crossing) => {
                     match (QUANTITIES[crossing.quantity].of)(&record.event) {
                         Some(value) => {
-                            let is_true = crossing.comparator.holds(value, crossing.bound);
+                            let is_true = crossing.relation.holds(value, crossing.bound);
                             let was_true = std::mem::replace(&mut watched.was_true, is_true);
                             is_true && !was_true
                         }

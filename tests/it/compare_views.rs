@@ -290,7 +290,7 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
     let compared = posescope::measure::RunComparison::of(
         &rows(&before),
         &rows(&now),
-        &posescope::measure::Tolerance::default(),
+        &posescope::measure::RunComparison::TOLERANCE,
     );
     assert_eq!(compared.migrations.len(), 1);
     let [only] = compared.migrations.as_slice() else {

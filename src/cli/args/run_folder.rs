@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use posescope::fusion::Fusion;
-use posescope::measure::{Format, Tolerance};
+use posescope::measure::{Format, RunComparison};
 use posescope::method::Method;
 use posescope::report::PICTURES;
 
@@ -22,10 +22,10 @@ pub struct DiffArgs {
     #[arg(value_name = "RUN_B")]
     pub after: PathBuf,
     /// Changes of the translation error up to this are none [m]
-    #[arg(long, value_name = "METRES", default_value_t = Tolerance::default().metres)]
+    #[arg(long, value_name = "METRES", default_value_t = RunComparison::TOLERANCE.translation_m)]
     pub tolerance_m: f64,
     /// Changes of the rotation error up to this are none [°]
-    #[arg(long, value_name = "DEGREES", default_value_t = Tolerance::default().degrees)]
+    #[arg(long, value_name = "DEGREES", default_value_t = RunComparison::TOLERANCE.rotation_deg)]
     pub tolerance_deg: f64,
     /// Where to save the recording with both runs on the same timelines [default: RUN_B/diff.rrd]
     #[arg(long, value_name = "FILE.rrd")]

@@ -4,11 +4,12 @@ use std::str::FromStr;
 
 use super::field::{Field, Value};
 use crate::localize::QueryResult;
+use crate::relation::Relation;
 
 /// A condition on a result.
 ///
 /// `FIELD RELATION VALUE`, joined by `and`, `or`, `not` and parentheses; `and` binds more tightly than
-/// `or`. Relations are `=`, `!=`, `<`, `<=`, `>`, `>=`, and `~` for words that hold others. Words are
+/// `or`. Relations are those of [`Relation`]; `~` is for words. Words are
 /// compared without regard to capitals; those with spaces stand in quotes. A number that a result does
 /// not have meets no relation.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,30 +35,6 @@ enum Tree {
     Words(&'static Field, Relation, String),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Relation {
-    Is,
-    IsNot,
-    Below,
-    AtMost,
-    Above,
-    AtLeast,
-    Holds,
-}
-
-impl Relation {
-    /// Longer signs first, so that none is taken for the beginning of another.
-    const ALL: [(&str, Self); 7] = [
-        ("!=", Self::IsNot),
-        ("<=", Self::AtMost),
-        (">=", Self::AtLeast),
-        ("=", Self::Is),
-        ("<", Self::Below),
-        (">", Self::Above),
-        ("~", Self::Holds),
-    ];
-}
-
 /// How deep conditions may be nested.
 const DEEPEST: usize = 64;
 
@@ -80,28 +57,11 @@ impl Tree {
             Self::Any(parts) => parts.iter().any(|part| part.is_met(result)),
             Self::Not(part) => !part.is_met(result),
             Self::Number(field, relation, limit) => match field.of(result) {
-                Value::Number(number) => match relation {
-                    Relation::Is => number == *limit,
-                    Relation::IsNot => number != *limit,
-                    Relation::Below => number < *limit,
-                    Relation::AtMost => number <= *limit,
-                    Relation::Above => number > *limit,
-                    Relation::AtLeast => number >= *limit,
-                    Relation::Holds => false,
-                },
+                Value::Number(number) => relation.holds(number, *limit),
                 Value::Words(_) | Value::None => false,
             },
             Self::Words(field, relation, wanted) => {
-                let words = field.text(result).to_lowercase();
-                match relation {
-                    Relation::Is => words == *wanted,
-                    Relation::IsNot => words != *wanted,
-                    Relation::Below => words < *wanted,
-                    Relation::AtMost => words <= *wanted,
-                    Relation::Above => words > *wanted,
-                    Relation::AtLeast => words >= *wanted,
-                    Relation::Holds => words.contains(wanted.as_str()),
-                }
+                relation.holds_for_words(&field.text(result).to_lowercase(), wanted)
             }
         }
     }
@@ -148,13 +108,7 @@ impl Token {
         match self {
             Self::Open => "`(`".to_owned(),
             Self::Close => "`)`".to_owned(),
-            Self::Relation(relation) => {
-                let mut all = Relation::ALL.iter();
-                let sign = all
-                    .find(|(_, one)| one == relation)
-                    .map_or("", |(sign, _)| sign);
-                format!("`{sign}`")
-            }
+            Self::Relation(relation) => format!("`{relation}`"),
             Self::Word(word) | Self::Quoted(word) => format!("`{word}`"),
         }
     }
@@ -164,13 +118,10 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
     let mut rest = text.trim_start();
     let mut tokens = Vec::new();
     while let Some(first) = rest.chars().next() {
-        let relation = Relation::ALL
-            .iter()
-            .find(|(sign, _)| rest.starts_with(sign));
-        let (token, length) = match (first, relation) {
+        let (token, length) = match (first, Relation::at_start(rest)) {
             ('(', _) => (Token::Open, 1),
             (')', _) => (Token::Close, 1),
-            (_, Some((sign, relation))) => (Token::Relation(*relation), sign.len()),
+            (_, Some((relation, right))) => (Token::Relation(relation), rest.len() - right.len()),
             ('"' | '\'', _) => {
                 let inside = &rest[1..];
                 let end = inside
@@ -179,7 +130,9 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
                 (Token::Quoted(inside[..end].to_owned()), end + 2)
             }
             _ => {
-                let is_end = |c: char| c.is_whitespace() || "()=!<>~\"'".contains(c);
+                let is_end = |c: char| {
+                    c.is_whitespace() || "()\"'".contains(c) || Relation::STARTS.contains(c)
+                };
                 let end = rest.find(is_end).unwrap_or(rest.len());
                 if end == 0 {
                     return Err(format!("a word or a relation expected at `{rest}`"));
@@ -272,7 +225,7 @@ impl Parser<'_> {
         }
         let number = value.parse().ok().filter(|number: &f64| number.is_finite());
         match number {
-            Some(number) if relation != Relation::Holds => {
+            Some(number) if relation != Relation::Contains => {
                 Ok(Tree::Number(field, relation, number))
             }
             Some(_) => Err(format!("`{}` is a number: `~` is for words", field.name)),

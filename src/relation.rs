@@ -1,0 +1,130 @@
+//! How a number or a word is compared with another: the signs of gates, conditions and breakpoints.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::text::UnknownWord;
+
+/// A comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relation {
+    /// `=`, also written `==`.
+    Is,
+    /// `!=`.
+    IsNot,
+    /// `<`.
+    Below,
+    /// `<=`.
+    AtMost,
+    /// `>`.
+    Above,
+    /// `>=`.
+    AtLeast,
+    /// `~`: the left word contains the right one. No number contains another.
+    Contains,
+}
+
+/// Longer signs first: a sign must not be taken for the start of another.
+const SIGNS: [(&str, Relation); 8] = [
+    ("!=", Relation::IsNot),
+    ("<=", Relation::AtMost),
+    (">=", Relation::AtLeast),
+    ("==", Relation::Is),
+    ("=", Relation::Is),
+    ("<", Relation::Below),
+    (">", Relation::Above),
+    ("~", Relation::Contains),
+];
+
+impl Relation {
+    /// Characters that a sign starts with.
+    pub const STARTS: &str = "=!<>~";
+
+    /// The sign at the start of a text, and what follows it.
+    pub fn at_start(text: &str) -> Option<(Self, &str)> {
+        let of = |&(sign, relation): &(&str, Self)| Some((relation, text.strip_prefix(sign)?));
+        SIGNS.iter().find_map(of)
+    }
+
+    /// The first sign in a text, with the trimmed texts before and after it.
+    pub fn split(text: &str) -> Option<(&str, Self, &str)> {
+        let (at, _) = text
+            .char_indices()
+            .find(|(at, _)| Self::at_start(&text[*at..]).is_some())?;
+        let (relation, right) = Self::at_start(&text[at..])?;
+        Some((text[..at].trim(), relation, right.trim()))
+    }
+
+    /// Whether a number stands in this relation to another; a number that is NaN only in `!=`.
+    pub fn holds(self, left: f64, right: f64) -> bool {
+        self.holds_between(&left, &right)
+    }
+
+    /// Whether a word stands in this relation to another.
+    pub fn holds_for_words(self, left: &str, right: &str) -> bool {
+        match self {
+            Self::Contains => left.contains(right),
+            _ => self.holds_between(left, right),
+        }
+    }
+
+    fn holds_between<T: PartialOrd + ?Sized>(self, left: &T, right: &T) -> bool {
+        match self {
+            Self::Is => left == right,
+            Self::IsNot => left != right,
+            Self::Below => left < right,
+            Self::AtMost => left <= right,
+            Self::Above => left > right,
+            Self::AtLeast => left >= right,
+            Self::Contains => false,
+        }
+    }
+}
+
+impl fmt::Display for Relation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut signs = SIGNS.iter().rev();
+        let sign = signs.find(|(_, relation)| relation == self);
+        f.pad(sign.map_or("", |(sign, _)| sign))
+    }
+}
+
+impl FromStr for Relation {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        match Self::at_start(text) {
+            Some((relation, "")) => Ok(relation),
+            _ => Err(UnknownWord::among(
+                text,
+                "relation",
+                SIGNS.map(|(sign, _)| sign),
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_sign_is_read_and_written_again() {
+        for (sign, relation) in SIGNS {
+            assert_eq!(sign.parse(), Ok(relation));
+            let written = relation.to_string();
+            assert_eq!(written.parse(), Ok(relation));
+        }
+        assert_eq!(Relation::Is.to_string(), "=");
+        assert_eq!(Relation::split("a<= 1"), Some(("a", Relation::AtMost, "1")));
+        assert_eq!(Relation::split("a 1"), None);
+        assert!("=>".parse::<Relation>().is_err());
+    }
+
+    #[test]
+    fn a_nan_only_differs() {
+        let holding = SIGNS.iter().filter(|(_, one)| one.holds(f64::NAN, 1.0));
+        assert!(holding.map(|one| one.1).eq([Relation::IsNot]));
+        assert!(Relation::Contains.holds_for_words("D1 D2", "D2"));
+    }
+}
