@@ -4,6 +4,7 @@ mod estimates_file;
 mod execute;
 mod experiment;
 mod inputs;
+mod preset;
 mod protocol;
 mod run_file;
 mod run_folder;
@@ -16,6 +17,7 @@ pub use experiment::{
     Defaults, Draw, DrawError, Experiment, PaperProtocol, default_failure_radius_m, defaults,
 };
 pub use inputs::inputs;
+pub use preset::{ByDataSet, Preset};
 pub use protocol::Protocol;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{
