@@ -2,7 +2,6 @@
 
 mod args;
 mod choice;
-mod columns;
 mod compute;
 mod demo;
 mod demo_settings;
@@ -15,7 +14,6 @@ mod event_export;
 mod export;
 mod failure;
 mod failures;
-mod figures;
 mod index;
 mod interrupt;
 mod lesson;

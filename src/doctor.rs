@@ -8,8 +8,10 @@ mod agreement;
 mod inventory;
 mod picture;
 mod reading;
+mod route;
 mod trial;
 
+use crate::geometry::Pose;
 use crate::image::RgbImage;
 use crate::scene::{Scene, SceneError};
 
@@ -31,7 +33,7 @@ pub struct Examination {
     pub finding: Option<Finding>,
     /// Frames that were compared.
     pub compared: Vec<usize>,
-    /// The cloud of the first of them on its photo.
+    /// The cloud of the first of them on its photo, and below it the way of the camera.
     pub picture: Option<RgbImage>,
 }
 
@@ -49,13 +51,16 @@ impl Examination {
 /// Frames that are compared and cannot be read.
 pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
     let (inventory, remarks) = inventory::take(scene);
+    let poses: Vec<Pose> = (0..scene.frames().len())
+        .filter_map(|at| scene.pose(at))
+        .collect();
     let mut examination = Examination {
         inventory,
         remarks,
         agreement: None,
         finding: None,
         compared: Vec::new(),
-        picture: None,
+        picture: route::below(None, &poses),
     };
     let is_readable = |remark: &Remark| !matches!(remark, Remark::Broken(_));
     let has_clouds = !examination.inventory.clouds.is_empty();
@@ -72,9 +77,10 @@ pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
     examination.finding = finding;
     examination.compared = sample.anchors().to_vec();
     let first = sample.anchors().first();
-    examination.picture = first.and_then(|&anchor| {
+    let cloud = first.and_then(|&anchor| {
         let (photo, seen) = sample.seen(anchor)?;
         Some(picture::cloud_on(photo, &seen))
     });
+    examination.picture = route::below(cloud, &poses);
     Ok(examination)
 }

@@ -30,16 +30,17 @@ pub use posescope_core::{
 
 #[cfg(feature = "app")]
 pub mod app;
+#[cfg(feature = "cli")]
+mod chart;
 pub mod doctor;
 #[cfg(feature = "cli")]
 pub mod lesson;
 pub mod measure;
 #[cfg(feature = "rerun")]
 mod narration;
+pub mod palette;
 #[cfg(feature = "rerun")]
-mod palette;
-#[cfg(feature = "rerun")]
-mod picture;
+pub mod picture;
 #[cfg(feature = "rerun")]
 mod place;
 mod relation;
@@ -49,3 +50,4 @@ pub mod run;
 pub mod scene;
 pub mod session;
 pub mod sink;
+pub mod table;

@@ -11,16 +11,14 @@ mod known;
 mod metrics;
 mod migration;
 #[cfg(feature = "cli")]
-mod overview;
 mod paper;
 #[cfg(feature = "cli")]
 mod plots;
 #[cfg(feature = "cli")]
 mod report;
+mod results;
 #[cfg(feature = "cli")]
 mod sweep;
-#[cfg(feature = "cli")]
-mod table;
 #[cfg(feature = "cli")]
 mod tables;
 #[cfg(feature = "cli")]
@@ -33,19 +31,17 @@ pub use diff::{Change, Difference, RunComparison};
 pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownError, KnownFailures, KnownReport};
-pub use metrics::{Group, Measures, RECALL_LIMITS, Row, Spread, measure};
+pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
 pub use migration::{Migration, migrations, verdict_name};
 #[cfg(feature = "cli")]
-pub use overview::{Route, overview, write_overview};
-pub use paper::{FigureKey, figure as paper_figure};
+pub use paper::scene as paper_scene;
 #[cfg(feature = "cli")]
-pub use plots::{Plot, method_color, plots, verdict_color};
+pub use plots::Plot;
 #[cfg(feature = "cli")]
-pub use report::{Report, SUMMARY_SCHEMA, read_gate_results, read_rows, write_report};
+pub use report::{Report, SUMMARY_SCHEMA, plain, read_gate_results, write_report};
+pub use results::{RunResults, read_rows};
 #[cfg(feature = "cli")]
 pub use sweep::{SweptRun, write_sweep};
 #[cfg(feature = "cli")]
-pub use table::Table;
-#[cfg(feature = "cli")]
-pub use tables::tables;
+pub use tables::{TableName, rows, tables};
 pub use triage::{Condition, ConditionError, Field, Order, Value, select};

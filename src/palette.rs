@@ -1,22 +1,33 @@
-//! The colours of recordings and of the window. Those of the cameras and states stay apart for
-//! colour-blind eyes (after Okabe and Ito), and nothing is told by hue alone: names, labels and
-//! shapes say the same.
+//! The colours of the window, of recordings, plots and reports: each means one thing everywhere. They stay apart
+//! for colour-blind eyes (after Okabe and Ito), and a name, label or shape always says the same.
 
+use crate::estimator;
 use crate::features::FeatureState;
+use crate::method::Method;
 
 /// An RGB triple.
-pub(crate) type Rgb = [u8; 3];
+pub type Rgb = [u8; 3];
 
-pub(crate) const REFERENCE: Rgb = [0x00, 0x72, 0xB2];
-pub(crate) const ESTIMATE: Rgb = [0xD5, 0x5E, 0x00];
-pub(crate) const TRUTH: Rgb = [0x00, 0x9E, 0x73];
+/// A reference.
+pub const REFERENCE: Rgb = [0x00, 0x72, 0xB2];
+/// A reference on a map of costs, whose dark end hides blue.
+pub const REFERENCE_ON_COSTS: Rgb = [0xFF; 3];
+/// An estimate, and what is wrong.
+pub const ESTIMATE: Rgb = [0xE4, 0x57, 0x2E];
+/// The truth, and what is right.
+pub const TRUTH: Rgb = [0x1F, 0xB5, 0x8A];
+/// A result without a pose, and one that is not measured.
+pub const NO_POSE: Rgb = [0x80; 3];
 /// What is not decided yet.
-pub(crate) const UNDECIDED: Rgb = [0xCC, 0x79, 0xA7];
+pub const UNDECIDED: Rgb = [0xCC, 0x79, 0xA7];
 /// Where a picture shows nothing.
-pub(crate) const NOTHING: Rgb = [0x18, 0x18, 0x18];
+pub const NOTHING: Rgb = [0x18, 0x18, 0x18];
+
+/// A position whose view covers too little to be compared.
+pub const INELIGIBLE: Rgb = [70; 3];
 
 /// The colour of a state, by its position in [`FeatureState::NAMES`].
-pub(crate) const STATES: [Rgb; FeatureState::NAMES.len()] = [
+pub const STATES: [Rgb; FeatureState::NAMES.len()] = [
     [0x80, 0x80, 0x80],
     [0x56, 0xB4, 0xE9],
     [0xF0, 0xE4, 0x42],
@@ -24,43 +35,83 @@ pub(crate) const STATES: [Rgb; FeatureState::NAMES.len()] = [
     TRUTH,
 ];
 
+/// The colours of methods, in the order of the registry; those after the paper's take turns.
+const METHODS: [Rgb; 6] = [
+    [0x56, 0xB4, 0xE9],
+    [0xE6, 0x9F, 0x00],
+    [0xCC, 0x79, 0xA7],
+    [0x80, 0x80, 0x80],
+    [0xF0, 0xE4, 0x42],
+    [0x8D, 0xD3, 0xC7],
+];
+
+/// The colours of verdicts in bars. Pale enough for black letters; neighbours differ in lightness.
+const VERDICTS: [Rgb; 6] = [
+    [0x8C, 0xC5, 0xE3],
+    [0xF0, 0xC5, 0x71],
+    [0x59, 0xA8, 0x9C],
+    [0xF2, 0xA0, 0x8D],
+    [0xC8, 0xC8, 0xC8],
+    [0xB0, 0x9C, 0xD8],
+];
+
+/// The colour of a method. Other systems come after all of ours.
+pub fn method(method: Method) -> Rgb {
+    let place = estimator::methods().position(|known| known == method);
+    let place = place.unwrap_or_else(|| estimator::all().len());
+    let paper = Method::PAPER.len();
+    match METHODS.get(place) {
+        Some(&color) => color,
+        None => METHODS[paper + (place - paper) % (METHODS.len() - paper)],
+    }
+}
+
+/// The colour of the nth verdict of a plot.
+pub fn verdict(number: usize) -> Rgb {
+    VERDICTS[number % VERDICTS.len()]
+}
+
+/// A shade that can be read as text on a light ground.
+pub fn dark(color: Rgb) -> Rgb {
+    mix(color, [0; 3], 0.4)
+}
+
 /// A tint that can be read as text on a dark ground.
-pub(crate) fn light(color: Rgb) -> Rgb {
+pub fn light(color: Rgb) -> Rgb {
     mix(color, [255; 3], 0.5)
 }
 
 /// Viridis, for costs and shares: from dark blue (0) over green to yellow (1).
-pub(crate) fn viridis(value: f64) -> Rgb {
+pub fn viridis(value: f64) -> Rgb {
     on(colorous::VIRIDIS, value)
 }
 
 /// Turbo, for depths and heights: from dark blue (0) over green to dark red (1).
-#[cfg(feature = "app")]
-pub(crate) fn turbo(value: f64) -> Rgb {
+pub fn turbo(value: f64) -> Rgb {
     on(colorous::TURBO, value)
 }
 
 /// The nearest and the farthest depth that have colours of their own \[m\].
-#[cfg(feature = "app")]
 const DEPTH_RANGE_M: (f64, f64) = (2.0, 80.0);
 
 /// The place of a depth \[m\] among the colours of depths, 0 … 1: by its logarithm, because a metre
 /// means less far away.
-#[cfg(feature = "app")]
-pub(crate) fn depth_share(depth_m: f64) -> f64 {
+pub fn depth_share(depth_m: f64) -> f64 {
     let (near, far) = DEPTH_RANGE_M;
     (depth_m.clamp(near, far) / near).ln() / (far / near).ln()
 }
 
 /// The colour of a depth \[m\] in the pictures of a run.
-#[cfg(feature = "app")]
-pub(crate) fn depth(depth_m: f64) -> Rgb {
+pub fn depth(depth_m: f64) -> Rgb {
     turbo(depth_share(depth_m))
 }
 
-/// From blue (−1) over white (0) to vermillion (1).
-pub(crate) fn diverging(value: f64) -> Rgb {
-    let end = if value < 0.0 { REFERENCE } else { ESTIMATE };
+/// The ends of [`diverging`].
+const DIVERGING: [Rgb; 2] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00]];
+
+/// From blue (−1) over white (0) to vermilion (1).
+pub fn diverging(value: f64) -> Rgb {
+    let end = DIVERGING[usize::from(value >= 0.0)];
     mix([255; 3], end, value.abs().min(1.0))
 }
 
@@ -83,7 +134,6 @@ fn mix(from: Rgb, to: Rgb, share: f64) -> Rgb {
 mod tests {
     use super::*;
 
-    #[cfg(feature = "app")]
     #[test]
     fn depths_have_colours_by_their_logarithm_and_ends_that_bear_any_depth() {
         assert_eq!(depth(0.1), turbo(0.0));
@@ -98,7 +148,6 @@ mod tests {
         assert_eq!(viridis(7.0), [253, 231, 37]);
         assert_eq!(viridis(f64::NAN), [0; 3]);
         assert_eq!(diverging(0.0), [255; 3]);
-        assert_eq!(diverging(-3.0), REFERENCE);
-        assert_eq!(diverging(1.0), ESTIMATE);
+        assert_eq!([diverging(-3.0), diverging(1.0)], DIVERGING);
     }
 }

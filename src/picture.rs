@@ -7,6 +7,7 @@ use crate::cost::Explanation;
 use crate::cost::JointHistogram;
 #[cfg(feature = "app")]
 use crate::cost::{IntensityPair, PhotometricWeights};
+use crate::grid::ScoredLattice;
 use crate::image::Photo;
 use crate::palette;
 #[cfg(feature = "app")]
@@ -217,6 +218,28 @@ pub(crate) fn coverage(query: &GrayImage, view: &SyntheticView) -> RgbImage {
         }
     }
     picture
+}
+
+/// The cost of each position around the reference, its front up: yellow the least, dark blue the greatest.
+/// Positions whose views cover too little to be compared are grey, those without a score black.
+pub fn surface(surface: &ScoredLattice) -> RgbImage {
+    let lattice = &surface.lattice;
+    let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
+    let (least, most) = (
+        costs().fold(f64::INFINITY, f64::min),
+        costs().fold(f64::NEG_INFINITY, f64::max),
+    );
+    RgbImage::from_fn(lattice.columns as u32, lattice.rows as u32, |x, y| {
+        let row = lattice.rows - 1 - y as usize;
+        let cell = row * lattice.columns + x as usize;
+        Rgb(match (&surface.scores[cell], surface.eligible_cost(cell)) {
+            (None, _) => palette::NOTHING,
+            (Some(_), None) => palette::INELIGIBLE,
+            (Some(_), Some(cost)) => {
+                palette::viridis((most - cost) / (most - least).max(f64::MIN_POSITIVE))
+            }
+        })
+    })
 }
 
 /// How often grey values meet: the synthetic view's to the right, the query's upwards.

@@ -2,7 +2,6 @@
 //!
 //! It follows from the run folder, and from its scenes where they can be opened: those have the photos.
 
-mod charts;
 mod page;
 mod pictures;
 
@@ -10,21 +9,22 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use clap::ValueEnum as _;
 use rayon::prelude::*;
 
 use posescope_core::files::write_whole;
 
+use crate::chart::Chart;
 use crate::localize::{LocalizeError, Localizer, QueryResult, Request};
 use crate::measure::{
-    Change, GateResult, Measures, Row, RunComparison, Table, measure, plots, read_gate_results,
-    read_rows, tables,
+    Change, GateResult, Measures, Plot, RunComparison, RunResults, read_gate_results, read_rows,
+    tables,
 };
 use crate::method::Method;
 use crate::params::Params;
-use crate::run::{
-    FAILURES, FolderError, RunFile, ScenePair, Scenes, read_results, read_run, recording_name,
-};
+use crate::run::{FAILURES, FolderError, RunFile, ScenePair, Scenes, read_run, recording_name};
 use crate::scene::{self, Scene, SceneError};
+use crate::table::Table;
 use pictures::{FailurePictures, Witness, thumbnail};
 
 /// Pictures of so many failures, where nobody says how many.
@@ -46,8 +46,7 @@ struct RunReport {
     measures: Vec<Measures>,
     tables: Vec<Table>,
     gates: Vec<GateResult>,
-    /// Plots with what they show.
-    plots: Vec<(String, String)>,
+    charts: Vec<Chart>,
     /// Thumbnails of the queries, by the class that shows them.
     thumbnails: BTreeMap<usize, String>,
     /// What is missing, and why.
@@ -77,31 +76,6 @@ struct ReportedResult {
     pictures: FailurePictures,
 }
 
-impl ReportedResult {
-    /// Query, method, error and verdict in a line.
-    fn headline(&self) -> String {
-        let QueryResult {
-            query,
-            method,
-            error,
-            diagnosis,
-            ..
-        } = &self.result;
-        let mut text = format!("{query} {}", method.name().to_uppercase());
-        if let Some(fusion) = &self.result.fusion {
-            text += &format!(" {fusion}");
-        }
-        text += &match error {
-            Some(error) => format!(", {}", error.translation()),
-            None => format!(", {}", self.result.grade),
-        };
-        if let Some(primary) = diagnosis.first() {
-            text += &format!(": {} {}", primary.code, primary.text);
-        }
-        text
-    }
-}
-
 /// Writes the report of a run into its folder or to `out`, held against a baseline if there is one, with
 /// pictures of at most so many failures.
 ///
@@ -123,17 +97,20 @@ pub fn write_html(
 impl RunReport {
     fn of(folder: &Path, baseline: Option<&Path>, pictures: usize) -> Result<Self, FolderError> {
         let run = read_run(folder)?;
-        let rows = read_rows(folder)?;
-        let measures = measure(&rows, run.failure_radius_m);
+        let measured = RunResults::of(read_rows(folder)?, run.failure_radius_m);
+        let charts = Plot::value_variants()
+            .iter()
+            .flat_map(|plot| plot.charts(&measured));
+        let charts = charts.collect();
+        let tables = tables(&measured, run.experiment.map(|one| one.name()));
         let mut params = Params::default();
         let mut notes = Vec::new();
         if let Err(error) = params.merge_toml(&run.params.to_string()) {
             notes.push(format!("Parameters of another version: {error}"));
         }
-        let results: Vec<QueryResult> = read_results(folder)?.collect::<Result<_, _>>()?;
-        let mut results = reported(folder, &run, results);
+        let mut results = reported(folder, &run, &measured.results);
         let baseline = match baseline {
-            Some(before) => Some(held_against(before, &rows, &mut results)?),
+            Some(before) => Some(held_against(before, &measured.results, &mut results)?),
             None => None,
         };
         let mut thumbnails = BTreeMap::new();
@@ -160,15 +137,14 @@ impl RunReport {
             }
             Err(error) => notes.push(format!("There are no photos: {error}")),
         }
-        let plots = drawn(&run, &measures, &rows, &results, &mut notes);
         Ok(Self {
             changes: params.changes(),
-            tables: tables(&run, &measures),
+            tables,
+            charts,
             gates: read_gate_results(folder)?,
             run,
             results,
-            measures,
-            plots,
+            measures: measured.measures,
             thumbnails,
             notes,
             baseline,
@@ -176,10 +152,10 @@ impl RunReport {
     }
 }
 
-fn reported(folder: &Path, run: &RunFile, results: Vec<QueryResult>) -> Vec<ReportedResult> {
+fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<ReportedResult> {
     let mut queries: BTreeMap<[String; 3], usize> = BTreeMap::new();
     let several_pairs = run.pairs.len() > 1;
-    let results = results.into_iter().enumerate().map(|(number, result)| {
+    let results = results.iter().enumerate().map(|(number, result)| {
         let query_scene = result.query_scene.clone();
         let key = [
             result.scene.clone(),
@@ -188,7 +164,7 @@ fn reported(folder: &Path, run: &RunFile, results: Vec<QueryResult>) -> Vec<Repo
         ];
         let next = queries.len();
         let query = *queries.entry(key).or_insert(next);
-        let recording = pair_of(run, &result)
+        let recording = pair_of(run, result)
             .map(|pair| recording_name(pair, &result.query, result.method, several_pairs))
             .map(|name| format!("{FAILURES}/{name}.rrd"))
             .filter(|name| folder.join(name).is_file());
@@ -198,7 +174,7 @@ fn reported(folder: &Path, run: &RunFile, results: Vec<QueryResult>) -> Vec<Repo
             recording,
             change: None,
             pictures: FailurePictures::default(),
-            result,
+            result: result.clone(),
         }
     });
     results.collect()
@@ -213,12 +189,12 @@ fn pair_of<'a>(run: &'a RunFile, result: &QueryResult) -> Option<&'a ScenePair> 
 
 fn held_against(
     before: &Path,
-    rows: &[Row],
+    rows: &[QueryResult],
     results: &mut [ReportedResult],
 ) -> Result<Baseline, FolderError> {
     let run_before = read_run(before)?;
-    let rows_before = read_rows(before)?;
-    let comparison = RunComparison::of(&rows_before, rows, &RunComparison::TOLERANCE);
+    let measured = RunResults::read(before)?;
+    let comparison = RunComparison::of(&measured.results, rows, &RunComparison::TOLERANCE);
     for one in &comparison.differences {
         // Rows and results are the same lines.
         let at = rows.iter().position(|row| *row == one.after);
@@ -226,11 +202,10 @@ fn held_against(
             result.change = Some(one.change);
         }
     }
-    let measures = measure(&rows_before, run_before.failure_radius_m);
     Ok(Baseline {
         name: before.display().to_string(),
         comparison,
-        tables: tables(&run_before, &measures),
+        tables: tables(&measured, run_before.experiment.map(|one| one.name())),
     })
 }
 
@@ -336,41 +311,4 @@ fn drawn_failure(
     let truth = localizer.queries().pose(query);
     let pose = again.as_ref().and_then(|result| result.pose.as_ref());
     Some(witness.pictures(truth.as_ref(), pose))
-}
-
-/// All plots with what they show.
-fn drawn(
-    run: &RunFile,
-    measures: &[Measures],
-    rows: &[Row],
-    results: &[ReportedResult],
-    notes: &mut Vec<String>,
-) -> Vec<(String, String)> {
-    let mut all = Vec::new();
-    let mut add = |caption: String, svg: Result<String, String>| match svg {
-        Ok(svg) => all.push((caption, svg)),
-        Err(why) => notes.push(format!("{caption} could not be drawn: {why}")),
-    };
-    if let Some(svg) = charts::errors(results) {
-        add(
-            "Error over the distance of the reference; a point leads to its row".to_owned(),
-            svg,
-        );
-    }
-    if let Some(svg) = charts::verdicts(measures) {
-        add("Primary verdicts by method and condition".to_owned(), svg);
-    }
-    for (name, svg) in plots(run, measures, rows) {
-        let what = match name.split('-').next().unwrap_or_default() {
-            "recall" => "Share of queries within an error",
-            "success" => "Success rate",
-            "causes" => "What went wrong over the distance of the reference",
-            "basin" => "From how far around the truth the search finds it",
-            "margin" => "What the cheapest minimum elsewhere costs more",
-            other => other,
-        };
-        let svg = svg.map(|svg| charts::with_methods_named(&svg, &run.protocol.methods));
-        add(format!("{what} ({name})"), svg);
-    }
-    all
 }

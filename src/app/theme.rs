@@ -8,7 +8,6 @@
 use egui::{Color32, FontId, TextStyle, Visuals};
 
 use crate::diagnosis::Grade;
-use crate::estimator;
 use crate::features::FeatureState;
 use crate::method::Method;
 use crate::palette::{self, Rgb};
@@ -94,29 +93,14 @@ pub fn grade(visuals: &Visuals, grade: Grade) -> Color32 {
     match grade {
         Grade::Right => text(visuals, TRUTH),
         Grade::Unmeasured => visuals.text_color(),
-        Grade::Wrong | Grade::NoPose => text(visuals, ESTIMATE),
+        Grade::Wrong => text(visuals, ESTIMATE),
+        Grade::NoPose => text(visuals, rgb(palette::NO_POSE)),
     }
 }
 
 /// The colour of a method's lane and curves.
 pub fn method(method: Method) -> Color32 {
-    /// In the order of the registry; those behind the paper's take turns.
-    const COLORS: [Rgb; 6] = [
-        [0x56, 0xB4, 0xE9],
-        [0xE6, 0x9F, 0x00],
-        [0xCC, 0x79, 0xA7],
-        [0x80, 0x80, 0x80],
-        [0xF0, 0xE4, 0x42],
-        [0x8D, 0xD3, 0xC7],
-    ];
-    let place = estimator::methods().position(|known| known == method);
-    // Other systems are behind all of ours.
-    let place = place.unwrap_or_else(|| estimator::all().len());
-    let paper = Method::PAPER.len();
-    rgb(match COLORS.get(place) {
-        Some(&color) => color,
-        None => COLORS[paper + (place - paper) % (COLORS.len() - paper)],
-    })
+    rgb(palette::method(method))
 }
 
 /// Viridis, for costs: 0 the worst, 1 the best.
@@ -231,6 +215,7 @@ pub(super) fn install(ctx: &egui::Context) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator;
 
     const THEMES: [egui::Theme; 2] = [egui::Theme::Dark, egui::Theme::Light];
 

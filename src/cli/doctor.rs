@@ -1,11 +1,12 @@
 //! `posescope doctor`: whether a scene can work, and which of the usual mistakes is in it.
 
 use posescope::doctor::{Agreement, Examination, Remark, examine};
+use posescope::measure::paper_scene;
 use posescope::scene::{self, Scene};
 use posescope::sink::rerun::{Targets, record_checkup};
+use posescope::table::wrapped;
 
 use super::args::DoctorArgs;
-use super::columns::beside;
 use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
@@ -55,7 +56,13 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
     let mut text = String::new();
     let there = &found.inventory;
     let mut line = |what: &str, words: &str| {
-        text += &beside(&format!("{what:<11}"), words, width);
+        const LABEL: &str = "           ";
+        let lines = wrapped(
+            &format!("{LABEL}{words}"),
+            width.unwrap_or(usize::MAX),
+            LABEL,
+        );
+        text += &format!("{what:<11}{}", &lines[LABEL.len()..]);
     };
     line("scene", scene.name());
     line(
@@ -79,6 +86,10 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
                 there.way_m
             ),
         );
+    }
+    if let Some([images, length_km, spacing_m]) = paper_scene(scene.name()) {
+        let words = format!("{images} images, {length_km} km, {spacing_m} m from image to image");
+        line("paper", &words);
     }
     for (frame, points, depth) in &there.clouds {
         let depth = depth.map_or("nothing in view".to_owned(), |depth| {

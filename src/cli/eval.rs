@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use posescope::localize::{Ranking, Selection};
+use posescope::localize::{QueryResult, Ranking, Selection};
 use posescope::measure::{
-    Change, Gate, KnownFailures, Report, Row, RunComparison, read_rows, write_report,
+    Change, Gate, KnownFailures, Report, RunComparison, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -27,10 +27,10 @@ use super::diff;
 use super::event_export::EventExport;
 use super::failure::CliError;
 use super::failures::FailureRecordings;
-use super::figures;
 use super::interrupt::Interrupt;
 use super::output;
 use super::run::use_threads;
+use super::table;
 use super::terminal::Terminal;
 
 /// Runs the command.
@@ -365,8 +365,8 @@ fn finish(
 fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
     // The overview of an experiment has a line for every combination.
     let skipped = usize::from(run.experiment.is_some());
-    for table in report.tables.iter().skip(skipped) {
-        output::print(&figures::text(table, width))?;
+    for figures in report.tables.iter().skip(skipped) {
+        output::print(&table::figures(figures, width))?;
     }
     for gate_result in &report.gate_results {
         let verdict = if gate_result.passed {
@@ -389,7 +389,7 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
 fn against(before: &Path, folder: &Path, only_again: bool) -> Result<RunComparison, CliError> {
     let (mut rows_before, rows) = (read_rows(before)?, read_rows(folder)?);
     if only_again {
-        let key = |row: &Row| [row.scene.clone(), row.query.clone()];
+        let key = |row: &QueryResult| [row.scene.clone(), row.query.clone()];
         let again: BTreeSet<_> = rows.iter().map(key).collect();
         rows_before.retain(|row| again.contains(&key(row)));
     }

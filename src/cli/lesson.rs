@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use comfy_table::{ContentArrangement, Table, presets};
 use posescope::estimator;
 use posescope::lesson::{Lesson, OpenSetting, Page, PageTurner};
 use posescope::method::Method;
 use posescope::scene::Scene;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
+use posescope::table::Table;
 
 use super::args::LessonArgs;
 use super::demo_settings;
@@ -35,25 +35,13 @@ pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
 }
 
 fn list(terminal: &Terminal) -> Result<(), CliError> {
-    let mut table = Table::new();
-    // Words wrap where there is a terminal, and stay in one line in a pipe.
-    if let Some(width) = terminal.width() {
-        table
-            .set_content_arrangement(ContentArrangement::Dynamic)
-            .set_width(width.try_into().unwrap_or(u16::MAX));
-    }
-    table
-        .load_preset(presets::NOTHING)
-        .set_header(["lesson", "minutes", "title", "about"]);
+    let header = ["lesson", "minutes", "title", "about"];
+    let mut table = Table::with_notes(header, &[], 0);
     for lesson in Lesson::all()? {
-        table.add_row([
-            lesson.name,
-            lesson.minutes.to_string(),
-            lesson.title,
-            lesson.about,
-        ]);
+        let minutes = lesson.minutes.to_string();
+        table.push([lesson.name, minutes, lesson.title, lesson.about]);
     }
-    output::print(&table.trim_fmt())
+    output::print(&table.to_text(terminal.width()).trim_end())
 }
 
 /// All pages, with their answers.

@@ -1,28 +1,34 @@
 //! `posescope overview`: scenes at a glance.
 
-use posescope::measure::{self, write_overview};
-use posescope::scene::{self, Scene};
+use posescope::scene;
+use posescope::table::Table;
 
 use super::args::OverviewArgs;
 use super::failure::CliError;
-use super::figures;
 use super::output;
+use super::table::figures;
 use super::terminal::Terminal;
 
 /// Runs the command.
 pub fn overview(args: &OverviewArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let scenes = args
-        .scenes
-        .iter()
-        .map(|scene| scene::open(scene, args.format.as_deref()))
-        .collect::<Result<Vec<_>, _>>()?;
-    let scenes: Vec<&dyn Scene> = scenes.iter().map(AsRef::as_ref).collect();
-    let table = measure::overview(&scenes);
-    if let Some(folder) = &args.out {
-        write_overview(folder, &scenes, &table)?;
+    if args.out.is_some() {
+        return Err(CliError::Usage(
+            "--out: posescope doctor --picture draws the route".to_owned(),
+        ));
+    }
+    let mut table = Table::new("scenes", "Scenes", ["scene", "images", "with a cloud"]);
+    for name in &args.scenes {
+        let scene = scene::open(name, args.format.as_deref())?;
+        let frames = scene.frames().len();
+        let clouds = (0..frames).filter(|&frame| scene.has_cloud(frame)).count();
+        table.push([
+            scene.name().to_owned(),
+            frames.to_string(),
+            clouds.to_string(),
+        ]);
     }
     match terminal.is_quiet() {
         true => Ok(()),
-        false => output::print(&figures::text(&table, terminal.width()).trim_end()),
+        false => output::print(&figures(&table, terminal.width()).trim_end()),
     }
 }

@@ -1,9 +1,9 @@
 //! `posescope params`: the table of parameters.
 
 use posescope::params::Params;
+use posescope::table::Table;
 
 use super::args::ConfigArgs;
-use super::columns::Columns;
 use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
@@ -11,8 +11,8 @@ use super::terminal::Terminal;
 /// Prints all parameters; those that differ from their default are marked.
 pub fn print(config: &ConfigArgs, terminal: &Terminal) -> Result<(), CliError> {
     let params = config.resolve()?;
-    let header = ["parameter", "value", "unit"];
-    let mut table = Columns::new(header, "range, and meaning", 0, &[]);
+    let header = ["parameter", "value", "unit", "range, and meaning"];
+    let mut table = Table::with_notes(header, &[], 0);
     for (row, default) in params.list().into_iter().zip(Params::default().list()) {
         let value = if row.value == default.value {
             row.value.to_string()
@@ -21,7 +21,7 @@ pub fn print(config: &ConfigArgs, terminal: &Terminal) -> Result<(), CliError> {
         };
         let unit = row.about.unit.to_owned();
         let about = format!("{}. {}", row.domain, row.about.help());
-        table.push([row.key, value, unit], about);
+        table.push([row.key, value, unit, about]);
     }
-    output::print(&table.text(terminal.width()).trim_end())
+    output::print(&table.to_text(terminal.width()).trim_end())
 }

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-use image::{Rgb, RgbImage};
+use image::imageops::{self, FilterType};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::grid::{
     DenseSurface, GridParams, LatticeTooLarge, MOST_CELLS, Offset, least_covered,
 };
 use posescope::method::Method;
+use posescope::picture;
 use posescope::problem::Problem;
 use posescope::render::{Score, Scorer};
 
@@ -23,8 +24,6 @@ use super::terminal::Terminal;
 
 /// Side of the square that shows a position \[px\].
 const CELL_PX: u32 = 3;
-/// Where nothing was scored.
-const NOTHING: Rgb<u8> = Rgb([0x18, 0x18, 0x18]);
 
 /// Runs the command.
 pub fn surface(args: &SurfaceArgs, terminal: &Terminal) -> Result<(), CliError> {
@@ -199,22 +198,11 @@ fn write_csv(surface: &DenseSurface, out: &Path) -> Result<(), CliError> {
     std::fs::write(out, text).map_err(CliError::io(out))
 }
 
-/// Forward is up; from the least cost, yellow, to the greatest, dark blue.
+/// Each position as a square.
 fn write_png(surface: &DenseSurface, out: &Path) -> Result<(), CliError> {
-    let lattice = &surface.cheapest().lattice;
-    let (columns, rows) = (lattice.columns as u32, lattice.rows as u32);
-    let least = costs(surface).fold(f64::INFINITY, |least, (_, _, cost, _)| least.min(cost));
-    let most = costs(surface).fold(f64::NEG_INFINITY, |most, (_, _, cost, _)| most.max(cost));
-    let mut cells = RgbImage::from_pixel(columns, rows, NOTHING);
-    for (cell, _, cost, _) in costs(surface) {
-        let share = (most - cost) / (most - least).max(f64::MIN_POSITIVE);
-        let color = colorous::VIRIDIS.eval_continuous(share.clamp(0.0, 1.0));
-        let (column, row) = (cell as u32 % columns, cell as u32 / columns);
-        cells.put_pixel(column, rows - 1 - row, Rgb(color.as_array()));
-    }
-    let picture = RgbImage::from_fn(columns * CELL_PX, rows * CELL_PX, |x, y| {
-        *cells.get_pixel(x / CELL_PX, y / CELL_PX)
-    });
+    let cells = picture::surface(surface.cheapest());
+    let (width, height) = (cells.width() * CELL_PX, cells.height() * CELL_PX);
+    let picture = imageops::resize(&cells, width, height, FilterType::Nearest);
     picture.save(out).map_err(|error| match error {
         image::ImageError::IoError(error) => CliError::io(out)(error),
         other => CliError::io(out)(std::io::Error::other(other)),

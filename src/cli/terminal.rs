@@ -57,7 +57,8 @@ impl Terminal {
         const LEAST: usize = 40;
         let columns = std::env::var("COLUMNS").ok();
         let asked = columns.and_then(|columns| columns.parse::<usize>().ok());
-        let width = asked.or_else(|| comfy_table::Table::new().width().map(usize::from));
+        let terminal = || terminal_size::terminal_size_of(std::io::stdout());
+        let width = asked.or_else(|| Some(usize::from(terminal()?.0.0)));
         width.map(|width| width.max(LEAST))
     }
 

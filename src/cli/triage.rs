@@ -1,9 +1,8 @@
 //! `posescope triage`: the results of a run that meet a condition, in an order.
 
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use posescope::localize::QueryResult;
-use posescope::measure::{Field, select};
-use posescope::run::{read_results, read_run, result_lines};
+use posescope::measure::{Field, read_rows, rows, select};
+use posescope::run::{read_run, result_lines};
 
 use super::args::TriageArgs;
 use super::failure::CliError;
@@ -13,7 +12,7 @@ use super::terminal::Terminal;
 /// Prints the table, or writes the results.
 pub fn triage(args: &TriageArgs, terminal: &Terminal) -> Result<(), CliError> {
     read_run(&args.run)?;
-    let mut results: Vec<QueryResult> = read_results(&args.run)?.collect::<Result<_, _>>()?;
+    let mut results: Vec<QueryResult> = read_rows(&args.run)?;
     if let Some(right) = args.right {
         let graded = results.into_iter().map(|result| result.graded(right));
         results = graded.collect();
@@ -31,11 +30,9 @@ pub fn triage(args: &TriageArgs, terminal: &Terminal) -> Result<(), CliError> {
             }
         }
         None => {
-            let rows = shown.iter().map(|&index| {
-                let cells = args.columns.iter();
-                cells.map(|field| field.text(&results[index])).collect()
-            });
-            output::print(&table(&args.columns, rows).to_string())?;
+            let shown = shown.iter().map(|&index| &results[index]);
+            let table = rows(shown, args.columns.iter().copied(), Field::text);
+            output::print(&table.to_text(None).trim_end())?;
         }
     }
     if !terminal.is_quiet() {
@@ -47,21 +44,4 @@ pub fn triage(args: &TriageArgs, terminal: &Terminal) -> Result<(), CliError> {
         eprintln!("{shown}{of_those} of {all} results");
     }
     Ok(())
-}
-
-fn table(columns: &[&Field], rows: impl Iterator<Item = Vec<String>>) -> Table {
-    let mut table = Table::new();
-    table
-        .load_preset(presets::NOTHING)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(columns.iter().map(|field| field.name));
-    for (index, field) in columns.iter().enumerate() {
-        if field.decimals.is_some()
-            && let Some(column) = table.column_mut(index)
-        {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    table.add_rows(rows);
-    table
 }

@@ -4,6 +4,7 @@ use image::imageops;
 
 use super::agreement::Seen;
 use crate::image::{GrayImage, RgbImage};
+use crate::palette;
 
 /// The photo, darkened, with the points on it: near ones red, far ones blue.
 pub(super) fn cloud_on(photo: &GrayImage, seen: &[Seen]) -> RgbImage {
@@ -17,7 +18,7 @@ pub(super) fn cloud_on(photo: &GrayImage, seen: &[Seen]) -> RgbImage {
     far_first.sort_by(|a, b| b.depth.total_cmp(&a.depth));
     for seen in far_first {
         let share = ((seen.depth / near).ln() / (far / near).ln().max(1e-6)).clamp(0.0, 1.0);
-        let color = image::Rgb(warm_to_cold(share));
+        let color = image::Rgb(palette::turbo(1.0 - share));
         let (x, y) = (seen.pixel.x.round() as i64, seen.pixel.y.round() as i64);
         for (x, y) in
             (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| (x, y)))
@@ -31,20 +32,4 @@ pub(super) fn cloud_on(photo: &GrayImage, seen: &[Seen]) -> RgbImage {
         }
     }
     canvas
-}
-
-/// From red over yellow and green to blue.
-fn warm_to_cold(share: f64) -> [u8; 3] {
-    const STOPS: [[f64; 3]; 4] = [
-        [230.0, 60.0, 40.0],
-        [240.0, 220.0, 60.0],
-        [60.0, 200.0, 120.0],
-        [50.0, 90.0, 230.0],
-    ];
-    let place = share * (STOPS.len() - 1) as f64;
-    let first = (place as usize).min(STOPS.len() - 2);
-    let along = place - first as f64;
-    let mixed =
-        |channel: usize| STOPS[first][channel] * (1.0 - along) + STOPS[first + 1][channel] * along;
-    [0, 1, 2].map(|channel| mixed(channel).round() as u8)
 }

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::metrics::Row;
+use super::metrics::Group;
 use super::migration::{Migration, migrations};
 use crate::diagnosis::{Code, Grade, Tolerance};
+use crate::localize::QueryResult;
+use crate::table::Table;
 
 /// What happened to a query from one run to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,9 +39,9 @@ pub struct Difference {
     /// What happened to the query.
     pub change: Change,
     /// The result in the first run.
-    pub before: Row,
+    pub before: QueryResult,
     /// The result in the second run.
-    pub after: Row,
+    pub after: QueryResult,
     /// What the result is worth in the first and in the second run.
     pub grades: [Grade; 2],
 }
@@ -67,9 +69,10 @@ impl RunComparison {
     };
 
     /// Compares two runs. Changes of an error up to the tolerance are none.
-    pub fn of(before: &[Row], after: &[Row], tolerance: &Tolerance) -> Self {
-        let key = |row: &Row| format!("{:?}/{}/{}", row.group(), row.query, row.method);
-        let mut others: BTreeMap<String, &Row> = after.iter().map(|row| (key(row), row)).collect();
+    pub fn of(before: &[QueryResult], after: &[QueryResult], tolerance: &Tolerance) -> Self {
+        let key = |row: &QueryResult| format!("{:?}/{}/{}", Group::of(row), row.query, row.method);
+        let mut others: BTreeMap<String, &QueryResult> =
+            after.iter().map(|row| (key(row), row)).collect();
         let mut comparison = Self::default();
         let mut pairs = Vec::new();
         for row in before {
@@ -103,6 +106,52 @@ impl RunComparison {
         changes.filter(|one| one.change == change).count()
     }
 
+    /// In a sentence, how many results changed and which verdicts became others.
+    pub fn summary(&self) -> String {
+        let counts = [Change::Broken, Change::Fixed, Change::Worse, Change::Better];
+        let counts = counts.map(|change| format!("{} {}", self.count(change), change.name()));
+        let mut text = format!(
+            "{}, of {} results in both runs",
+            counts.join(", "),
+            self.common
+        );
+        if self.only_before + self.only_after > 0 {
+            text += &format!(
+                " ({} only in the first, {} only in the second)",
+                self.only_before, self.only_after
+            );
+        }
+        let moved = self.migrations.iter().map(|one| {
+            format!(
+                "{} {} → {} {}",
+                one.method, one.before, one.after, one.count
+            )
+        });
+        let moved: Vec<String> = moved.collect();
+        if !moved.is_empty() {
+            text += &format!(". Verdicts: {}", moved.join(", "));
+        }
+        text
+    }
+
+    /// The results that changed.
+    pub fn table(&self) -> Table {
+        let header = ["change", "query", "method", "before", "after", "where"];
+        let mut table = Table::with_notes(header, &[3, 4], 0);
+        table.name = "Changed results".to_owned();
+        for one in &self.differences {
+            table.push([
+                one.change.name().to_owned(),
+                one.before.query.clone(),
+                one.before.method.to_string(),
+                one.grades[0].words(one.before.error.as_ref()),
+                one.grades[1].words(one.after.error.as_ref()),
+                Group::of(&one.before).to_string(),
+            ]);
+        }
+        table
+    }
+
     /// Whether a query is broken.
     pub fn is_regression(&self) -> bool {
         self.count(Change::Broken) > 0
@@ -110,11 +159,17 @@ impl RunComparison {
 }
 
 /// The primary verdict of a result.
-fn primary(row: &Row) -> Option<Code> {
+fn primary(row: &QueryResult) -> Option<Code> {
     Some(row.diagnosis.first()?.code)
 }
 
-fn change(was: bool, is: bool, before: &Row, after: &Row, tolerance: &Tolerance) -> Option<Change> {
+fn change(
+    was: bool,
+    is: bool,
+    before: &QueryResult,
+    after: &QueryResult,
+    tolerance: &Tolerance,
+) -> Option<Change> {
     match (was, is) {
         (true, false) => return Some(Change::Broken),
         (false, true) => return Some(Change::Fixed),
@@ -136,10 +191,10 @@ fn change(was: bool, is: bool, before: &Row, after: &Row, tolerance: &Tolerance)
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::tests::{row, rows};
+    use super::super::metrics::tests::{finding, row, rows};
     use super::*;
 
-    fn compare(before: &[Row], after: &[Row]) -> RunComparison {
+    fn compare(before: &[QueryResult], after: &[QueryResult]) -> RunComparison {
         RunComparison::of(before, after, &RunComparison::TOLERANCE)
     }
 
@@ -155,11 +210,8 @@ mod tests {
     fn verdicts_that_became_others_are_counted_by_method() {
         let with = |query: &str, method: &str, code: Option<&str>| {
             let mut row = row(query, method, Some(0.1));
-            row.diagnosis = code
-                .map(|code| serde_json::from_value(serde_json::json!({ "code": code })))
-                .into_iter()
-                .collect::<Result<_, _>>()
-                .expect("a finding");
+            let code = code.map(|code| code.parse().expect("a code"));
+            row.diagnosis = code.map(finding).into_iter().collect();
             row
         };
         let before = [

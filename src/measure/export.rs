@@ -8,16 +8,16 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
-use super::metrics::is_success;
-use super::report::read_rows;
-use super::table::Table;
-use super::{measure, tables};
+use super::results::{RunResults, read_rows};
+use super::tables::{rows, tables};
+use super::triage::Field;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::{FolderError, read_results};
 use crate::run::{QueryCamera, RunFile, RunItem};
+use crate::table::Table;
 
 /// A format to export to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,11 +154,11 @@ pub fn export(
     choice: &ResultChoice,
 ) -> Result<Export, ExportError> {
     match format {
-        Format::Csv => return single(csv(folder, run, choice)?),
+        Format::Csv => return single(csv(folder, choice)?),
         Format::Latex => {
-            let measures = measure(&read_rows(folder)?, run.failure_radius_m);
-            let tables = tables::tables(run, &measures);
-            let text: Vec<String> = tables.iter().map(Table::latex).collect();
+            let preset = run.experiment.map(|one| one.name());
+            let tables = tables(&RunResults::read(folder)?, preset);
+            let text: Vec<String> = tables.iter().map(Table::to_latex).collect();
             return single(text.join("\n"));
         }
         Format::Tum | Format::Kitti | Format::Colmap | Format::Vloc => {}
@@ -316,75 +316,9 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
     ]
 }
 
-fn csv(folder: &Path, run: &RunFile, choice: &ResultChoice) -> Result<String, ExportError> {
-    let mut table = Table::new(
-        "results",
-        "",
-        [
-            "scene",
-            "query_scene",
-            "query",
-            "method",
-            "fusion",
-            "radius_m",
-            "references_asked",
-            "references",
-            "status",
-            "reason",
-            "success",
-            "x_m",
-            "y_m",
-            "z_m",
-            "qx",
-            "qy",
-            "qz",
-            "qw",
-            "translation_m",
-            "rotation_deg",
-            "max_euler_deg",
-        ],
-    );
-    for result in read_results::<QueryResult>(folder)? {
-        let result = result?;
-        if !choice.takes(&result) {
-            continue;
-        }
-        let success = is_success(result.status, result.error.as_ref(), run.failure_radius_m);
-        let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-        let setting = result.setting;
-        let mut cells = vec![
-            result.scene.clone(),
-            result.query_scene.unwrap_or(result.scene),
-            result.query,
-            result.method.to_string(),
-            (result.fusion.map(|fusion| fusion.to_string())).unwrap_or_default(),
-            optional(setting.map(|setting| setting.radius_m)),
-            setting
-                .map(|s| s.references.to_string())
-                .unwrap_or_default(),
-            result.references.join(" "),
-            if result.pose.is_some() {
-                "ok"
-            } else {
-                "failed"
-            }
-            .to_owned(),
-            result
-                .reason
-                .map(|reason| reason.code.to_string())
-                .unwrap_or_default(),
-            u8::from(success).to_string(),
-        ];
-        let pose = result.pose.as_ref();
-        cells.extend((0..3).map(|i| optional(pose.map(|pose| pose.position_m[i]))));
-        cells.extend((0..4).map(|i| optional(pose.map(|pose| pose.quaternion_xyzw[i]))));
-        let error = result.error.as_ref();
-        cells.push(optional(error.map(|error| error.translation_m)));
-        cells.push(optional(error.map(|error| error.rotation_deg)));
-        cells.push(optional(error.map(|error| error.max_euler_deg)));
-        table.push(cells);
-    }
-    let bytes = table.csv();
-    let bytes = bytes.map_err(|error| FolderError::io(folder)(error.into()))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+/// Every chosen result with all its fields, numbers in full.
+fn csv(folder: &Path, choice: &ResultChoice) -> Result<String, FolderError> {
+    let mut results = read_rows(folder)?;
+    results.retain(|result| choice.takes(result));
+    Ok(rows(&results, Field::ALL.iter().chain(Field::POSE), Field::whole).to_csv())
 }

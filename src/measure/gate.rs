@@ -5,28 +5,33 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::metrics::Measures;
-use crate::diagnosis::Code;
+use crate::diagnosis::{Code, Tolerance};
 use crate::method::Method;
 use crate::relation::Relation;
+use crate::table::Table;
 
 /// What a gate looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Metric {
-    Right,
-    Success,
-    Recall {
-        metres: f64,
-        degrees: f64,
-    },
-    MedianMetres,
-    MedianDegrees,
-    RmseMetres,
-    RmseDegrees,
+    /// One of [`FIGURES`].
+    Figure(&'static str),
+    /// Share of the queries within limits.
+    Recall(Tolerance),
     /// Share of the queries with this primary verdict.
     Share(Code),
-    MedianConfidence,
-    MedianSeconds,
 }
+
+/// What [`Measures::figure`] knows and a gate can look at.
+const FIGURES: [&str; 8] = [
+    "right",
+    "success",
+    "median_m",
+    "median_deg",
+    "rmse_m",
+    "rmse_deg",
+    "median(confidence)",
+    "median(time)",
+];
 
 /// A condition such as `success@mi >= 0.9`, `recall@0.5m,5deg@fb >= 0.8` or `share(D3)@mi <= 0.05`.
 ///
@@ -49,6 +54,23 @@ pub struct GateResult {
     pub passed: bool,
     /// The worst figure and where it was found.
     pub found: String,
+}
+
+impl GateResult {
+    /// The gates of a run with what they found.
+    pub fn table(gates: &[Self]) -> Table {
+        let mut table = Table::with_notes(["gate", "", "found"], &[], 0);
+        table.name = "Gates".to_owned();
+        for one in gates {
+            let passed = if one.passed { "passed" } else { "failed" };
+            table.push([
+                format!("`{}`", one.gate),
+                passed.to_owned(),
+                one.found.clone(),
+            ]);
+        }
+        table
+    }
 }
 
 impl FromStr for Gate {
@@ -84,27 +106,14 @@ impl FromStr for Gate {
 }
 
 fn metric_of(text: &str) -> Option<Metric> {
-    Some(match text {
-        "right" => Metric::Right,
-        "success" => Metric::Success,
-        "median_m" => Metric::MedianMetres,
-        "median_deg" => Metric::MedianDegrees,
-        "rmse_m" => Metric::RmseMetres,
-        "rmse_deg" => Metric::RmseDegrees,
-        "median(confidence)" => Metric::MedianConfidence,
-        "median(time)" => Metric::MedianSeconds,
-        _ if text.starts_with("share(") => {
-            let code = text.strip_prefix("share(")?.strip_suffix(')')?;
-            Metric::Share(code.parse().ok()?)
-        }
-        _ => {
-            let (metres, degrees) = text.strip_prefix("recall@")?.split_once(',')?;
-            Metric::Recall {
-                metres: metres.strip_suffix('m')?.parse().ok()?,
-                degrees: degrees.strip_suffix("deg")?.parse().ok()?,
-            }
-        }
-    })
+    if let Some(limits) = text.strip_prefix("recall@") {
+        return Some(Metric::Recall(limits.parse().ok()?));
+    }
+    if let Some(code) = text.strip_prefix("share(") {
+        return Some(Metric::Share(code.strip_suffix(')')?.parse().ok()?));
+    }
+    let figure = FIGURES.into_iter().find(|name| *name == text);
+    figure.map(Metric::Figure)
 }
 
 impl Gate {
@@ -145,29 +154,25 @@ impl Gate {
     }
 
     fn value(&self, measures: &Measures) -> Option<f64> {
-        let errors = &measures.of_successes;
         match self.metric {
-            Metric::Right => Some(measures.share(measures.right)),
-            Metric::Success => Some(measures.success_rate),
-            Metric::Recall { metres, degrees } => measures.recall_within(metres, degrees),
-            Metric::MedianMetres => errors.median_m,
-            Metric::MedianDegrees => errors.median_deg,
-            Metric::RmseMetres => errors.rmse_m,
-            Metric::RmseDegrees => errors.rmse_deg,
+            Metric::Figure(name) => measures.figure(name),
+            Metric::Recall(limits) => {
+                measures.recall_within(limits.translation_m, limits.rotation_deg)
+            }
             Metric::Share(code) => {
                 let count = measures.verdicts.get(&code).copied();
                 Some(measures.share(count.unwrap_or(0)))
             }
-            Metric::MedianConfidence => measures.median_confidence,
-            Metric::MedianSeconds => measures.median_s,
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::{ConfidenceOfRow, Finding, measure, tests::rows};
+    use super::super::metrics::measure;
+    use super::super::metrics::tests::{finding, rows};
     use super::*;
+    use crate::localize::QueryResult;
 
     fn passes(gate: &str) -> bool {
         let gate: Gate = gate.parse().expect("a gate");
@@ -191,21 +196,25 @@ mod tests {
     #[test]
     fn verdicts_confidence_and_time_have_gates() {
         let mut rows = rows();
-        for (at, row) in rows
-            .iter_mut()
-            .filter(|row| row.method == Method::MI)
-            .enumerate()
-        {
-            row.seconds = Some(at as f64);
-            row.confidence = (at > 0).then_some(ConfidenceOfRow {
-                probability: 0.9 + 0.01 * at as f64,
+        let of_mi = rows.iter_mut().filter(|row| row.method == Method::MI);
+        for (at, row) in of_mi.enumerate() {
+            let confidence = serde_json::json!({
+                "probability": 0.9 + 0.01 * at as f64, "word": "unsure", "calibrated_on": "street"
             });
-            row.diagnosis
-                .extend((at == 3).then_some(Finding { code: Code::D3 }));
+            let confidence = serde_json::from_value(confidence).expect("a confidence");
+            row.confidence = (at > 0).then_some(confidence);
+            row.diagnosis.extend((at == 3).then(|| finding(Code::D3)));
         }
+        // The results of MI took 0, 1, 2 and 3 s.
+        let seconds =
+            |at: usize, row: &QueryResult| (row.method == Method::MI).then_some((at / 2) as f64);
+        let timed = rows.iter().enumerate();
+        let timed = timed.map(|(at, row)| (row, seconds(at, row)));
+        let mut measures = measure(&rows, 10.0);
+        super::super::timings::add_medians(&mut measures, timed);
         let passes = |gate: &str| {
             let gate: Gate = gate.parse().expect("a gate");
-            gate.check(&measure(&rows, 10.0)).passed
+            gate.check(&measures).passed
         };
         assert!(passes("share(D3)@mi <= 0.25"));
         assert!(!passes("share(D3)@mi < 0.25"));

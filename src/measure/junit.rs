@@ -1,60 +1,31 @@
 //! `junit.xml`: one case per query and method, for the test report of a CI service.
 
-use std::path::Path;
-
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::gate::GateResult;
 use super::known::KnownFailures;
-use super::metrics::{Finding, Row};
-use crate::diagnosis::Diagnosis;
+use super::metrics::Group;
 use crate::fusion::Fusion;
-use crate::localize::{Reason, Setting};
-use crate::run::{FolderError, read_results};
-
-/// What a case is made of.
-#[derive(serde::Deserialize)]
-struct Case {
-    #[serde(flatten)]
-    row: Row,
-    reason: Option<Reason>,
-    #[serde(default)]
-    diagnosis: Vec<Diagnosis>,
-}
+use crate::localize::{QueryResult, Setting};
 
 /// The report as XML. It holds no clock.
 ///
 /// # Errors
-/// A line of the results that is none.
+/// What cannot be said in XML.
 pub fn junit(
-    folder: &Path,
+    results: &[QueryResult],
     gate_results: &[GateResult],
     known: &KnownFailures,
-) -> Result<String, FolderError> {
+) -> Result<String, quick_junit::SerializeError> {
     let mut report = Report::new("posescope");
     // Results come by query; a suite holds those of a method.
     let mut suites: Vec<TestSuite> = Vec::new();
-    for case in read_results::<Case>(folder)? {
-        let Case {
-            row,
-            reason,
-            diagnosis,
-        } = case?;
-        let row = Row {
-            diagnosis: (diagnosis.iter())
-                .map(|one| Finding { code: one.code })
-                .collect(),
-            ..row
-        };
-        let mut name = row.scene.clone();
-        if let Some(queries) = &row.query_scene {
-            name += &format!(" ← {queries}");
-        }
-        name += &format!(" {}", row.method);
+    for row in results {
+        let name = format!("{} {}", Group::of(row).scenes(), row.method);
         let words = row.grade.words(row.error.as_ref());
-        let status = match (diagnosis.first(), &reason) {
+        let status = match (row.diagnosis.first(), &row.reason) {
             _ if !row.grade.is_failure() => TestCaseStatus::success(),
-            _ if known.has(&row) => skipped(&words),
+            _ if known.has(row) => skipped(&words),
             (Some(primary), _) => failure(primary.code.name(), &primary.text),
             (None, Some(reason)) => failure(reason.code.name(), &reason.text),
             (None, None) => failure(row.grade.word(), &words),
@@ -82,8 +53,7 @@ pub fn junit(
         suites.push(suite);
     }
     report.add_test_suites(suites);
-    let xml = report.to_string();
-    xml.map_err(|error| FolderError::io(folder)(std::io::Error::other(error)))
+    report.to_string()
 }
 
 fn failure(kind: &str, message: &str) -> TestCaseStatus {

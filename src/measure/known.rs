@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::metrics::Row;
 use crate::diagnosis::Code;
+use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::is_called;
 
@@ -124,20 +124,20 @@ impl KnownFailures {
     }
 
     /// Whether the result is wrong in a way that the list knows.
-    pub fn has(&self, row: &Row) -> bool {
+    pub fn has(&self, row: &QueryResult) -> bool {
         is_wrong(row) && self.of(row).any(|line| line.allows(row))
     }
 
     /// What became of the list in a run.
-    pub fn report(&self, rows: &[Row]) -> KnownReport {
-        let wrong = |row: &&Row| is_wrong(row);
-        let known = |row: &&Row| self.has(row);
+    pub fn report(&self, rows: &[QueryResult]) -> KnownReport {
+        let wrong = |row: &&QueryResult| is_wrong(row);
+        let known = |row: &&QueryResult| self.has(row);
         let mut report = KnownReport {
             still: rows.iter().filter(known).count(),
             ..KnownReport::default()
         };
         for line in &self.lines {
-            let of_line: Vec<&Row> = rows.iter().filter(|row| line.is_about(row)).collect();
+            let of_line: Vec<&QueryResult> = rows.iter().filter(|row| line.is_about(row)).collect();
             let KnownFailure {
                 number,
                 query,
@@ -164,31 +164,31 @@ impl KnownFailures {
         report
     }
 
-    fn of(&self, row: &Row) -> impl Iterator<Item = &KnownFailure> {
+    fn of(&self, row: &QueryResult) -> impl Iterator<Item = &KnownFailure> {
         self.lines.iter().filter(|line| line.is_about(row))
     }
 }
 
 impl KnownFailure {
-    fn is_about(&self, row: &Row) -> bool {
+    fn is_about(&self, row: &QueryResult) -> bool {
         self.method == row.method && is_called(&row.query, &self.query)
     }
 
-    fn allows(&self, row: &Row) -> bool {
+    fn allows(&self, row: &QueryResult) -> bool {
         let primary = row.diagnosis.first().map(|finding| finding.code);
         self.code.is_none_or(|code| primary == Some(code))
     }
 }
 
 /// Whether a result is wrong, missing, or has a verdict that says what is wrong.
-fn is_wrong(row: &Row) -> bool {
+fn is_wrong(row: &QueryResult) -> bool {
     let primary = row.diagnosis.first();
     row.grade.is_failure() || primary.is_some_and(|finding| finding.code.is_failure())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::{Finding, tests::row};
+    use super::super::metrics::tests::{finding, row};
     use super::*;
 
     fn read(text: &str) -> Result<KnownFailures, KnownError> {
@@ -198,11 +198,9 @@ mod tests {
         KnownFailures::read(&path)
     }
 
-    fn with_code(row: Row, code: &str) -> Row {
-        Row {
-            diagnosis: vec![Finding {
-                code: code.parse().expect("a code"),
-            }],
+    fn with_code(row: QueryResult, code: &str) -> QueryResult {
+        QueryResult {
+            diagnosis: vec![finding(code.parse().expect("a code"))],
             ..row
         }
     }

@@ -1,6 +1,6 @@
 //! What the results of many queries amount to.
 //!
-//! A *success* is the paper's: a pose within the failure radius of the run ([`Row::is_success`]). *Right* is a
+//! A *success* is the paper's: a pose within the failure radius of the run. *Right* is a
 //! pose within the tolerance of `--right`. Medians and RMSE are over successes, and once more over queries that
 //! all methods report as solved, whatever the error, as in the paper: its medians exceed any failure
 //! radius. Their rotation is the greatest Euler angle, as there.
@@ -14,113 +14,17 @@ use super::chance::Chance;
 use crate::diagnosis::{Code, Grade};
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
-use crate::localize::{Setting, Status};
+use crate::localize::{QueryResult, Setting, Status};
 use crate::method::Method;
 
 /// The limits of the recall: metres and degrees.
 pub const RECALL_LIMITS: [(f64, f64); 3] = [(0.25, 2.0), (0.5, 5.0), (5.0, 10.0)];
 
-/// A result, as far as the statistics want to know it: one line of `results.jsonl`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// The references' scene.
-    pub scene: String,
-    /// The query's scene, where it is another one.
-    #[serde(default)]
-    pub query_scene: Option<String>,
-    /// The query frame.
-    pub query: String,
-    /// The method.
-    pub method: Method,
-    /// The fusion.
-    pub fusion: Option<Fusion>,
-    /// What the experiment varied.
-    #[serde(default)]
-    pub setting: Option<Setting>,
-    /// Whether there is a pose.
-    pub status: Status,
-    /// What it is worth by the truth.
-    pub grade: Grade,
-    /// Its error, where the truth is known.
-    pub error: Option<PoseError>,
-    /// The error of the reference pose, where the truth is known.
-    #[serde(default)]
-    pub initial_error: Option<PoseError>,
-    /// The verdicts, the primary one first.
-    #[serde(default)]
-    pub diagnosis: Vec<Finding>,
-    /// The references.
-    #[serde(default)]
-    pub references: Vec<String>,
-    /// What the cost was like, if a cost was minimised.
-    #[serde(default)]
-    pub cost: Option<CostOfRow>,
-    /// How likely the pose is right.
-    #[serde(default)]
-    pub confidence: Option<ConfidenceOfRow>,
-    /// How long the method took \[s\], where that was asked for; no result says it.
-    #[serde(skip)]
-    pub seconds: Option<f64>,
-}
-
-/// What the statistics want to know of a pose's confidence.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ConfidenceOfRow {
-    /// The probability of being within 1 m.
-    pub probability: f64,
-}
-
-/// What the statistics want to know of a cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CostOfRow {
-    /// Whether the result lies where the grid of positions ends.
-    #[serde(default)]
-    pub on_rim: bool,
-    /// The cost at the result.
-    #[serde(default)]
-    pub best: f64,
-    /// From how far around the truth the coarse positions lead to it \[m\].
-    #[serde(default)]
-    pub basin_m: Option<f64>,
-    /// What the cheapest coarse minimum elsewhere costs more.
-    #[serde(default)]
-    pub basin_margin: Option<f64>,
-}
-
-/// A verdict without its words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Finding {
-    /// The code.
-    pub code: Code,
-}
-
-impl Row {
-    /// The paper's success: there is a pose and, where the truth is known, it is nearer than the failure
-    /// radius (section 4.2).
-    pub fn is_success(&self, failure_radius_m: f64) -> bool {
-        is_success(self.status, self.error.as_ref(), failure_radius_m)
-    }
-
-    /// Whether a direct method's result lies where its grid ends.
-    pub fn is_on_rim(&self) -> bool {
-        self.cost.is_some_and(|cost| cost.on_rim)
-    }
-
-    /// What is measured together with this row.
-    pub fn group(&self) -> Group {
-        Group {
-            scene: self.scene.clone(),
-            query_scene: self.query_scene.clone(),
-            setting: self.setting,
-            fusion: self.fusion,
-        }
-    }
-}
-
-/// The paper's success ([`Row::is_success`]). An error that is no number is not near.
-pub(super) fn is_success(status: Status, error: Option<&PoseError>, failure_radius_m: f64) -> bool {
-    let is_near = error.is_none_or(|error| error.translation_m < failure_radius_m);
-    status == Status::Ok && is_near
+/// The paper's success: there is a pose and, where the truth is known, it is nearer than the failure
+/// radius (section 4.2). An error that is no number is not near.
+pub(super) fn is_success(result: &QueryResult, failure_radius_m: f64) -> bool {
+    let is_near = |error: &PoseError| error.translation_m < failure_radius_m;
+    result.status == Status::Ok && result.error.as_ref().is_none_or(is_near)
 }
 
 /// Results that differ in query and method alone.
@@ -137,12 +41,29 @@ pub struct Group {
     pub fusion: Option<Fusion>,
 }
 
+impl Group {
+    /// What is measured together with this result.
+    pub fn of(result: &QueryResult) -> Self {
+        Self {
+            scene: result.scene.clone(),
+            query_scene: result.query_scene.clone(),
+            setting: result.setting,
+            fusion: result.fusion,
+        }
+    }
+
+    /// The scenes: those of the references and, where they differ, of the queries.
+    pub fn scenes(&self) -> String {
+        match &self.query_scene {
+            Some(queries) => format!("{} ← {queries}", self.scene),
+            None => self.scene.clone(),
+        }
+    }
+}
+
 impl std::fmt::Display for Group {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.scene)?;
-        if let Some(queries) = &self.query_scene {
-            write!(f, " ← {queries}")?;
-        }
+        f.write_str(&self.scenes())?;
         if let Some(setting) = &self.setting {
             write!(f, ", {} m, {} ref.", setting.radius_m, setting.references)?;
         }
@@ -183,7 +104,7 @@ impl Spread {
 }
 
 /// The median; of an even number of values the mean of the two in the middle.
-fn median(values: &[f64]) -> Option<f64> {
+pub(super) fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let upper = *sorted.get(sorted.len() / 2)?;
@@ -262,6 +183,35 @@ impl Measures {
         share(self.successes, self.queries - self.without_reference)
     }
 
+    /// A figure by its name in tables and gates; shares from 0 to 1.
+    pub fn figure(&self, name: &str) -> Option<f64> {
+        let (own, common) = (&self.of_successes, &self.of_common);
+        match name {
+            "queries" => Some(self.queries as f64),
+            "solved" => Some(self.share(self.poses)),
+            "off_rim" => Some(self.share(self.off_rim)),
+            "right" => Some(self.share(self.right)),
+            "success" => Some(self.success_rate),
+            "success_with_reference" => Some(self.success_rate_with_reference()),
+            "chance_reference" => Some(self.chance?.reference_pose),
+            "chance_random" => Some(self.chance?.random_pose),
+            "median_m" => own.median_m,
+            "median_deg" => own.median_deg,
+            "rmse_m" => own.rmse_m,
+            "rmse_deg" => own.rmse_deg,
+            "common" => Some(common.count as f64),
+            "common_percent" => Some(self.share(common.count)),
+            "common_median_m" => common.median_m,
+            "common_median_deg" => common.median_deg,
+            "recall_025" => Some(self.recall?[0]),
+            "recall_050" => Some(self.recall?[1]),
+            "recall_500" => Some(self.recall?[2]),
+            "median(confidence)" => self.median_confidence,
+            "median(time)" => self.median_s,
+            _ => None,
+        }
+    }
+
     /// Share of the queries within limits \[m, °\], with failures counted as infinite.
     pub fn recall_within(&self, limit_m: f64, limit_deg: f64) -> Option<f64> {
         let errors = self.errors.as_ref()?;
@@ -275,24 +225,27 @@ fn share(part: usize, whole: usize) -> f64 {
 }
 
 /// Measures all groups of a run, in the order in which they and their methods first appear.
-pub fn measure(rows: &[Row], failure_radius_m: f64) -> Vec<Measures> {
-    let mut groups: Vec<(Group, Vec<&Row>)> = Vec::new();
+pub fn measure<'a>(
+    results: impl IntoIterator<Item = &'a QueryResult>,
+    failure_radius_m: f64,
+) -> Vec<Measures> {
+    let mut groups: Vec<(Group, Vec<&QueryResult>)> = Vec::new();
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for row in rows {
-        let group = row.group();
+    for result in results {
+        let group = Group::of(result);
         let place = *places.entry(format!("{group:?}")).or_insert_with(|| {
             groups.push((group, Vec::new()));
             groups.len() - 1
         });
-        groups[place].1.push(row);
+        groups[place].1.push(result);
     }
     groups
         .into_iter()
-        .flat_map(|(group, rows)| measure_group(&group, &rows, failure_radius_m))
+        .flat_map(|(group, results)| measure_group(&group, &results, failure_radius_m))
         .collect()
 }
 
-fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Measures> {
+fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) -> Vec<Measures> {
     let mut methods: Vec<Method> = Vec::new();
     let mut solved: BTreeMap<Method, BTreeSet<&str>> = BTreeMap::new();
     for row in rows {
@@ -307,26 +260,22 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
     let is_common = |query: &str| solved.values().all(|queries| queries.contains(query));
     let measure = |method: Method| {
         let of_method = rows.iter().copied().filter(|row| row.method == method);
-        let rows: Vec<&Row> = of_method.collect();
-        let errors_of = |wanted: &dyn Fn(&Row) -> bool| {
+        let rows: Vec<&QueryResult> = of_method.collect();
+        let errors_of = |wanted: &dyn Fn(&QueryResult) -> bool| {
             let errors = rows.iter().filter(|row| wanted(row));
             Spread::of(&errors.filter_map(|row| row.error).collect::<Vec<_>>())
         };
-        let success = |row: &Row| row.is_success(failure_radius_m);
-        let count = |wanted: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| wanted(row)).count();
-        let median_of = |figure: &dyn Fn(&Row) -> Option<f64>| {
-            median(
-                &rows
-                    .iter()
-                    .filter_map(|row| figure(row))
-                    .collect::<Vec<_>>(),
-            )
-        };
+        let success = |row: &QueryResult| is_success(row, failure_radius_m);
+        let is_on_rim = |row: &QueryResult| row.cost.as_ref().is_some_and(|cost| cost.on_rim);
+        let count =
+            |wanted: &dyn Fn(&QueryResult) -> bool| rows.iter().filter(|row| wanted(row)).count();
+        let confidences = rows.iter().filter_map(|row| row.confidence.as_ref());
+        let confidences: Vec<f64> = confidences.map(|one| one.probability).collect();
         // A pose without an error is one whose truth is not known.
         let has_truth = rows
             .iter()
             .all(|row| row.error.is_some() || row.status == Status::Failed);
-        let error = |row: &&Row| match (row.error, success(row)) {
+        let error = |row: &&QueryResult| match (row.error, success(row)) {
             (Some(error), true) => (error.translation_m, error.rotation_deg),
             _ => (f64::INFINITY, f64::INFINITY),
         };
@@ -335,7 +284,7 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
             method,
             queries: rows.len(),
             poses: count(&|row| row.status == Status::Ok),
-            off_rim: count(&|row| row.status == Status::Ok && !row.is_on_rim()),
+            off_rim: count(&|row| row.status == Status::Ok && !is_on_rim(row)),
             without_reference: count(&|row| row.references.is_empty()),
             right: count(&|row| row.grade == Grade::Right),
             successes: count(&success),
@@ -351,8 +300,8 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
                 }),
                 failure_radius_m,
             ),
-            median_confidence: median_of(&|row| Some(row.confidence?.probability)),
-            median_s: median_of(&|row| row.seconds),
+            median_confidence: median(&confidences),
+            median_s: None,
             errors: has_truth.then(|| rows.iter().map(error).collect()),
         };
         for primary in rows.iter().filter_map(|row| row.diagnosis.first()) {
@@ -367,43 +316,52 @@ fn measure_group(group: &Group, rows: &[&Row], failure_radius_m: f64) -> Vec<Mea
 
 #[cfg(test)]
 pub(super) mod tests {
+    use serde_json::json;
+
     use super::*;
+    use crate::diagnosis::Diagnosis;
+    use crate::localize::{CostReport, SCHEMA};
 
     /// A result of fb or mi with an error in metres, and as many degrees; none where it failed.
-    pub fn row(query: &str, method: &str, error: Option<f64>) -> Row {
-        Row {
-            scene: "street".to_owned(),
-            query_scene: None,
-            query: query.to_owned(),
-            method: method.parse().expect("a method"),
-            fusion: None,
-            setting: None,
-            status: if error.is_some() {
-                Status::Ok
-            } else {
-                Status::Failed
-            },
-            grade: match error {
-                None => Grade::NoPose,
-                Some(error) if error <= 2.0 => Grade::Right,
-                Some(_) => Grade::Wrong,
-            },
-            error: error.map(|error| PoseError {
-                translation_m: error,
-                rotation_deg: error,
-                max_euler_deg: error / 2.0,
-            }),
-            initial_error: None,
-            diagnosis: Vec::new(),
-            references: vec!["000000".to_owned()],
-            cost: None,
-            confidence: None,
-            seconds: None,
+    pub fn row(query: &str, method: &str, error: Option<f64>) -> QueryResult {
+        let grade = match error {
+            None => Grade::NoPose,
+            Some(error) if error <= 2.0 => Grade::Right,
+            Some(_) => Grade::Wrong,
+        };
+        let error = error.map(|error| PoseError {
+            translation_m: error,
+            rotation_deg: error,
+            max_euler_deg: error / 2.0,
+        });
+        let result = json!({
+            "schema": SCHEMA, "scene": "street", "query": query, "references": ["000000"], "method": method,
+            "seed": 0, "status": if error.is_some() { "ok" } else { "failed" }, "grade": grade,
+            "error": error, "diagnosis": []
+        });
+        serde_json::from_value(result).expect("a result")
+    }
+
+    /// A verdict without its words.
+    pub fn finding(code: Code) -> Diagnosis {
+        Diagnosis {
+            code,
+            text: String::new(),
+            evidence: json!({}),
         }
     }
 
+    /// The cost of a direct method.
+    pub fn cost(best: f64, basin_m: Option<f64>, on_rim: bool) -> CostReport {
+        let cost = json!({
+            "best": best, "coverage_best": 0.5, "coverage_reference": 0.5, "evaluations": 1,
+            "basin_m": basin_m, "on_rim": on_rim
+        });
+        serde_json::from_value(cost).expect("a cost")
+    }
+
     /// Four queries; mi fails on the second by 12 m, fb on the last by its own report.
-    pub fn rows() -> Vec<Row> {
+    pub fn rows() -> Vec<QueryResult> {
         let errors = [
             ("a", Some(0.1), Some(1.0)),
             ("b", Some(0.2), Some(12.0)),
@@ -446,10 +404,7 @@ pub(super) mod tests {
             row("b", "mi", Some(3.0)),
             row("c", "mi", None),
         ];
-        rows[1].cost = Some(CostOfRow {
-            on_rim: true,
-            ..CostOfRow::default()
-        });
+        rows[1].cost = Some(cost(1.0, None, true));
         rows[2].references.clear();
         let measures = &measure(&rows, 10.0)[0];
         assert_eq!((measures.poses, measures.off_rim), (2, 1));

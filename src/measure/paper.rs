@@ -6,126 +6,121 @@
 
 use std::sync::LazyLock;
 
-/// `table,scene,query_scene,method,radius_m,references,fusion,measure,value`.
-const FIGURES: &str = include_str!("../../assets/paper.csv");
+use super::metrics::Group;
+use crate::table::Table;
 
-struct PaperFigure {
-    key: String,
-    value: f64,
+/// A line of `table,scene,query_scene,method,radius_m,references,fusion,measure,value`. The query's scene is
+/// empty where it is that of the references. Other empty fields match any value: tables 5 and 6 are of
+/// `r-wavg` with five references.
+struct Figure {
+    fields: Vec<&'static str>,
 }
 
-static ALL: LazyLock<Vec<PaperFigure>> = LazyLock::new(|| {
-    let lines = FIGURES.lines().skip(1);
-    lines
-        .filter_map(|line| {
-            let (key, value) = line.rsplit_once(',')?;
-            Some(PaperFigure {
-                key: key.to_owned(),
-                value: value.parse().ok()?,
-            })
-        })
-        .collect()
+static ALL: LazyLock<Vec<Figure>> = LazyLock::new(|| {
+    let lines = include_str!("../../assets/paper.csv").lines().skip(1);
+    let fields = lines.map(|line| line.split(',').collect::<Vec<_>>());
+    let whole = fields.filter(|fields| fields.len() == 9);
+    whole.map(|fields| Figure { fields }).collect()
 });
 
-/// What a figure of the paper is found by.
-#[derive(Clone, Copy, Debug)]
-pub struct FigureKey<'a> {
-    /// The table's number in the paper, 1 to 6.
-    pub table: u8,
-    /// The references' scene.
-    pub scene: &'a str,
-    /// The queries' scene, where it is another one.
-    pub query_scene: Option<&'a str>,
-    /// The method; empty for figures about all of them.
-    pub method: &'a str,
-    /// The uncertainty radius \[m\], where the table says it.
-    pub radius_m: Option<f64>,
-    /// Number of references; 1 where the table is about none.
-    pub references: usize,
-    /// The fusion.
-    pub fusion: Option<&'a str>,
-    /// `median_m`, `median_deg`, `rmse_m`, `rmse_deg`, `success_percent`, `common`, `common_percent`,
-    /// and in tables 1 and 2 `images`, `length_km`, `spacing_m`.
-    pub measure: &'a str,
-}
-
-/// The figure, if the paper has it for this scene.
-pub fn figure(key: &FigureKey<'_>) -> Option<f64> {
-    let radius = key.radius_m.map(|radius| radius.to_string());
-    let key = format!(
-        "{},{},{},{},{},{},{},{}",
-        key.table,
-        key.scene,
-        key.query_scene.unwrap_or_default(),
-        key.method,
-        radius.unwrap_or_default(),
-        key.references,
-        key.fusion.unwrap_or_default(),
-        key.measure
-    );
-    ALL.iter()
-        .find(|figure| figure.key == key)
-        .map(|figure| figure.value)
-}
-
-/// Whether the paper has any figure for these scenes of references and queries.
-#[cfg(feature = "cli")]
-pub fn has_scene(scene: &str, query_scene: Option<&str>) -> bool {
-    ALL.iter().any(|figure| {
-        let mut fields = figure.key.split(',').skip(1);
-        fields.next() == Some(scene) && fields.next() == Some(query_scene.unwrap_or_default())
+/// The figure of the first of these tables that has it for results of this group and method, as the paper
+/// writes it. `measure` is `median_m`, `median_deg`, `rmse_m`, `rmse_deg`, `success_percent`, `common` or
+/// `common_percent`.
+pub fn figure(tables: &[u8], group: &Group, method: &str, measure: &str) -> Option<&'static str> {
+    let setting = group.setting;
+    let keys = [
+        Some(method.to_owned()),
+        setting.map(|setting| setting.radius_m.to_string()),
+        setting.map(|setting| setting.references.to_string()),
+        group.fusion.map(|fusion| fusion.to_string()),
+    ];
+    let is_its = |fields: &[&str]| {
+        let same = |(field, key): (&&str, &Option<String>)| {
+            field.is_empty() || key.as_deref() == Some(*field)
+        };
+        fields[1] == group.scene
+            && fields[2] == group.query_scene.as_deref().unwrap_or_default()
+            && fields[3..7].iter().zip(&keys).all(same)
+            && fields[7] == measure
+    };
+    tables.iter().find_map(|number| {
+        let number = number.to_string();
+        let mut figures = ALL.iter().filter(|figure| figure.fields[0] == number);
+        figures
+            .find(|figure| is_its(&figure.fields))
+            .map(|figure| figure.fields[8])
     })
+}
+
+/// What the paper's tables 1 and 2 say of a scene: number of images, length \[km\] and mean distance of
+/// consecutive images \[m\].
+pub fn scene(name: &str) -> Option<[&'static str; 3]> {
+    let find = |measure| {
+        let of_scene = |figure: &&Figure| figure.fields[0] <= "2" && figure.fields[1] == name;
+        let mut figures = ALL.iter().filter(of_scene);
+        figures
+            .find(|figure| figure.fields[7] == measure)
+            .map(|figure| figure.fields[8])
+    };
+    Some([find("images")?, find("length_km")?, find("spacing_m")?])
+}
+
+/// The paper's table 1 or 2.
+pub fn scenes(number: u8) -> Table {
+    let header = [
+        "scene",
+        "images",
+        "length (km)",
+        "mean distance of images (m)",
+    ];
+    let mut table = Table::new(format!("scenes-{number}"), "Scenes of the paper", header);
+    let number = number.to_string();
+    let of_table = ALL.iter().filter(|figure| figure.fields[0] == number);
+    let names = of_table.filter(|figure| figure.fields[7] == "images");
+    for name in names.map(|figure| figure.fields[1]) {
+        let figures = scene(name).unwrap_or_default();
+        table.push([name].into_iter().chain(figures));
+    }
+    table
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::localize::Setting;
+
+    fn group(scene: &str, queries: Option<&str>, setting: (f64, usize), fusion: &str) -> Group {
+        Group {
+            scene: scene.to_owned(),
+            query_scene: queries.map(str::to_owned),
+            setting: Some(Setting {
+                radius_m: setting.0,
+                references: setting.1,
+            }),
+            fusion: fusion.parse().ok(),
+        }
+    }
 
     #[test]
     fn figures_are_found_where_the_paper_has_them_and_nowhere_else() {
-        let single = FigureKey {
-            table: 3,
-            scene: "kitti/00",
-            query_scene: None,
-            method: "pm",
-            radius_m: Some(25.0),
-            references: 1,
-            fusion: None,
-            measure: "median_m",
-        };
-        assert_eq!(figure(&single), Some(14.85));
-        let multi = FigureKey {
-            table: 4,
-            method: "fb",
-            radius_m: Some(10.0),
-            references: 5,
-            fusion: Some("r-wavg"),
-            measure: "rmse_m",
-            ..single
-        };
-        assert_eq!(figure(&multi), Some(0.045));
-        let large = FigureKey {
-            table: 6,
-            scene: "robotcar/night",
-            query_scene: Some("robotcar/rain"),
-            method: "hy",
-            radius_m: None,
-            measure: "success_percent",
-            ..multi
-        };
-        assert_eq!(figure(&large), Some(37.6));
-        assert_eq!(
-            figure(&FigureKey {
-                scene: "street",
-                ..single
-            }),
-            None
-        );
+        let single = group("kitti/00", None, (25.0, 1), "");
+        assert_eq!(figure(&[3], &single, "pm", "median_m"), Some("14.85"));
+        let multi = group("kitti/00", None, (10.0, 5), "r-wavg");
+        assert_eq!(figure(&[4], &multi, "fb", "rmse_m"), Some("0.045"));
+        let large = group("robotcar/night", Some("robotcar/rain"), (10.0, 2), "r-wavg");
+        let found = figure(&[5, 6], &large, "hy", "success_percent");
+        assert_eq!(found, Some("37.6"));
+        let street = group("street", None, (25.0, 1), "");
+        assert_eq!(figure(&[3], &street, "pm", "median_m"), None);
+        assert_eq!(scene("kitti/04"), Some(["271", "0.4", "1.5"]));
+        assert_eq!(scene("street"), None);
+        assert_eq!(scenes(2).rows.len(), 5);
     }
 
     #[test]
     fn every_figure_of_the_file_is_a_number() {
-        assert_eq!(ALL.len(), FIGURES.lines().count() - 1);
         assert_eq!(ALL.len(), 616 + 3 * (11 + 5));
+        let mut values = ALL.iter().map(|figure| figure.fields[8]);
+        assert!(values.all(|value| value.parse::<f64>().is_ok()));
     }
 }

@@ -1,226 +1,495 @@
-//! The figures of a run, as SVG.
+//! The plots of a run.
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use std::collections::BTreeMap;
 
-mod bars;
-mod basins;
-mod causes;
+use clap::ValueEnum;
 
-use super::metrics::{Measures, Row};
-use super::tables::slug;
-use crate::estimator;
+use super::metrics::{Group, Measures};
+use super::results::RunResults;
+use crate::chart::{self, Axis, Chart, Mark, Shape, round_up};
+use crate::diagnosis::Code;
+use crate::localize::{CostReport, QueryResult, Status};
 use crate::method::Method;
-use crate::run::Experiment;
-use crate::run::RunFile;
+use crate::palette;
 
-/// A name and a drawing, or what went wrong.
-pub type Plot = (String, Result<String, String>);
+/// Bins of distance in which bars stand.
+const BINS: f64 = 6.0;
+/// A bar is labelled where it is at least this long \[%\].
+const LABELLED_FROM: f64 = 5.0;
+/// What has no pose is drawn above the greatest error by this factor.
+const ABOVE: f64 = 2.0;
+/// The width of a bar \[px\].
+const BAR_PX: f64 = 26.0;
 
-/// Colours that colour-blind readers tell apart on white, the first after Okabe and Ito: the paper's four
-/// methods, and those behind them in the registry, which take turns.
-const COLORS: [RGBColor; 8] = [
-    RGBColor(0x00, 0x72, 0xB2),
-    RGBColor(0xE6, 0x9F, 0x00),
-    RGBColor(0x00, 0x9E, 0x73),
-    RGBColor(0xD5, 0x5E, 0x00),
-    RGBColor(0x56, 0xB4, 0xE9),
-    RGBColor(0xCC, 0x79, 0xA7),
-    RGBColor(0x7A, 0x5C, 0x2E),
-    RGBColor(0x70, 0x70, 0x70),
-];
+/// A kind of plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Plot {
+    /// Error over the distance of the reference.
+    Errors,
+    /// Primary verdicts by method and condition.
+    Verdicts,
+    /// Success rate over what an experiment varies.
+    Success,
+    /// Share of queries within an error.
+    Recall,
+    /// Primary failure verdicts over the distance of the reference.
+    Causes,
+    /// From how far around the truth the search finds it.
+    Basin,
+    /// What the cheapest minimum elsewhere costs more.
+    Margin,
+}
 
-/// The colour of a method in plots; black for one of another system.
-pub fn method_color(method: Method) -> (u8, u8, u8) {
-    let place = estimator::methods().position(|known| known == method);
-    let paper = Method::PAPER.len();
-    match place {
-        Some(place) if place < COLORS.len() => COLORS[place].rgb(),
-        Some(place) => COLORS[paper + (place - paper) % (COLORS.len() - paper)].rgb(),
-        None => (0, 0, 0),
+impl Plot {
+    /// The plot of a run as an SVG file; `None` where there is nothing to draw.
+    pub fn svg(self, run: &RunResults) -> Option<String> {
+        let charts = self.charts(run);
+        (!charts.is_empty()).then(|| chart::file(&charts))
     }
-}
 
-/// The colour of the bars of the nth verdict.
-pub fn verdict_color(number: usize) -> (u8, u8, u8) {
-    causes::COLORS[number % causes::COLORS.len()].rgb()
-}
-
-/// One line of a plot.
-#[derive(Debug)]
-pub(super) struct Line {
-    /// Whose line it is, which says its colour.
-    pub(super) method: Method,
-    /// Its corners.
-    pub(super) points: Vec<(f64, f64)>,
-}
-
-/// The success rate over what the experiment varies, the recall over the translation error, what went
-/// wrong over the distance of the reference, and how wide and deep the basins of the truth are.
-pub fn plots(run: &RunFile, measures: &[Measures], rows: &[Row]) -> Vec<Plot> {
-    let mut all = Vec::new();
-    if run.experiment == Some(Experiment::Large) && run.pairs.len() > 1 {
-        let groups = bars::by_pair(run, measures);
-        let axis = "references of each scene, queries of it or of another";
-        all.push(("success".to_owned(), bars::draw(axis, &groups)));
+    /// A chart for each pair of scenes, and of causes for each method.
+    pub(crate) fn charts(self, run: &RunResults) -> Vec<Chart> {
+        match self {
+            Self::Errors => errors(&run.results).into_iter().collect(),
+            Self::Verdicts => verdicts(&run.measures).into_iter().collect(),
+            Self::Success if !varies(&run.measures) => {
+                let all: Vec<&Measures> = run.measures.iter().collect();
+                let chart = success("Success rate".to_owned(), "scenes", &all, brief_scenes);
+                chart.into_iter().collect()
+            }
+            _ => pairs(&run.results)
+                .iter()
+                .flat_map(|pair| self.of_pair(run, pair))
+                .collect(),
+        }
     }
-    for pair in &run.pairs {
-        let of_pair: Vec<&Measures> = measures
+
+    fn of_pair(self, run: &RunResults, pair: &str) -> Vec<Chart> {
+        let measures = run.measures.iter().filter(|one| one.group.scenes() == pair);
+        let measures: Vec<&Measures> = measures.collect();
+        let results = run
+            .results
             .iter()
-            .filter(|one| {
-                let queries = one.group.query_scene.as_ref().unwrap_or(&one.group.scene);
-                one.group.scene == pair.scene && *queries == pair.query_scene
-            })
-            .collect();
-        let name = |what: &str| match pair.scene == pair.query_scene {
-            true => format!("{what}-{}", slug(&pair.scene)),
-            false => format!("{what}-{}-{}", slug(&pair.scene), slug(&pair.query_scene)),
-        };
-        if let Some((axis, groups)) = bars::by_setting(run, &of_pair) {
-            all.push((name("success"), bars::draw(axis, &groups)));
-        }
-        let lines = recall_lines(&run.protocol.methods, &of_pair);
-        if !lines.is_empty() {
-            let axis = "translation error (m), failures infinite";
-            all.push((name("recall"), draw(axis, "queries (%)", &lines, false)));
-        }
-        let of_pair: Vec<&Row> = rows
-            .iter()
-            .filter(|row| {
-                let queries = row.query_scene.as_ref().unwrap_or(&row.scene);
-                row.scene == pair.scene && *queries == pair.query_scene
-            })
-            .collect();
-        for &method in &run.protocol.methods {
-            if let Some(plot) = causes::draw(method, &of_pair) {
-                all.push((name(&format!("causes-{method}")), plot));
+            .filter(|one| Group::of(one).scenes() == pair);
+        let results: Vec<&QueryResult> = results.collect();
+        let mut methods: Vec<Method> = Vec::new();
+        for one in &measures {
+            if !methods.contains(&one.method) {
+                methods.push(one.method);
             }
         }
-        for (what, axis, lines) in basins::curves(&run.protocol.methods, &of_pair) {
-            all.push((name(what), draw(axis, "queries (%)", &lines, false)));
-        }
-    }
-    all
-}
-
-/// Dotted lines over a setting; what is a share of a hundred has an axis up to there.
-pub(super) fn curves(x_axis: &str, y_axis: &str, lines: &[Line]) -> Result<String, String> {
-    draw(x_axis, y_axis, lines, true)
-}
-
-/// For the last group alone: the largest radius, or the most references. Steps, all as long as the
-/// longest: a method does not lose what it has found.
-fn recall_lines(methods: &[Method], measures: &[&Measures]) -> Vec<Line> {
-    let mut all = lines(methods, |method| {
-        let last = measures.iter().rfind(|one| one.method == method);
-        let Some(errors) = last.and_then(|one| one.errors.as_ref()) else {
-            return Vec::new();
+        let titled = |what: &str| format!("{what}: {pair}");
+        let of_costs = |what, axis, value: fn(&CostReport) -> Option<f64>| {
+            lines(titled(what), axis, &methods, |method| {
+                at_least(costs(&results, method, value))
+            })
         };
-        let mut metres: Vec<f64> = errors.iter().map(|error| error.0).collect();
-        metres.sort_unstable_by(f64::total_cmp);
-        let queries = metres.len() as f64;
-        let found = metres
-            .iter()
-            .take_while(|error| error.is_finite())
-            .enumerate();
-        let steps = found.flat_map(|(index, &error)| {
-            [index, index + 1].map(|count| (error, 100.0 * count as f64 / queries))
-        });
-        std::iter::once((0.0, 0.0)).chain(steps).collect()
-    });
-    let ends = all.iter().filter_map(|line| line.points.last());
-    let end = ends.map(|point| point.0).fold(0.0, f64::max);
-    for line in &mut all {
-        if let Some(&(_, share)) = line.points.last() {
-            line.points.push((end, share));
+        match self {
+            Self::Errors | Self::Verdicts => Vec::new(),
+            Self::Success => {
+                let axis = "uncertainty radius, and references";
+                let chart = success(titled("Success rate"), axis, &measures, setting);
+                chart.into_iter().collect()
+            }
+            Self::Recall => {
+                let axis = "translation error (m), failures infinite";
+                let title = titled("Share of queries within an error");
+                lines(title, axis, &methods, |method| recall(method, &measures))
+            }
+            Self::Causes => {
+                let of_method = methods.iter().filter_map(|&method| {
+                    let title = format!("{} over the distance of the reference", method.label());
+                    causes(
+                        titled(&format!("Causes of failures of {title}")),
+                        method,
+                        &results,
+                    )
+                });
+                of_method.collect()
+            }
+            Self::Basin => of_costs(
+                "From how far around the truth the search finds it",
+                "radius of the truth's basin, at least (m)",
+                |cost| cost.basin_m,
+            ),
+            Self::Margin => of_costs(
+                "What the cheapest minimum elsewhere costs more",
+                "best minimum elsewhere over that at the truth, at least (% of the cost at the result)",
+                |cost| Some(100.0 * cost.basin_margin? / cost.best),
+            ),
         }
     }
-    all
 }
 
-fn lines(methods: &[Method], points: impl Fn(Method) -> Vec<(f64, f64)>) -> Vec<Line> {
-    let lines = methods.iter().map(|&method| Line {
-        method,
-        points: points(method),
-    });
-    lines.filter(|line| !line.points.is_empty()).collect()
-}
-
-fn draw(x_axis: &str, y_axis: &str, lines: &[Line], dotted: bool) -> Result<String, String> {
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (560, 380)).into_drawing_area();
-        draw_into(&area, x_axis, y_axis, lines, dotted).map_err(|error| error.to_string())?;
-        area.present().map_err(|error| error.to_string())?;
+fn pairs(results: &[QueryResult]) -> Vec<String> {
+    let mut pairs: Vec<String> = Vec::new();
+    for pair in results.iter().map(|result| Group::of(result).scenes()) {
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
     }
-    Ok(svg)
+    pairs
 }
 
-fn draw_into(
-    area: &DrawingArea<SVGBackend<'_>, Shift>,
+fn legend(methods: impl IntoIterator<Item = Method>) -> Vec<(String, palette::Rgb)> {
+    let entries = methods.into_iter();
+    entries
+        .map(|method| (method.label(), palette::method(method)))
+        .collect()
+}
+
+/// A line for each method, in per cent of the queries, all as long as the longest. None without a point.
+fn lines(
+    title: String,
+    x_axis: &str,
+    methods: &[Method],
+    points: impl Fn(Method) -> Vec<(f64, f64)>,
+) -> Vec<Chart> {
+    let lines = methods.iter().map(|&method| (method, points(method)));
+    let lines: Vec<_> = lines.filter(|(_, points)| !points.is_empty()).collect();
+    let chart = curves(title, x_axis, "queries (%)", lines);
+    chart.into_iter().collect()
+}
+
+/// A line for each method over numbers.
+pub(super) fn curves(
+    title: String,
     x_axis: &str,
     y_axis: &str,
-    lines: &[Line],
-    dotted: bool,
-) -> Result<(), Box<dyn std::error::Error>> {
-    area.fill(&WHITE)?;
-    let xs = || {
-        lines
-            .iter()
-            .flat_map(|line| line.points.iter().map(|point| point.0))
+    lines: Vec<(Method, Vec<(f64, f64)>)>,
+) -> Option<Chart> {
+    let points = || lines.iter().flat_map(|(_, points)| points);
+    let least = points().map(|point| point.0).reduce(f64::min)?;
+    let most = points().map(|point| point.0).fold(least, f64::max);
+    let highest = points().map(|point| point.1).fold(1e-3, f64::max);
+    let y = match y_axis.ends_with("(%)") {
+        true => Axis::percent(y_axis),
+        false => Axis::linear(y_axis, 0.0, 1.1 * highest),
     };
-    let (least, most) = (xs().fold(f64::INFINITY, f64::min), xs().fold(0.0, f64::max));
-    let least = if least.is_finite() { least } else { 0.0 };
-    let highest = match y_axis.ends_with("(%)") {
-        true => 100.0,
-        false => {
-            let ys = lines.iter().flat_map(|line| &line.points);
-            1.1 * ys.map(|point| point.1).fold(1e-3, f64::max)
-        }
+    let legend = legend(lines.iter().map(|(method, _)| *method));
+    let marks = lines.into_iter().map(|(method, points)| {
+        Mark::new(Shape::Line(points), palette::method(method)).titled(method.label())
+    });
+    Some(Chart {
+        title,
+        x: Axis::linear(x_axis, least, most),
+        y,
+        marks: marks.collect(),
+        legend,
+    })
+}
+
+/// Steps over the error, for the last group alone: the largest radius, or the most references.
+fn recall(method: Method, measures: &[&Measures]) -> Vec<(f64, f64)> {
+    let longest = measures
+        .iter()
+        .filter_map(|one| one.errors.as_ref())
+        .flatten();
+    let finite = longest
+        .map(|error| error.0)
+        .filter(|error| error.is_finite());
+    let end = finite.fold(0.0, f64::max);
+    let last = measures.iter().rfind(|one| one.method == method);
+    let Some(errors) = last.and_then(|one| one.errors.as_ref()) else {
+        return Vec::new();
     };
-    let mut chart = ChartBuilder::on(area)
-        .margin(12)
-        .x_label_area_size(36)
-        .y_label_area_size(44)
-        .build_cartesian_2d(least..most.max(least + 1e-3), 0.0..highest)?;
-    chart
-        .configure_mesh()
-        .x_desc(x_axis)
-        .y_desc(y_axis)
-        .x_labels(6)
-        .light_line_style(WHITE)
-        .draw()?;
-    for line in lines {
-        let (r, g, b) = method_color(line.method);
-        let color = RGBColor(r, g, b);
-        chart
-            .draw_series(LineSeries::new(
-                line.points.iter().copied(),
-                color.stroke_width(2),
-            ))?
-            .label(line.method.name().to_uppercase())
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
-        if dotted {
-            let dots = line
-                .points
-                .iter()
-                .map(|&point| Circle::new(point, 3, color.filled()));
-            chart.draw_series(dots)?;
+    let mut metres: Vec<f64> = errors.iter().map(|error| error.0).collect();
+    metres.sort_unstable_by(f64::total_cmp);
+    let share = |count: usize| 100.0 * count as f64 / metres.len() as f64;
+    let found = metres.iter().take_while(|error| error.is_finite());
+    let steps = found.enumerate();
+    let steps = steps.flat_map(|(at, &error)| [(error, share(at)), (error, share(at + 1))]);
+    let mut steps: Vec<_> = [(0.0, 0.0)].into_iter().chain(steps).collect();
+    steps.extend(steps.last().map(|last| (end, last.1)));
+    steps
+}
+
+/// A figure of the costs of a method, where the basin of the truth is known. A truth without a minimum has no
+/// margin, and counts as the least of all.
+fn costs(
+    results: &[&QueryResult],
+    method: Method,
+    value: fn(&CostReport) -> Option<f64>,
+) -> Vec<f64> {
+    let of_method = results.iter().filter(|result| result.method == method);
+    let costs = of_method.filter_map(|result| result.cost.as_ref());
+    let known = costs.filter(|cost| cost.basin_m.is_some());
+    known
+        .map(|cost| value(cost).unwrap_or(f64::NEG_INFINITY))
+        .collect()
+}
+
+/// The share of the values that are at least x, in steps from the least to the greatest.
+fn at_least(mut values: Vec<f64>) -> Vec<(f64, f64)> {
+    let all = values.len() as f64;
+    values.retain(|value| value.is_finite());
+    values.sort_unstable_by(f64::total_cmp);
+    let count = values.len();
+    let share = |rank: usize| 100.0 * (count - rank) as f64 / all;
+    let steps = values.iter().enumerate();
+    let steps = steps.flat_map(|(rank, &value)| [(value, share(rank)), (value, share(rank + 1))]);
+    steps.collect()
+}
+
+/// Whether the run has several radii, or several numbers of references.
+fn varies(measures: &[Measures]) -> bool {
+    let mut settings = measures.iter().map(|one| one.group.setting);
+    let first = settings.next();
+    settings.any(|setting| Some(setting) != first)
+}
+
+fn setting(one: &Measures) -> String {
+    one.group.setting.map_or(String::new(), |setting| {
+        format!("{} m, {} ref.", setting.radius_m, setting.references)
+    })
+}
+
+/// Scenes without what they have in common with others of their kind: `night` of `street:night`.
+fn brief_scenes(one: &Measures) -> String {
+    let brief = |scene: &str| {
+        scene
+            .rsplit(['/', ':'])
+            .next()
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let scene = brief(&one.group.scene);
+    match &one.group.query_scene {
+        Some(queries) => format!("{} in {scene}", brief(queries)),
+        None => scene,
+    }
+}
+
+/// Success rates as bars: a group for each name, a bar for each method; of several fusions those of r-wavg.
+/// `None` where there is only one group.
+fn success(
+    title: String,
+    axis: &str,
+    measures: &[&Measures],
+    name: fn(&Measures) -> String,
+) -> Option<Chart> {
+    let is_shown = |one: &&&Measures| {
+        one.group
+            .fusion
+            .is_none_or(|fusion| fusion.name == "r-wavg")
+    };
+    let mut groups: Vec<(String, Vec<&Measures>)> = Vec::new();
+    for one in measures.iter().filter(is_shown) {
+        let name = name(one);
+        match groups.iter_mut().find(|group| group.0 == name) {
+            Some(group) => group.1.push(one),
+            None => groups.push((name, vec![one])),
         }
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerRight)
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
-    Ok(())
+    let mut methods: Vec<Method> = measures.iter().map(|one| one.method).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    let mut marks = Vec::new();
+    for (at, (name, of_group)) in groups.iter().enumerate() {
+        let width = 0.84 / of_group.len().max(1) as f64;
+        for (place, one) in of_group.iter().enumerate() {
+            let left = at as f64 + 0.08 + width * place as f64;
+            let (right, rate) = (left + 0.9 * width, 100.0 * one.success_rate);
+            let (from, to) = ((left, 0.0), (right, rate));
+            let words = format!("{} {name}: {rate:.0} %", one.method.label());
+            let color = palette::method(one.method);
+            marks.push(Mark::new(Shape::Bar { from, to }, color).titled(words));
+            let top = ((left + right) / 2.0, rate);
+            marks.push(Mark::words(format!("{rate:.0}"), top, (0.0, -3.0)));
+        }
+    }
+    let bars = groups.iter().map(|group| group.1.len() + 1).sum::<usize>() as f64;
+    (groups.len() > 1).then(|| Chart {
+        title,
+        x: Axis::named(axis, groups.iter().map(|group| group.0.clone()))
+            .long((bars * BAR_PX).max(500.0)),
+        y: Axis::percent("success rate (%)"),
+        marks,
+        legend: legend(methods),
+    })
+}
+
+/// The primary verdicts of the results in one bin of distance.
+#[derive(Debug, Default, PartialEq)]
+struct Bin {
+    queries: usize,
+    verdicts: BTreeMap<Code, usize>,
+}
+
+/// Bars of the shares of queries by primary failure verdict, each over a bin of the distance between
+/// reference and truth; `None` where no distance is known, or nothing went wrong.
+fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Chart> {
+    let (width_m, bins) = binned(method, results)?;
+    let mut codes: Vec<Code> = bins
+        .iter()
+        .flat_map(|bin| bin.verdicts.keys().copied())
+        .collect();
+    codes.sort_unstable();
+    codes.dedup();
+    let mut marks = Vec::new();
+    for (at, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.queries > 0) {
+        let ends = [0.08, 0.92].map(|share| width_m * (at as f64 + share));
+        let middle = width_m * (at as f64 + 0.5);
+        let mut bottom = 0.0;
+        for (rank, code) in codes.iter().enumerate() {
+            let count = bin.verdicts.get(code).copied().unwrap_or_default();
+            let top = bottom + 100.0 * count as f64 / bin.queries as f64;
+            marks.extend(verdict(
+                rank,
+                *code,
+                (ends[0], bottom),
+                (ends[1], top),
+                count,
+                bin.queries,
+            ));
+            if top - bottom >= LABELLED_FROM {
+                marks.push(Mark::words(
+                    code.name(),
+                    (middle, (bottom + top) / 2.0),
+                    (0.0, 4.0),
+                ));
+            }
+            bottom = top;
+        }
+        let words = format!("{} queries", bin.queries);
+        marks.push(Mark::words(words, (middle, bottom), (0.0, -3.0)));
+    }
+    (!codes.is_empty()).then(|| Chart {
+        title,
+        x: Axis::linear(
+            "distance of the reference from the truth (m)",
+            0.0,
+            width_m * bins.len() as f64,
+        ),
+        y: Axis::percent("queries (%)"),
+        marks,
+        legend: Vec::new(),
+    })
+}
+
+/// The part of a bar that is of one verdict.
+fn verdict(
+    rank: usize,
+    code: Code,
+    from: (f64, f64),
+    to: (f64, f64),
+    count: usize,
+    queries: usize,
+) -> Option<Mark> {
+    let share = 100.0 * count as f64 / queries.max(1) as f64;
+    let title = format!(
+        "{code} {}: {count} of {queries} queries ({share:.0} %)",
+        code.title()
+    );
+    let bar = Mark::new(Shape::Bar { from, to }, palette::verdict(rank));
+    (count > 0).then(|| bar.titled(title))
+}
+
+/// The width of a bin \[m\] and the bins from 0 on.
+fn binned(method: Method, results: &[&QueryResult]) -> Option<(f64, Vec<Bin>)> {
+    let of_method = results.iter().filter(|result| result.method == method);
+    let known = of_method.filter_map(|result| {
+        let primary = result.diagnosis.first().map(|finding| finding.code);
+        let distance_m = result.initial_error?.translation_m;
+        let code = primary.filter(|code| code.is_failure());
+        distance_m.is_finite().then_some((distance_m, code))
+    });
+    let known: Vec<(f64, Option<Code>)> = known.collect();
+    let farthest_m = known.iter().map(|one| one.0).reduce(f64::max)?;
+    let width_m = round_up(farthest_m / BINS);
+    let mut bins: Vec<Bin> = Vec::new();
+    for (distance_m, code) in known {
+        let bin = (distance_m / width_m) as usize;
+        if bins.len() <= bin {
+            bins.resize_with(bin + 1, Bin::default);
+        }
+        bins[bin].queries += 1;
+        if let Some(code) = code {
+            *bins[bin].verdicts.entry(code).or_default() += 1;
+        }
+    }
+    Some((width_m, bins))
+}
+
+/// Every result's error over the distance of its reference, both where they are known. What has no pose
+/// lies on the upper border. Points lead to their rows in the report.
+fn errors(results: &[QueryResult]) -> Option<Chart> {
+    let known = results.iter().enumerate().filter_map(|(number, result)| {
+        let start = result.initial_error?.translation_m;
+        let error = result.error.map(|error| error.translation_m.max(1e-3));
+        let is_shown = error.is_some() || result.status == Status::Failed;
+        (start.is_finite() && is_shown).then_some((start, error, number, result))
+    });
+    let known: Vec<_> = known.collect();
+    let errors = || known.iter().filter_map(|one| one.1);
+    let least = errors().reduce(f64::min)?;
+    let top = ABOVE * errors().fold(0.0, f64::max);
+    let farthest = known.iter().map(|one| one.0).fold(0.0, f64::max);
+    let mut methods: Vec<Method> = known.iter().map(|one| one.3.method).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    let marks = known.iter().map(|(start, error, number, result)| {
+        let dot = Shape::Dot {
+            at: (*start, error.unwrap_or(top)),
+            filled: error.is_some(),
+        };
+        Mark {
+            link: Some(format!("#r{number}")),
+            ..Mark::new(dot, palette::method(result.method)).titled(result.headline())
+        }
+    });
+    Some(Chart {
+        title: "Error over the distance of the reference; without a pose above".to_owned(),
+        x: Axis::linear("distance of the reference (m)", 0.0, 1.05 * farthest),
+        y: Axis::log("error (m)", 0.8 * least, 1.2 * top),
+        marks: marks.collect(),
+        legend: legend(methods),
+    })
+}
+
+/// A bar for each method and condition: the shares of its queries by primary verdict.
+fn verdicts(measures: &[Measures]) -> Option<Chart> {
+    let codes = measures.iter().flat_map(|one| one.verdicts.keys());
+    let codes: std::collections::BTreeSet<Code> = codes.copied().collect();
+    let bars = measures.len() as f64;
+    let mut marks = Vec::new();
+    for (at, one) in measures.iter().enumerate() {
+        let low = bars - 1.0 - at as f64;
+        let name = format!("{} {}", one.method.label(), one.group);
+        marks.push(Mark::words(name, (50.0, low + 0.7), (0.0, 0.0)));
+        let mut from = 0.0;
+        for (rank, &code) in codes.iter().enumerate() {
+            let count = one.verdicts.get(&code).copied().unwrap_or_default();
+            let to = from + 100.0 * one.share(count);
+            let ends = ((from, low + 0.08), (to, low + 0.58));
+            marks.extend(verdict(rank, code, ends.0, ends.1, count, one.queries));
+            if to - from >= LABELLED_FROM {
+                marks.push(Mark::words(
+                    code.name(),
+                    ((from + to) / 2.0, low + 0.33),
+                    (0.0, 4.0),
+                ));
+            }
+            from = to;
+        }
+    }
+    (!codes.is_empty()).then(|| Chart {
+        title: "Primary verdicts by method and condition".to_owned(),
+        x: Axis::percent("queries (%)"),
+        y: Axis::named("", measures.iter().map(|_| String::new())).long(40.0 * bars),
+        marks,
+        legend: Vec::new(),
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::{measure, tests::row};
+    use super::super::metrics::{
+        measure,
+        tests::{finding, row},
+    };
     use super::*;
+    use crate::geometry::PoseError;
 
     #[test]
     fn recall_rises_in_steps_and_stays_where_failures_begin() {
@@ -233,8 +502,6 @@ mod tests {
         ];
         let measures = measure(&rows, 10.0);
         let measures: Vec<&Measures> = measures.iter().collect();
-        let methods = [Method::FB, Method::MI];
-        let lines = recall_lines(&methods, &measures);
         let fb = [
             (0.0, 0.0),
             (1.0, 0.0),
@@ -243,10 +510,69 @@ mod tests {
             (3.0, 50.0),
             (3.0, 50.0),
         ];
-        assert_eq!(lines[0].points, fb);
-        assert_eq!(
-            lines[1].points,
-            [(0.0, 0.0), (2.0, 0.0), (2.0, 100.0), (3.0, 100.0)]
-        );
+        assert_eq!(recall(Method::FB, &measures), fb);
+        let mi = [(0.0, 0.0), (2.0, 0.0), (2.0, 100.0), (3.0, 100.0)];
+        assert_eq!(recall(Method::MI, &measures), mi);
+    }
+
+    #[test]
+    fn a_curve_falls_from_all_that_have_a_value_to_none() {
+        let steps = [
+            (1.0, 75.0),
+            (1.0, 50.0),
+            (2.0, 50.0),
+            (2.0, 25.0),
+            (3.0, 25.0),
+            (3.0, 0.0),
+        ];
+        assert_eq!(at_least(vec![3.0, 1.0, f64::NEG_INFINITY, 2.0]), steps);
+        assert!(at_least(Vec::new()).is_empty());
+    }
+
+    fn started(away_m: f64, code: Option<Code>) -> QueryResult {
+        QueryResult {
+            initial_error: Some(PoseError {
+                translation_m: away_m,
+                rotation_deg: 0.0,
+                max_euler_deg: 0.0,
+            }),
+            diagnosis: code.map(finding).into_iter().collect(),
+            ..row("a", "mi", Some(1.0))
+        }
+    }
+
+    #[test]
+    fn results_fall_into_bins_of_a_round_width_and_a_doubt_is_no_failure() {
+        let rows = [
+            started(0.3, None),
+            started(1.7, Some(Code::D2)),
+            started(2.2, Some(Code::L1)),
+            started(11.4, Some(Code::D3)),
+            started(11.9, Some(Code::D3)),
+            row("b", "mi", None),
+        ];
+        let of_run: Vec<&QueryResult> = rows.iter().collect();
+        let (width_m, bins) = binned(Method::MI, &of_run).expect("there are distances");
+        assert_eq!((width_m, bins.len()), (2.0, 6));
+        assert_eq!(bins[0].queries, 2);
+        assert_eq!(bins[0].verdicts, BTreeMap::from([(Code::D2, 1)]));
+        assert!(bins[1].verdicts.is_empty() && bins[1].queries == 1);
+        assert_eq!(bins[5].verdicts, BTreeMap::from([(Code::D3, 2)]));
+        assert_eq!(binned(Method::FB, &of_run), None);
+        let svg = Plot::Causes.svg(&RunResults::of(rows.to_vec(), 10.0));
+        let svg = svg.expect("some failed");
+        assert!(svg.contains("D3") && svg.contains("2 queries"), "{svg}");
+    }
+
+    #[test]
+    fn what_is_known_is_drawn() {
+        let rows = vec![row("a", "fb", Some(0.1)), row("a", "mi", None)];
+        let run = RunResults::of(rows, 10.0);
+        let recall = Plot::Recall.svg(&run).expect("errors are known");
+        for words in ["FB", "street", "queries (%)"] {
+            assert!(recall.contains(words), "{recall}");
+        }
+        assert_eq!(Plot::Basin.svg(&run), None);
+        assert_eq!(Plot::Verdicts.svg(&run), None);
     }
 }

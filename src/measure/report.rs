@@ -1,19 +1,21 @@
-//! What a finished run is boiled down to: `summary.json`, `summary.md`, `junit.xml`, `tables/` and
-//! `plots/`. All of it follows from `run.toml` and `results.jsonl`, so that it can be written again.
+//! What a finished run comes to: `summary.json` and `junit.xml`. Both follow from `run.toml` and
+//! `results.jsonl` and can be written again.
 
 use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::diff::{Change, RunComparison};
 use super::gate::{Gate, GateResult};
 use super::known::{KnownFailures, KnownReport};
-use super::metrics::{Measures, Row, measure};
-use super::table::Table;
-use super::timings::add_times;
-use super::{junit, plots, tables};
-use crate::run::RunFile;
-use crate::run::{FolderError, read_results};
+use super::metrics::{Measures, measure};
+use super::results::{RunResults, read_rows};
+use super::tables::{brief, tables};
+use super::{junit, timings};
+use crate::localize::QueryResult;
+use crate::run::{FolderError, RunFile};
+use crate::table::Table;
 use posescope_core::files::write_whole;
 use posescope_core::text::json_message;
 
@@ -31,8 +33,54 @@ pub struct Report {
     pub gate_results: Vec<GateResult>,
     /// What became of failures that are known.
     pub known: KnownReport,
-    /// The tables, the overview first.
+    /// The tables, the summary first.
     pub tables: Vec<Table>,
+}
+
+/// Rows of a list on the page of a job, which is no log.
+const ROWS: usize = 10;
+
+impl Report {
+    /// For the page of a job: gates, figures, known failures, and what is broken since a baseline.
+    pub fn markdown(&self, since: Option<&RunComparison>) -> String {
+        let mut text = String::new();
+        if !self.gate_results.is_empty() {
+            text += &(GateResult::table(&self.gate_results).to_markdown() + "\n");
+        }
+        let verdicts = self.tables.iter().find(|table| table.name == "verdicts");
+        for mut table in brief(&self.measures).into_iter().chain(verdicts.cloned()) {
+            table.rows.truncate(2 * ROWS);
+            for row in &mut table.rows {
+                row[0] = plain(&row[0]);
+            }
+            text += &(table.to_markdown() + "\n");
+        }
+        let mut lines = self.known.lines();
+        let differences = since.iter().flat_map(|since| &since.differences);
+        let broken = differences.filter(|one| one.change == Change::Broken);
+        lines.extend(broken.map(|one| {
+            let worth = |at: usize, row: &QueryResult| one.grades[at].words(row.error.as_ref());
+            let (before, after) = (worth(0, &one.before), worth(1, &one.after));
+            let query = &one.before.query;
+            format!("broken: {query} {}, {before} → {after}", one.before.method)
+        }));
+        for line in lines.iter().take(ROWS) {
+            text += &format!("- {}\n", plain(line));
+        }
+        if lines.len() > ROWS {
+            text += &format!("- and {} more\n", lines.len() - ROWS);
+        }
+        if let Some(since) = since {
+            text += &format!("\n{}\n", since.summary());
+        }
+        text
+    }
+}
+
+/// Names from elsewhere as text, which are no markup then.
+pub fn plain(text: &str) -> String {
+    let text = text.replace(['\n', '\r', '`'], " ");
+    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 #[derive(Serialize)]
@@ -73,14 +121,6 @@ pub fn read_gate_results(folder: &Path) -> Result<Vec<GateResult>, FolderError> 
     }
 }
 
-/// Reads the results of a folder, without what nobody measures.
-///
-/// # Errors
-/// A line that is no result.
-pub fn read_rows(folder: &Path) -> Result<Vec<Row>, FolderError> {
-    read_results(folder)?.collect()
-}
-
 /// Measures a run and writes everything that follows from its results.
 ///
 /// # Errors
@@ -91,16 +131,18 @@ pub fn write_report(
     gates: &[Gate],
     known: &KnownFailures,
 ) -> Result<Report, FolderError> {
-    let mut rows = read_rows(folder)?;
-    add_times(folder, &mut rows)?;
-    let radius_m = run.failure_radius_m;
-    let measures = measure(&rows, radius_m);
-    let mut gated = rows.clone();
-    gated.retain(|row| !known.has(row));
-    let gated = measure(&gated, radius_m);
+    let rows = read_rows(folder)?;
+    let times = timings::read(folder, &rows)?;
+    let timed = rows.iter().zip(times);
+    let measured = |timed: Vec<(&QueryResult, Option<f64>)>| {
+        let mut measures = measure(timed.iter().map(|one| one.0), run.failure_radius_m);
+        timings::add_medians(&mut measures, timed.into_iter());
+        measures
+    };
+    let measures = measured(timed.clone().collect());
+    let gated = measured(timed.filter(|(row, _)| !known.has(row)).collect());
     let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&gated)).collect();
     let known_report = known.report(&rows);
-    let tables = tables::tables(run, &measures);
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
         failure_radius_m: run.failure_radius_m,
@@ -110,98 +152,23 @@ pub fn write_report(
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
     write(&folder.join(SUMMARY), &json)?;
-    let text = markdown(run, &tables, &gate_results, &known_report);
-    write(&folder.join("summary.md"), text.as_bytes())?;
-    for table in &tables {
-        write_table(folder, table)?;
-    }
-    for (name, svg) in plots::plots(run, &measures, &rows) {
-        let path = folder.join("plots").join(format!("{name}.svg"));
-        let svg = svg.map_err(|message| FolderError::io(&path)(std::io::Error::other(message)))?;
-        write(&path, svg.as_bytes())?;
-    }
+    let xml = junit::junit(&rows, &gate_results, known);
     let path = folder.join("junit.xml");
-    let xml = junit::junit(folder, &gate_results, known)?;
+    let xml = xml.map_err(|error| FolderError::io(&path)(std::io::Error::other(error)))?;
     write(&path, xml.as_bytes())?;
-    Ok(Report {
+    let results = RunResults {
+        results: rows,
         measures,
+        failure_radius_m: run.failure_radius_m,
+    };
+    Ok(Report {
+        tables: tables(&results, run.experiment.map(|one| one.name())),
+        measures: results.measures,
         gate_results,
         known: known_report,
-        tables,
     })
 }
 
-/// Writes a table into the run folder's `tables/` in each of its forms.
-pub(super) fn write_table(folder: &Path, table: &Table) -> Result<(), FolderError> {
-    let path = |extension: &str| {
-        folder
-            .join("tables")
-            .join(format!("{}.{extension}", table.name))
-    };
-    let csv = table.csv();
-    let csv = csv.map_err(|error| FolderError::io(path("csv"))(error.into()))?;
-    write(&path("md"), table.markdown().as_bytes())?;
-    write(&path("csv"), &csv)?;
-    write(&path("tex"), table.latex().as_bytes())
-}
-
 pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
-    if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent).map_err(FolderError::io(parent))?;
-    }
     write_whole(path, bytes).map_err(FolderError::io(path))
-}
-
-fn markdown(
-    run: &RunFile,
-    tables: &[Table],
-    gate_results: &[GateResult],
-    known: &KnownReport,
-) -> String {
-    let scenes: Vec<String> = run
-        .pairs
-        .iter()
-        .map(|pair| match pair.scene == pair.query_scene {
-            true => pair.scene.clone(),
-            false => format!("{} ← {}", pair.scene, pair.query_scene),
-        })
-        .collect();
-    let prior = run.protocol.prior_m.map_or(String::new(), |metres| {
-        format!(" within {metres} m of the known position")
-    });
-    let degradation = run.protocol.degrade;
-    let degraded = match degradation.is_none() {
-        true => String::new(),
-        false => format!(", photos of queries degraded by {degradation}"),
-    };
-    let mut text = format!(
-        "# {}\n\n{} queries, references {}{prior}, seed {}{degraded}; a pose {} m off or more is a failure.\n\n",
-        scenes.join(", "),
-        run.plan().count(),
-        run.protocol.references,
-        run.protocol.seed,
-        run.failure_radius_m
-    );
-    for gate_result in gate_results {
-        let verdict = if gate_result.passed {
-            "passed"
-        } else {
-            "FAILED"
-        };
-        text += &format!(
-            "- {verdict}: `{}`: {}\n",
-            gate_result.gate, gate_result.found
-        );
-    }
-    for line in known.lines() {
-        text += &format!("- {line}\n");
-    }
-    if !gate_results.is_empty() || *known != KnownReport::default() {
-        text += "\n";
-    }
-    for table in tables {
-        text += &table.markdown();
-        text += "\n";
-    }
-    text
 }

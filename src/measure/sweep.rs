@@ -4,10 +4,12 @@ use std::path::Path;
 
 use super::metrics::{Group, Measures};
 use super::plots;
-use super::report::{write, write_table};
-use super::table::Table;
-use super::tables::slug;
+use super::report::write;
+use super::tables::NOTHING;
+use crate::chart;
+use crate::method::Method;
 use crate::run::{FolderError, Sweep};
+use crate::table::Table;
 
 /// The figures of one value of a sweep.
 #[derive(Clone, Debug)]
@@ -18,35 +20,26 @@ pub struct SweptRun {
     pub measures: Vec<Measures>,
 }
 
-/// Writes `summary.md`, `tables/sweep.*` and, for each group of results, `plots/success-*.svg` and
-/// `plots/median-*.svg` into the folder that holds the runs of all values.
+/// Writes `sweep.csv`, `success.svg` and `median.svg` into the folder that holds the runs of all values.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Table, FolderError> {
     let table = table(sweep, runs);
-    write_table(folder, &table)?;
-    let mut summary = format!("# {sweep}\n\n{}", table.markdown());
+    write(&folder.join("sweep.csv"), table.to_csv().as_bytes())?;
     let axis = match sweep.unit() {
         "" => sweep.key().to_owned(),
         unit => format!("{} ({unit})", sweep.key()),
     };
-    for group in groups(runs) {
-        for (what, label, figure) in CURVES {
-            let name = match groups(runs).len() {
-                1 => what.to_owned(),
-                _ => format!("{what}-{}", slug(&group.to_string())),
-            };
-            let points = |one: &Measures| figure(one);
-            let curves = curves(runs, group, &points);
-            let path = folder.join("plots").join(format!("{name}.svg"));
-            let svg = plots::curves(&axis, label, &curves);
-            let svg = svg.map_err(|why| FolderError::io(&path)(std::io::Error::other(why)))?;
-            write(&path, svg.as_bytes())?;
-            summary += &format!("\n![{label} over {axis}, {group}](plots/{name}.svg)\n");
-        }
+    for (what, label, figure) in CURVES {
+        let charts = groups(runs).into_iter().filter_map(|group| {
+            let title = format!("{label} over {axis}: {group}");
+            plots::curves(title, &axis, label, curves(runs, group, &figure))
+        });
+        let charts: Vec<_> = charts.collect();
+        let path = folder.join(format!("{what}.svg"));
+        write(&path, chart::file(&charts).as_bytes())?;
     }
-    write(&folder.join("summary.md"), summary.as_bytes())?;
     Ok(table)
 }
 
@@ -78,20 +71,17 @@ fn curves(
     runs: &[SweptRun],
     group: &Group,
     figure: &dyn Fn(&Measures) -> Option<f64>,
-) -> Vec<plots::Line> {
-    let mut lines: Vec<plots::Line> = Vec::new();
+) -> Vec<(Method, Vec<(f64, f64)>)> {
+    let mut lines: Vec<(Method, Vec<(f64, f64)>)> = Vec::new();
     for run in runs {
         let Ok(x) = run.value.parse::<f64>() else {
             continue;
         };
         for one in run.measures.iter().filter(|one| one.group == *group) {
             let Some(y) = figure(one) else { continue };
-            match lines.iter_mut().find(|line| line.method == one.method) {
-                Some(line) => line.points.push((x, y)),
-                None => lines.push(plots::Line {
-                    method: one.method,
-                    points: vec![(x, y)],
-                }),
+            match lines.iter_mut().find(|line| line.0 == one.method) {
+                Some(line) => line.1.push((x, y)),
+                None => lines.push((one.method, vec![(x, y)])),
             }
         }
     }
@@ -116,7 +106,7 @@ fn table(sweep: &Sweep, runs: &[SweptRun]) -> Table {
     let caption = format!("Success and median error of successes over {}", sweep.key());
     let mut table = Table::new("sweep", caption, header);
     let number = |value: Option<f64>, digits: usize| {
-        value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
+        value.map_or(NOTHING.to_owned(), |value| format!("{value:.digits$}"))
     };
     for run in runs {
         for one in &run.measures {
@@ -154,10 +144,10 @@ mod tests {
         let runs = runs();
         let group = groups(&runs)[0];
         let medians = curves(&runs, group, &|one| one.of_successes.median_m);
-        assert_eq!(medians[0].points, [(0.5, 0.25)]);
-        assert_eq!(medians[1].points, [(0.5, 0.5), (1.0, 0.5)]);
+        assert_eq!(medians[0].1, [(0.5, 0.25)]);
+        assert_eq!(medians[1].1, [(0.5, 0.5), (1.0, 0.5)]);
         let successes = curves(&runs, group, &|one| Some(one.success_rate));
-        assert_eq!(successes[0].points, [(0.5, 1.0), (1.0, 0.0)]);
+        assert_eq!(successes[0].1, [(0.5, 1.0), (1.0, 0.0)]);
     }
 
     #[test]

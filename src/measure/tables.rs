@@ -1,488 +1,528 @@
-//! The tables of a run: an overview, and those of the paper with its figures beside ours.
+//! The tables of a run: a summary, its verdicts, and those of the paper with its figures beside ours.
+//!
+//! Their shapes are data (`assets/tables.toml`), which [`Filling`] fills.
 
-mod advantage;
-mod verdicts;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
-use super::metrics::{Measures, RECALL_LIMITS};
-use super::paper::{self, FigureKey};
-use super::table::Table;
-use crate::fusion::Fusion;
+use clap::ValueEnum;
+use serde::Deserialize;
+
+use super::metrics::Measures;
+use super::paper;
+use super::results::RunResults;
+use super::triage::Field;
+use crate::localize::QueryResult;
 use crate::method::Method;
-use crate::run::Experiment;
-use crate::run::{RunFile, ScenePair};
+use crate::table::Table;
 
-/// What is to be known of the paper's RMSE.
+/// What stands where there is no figure.
+pub(super) const NOTHING: &str = "–";
+
+/// What readers must know of the paper's RMSE.
 const RMSE_FOOTNOTE: &str = "What the paper calls RMSE behaves like a median (its table 4 has 0.125 m and \
     1.76° for FB with one reference, its table 3 a median of 0.13 m and 1.76°), so both of ours are given";
 
-/// What stands where there is no figure.
-const NOTHING: &str = "–";
+/// A table, or a few that belong together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TableName {
+    /// A row for each result.
+    Rows,
+    /// Every figure that is measured, a row for each group and method.
+    Summary,
+    /// The primary verdicts, counted.
+    Verdicts,
+    /// The paper's scenes of KITTI.
+    #[value(name = "paper:1")]
+    Paper1,
+    /// The paper's scenes of RobotCar.
+    #[value(name = "paper:2")]
+    Paper2,
+    /// Our figures beside the paper's with a single reference.
+    #[value(name = "paper:3")]
+    Paper3,
+    /// Our figures beside the paper's with several references.
+    #[value(name = "paper:4")]
+    Paper4,
+    /// Our figures beside the paper's within a large prior, on KITTI.
+    #[value(name = "paper:5")]
+    Paper5,
+    /// The same on RobotCar.
+    #[value(name = "paper:6")]
+    Paper6,
+}
 
-/// All tables of a run.
-pub fn tables(run: &RunFile, measures: &[Measures]) -> Vec<Table> {
-    let mut tables = vec![overview(measures)];
-    tables.extend(verdicts::verdicts(measures));
-    for pair in &run.pairs {
-        let of_pair = OfPair::new(pair, measures);
-        match run.experiment {
-            Some(Experiment::Single) => tables.extend(single(run, &of_pair)),
-            Some(Experiment::Multi) => tables.extend(multi(run, &of_pair)),
-            Some(Experiment::Large) | None => {}
+impl TableName {
+    /// The tables of a run; none where it has nothing to show in them.
+    pub fn of(self, run: &RunResults) -> Vec<Table> {
+        let papers = |number: u8| {
+            let mut tables = shaped(&run.measures, |shape| shape.paper.contains(&number));
+            tables.extend(advantage(&run.measures).filter(|_| number >= 5));
+            tables
+        };
+        match self {
+            Self::Rows => {
+                let fields = Field::ALL.iter().chain(Field::POSE);
+                vec![rows(&run.results, fields, Field::whole)]
+            }
+            Self::Summary => shaped(&run.measures, |shape| shape.name == "summary"),
+            Self::Verdicts => verdicts(&run.measures).into_iter().collect(),
+            Self::Paper1 => vec![paper::scenes(1)],
+            Self::Paper2 => vec![paper::scenes(2)],
+            Self::Paper3 => papers(3),
+            Self::Paper4 => papers(4),
+            Self::Paper5 => papers(5),
+            Self::Paper6 => papers(6),
         }
     }
-    if run.experiment == Some(Experiment::Large) {
-        tables.push(large(run, measures));
-        if run.pairs.len() > 1 && !run.queries.is_empty() {
-            tables.push(confusion(run, measures));
-        }
-        tables.extend(advantage::advantage(run, measures));
+}
+
+/// The tables that a run shows: summary, verdicts, and those of the paper's experiment that it repeats.
+pub fn tables(run: &RunResults, preset: Option<&str>) -> Vec<Table> {
+    let mut tables = TableName::Summary.of(run);
+    tables.extend(TableName::Verdicts.of(run));
+    if preset.is_some() {
+        tables.extend(shaped(&run.measures, |shape| {
+            shape.preset.as_deref() == preset
+        }));
+    }
+    if preset == Some("large") {
+        tables.extend(advantage(&run.measures));
     }
     tables
 }
 
-/// Every figure that is measured, one line per group and method.
-fn overview(measures: &[Measures]) -> Table {
-    let mut header: Vec<String> = [
-        "",
-        "method",
-        "queries",
-        "reported solved (%)",
-        "off the rim (%)",
-        "success (%)",
-        "success with a reference (%)",
-        "by chance: reference pose, random pose (%)",
-        "median (m)",
-        "median max Euler (°)",
-        "RMSE (m)",
-        "RMSE max Euler (°)",
-        "solved by all",
-        "median of these (m)",
-        "median max Euler of these (°)",
-    ]
-    .map(str::to_owned)
-    .into();
-    header.extend(RECALL_LIMITS.map(|(m, deg)| format!("within {m} m, {deg}° rotation (%)")));
-    let mut table = Table::new(
-        "overview",
-        "All figures of the run. A query is reported solved where the method says so, whatever the error, \
-         and solved by all where every method does; off the rim, if a direct method's minimum does not lie \
-         where its grid ends. Success is within the failure radius; failures count as infinite in the \
-         shares within limits.",
-        header,
-    );
-    for one in measures {
-        let (own, common) = (&one.of_successes, &one.of_common);
-        let mut cells = vec![
-            one.group.to_string(),
-            one.method.name().to_uppercase(),
-            one.queries.to_string(),
-            percent(one.share(one.poses)),
-            percent(one.share(one.off_rim)),
-            percent(one.success_rate),
-            percent(one.success_rate_with_reference()),
-            one.chance.map_or(NOTHING.to_owned(), |chance| {
-                format!(
-                    "{}, {}",
-                    percent(chance.reference_pose),
-                    percent(chance.random_pose)
-                )
-            }),
-            number(own.median_m, 2),
-            number(own.median_deg, 2),
-            number(own.rmse_m, 3),
-            number(own.rmse_deg, 3),
-            common.count.to_string(),
-            number(common.median_m, 2),
-            number(common.median_deg, 2),
-        ];
-        let recall = one.recall.map(|shares| shares.map(percent));
-        cells.extend(recall.unwrap_or([NOTHING; 3].map(str::to_owned)));
-        table.push(cells);
+/// The figures that fit the page of a job.
+pub(super) fn brief(measures: &[Measures]) -> Vec<Table> {
+    shaped(measures, |shape| shape.name == "brief")
+}
+
+/// A row for each result with these fields, as `text` writes them.
+pub fn rows<'a, 'f>(
+    results: impl IntoIterator<Item = &'a QueryResult>,
+    fields: impl IntoIterator<Item = &'f Field>,
+    text: fn(&Field, &QueryResult) -> String,
+) -> Table {
+    let fields: Vec<&Field> = fields.into_iter().collect();
+    let mut table = Table::new("rows", "", fields.iter().map(|field| field.name));
+    table.align = fields.iter().map(|field| field.align()).collect();
+    for result in results {
+        table.push(fields.iter().map(|field| text(field, result)));
     }
     table
 }
 
-/// The figures of one pair of scenes.
-struct OfPair<'a> {
-    pair: &'a ScenePair,
-    query_scene: Option<&'a str>,
-    measures: Vec<&'a Measures>,
+#[derive(Deserialize)]
+struct Shapes {
+    table: Vec<Shape>,
+    figures: BTreeMap<String, Figure>,
 }
 
-impl<'a> OfPair<'a> {
-    fn new(pair: &'a ScenePair, measures: &'a [Measures]) -> Self {
-        let is_same = pair.scene == pair.query_scene;
-        let query_scene = (!is_same).then_some(pair.query_scene.as_str());
-        let of_pair = |one: &&Measures| {
-            one.group.scene == pair.scene && one.group.query_scene.as_deref() == query_scene
-        };
-        Self {
-            pair,
-            query_scene,
-            measures: measures.iter().filter(of_pair).collect(),
+/// The shape of a table; `assets/tables.toml` says what its fields mean.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Shape {
+    name: String,
+    #[serde(default)]
+    paper: Vec<u8>,
+    preset: Option<String>,
+    #[serde(default)]
+    each: bool,
+    caption: String,
+    down: Vec<Dimension>,
+    #[serde(default)]
+    across: Vec<Dimension>,
+    #[serde(default)]
+    first: Vec<String>,
+    figures: Vec<Vec<String>>,
+    #[serde(default)]
+    labels: Vec<String>,
+    #[serde(default)]
+    beside: Beside,
+    #[serde(default)]
+    several: bool,
+}
+
+/// Where the paper's figures stand.
+#[derive(Clone, Copy, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+enum Beside {
+    /// They are left out.
+    #[default]
+    Nowhere,
+    /// In lines below ours.
+    Below,
+    /// In columns behind ours.
+    Behind,
+}
+
+/// What figures differ in.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Dimension {
+    Group,
+    Pair,
+    References,
+    Queries,
+    Method,
+    Radius,
+    Count,
+    Fusion,
+}
+
+impl Dimension {
+    fn head(self) -> &'static str {
+        match self {
+            Self::Group | Self::Pair => "",
+            Self::References => "references",
+            Self::Queries => "queries",
+            Self::Method => "method",
+            Self::Radius => "radius (m)",
+            Self::Count => "references",
+            Self::Fusion => "fusion",
         }
     }
 
-    fn find(
+    fn of(self, one: &Measures) -> String {
+        let group = &one.group;
+        match self {
+            Self::Group => group.to_string(),
+            Self::Pair => group.scenes(),
+            Self::References => group.scene.clone(),
+            Self::Queries => group.query_scene.as_ref().unwrap_or(&group.scene).clone(),
+            Self::Method => one.method.label(),
+            Self::Radius => group
+                .setting
+                .map_or(String::new(), |one| one.radius_m.to_string()),
+            Self::Count => group
+                .setting
+                .map_or(String::new(), |one| one.references.to_string()),
+            Self::Fusion => group
+                .fusion
+                .map_or(String::new(), |fusion| fusion.to_string()),
+        }
+    }
+}
+
+/// What a figure is called and how it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Figure {
+    head: String,
+    #[serde(default)]
+    decimals: usize,
+    #[serde(default)]
+    percent: bool,
+    paper: Option<String>,
+}
+
+static SHAPES: LazyLock<Result<Shapes, toml::de::Error>> =
+    LazyLock::new(|| toml::from_str(include_str!("../../assets/tables.toml")));
+
+/// The tables of the shapes that are wanted.
+fn shaped(measures: &[Measures], is_wanted: impl Fn(&Shape) -> bool) -> Vec<Table> {
+    // A test reads the file.
+    let Ok(shapes) = &*SHAPES else {
+        return Vec::new();
+    };
+    let all: Vec<&Measures> = measures.iter().collect();
+    let mut tables = Vec::new();
+    for shape in shapes.table.iter().filter(|shape| is_wanted(shape)) {
+        let pairs = match shape.each {
+            true => keys(&all, &[Dimension::Pair]),
+            false => vec![Vec::new()],
+        };
+        for pair in pairs {
+            let mut of_pair = all.clone();
+            of_pair.retain(|one| pair.is_empty() || pair[0] == one.group.scenes());
+            let filling = Filling {
+                shape,
+                figures: &shapes.figures,
+                columns: keys(&of_pair, &shape.across),
+                measures: &of_pair,
+            };
+            if filling.columns.len() > usize::from(shape.several) {
+                tables.extend(filling.table(pair.first().map(String::as_str)));
+            }
+        }
+    }
+    tables
+}
+
+/// The different values of some dimensions: by the first, then by the next, each in the order of the figures.
+fn keys(measures: &[&Measures], dimensions: &[Dimension]) -> Vec<Vec<String>> {
+    let mut keys: Vec<(Vec<usize>, Vec<String>)> = Vec::new();
+    let mut seen: Vec<Vec<String>> = vec![Vec::new(); dimensions.len()];
+    for one in measures {
+        let mut rank = Vec::new();
+        let key: Vec<String> = dimensions
+            .iter()
+            .map(|dimension| dimension.of(one))
+            .collect();
+        for (value, seen) in key.iter().zip(&mut seen) {
+            rank.push(
+                seen.iter()
+                    .position(|known| known == value)
+                    .unwrap_or(seen.len()),
+            );
+            if rank.last() == Some(&seen.len()) {
+                seen.push(value.clone());
+            }
+        }
+        keys.push((rank, key));
+    }
+    keys.sort();
+    keys.dedup();
+    keys.into_iter().map(|(_, key)| key).collect()
+}
+
+/// Figures that fill a shape: those of a pair of scenes, or of all.
+struct Filling<'a> {
+    shape: &'a Shape,
+    figures: &'a BTreeMap<String, Figure>,
+    measures: &'a [&'a Measures],
+    /// The different values of what is across; one without a name where nothing is.
+    columns: Vec<Vec<String>>,
+}
+
+/// A line of a table: what it is called, and its figures.
+struct Line<'a> {
+    names: Vec<String>,
+    label: &'a str,
+    cells: Vec<Option<String>>,
+}
+
+impl<'a> Filling<'a> {
+    fn head(&self, name: &str) -> String {
+        let figure = self.figures.get(name);
+        figure.map_or(name, |figure| &figure.head).to_owned()
+    }
+
+    fn ours(&self, name: &str, one: &Measures) -> Option<String> {
+        let figure = self.figures.get(name)?;
+        let (value, decimals) = (one.figure(name)?, figure.decimals);
+        Some(match figure.percent {
+            true => format!("{:.1}", 100.0 * value),
+            false => format!("{value:.decimals$}"),
+        })
+    }
+
+    fn papers(&self, name: &str, one: &Measures) -> Option<String> {
+        let measure = self.figures.get(name)?.paper.as_deref()?;
+        let tables = &self.shape.paper;
+        paper::figure(tables, &one.group, one.method.name(), measure).map(str::to_owned)
+    }
+
+    /// These figures in every column, of a row or of the first.
+    fn cells(
         &self,
-        method: Method,
-        radius_m: f64,
-        references: usize,
-        fusion: Option<Fusion>,
-    ) -> Option<&'a Measures> {
-        self.measures.iter().copied().find(|one| {
-            let setting = one.group.setting;
-            one.method == method
-                && one.group.fusion == fusion
-                && setting.is_some_and(|s| s.radius_m == radius_m && s.references == references)
-        })
-    }
-
-    fn title(&self) -> String {
-        match self.query_scene {
-            Some(queries) => format!("{}, queries from {queries}", self.pair.scene),
-            None => self.pair.scene.clone(),
-        }
-    }
-
-    /// A name for files.
-    fn slug(&self, what: &str) -> String {
-        match self.query_scene {
-            Some(queries) => format!("{what}-{}-{}", slug(&self.pair.scene), slug(queries)),
-            None => format!("{what}-{}", slug(&self.pair.scene)),
-        }
-    }
-
-    fn figure_key<'s>(&'s self, table: u8, method: &'s str, measure: &'s str) -> FigureKey<'s> {
-        FigureKey {
-            table,
-            scene: &self.pair.scene,
-            query_scene: self.query_scene,
-            method,
-            radius_m: None,
-            references: 1,
-            fusion: None,
-            measure,
-        }
-    }
-
-    /// A figure of the paper's tables 5 (KITTI) and 6.
-    fn figure_of_large(&self, method: Method, measure: &str) -> Option<f64> {
-        let table = if self.pair.scene.starts_with("kitti") {
-            5
-        } else {
-            6
+        row: Option<&[String]>,
+        names: &[String],
+        cell: fn(&Self, &str, &Measures) -> Option<String>,
+    ) -> Vec<Option<String>> {
+        let is = |one: &Measures, key: &[String], dimensions: &[Dimension]| {
+            let mut pairs = key.iter().zip(dimensions);
+            pairs.all(|(key, dimension)| *key == dimension.of(one))
         };
-        paper::figure(&FigureKey {
-            references: 5,
-            fusion: Some("r-wavg"),
-            ..self.figure_key(table, method.name(), measure)
-        })
+        let mut cells = Vec::new();
+        for column in &self.columns {
+            let one = self.measures.iter().find(|one| {
+                is(one, column, &self.shape.across)
+                    && row.is_none_or(|row| is(one, row, &self.shape.down))
+            });
+            let of_one = |name: &String| one.and_then(|one| cell(self, name, one));
+            cells.extend(names.iter().map(of_one));
+        }
+        cells
     }
+
+    /// A line of ours and, where the paper stands below, of the paper's.
+    fn lines(
+        &self,
+        names: Vec<String>,
+        row: Option<&[String]>,
+        label: &'a str,
+        figures: &[String],
+    ) -> impl Iterator<Item = Line<'a>> + use<'a> {
+        let papers = (self.shape.beside == Beside::Below).then(|| Line {
+            names: names.clone(),
+            label: "paper",
+            cells: self.cells(row, figures, Self::papers),
+        });
+        let ours = Line {
+            names,
+            label,
+            cells: self.cells(row, figures, Self::ours),
+        };
+        let papers = papers.filter(|line| line.cells.iter().any(Option::is_some));
+        [ours].into_iter().chain(papers)
+    }
+
+    fn table(&self, pair: Option<&str>) -> Option<Table> {
+        let Shape { down, figures, .. } = self.shape;
+        let names = figures.first()?;
+        let mut lines: Vec<Line<'_>> = Vec::new();
+        for name in &self.shape.first {
+            let mut row_names = vec![String::new(); down.len()];
+            row_names[0] = self.head(name);
+            lines.extend(self.lines(row_names, None, "", std::slice::from_ref(name)));
+        }
+        let rows = keys(self.measures, down);
+        for row in &rows {
+            for (at, figures) in figures.iter().enumerate() {
+                let label = self.shape.labels.get(at).map_or("", String::as_str);
+                lines.extend(self.lines(row.clone(), Some(row), label, figures));
+            }
+        }
+        let mut header: Vec<String> = down.iter().map(|one| one.head().to_owned()).collect();
+        for column in self.columns.iter().map(|column| column.join(" ")) {
+            header.extend(
+                names
+                    .iter()
+                    .map(|name| match (column.as_str(), names.len()) {
+                        ("", _) => self.head(name),
+                        (_, 1) => column.clone(),
+                        _ => format!("{column}: {}", self.head(name)),
+                    }),
+            );
+        }
+        let mut has_papers = lines.iter().any(|line| line.label == "paper");
+        if self.shape.beside == Beside::Behind {
+            let has_one = |name: &&String| {
+                self.figures
+                    .get(*name)
+                    .is_some_and(|one| one.paper.is_some())
+            };
+            let known: Vec<String> = names.iter().filter(has_one).cloned().collect();
+            let behind = rows
+                .iter()
+                .map(|row| self.cells(Some(row), &known, Self::papers));
+            let behind: Vec<Vec<Option<String>>> = behind.collect();
+            has_papers = behind.iter().flatten().any(Option::is_some);
+            if has_papers {
+                header.extend(
+                    known
+                        .iter()
+                        .map(|name| format!("{} (paper)", self.head(name))),
+                );
+                for (line, behind) in lines.iter_mut().zip(behind) {
+                    line.cells.extend(behind);
+                }
+            }
+        }
+        let mut name = self.shape.name.clone();
+        let mut caption = self.shape.caption.clone();
+        if let Some(pair) = pair {
+            name += &format!("-{}", slug(pair));
+            caption += &format!(": {pair}");
+        }
+        if has_papers && names.iter().any(|name| name.starts_with("rmse")) {
+            caption += &format!(". {RMSE_FOOTNOTE}");
+        }
+        let mut table = Table::new(name, caption, header);
+        table.shared = down.len() - 1;
+        for Line {
+            mut names,
+            label,
+            cells,
+        } in lines
+        {
+            if let (Some(last), false) = (names.last_mut(), label.is_empty()) {
+                *last = format!("{last} ({label})").trim_start().to_owned();
+            }
+            let cells = cells
+                .into_iter()
+                .map(|cell| cell.unwrap_or(NOTHING.to_owned()));
+            table.push(names.into_iter().chain(cells));
+        }
+        Some(table)
+    }
+}
+
+/// Why poses are wrong or missing: one line per group and method, one column for each primary verdict.
+fn verdicts(measures: &[Measures]) -> Option<Table> {
+    let codes = measures.iter().flat_map(|one| one.verdicts.keys());
+    let codes: std::collections::BTreeSet<_> = codes.copied().collect();
+    if codes.is_empty() {
+        return None;
+    }
+    let meanings: Vec<String> = codes
+        .iter()
+        .map(|code| format!("{code} {}", code.title()))
+        .collect();
+    let caption = format!(
+        "Shares of the queries by primary verdict. {}.",
+        meanings.join("; ")
+    );
+    let head = ["", "method", "queries"].map(str::to_owned);
+    let columns = codes.iter().map(|code| format!("{code} (%)"));
+    let mut table = Table::new("verdicts", caption, head.into_iter().chain(columns));
+    table.shared = 1;
+    for one in measures {
+        let head = [
+            one.group.to_string(),
+            one.method.label(),
+            one.queries.to_string(),
+        ];
+        let shares = codes.iter().map(|code| {
+            let count = one.verdicts.get(code).copied().unwrap_or_default();
+            format!("{:.1}", 100.0 * one.share(count))
+        });
+        table.push(head.into_iter().chain(shares));
+    }
+    Some(table)
+}
+
+/// How many points more of the queries the hybrid localises than each other method, as the mean over all
+/// pairs of scenes, ours and the paper's: the averages of its abstract. `None` without a hybrid.
+fn advantage(measures: &[Measures]) -> Option<Table> {
+    let header = ["HY over", "pairs of scenes", "points", "points (paper)"];
+    let caption = "How many points more of the queries the hybrid localises, on average over the pairs of scenes";
+    let mut table = Table::new("advantage", caption, header);
+    let hybrids: Vec<&Measures> = measures
+        .iter()
+        .filter(|one| one.method == Method::HY)
+        .collect();
+    let mut others: Vec<Method> = measures.iter().map(|one| one.method).collect();
+    others.sort_unstable();
+    others.dedup();
+    for method in others.into_iter().filter(|&method| method != Method::HY) {
+        let ours = hybrids.iter().filter_map(|hybrid| {
+            let mut others = measures.iter().filter(|one| one.method == method);
+            let other = others.find(|one| one.group == hybrid.group)?;
+            Some(100.0 * (hybrid.success_rate - other.success_rate))
+        });
+        let papers = hybrids.iter().filter_map(|hybrid| {
+            let rate = |method: Method| -> Option<f64> {
+                paper::figure(&[5, 6], &hybrid.group, method.name(), "success_percent")?
+                    .parse()
+                    .ok()
+            };
+            Some(rate(Method::HY)? - rate(method)?)
+        });
+        let [ours, papers]: [Vec<f64>; 2] = [ours.collect(), papers.collect()];
+        let mean = |points: &[f64]| match points.len() {
+            0 => NOTHING.to_owned(),
+            count => format!("{:.1}", points.iter().sum::<f64>() / count as f64),
+        };
+        table.push([
+            method.label(),
+            ours.len().to_string(),
+            mean(&ours),
+            mean(&papers),
+        ]);
+    }
+    (!hybrids.is_empty() && !table.rows.is_empty()).then_some(table)
 }
 
 /// A name without what a file's name had better not have.
 pub(super) fn slug(name: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
-    name.chars().map(plain).collect()
-}
-
-/// The paper's table 3 and figure "single".
-fn single(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
-    let title = of_pair.title();
-    let header = || {
-        let radii = run.radii_m.iter().map(|radius| format!("{radius}"));
-        std::iter::once("uncertainty radius (m)".to_owned()).chain(radii)
-    };
-    type Figure = fn(&Measures) -> Option<f64>;
-    let tables: [(&str, &str, &str, Figure); 2] = [
-        ("translation", "translation error (m)", "median_m", |one| {
-            one.of_common.median_m
-        }),
-        ("rotation", "max Euler error (°)", "median_deg", |one| {
-            one.of_common.median_deg
-        }),
-    ];
-    let mut all = Vec::new();
-    for (name, what, measure, figure) in tables {
-        let mut table = Table::new(
-            of_pair.slug(&format!("single-{name}")),
-            format!("Median {what} with a single reference, over queries solved by all: {title}"),
-            header(),
-        );
-        let common = |radius: f64| {
-            let methods = run.protocol.methods.iter();
-            methods
-                .filter_map(|&method| of_pair.find(method, radius, 1, None))
-                .next()
-        };
-        let row = |name: &str, cell: &dyn Fn(f64) -> Option<String>| -> Option<Vec<String>> {
-            let cells: Vec<Option<String>> = run.radii_m.iter().map(|&r| cell(r)).collect();
-            if cells.iter().all(Option::is_none) {
-                return None;
-            }
-            let cells = cells.into_iter().map(|c| c.unwrap_or(NOTHING.to_owned()));
-            Some(std::iter::once(name.to_owned()).chain(cells).collect())
-        };
-        let counted = |radius: f64| {
-            let one = common(radius)?;
-            let share = one.of_common.count as f64 / one.queries.max(1) as f64;
-            Some(format!("{} ({} %)", one.of_common.count, percent(share)))
-        };
-        let counted_by_paper = |radius: f64| {
-            let find = |measure| {
-                paper::figure(&FigureKey {
-                    radius_m: Some(radius),
-                    ..of_pair.figure_key(3, "", measure)
-                })
-            };
-            Some(format!(
-                "{} ({} %)",
-                find("common")?,
-                find("common_percent")?
-            ))
-        };
-        let mut rows = vec![
-            row("#images", &counted),
-            row("#images (paper)", &counted_by_paper),
-        ];
-        for &method in &run.protocol.methods {
-            let ours = |radius: f64| {
-                let one = of_pair.find(method, radius, 1, None)?;
-                Some(number(figure(one), 2))
-            };
-            let papers = |radius: f64| {
-                let figure = paper::figure(&FigureKey {
-                    radius_m: Some(radius),
-                    ..of_pair.figure_key(3, method.name(), measure)
-                });
-                Some(number(Some(figure?), 2))
-            };
-            let name = method.name().to_uppercase();
-            rows.push(row(&name, &ours));
-            rows.push(row(&format!("{name} (paper)"), &papers));
-        }
-        rows.into_iter().flatten().for_each(|row| table.push(row));
-        all.push(table);
-    }
-    let mut success = Table::new(
-        of_pair.slug("single-success"),
-        format!("Success rate (%) with a single reference: {title}"),
-        header(),
-    );
-    for &method in &run.protocol.methods {
-        let rate = |&radius: &f64| rate_cell(of_pair.find(method, radius, 1, None));
-        let rates = run.radii_m.iter().map(rate);
-        success.push(std::iter::once(method.name().to_uppercase()).chain(rates));
-    }
-    all.push(success);
-    all
-}
-
-/// The paper's table 4 and figure "multi".
-fn multi(run: &RunFile, of_pair: &OfPair<'_>) -> Vec<Table> {
-    let title = of_pair.title();
-    let most = run.protocol.references.count();
-    let columns =
-        (1..=most).flat_map(|count| [format!("{count}: RMSE (m)"), format!("{count}: RMSE (°)")]);
-    let mut rmse = Table::new(
-        of_pair.slug("multi-rmse"),
-        format!(
-            "RMSE and median (of max Euler in °) with 1 to {most} references by method and fusion, over \
-             successes: {title}{}",
-            footnote(of_pair)
-        ),
-        std::iter::once("#references".to_owned()).chain(columns),
-    );
-    let Some(&radius) = run.radii_m.first() else {
-        return vec![rmse];
-    };
-    for &method in &run.protocol.methods {
-        for &fusion in &run.protocol.fusions {
-            let name = format!("{} {fusion}", method.name().to_uppercase());
-            let ours = (1..=most).flat_map(|count| {
-                let one = of_pair.find(method, radius, count, Some(fusion));
-                let spread = one.map(|one| one.of_successes);
-                [
-                    number(spread.and_then(|s| s.rmse_m), 3),
-                    number(spread.and_then(|s| s.rmse_deg), 2),
-                ]
-            });
-            rmse.push(std::iter::once(name.clone()).chain(ours));
-            let medians = (1..=most).flat_map(|count| {
-                let one = of_pair.find(method, radius, count, Some(fusion));
-                let spread = one.map(|one| one.of_successes);
-                [
-                    number(spread.and_then(|s| s.median_m), 3),
-                    number(spread.and_then(|s| s.median_deg), 2),
-                ]
-            });
-            rmse.push(std::iter::once(format!("{name} (median)")).chain(medians));
-            let papers: Vec<Option<f64>> = (1..=most)
-                .flat_map(|references| {
-                    ["rmse_m", "rmse_deg"].map(|measure| {
-                        paper::figure(&FigureKey {
-                            radius_m: Some(radius),
-                            references,
-                            fusion: Some(fusion.name),
-                            ..of_pair.figure_key(4, method.name(), measure)
-                        })
-                    })
-                })
-                .collect();
-            if papers.iter().any(Option::is_some) {
-                let cells = papers.into_iter().map(|figure| number(figure, 3));
-                rmse.push(std::iter::once(format!("{name} (paper)")).chain(cells));
-            }
-        }
-    }
-    let mut success = Table::new(
-        of_pair.slug("multi-success"),
-        format!("Success rate (%) with 1 to {most} references: {title}"),
-        std::iter::once("#references".to_owned()).chain((1..=most).map(|k| k.to_string())),
-    );
-    for &method in &run.protocol.methods {
-        for &fusion in &run.protocol.fusions {
-            let rate = |count| rate_cell(of_pair.find(method, radius, count, Some(fusion)));
-            let name = format!("{} {fusion}", method.name().to_uppercase());
-            success.push(std::iter::once(name).chain((1..=most).map(rate)));
-        }
-    }
-    vec![rmse, success]
-}
-
-/// What is said of the paper's RMSE where it has any of these scenes.
-fn footnote(of_pair: &OfPair<'_>) -> String {
-    let is_papers = paper::has_scene(&of_pair.pair.scene, of_pair.query_scene);
-    match is_papers {
-        true => format!(". {RMSE_FOOTNOTE}"),
-        false => String::new(),
-    }
-}
-
-/// The paper's tables 5 and 6: one line per pair of scenes and method, with the paper's figures if it has
-/// any of these scenes.
-fn large(run: &RunFile, measures: &[Measures]) -> Table {
-    let mut rows: Vec<(Vec<String>, [Option<f64>; 3])> = Vec::new();
-    for pair in &run.pairs {
-        let of_pair = OfPair::new(pair, measures);
-        for one in &of_pair.measures {
-            let mut cells = vec![of_pair.title(), one.method.name().to_uppercase()];
-            cells.push(one.queries.to_string());
-            cells.extend(triple(one));
-            cells.push(number(one.of_successes.median_m, 3));
-            cells.push(number(one.of_successes.median_deg, 3));
-            let papers = ["success_percent", "rmse_m", "rmse_deg"]
-                .map(|measure| of_pair.figure_of_large(one.method, measure));
-            rows.push((cells, papers));
-        }
-    }
-    let mut header = vec![
-        "references",
-        "method",
-        "queries",
-        "%",
-        "RMSE (m)",
-        "RMSE (°)",
-        "median (m)",
-        "median (°)",
-    ];
-    let is_papers = rows
-        .iter()
-        .any(|(_, papers)| papers.iter().any(Option::is_some));
-    if is_papers {
-        header.extend(["% (paper)", "RMSE (m) (paper)", "RMSE (°) (paper)"]);
-    }
-    let mut caption = caption_of_large(run);
-    if is_papers {
-        caption += &format!(". {RMSE_FOOTNOTE}");
-    }
-    let mut table = Table::new("large", caption, header);
-    for (mut cells, [rate, metres, degrees]) in rows {
-        if is_papers {
-            cells.extend([number(rate, 1), number(metres, 3), number(degrees, 3)]);
-        }
-        table.push(cells);
-    }
-    table
-}
-
-fn caption_of_large(run: &RunFile) -> String {
-    format!(
-        "References by {} within {} m: success rate (within {} m) and RMSE (of max Euler in °) over \
-         successes",
-        run.protocol.references,
-        run.protocol.prior_m.unwrap_or_default(),
-        run.failure_radius_m
-    )
-}
-
-/// The paper's table 6: references by line, queries by column.
-fn confusion(run: &RunFile, measures: &[Measures]) -> Table {
-    let mut scenes: Vec<&str> = Vec::new();
-    let mut queries: Vec<&str> = Vec::new();
-    for pair in &run.pairs {
-        if !scenes.contains(&pair.scene.as_str()) {
-            scenes.push(&pair.scene);
-        }
-        if !queries.contains(&pair.query_scene.as_str()) {
-            queries.push(&pair.query_scene);
-        }
-    }
-    let columns = queries
-        .iter()
-        .flat_map(|query| ["%", "RMSE (m)", "RMSE (°)"].map(|figure| format!("{query}: {figure}")));
-    let mut table = Table::new(
-        "confusion",
-        format!(
-            "{}; references by line, queries by column",
-            caption_of_large(run)
-        ),
-        ["references", "method"]
-            .map(str::to_owned)
-            .into_iter()
-            .chain(columns),
-    );
-    for scene in scenes {
-        for &method in &run.protocol.methods {
-            let mut cells = vec![scene.to_owned(), method.name().to_uppercase()];
-            for query in &queries {
-                let pair = run
-                    .pairs
-                    .iter()
-                    .find(|pair| pair.scene == scene && pair.query_scene == *query);
-                let of_pair = pair.map(|pair| OfPair::new(pair, measures));
-                let one = of_pair
-                    .iter()
-                    .flat_map(|of_pair| &of_pair.measures)
-                    .find(|one| one.method == method);
-                cells.extend(one.map_or([NOTHING; 3].map(str::to_owned), |one| triple(one)));
-            }
-            table.push(cells);
-        }
-    }
-    table
-}
-
-fn triple(one: &Measures) -> [String; 3] {
-    [
-        percent(one.success_rate),
-        number(one.of_successes.rmse_m, 3),
-        number(one.of_successes.rmse_deg, 3),
-    ]
-}
-
-fn rate_cell(one: Option<&Measures>) -> String {
-    one.map_or(NOTHING.to_owned(), |one| percent(one.success_rate))
-}
-
-fn number(value: Option<f64>, decimals: usize) -> String {
-    value.map_or(NOTHING.to_owned(), |value| format!("{value:.decimals$}"))
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share)
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    words
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<_>>()
+        .join("-")
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+mod tests;

@@ -3,31 +3,44 @@
 use std::fs;
 use std::path::Path;
 
-use super::metrics::Row;
+use super::metrics::{Group, Measures, median};
+use crate::localize::QueryResult;
 use crate::run::FolderError;
 
-/// Adds to each result how long its method took. A folder without timings, or with others than those of its
-/// results, leaves them without.
+/// How long each method took \[s\]; nothing in a folder without timings, or with those of other results.
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn add_times(folder: &Path, rows: &mut [Row]) -> Result<(), FolderError> {
+pub fn read(folder: &Path, results: &[QueryResult]) -> Result<Vec<Option<f64>>, FolderError> {
     let path = folder.join("timings.jsonl");
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
         Err(error) => return Err(FolderError::io(path)(error)),
     };
-    for (row, line) in rows.iter_mut().zip(text.lines()) {
-        row.seconds = seconds(row, line);
+    let mut lines = text.lines();
+    let times = results.iter().map(|result| seconds(result, lines.next()?));
+    Ok(times.collect())
+}
+
+/// Adds the median times to figures.
+pub fn add_medians<'a>(
+    measures: &mut [Measures],
+    timed: impl Iterator<Item = (&'a QueryResult, Option<f64>)> + Clone,
+) {
+    for one in measures {
+        let is_of =
+            |result: &QueryResult| result.method == one.method && Group::of(result) == one.group;
+        let times = timed.clone().filter(|(result, _)| is_of(result));
+        let times: Vec<f64> = times.filter_map(|(_, seconds)| seconds).collect();
+        one.median_s = median(&times);
     }
-    Ok(())
 }
 
 /// The milliseconds under the method's own name: the whole of it.
-fn seconds(row: &Row, line: &str) -> Option<f64> {
+fn seconds(result: &QueryResult, line: &str) -> Option<f64> {
     let timing: serde_json::Value = serde_json::from_str(line).ok()?;
-    let is_of_row = timing["query"] == row.query && timing["method"] == row.method.name();
-    let milliseconds = timing.get(row.method.name())?.as_f64()?;
-    is_of_row.then_some(milliseconds / 1000.0)
+    let is_its = timing["query"] == result.query && timing["method"] == result.method.name();
+    let milliseconds = timing.get(result.method.name())?.as_f64()?;
+    is_its.then_some(milliseconds / 1000.0)
 }

@@ -3,11 +3,14 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Baseline, ReportedResult, RunReport};
+use crate::chart::hex;
 use crate::diagnosis::{Code, Grade};
-use crate::measure::{Change, Table};
+use crate::measure::{GateResult, Group};
 use crate::method::Method;
+use crate::palette;
 use crate::run::RunFile;
 use crate::session::Task;
+use crate::table::{Align, Table};
 
 const STYLE: &str = include_str!("../../assets/report/report.css");
 const SCRIPT: &str = include_str!("../../assets/report/report.js");
@@ -26,7 +29,7 @@ pub(super) fn page(report: &RunReport) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { "posescope: " (title) }
-                style { (PreEscaped(STYLE)) (PreEscaped(thumbnails(report))) }
+                style { (PreEscaped(colors())) (PreEscaped(STYLE)) (PreEscaped(thumbnails(report))) }
             }
             body {
                 header {
@@ -58,6 +61,17 @@ pub(super) fn page(report: &RunReport) -> String {
         }
     }
     .into_string()
+}
+
+/// The colours of words, for light and dark pages.
+fn colors() -> String {
+    let of = |shade: fn(palette::Rgb) -> palette::Rgb| {
+        let [right, wrong, none] = [palette::TRUTH, palette::ESTIMATE, palette::NO_POSE];
+        let [right, wrong, none] = [right, wrong, none].map(|color| hex(shade(color)));
+        format!(":root{{--right:{right};--wrong:{wrong};--none:{none}}}")
+    };
+    let (light, dark) = (of(palette::dark), of(palette::light));
+    format!("{light}\n@media (prefers-color-scheme: dark) {{{dark}}}\n")
 }
 
 fn title(run: &RunFile) -> String {
@@ -132,39 +146,34 @@ fn gates(report: &RunReport) -> Markup {
         @if !report.gates.is_empty() {
             section aria-labelledby="gates" {
                 h2 id="gates" { "Gates" }
-                div.scroll tabindex="0" role="region" aria-label="Gates" {
-                    table {
-                        caption { "What the figures of the run had to meet" }
-                        thead { tr { th scope="col" { "gate" } th scope="col" { "" } th scope="col" { "found" } } }
-                        tbody {
-                            @for one in &report.gates {
-                                tr {
-                                    td { code { (one.gate) } }
-                                    @if one.passed { td.right { "● passed" } } @else { td.wrong { "▲ failed" } }
-                                    td.words { (one.found) }
-                                }
-                            }
-                        }
-                    }
-                }
+                (table(&GateResult::table(&report.gates)))
             }
         }
     }
 }
 
-/// A table of figures: the first column in words, the others numbers.
+/// A table with words that mean good or bad in their colours.
 fn table(table: &Table) -> Markup {
-    let class = |at: usize| if at > 1 { Some("number") } else { None };
+    let class = |at: usize| match table.align.get(at) {
+        Some(Align::Right) => Some("number"),
+        Some(Align::Note) => Some("words"),
+        _ => None,
+    };
+    let tone = |cell: &str| match cell {
+        "passed" | "fixed" | "better" => Some("right"),
+        "failed" | "broken" | "worse" => Some("wrong"),
+        _ => None,
+    };
     html! {
         div.scroll tabindex="0" role="region" aria-label=(table.name) style="margin-bottom:1rem" {
             table {
-                caption { span { (table.caption) } }
+                caption { span { (if table.caption.is_empty() { &table.name } else { &table.caption }) } }
                 thead {
                     tr { @for (at, cell) in table.header.iter().enumerate() { th scope="col" class=[class(at)] { (cell) } } }
                 }
                 tbody {
                     @for row in &table.rows {
-                        tr { @for (at, cell) in row.iter().enumerate() { td class=[class(at)] { (cell) } } }
+                        tr { @for (at, cell) in row.iter().enumerate() { td class=[tone(cell).or(class(at))] { (cell) } } }
                     }
                 }
             }
@@ -177,38 +186,8 @@ fn changes(report: &RunReport, baseline: &Baseline) -> Markup {
     html! {
         section aria-labelledby="changes" {
             h2 id="changes" { "Changes since " code { (baseline.name) } }
-            p {
-                @for change in [Change::Broken, Change::Fixed, Change::Worse, Change::Better] {
-                    (comparison.count(change)) " " (change.name()) ", "
-                }
-                "of " (comparison.common) " results in both runs"
-                @if comparison.only_before + comparison.only_after > 0 {
-                    "; " (comparison.only_before) " only there, " (comparison.only_after) " only here"
-                }
-                "."
-            }
-            @if !comparison.differences.is_empty() {
-                div.scroll tabindex="0" role="region" aria-label="Changed results" {
-                    table {
-                        caption { "Results that changed" }
-                        thead {
-                            tr { @for name in ["change", "query", "method", "before", "after", "where"] { th scope="col" { (name) } } }
-                        }
-                        tbody {
-                            @for one in &comparison.differences {
-                                tr {
-                                    td class=(if matches!(one.change, Change::Broken | Change::Worse) { "wrong" } else { "right" }) { (one.change.name()) }
-                                    td { (one.before.query) }
-                                    td { (one.before.method) }
-                                    td { (one.grades[0].words(one.before.error.as_ref())) }
-                                    td { (one.grades[1].words(one.after.error.as_ref())) }
-                                    td { (one.before.group()) }
-                                }
-                            }
-                        }
-                    }
-                }
-            }
+            p { (comparison.summary()) }
+            @if !comparison.differences.is_empty() { (table(&comparison.table())) }
             @if let (Some(there), Some(here)) = (baseline.tables.first(), report.tables.first()) {
                 h3 { "Before" } (table(there))
                 h3 { "Now" } (table(here))
@@ -221,11 +200,10 @@ fn plots(report: &RunReport) -> Markup {
     html! {
         section aria-labelledby="plots" {
             h2 id="plots" { "Plots" }
-            @if report.plots.is_empty() { p { "Without a known truth there is nothing to draw." } }
+            @if report.charts.is_empty() { p { "Without a known truth there is nothing to draw." } }
             div.plots {
-                @for (caption, svg) in &report.plots {
-                    // Drawn by us, with all words escaped.
-                    figure.plot { (PreEscaped(svg)) figcaption { (caption) } }
+                @for chart in &report.charts {
+                    figure.plot { (chart.markup()) figcaption { (chart.title) } }
                 }
             }
         }
@@ -368,25 +346,11 @@ fn cell(report: &RunReport, one: &ReportedResult, name: &str, class: &str) -> Ma
             }
         },
         "query" => html! { td { (result.query) } },
-        "method" => {
-            let fusion = result.fusion.as_ref().map(ToString::to_string);
-            html! { td { (result.method) @if let Some(fusion) = fusion { " " (fusion) } } }
-        }
+        "method" => html! { td { (result.method_name()) } },
         "where" => {
-            let place = match (&result.query_scene, &result.setting) {
-                (queries, Some(setting)) => format!(
-                    "{}, {} m, {} ref.",
-                    queries
-                        .as_ref()
-                        .map_or(result.scene.clone(), |queries| format!(
-                            "{} ← {queries}",
-                            result.scene
-                        )),
-                    setting.radius_m,
-                    setting.references
-                ),
-                (Some(queries), None) => format!("{} ← {queries}", result.scene),
-                (None, None) => result.scene.clone(),
+            let place = Group {
+                fusion: None,
+                ..Group::of(result)
             };
             html! { td class=[class] { (place) } }
         }
@@ -430,7 +394,7 @@ fn failures(report: &RunReport) -> Markup {
         section aria-labelledby="failures" {
             h2 id="failures" { "Failures (" (failures.len()) ")" }
             p {
-                "The magenta cross is the truth, the orange square the result, the white circle the reference."
+                "The green plus is the truth, the vermilion diamond the result, the white ring the reference."
                 @if failures.iter().any(|one| one.recording.is_some()) {
                     " Recordings lie in the folder of the run, where the lines that open them are typed."
                 }
@@ -444,16 +408,8 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
     let result = &one.result;
     html! {
         details id={ "f" (one.number) } {
-            summary { (one.headline()) }
-            @for diagnosis in result.diagnosis.iter().skip(1) {
-                p { "Also " (diagnosis.code) ": " (diagnosis.text) }
-            }
-            @if let Some(explanation) = &result.explanation {
-                @if explanation.helped.is_empty() { p { "None of " (explanation.runs) " remedies helped." } }
-                @for helped in &explanation.helped {
-                    p { "Helped: " code { (helped.args.join(" ")) } ", " (helped.error.translation()) }
-                }
-            }
+            summary { (result.headline()) }
+            @for paragraph in result.paragraphs() { p { (paragraph) } }
             dl {
                 dt { "References" } dd { (result.references.join(", ")) }
                 @if let Some(error) = &result.error { dt { "Error" } dd { (error) } }
@@ -487,10 +443,10 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
             }
             div.pictures {
                 @if let Some(svg) = &one.pictures.matches {
-                    figure { (PreEscaped(svg)) figcaption { "Matches with a depth: inliers whole, outliers dashed" } }
+                    figure { (svg) figcaption { "Matches with a depth: inliers whole, outliers dashed" } }
                 }
                 @if let Some(svg) = &one.pictures.surface {
-                    figure { (PreEscaped(svg)) figcaption { "Costs around the reference, its front up: the least bright" } }
+                    figure { (svg) figcaption { "Costs around the reference, its front up: yellow is lower" } }
                 }
             }
         }

@@ -1,14 +1,15 @@
 //! Photos and pictures of a run as data URIs: thumbnails of its queries, matches and costs of failures.
 
-use std::fmt::Write as _;
 use std::io::Cursor;
 use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
-use image::{DynamicImage, ImageFormat, RgbaImage};
+use image::{DynamicImage, ImageFormat};
+use maud::{Markup, html};
 
+use crate::chart::hex;
 use crate::event::{
     FeaturesClassified, FeaturesDetected, Kind, KindSet, MatchesDecided, PhaseSearched, Side,
 };
@@ -31,6 +32,9 @@ const CANVAS_WIDTH: u32 = 560;
 const SURFACE_SIDE: f64 = 300.0;
 /// Lines of one state in a canvas; more hide each other.
 const MOST_LINES: usize = 200;
+/// Positions of these states among [`palette::STATES`].
+const OUTLIER: usize = 3;
+const INLIER: usize = 4;
 
 /// A small copy of a photo.
 pub(super) fn thumbnail(photo: &Photo) -> Option<String> {
@@ -80,11 +84,11 @@ impl LocalizeObserver for Witness {
     }
 }
 
-/// Pictures of a failure as SVG, each with what it shows.
+/// Pictures of a failure.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FailurePictures {
-    pub(super) matches: Option<String>,
-    pub(super) surface: Option<String>,
+    pub(super) matches: Option<Markup>,
+    pub(super) surface: Option<Markup>,
 }
 
 impl Witness {
@@ -113,7 +117,7 @@ impl Witness {
     }
 
     /// The query above the reference, with a line for each match that came as far as a depth.
-    fn matches(&self, problem: &Problem) -> Option<String> {
+    fn matches(&self, problem: &Problem) -> Option<Markup> {
         let of_side = |side: Side| {
             let mut detected = self.history.all::<FeaturesDetected>();
             detected
@@ -124,56 +128,36 @@ impl Witness {
         let decisions = &self.history.last::<MatchesDecided>()?.decisions;
         let states = &self.history.last::<FeaturesClassified>()?.states;
         let (canvas, top) = picture::stacked(&problem.query.photo, &problem.reference.photo);
-        let scale = f64::from(CANVAS_WIDTH.min(canvas.width())) / f64::from(canvas.width());
-        let (width, height) = (
-            f64::from(canvas.width()) * scale,
-            f64::from(canvas.height()) * scale,
-        );
+        let (width, height) = (canvas.width(), canvas.height());
         let photos = jpeg(&canvas, CANVAS_WIDTH, 60)?;
-        let mut svg = String::new();
-        let mut counts = [0; FeatureState::NAMES.len()];
-        // Inliers come last, so that no outlier hides one.
-        for wanted in [3, 4] {
-            for (state, decision) in states.iter().zip(decisions.iter()) {
-                let Some(found) = decision.filter(|_| state.index() == wanted) else {
-                    continue;
-                };
-                counts[wanted] += 1;
-                if counts[wanted] > MOST_LINES {
-                    continue;
-                }
-                let (from, to) = (
-                    query.keypoints.get(found.query)?,
-                    reference.keypoints.get(found.reference)?,
-                );
-                let [r, g, b] = palette::STATES[wanted];
-                let dashes = if wanted == 3 {
-                    " stroke-dasharray=\"4 3\""
-                } else {
-                    ""
-                };
-                // Writing to a string cannot fail.
-                let _ = write!(
-                    svg,
-                    "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" \
-                     stroke=\"rgb({r},{g},{b})\"{dashes}><title>{}</title></line>",
-                    f64::from(from.x) * scale,
-                    f64::from(from.y) * scale,
-                    f64::from(to.x) * scale,
-                    (f64::from(to.y) + f64::from(top)) * scale,
-                    told(state),
-                );
-            }
-        }
+        let of_state = |wanted: usize| {
+            let decided = states.iter().zip(decisions.iter());
+            let decided = decided.filter(move |(state, _)| state.index() == wanted);
+            decided.filter_map(|(state, decision)| {
+                let found = (*decision)?;
+                let from = query.keypoints.get(found.query)?;
+                Some((state, from, reference.keypoints.get(found.reference)?))
+            })
+        };
         let name = format!(
             "{} inliers and {} outliers between the query above and the reference below",
-            counts[4], counts[3]
+            of_state(INLIER).count(),
+            of_state(OUTLIER).count()
         );
-        Some(format!(
-            "<svg viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" role=\"img\" \
-             aria-label=\"{name}\"><image href=\"{photos}\" width=\"{width:.0}\" \
-             height=\"{height:.0}\"/>{svg}</svg>"
-        ))
+        Some(html! {
+            svg viewBox={ "0 0 " (width) " " (height) } width=(CANVAS_WIDTH.min(width)) role="img" aria-label=(name) {
+                image href=(photos) width=(width) height=(height) {}
+                // Inliers come last: no outlier may hide one.
+                @for (wanted, dashes) in [(OUTLIER, Some("4 3")), (INLIER, None)] {
+                    g stroke=(hex(palette::STATES[wanted])) stroke-dasharray=[dashes] {
+                        @for (state, from, to) in of_state(wanted).take(MOST_LINES) {
+                            line x1=(from.x) y1=(from.y) x2=(to.x) y2=(to.y + top as f32)
+                                vector-effect="non-scaling-stroke" { title { (told(state)) } }
+                        }
+                    }
+                }
+            }
+        })
     }
 }
 
@@ -186,71 +170,45 @@ fn told(state: &FeatureState) -> String {
     }
 }
 
-/// The costs of all positions around the reference, the least bright, the front up; cells without a say
-/// are grey.
+/// The costs of all positions around the reference, with marks.
 fn surface(
     surface: &ScoredLattice,
     truth: Option<Offset>,
     result: Option<Offset>,
-) -> Option<String> {
-    let lattice = &surface.lattice;
-    let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
-    let (least, greatest) = (
-        costs().fold(f64::INFINITY, f64::min),
-        costs().fold(f64::NEG_INFINITY, f64::max),
-    );
-    let cells = RgbaImage::from_fn(lattice.columns as u32, lattice.rows as u32, |x, y| {
-        let row = lattice.rows - 1 - y as usize;
-        let cell = row * lattice.columns + x as usize;
-        let [r, g, b] = match (surface.scores[cell], surface.eligible_cost(cell)) {
-            (None, _) => return image::Rgba([0; 4]),
-            (Some(_), None) => [128; 3],
-            (Some(_), Some(cost)) => {
-                palette::viridis((greatest - cost) / (greatest - least).max(1e-12))
-            }
-        };
-        image::Rgba([r, g, b, 255])
-    });
+) -> Option<Markup> {
     let mut png = Vec::new();
-    let written =
-        DynamicImage::ImageRgba8(cells).write_to(&mut Cursor::new(&mut png), ImageFormat::Png);
-    written.ok()?;
-    let place = |offset: &Offset| place(lattice, offset);
-    let mut marks = String::new();
-    let (x, y) = place(&Offset::default());
-    let _ = write!(
-        marks,
-        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"none\" stroke=\"#fff\" stroke-width=\"2\">\
-         <title>the reference</title></circle>"
+    let cells = DynamicImage::ImageRgb8(picture::surface(surface));
+    cells
+        .write_to(&mut Cursor::new(&mut png), ImageFormat::Png)
+        .ok()?;
+    let cells = format!("data:image/png;base64,{}", STANDARD.encode(png));
+    let ring = (
+        "the reference",
+        "M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0",
+        palette::REFERENCE_ON_COSTS,
     );
-    if let Some((x, y)) = result.as_ref().map(place) {
-        let (left, up) = (x - 6.0, y - 6.0);
-        let _ = write!(
-            marks,
-            "<rect x=\"{left:.1}\" y=\"{up:.1}\" width=\"12\" height=\"12\" fill=\"none\" \
-             stroke=\"#ff7a1a\" stroke-width=\"3\"><title>the result</title></rect>"
-        );
-    }
-    if let Some((x, y)) = truth.as_ref().map(place) {
-        let _ = write!(
-            marks,
-            "<path d=\"M{:.1} {:.1}l12 12m0 -12l-12 12\" stroke=\"#ff2bd6\" stroke-width=\"3\">\
-             <title>the truth</title></path>",
-            x - 6.0,
-            y - 6.0
-        );
-    }
-    let name = format!(
-        "costs from {least:.4}, bright, to {greatest:.4}, dark, of {} positions around the reference",
-        costs().count()
-    );
-    Some(format!(
-        "<svg viewBox=\"0 0 {SURFACE_SIDE} {SURFACE_SIDE}\" width=\"{SURFACE_SIDE}\" role=\"img\" \
-         aria-label=\"{name}\"><image href=\"data:image/png;base64,{}\" width=\"{SURFACE_SIDE}\" \
-         height=\"{SURFACE_SIDE}\" preserveAspectRatio=\"none\" \
-         style=\"image-rendering:pixelated\"/>{marks}</svg>",
-        STANDARD.encode(png)
-    ))
+    let diamond = ("the result", "M0 -7l7 7l-7 7l-7 -7z", palette::ESTIMATE);
+    let plus = ("the truth", "M-7 0h14M0 -7v14", palette::TRUTH);
+    let marks = [
+        (Some(Offset::default()), ring),
+        (result, diamond),
+        (truth, plus),
+    ];
+    let marks = marks
+        .into_iter()
+        .filter_map(|(offset, mark)| Some((offset?, mark)));
+    Some(html! {
+        svg viewBox={ "0 0 " (SURFACE_SIDE) " " (SURFACE_SIDE) } width=(SURFACE_SIDE) role="img"
+            aria-label="costs of positions around the reference: yellow the least, dark blue the greatest" {
+            image href=(cells) width=(SURFACE_SIDE) height=(SURFACE_SIDE) preserveAspectRatio="none"
+                style="image-rendering:pixelated" {}
+            @for (offset, (name, shape, color)) in marks {
+                @let (x, y) = place(&surface.lattice, &offset);
+                path d=(shape) transform=(format!("translate({x:.1} {y:.1})")) fill="none" stroke=(hex(color))
+                    stroke-width="3" { title { (name) } }
+            }
+        }
+    })
 }
 
 /// Where an offset is in the picture; what lies outside stays at its border.

@@ -280,13 +280,8 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
     let words = format!("1 of {results} verdicts changed: MI {code} → ok 1");
     assert!(is_said(&window, &words), "{words}");
     // As `posescope diff` counts it.
-    let rows = |results: &Results| -> Vec<posescope::measure::Row> {
-        let rows = results.values().flatten().map(|result| {
-            let line = serde_json::to_value(result).expect("written");
-            serde_json::from_value(line).expect("a row")
-        });
-        rows.collect()
-    };
+    let rows =
+        |results: &Results| -> Vec<QueryResult> { results.values().flatten().cloned().collect() };
     let compared = posescope::measure::RunComparison::of(
         &rows(&before),
         &rows(&now),

@@ -10,6 +10,7 @@ use assert_cmd::Command;
 use posescope::diagnosis::Code;
 use posescope::image::Photo;
 use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
+use posescope::measure::{Plot, RunResults, TableName};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
@@ -89,22 +90,23 @@ fn a_run_folder_holds_what_is_promised() {
         "run.toml",
         "results.jsonl",
         "timings.jsonl",
-        "summary.md",
         "summary.json",
         "junit.xml",
-        "tables/overview.md",
-        "tables/overview.csv",
-        "tables/overview.tex",
-        "plots/recall-kitti-42.svg",
+        "report.html",
         "failures/dropped.txt",
     ] {
         let size = fs::metadata(out.join(file)).map(|file| file.len());
         assert!(size.is_ok_and(|size| size > 0), "{file}");
     }
-    let results: Vec<QueryResult> = read_results(&out)
-        .expect("results")
-        .collect::<Result<_, _>>()
-        .expect("one per line");
+    // Tables and plots follow from the results.
+    let run = RunResults::read(&out).expect("a run");
+    let [summary] = TableName::Summary.of(&run).try_into().expect("one table");
+    assert!(summary.to_markdown().contains("| success (%) |"));
+    assert_eq!(summary.to_csv().lines().count(), 1 + 2);
+    assert!(summary.to_latex().contains("\\begin{tabular}"));
+    let recall = Plot::Recall.svg(&run).expect("the truth is known");
+    assert!(recall.contains("kitti/42"), "{recall}");
+    let results = run.results;
     assert_eq!(results.len(), 24);
     let order = |at: usize| (results[at].query.as_str(), results[at].method.name());
     let expected = [("000000", "fb"), ("000000", "mi"), ("000001", "fb")];

@@ -53,7 +53,7 @@ fn a_run_of_an_earlier_program_is_resumed() {
     let resumed = fs::read_to_string(run.join("results.jsonl")).expect("text");
     assert_eq!(resumed.lines().count(), 6);
     assert!(resumed.starts_with(&first));
-    assert!(run.join("summary.md").exists());
+    assert!(run.join("summary.json").exists());
 }
 
 #[test]

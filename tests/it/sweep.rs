@@ -40,24 +40,24 @@ fn a_sweep_has_a_run_per_value_a_table_and_curves_and_goes_on() {
                 .exists()
         );
     }
-    let table = text(&out.join("tables/sweep.csv"));
+    let table = text(&out.join("sweep.csv"));
     assert_eq!(table.lines().count(), 1 + 3 * 2, "{table}");
     for plot in ["success", "median"] {
-        assert!(text(&out.join(format!("plots/{plot}.svg"))).contains("gamma"));
+        assert!(text(&out.join(format!("{plot}.svg"))).contains("gamma"));
     }
 
     // One value is lost on the way; the others are as they were, and threads make no difference.
     let kept = text(&out.join("gamma=1.25/results.jsonl"));
     let (whole, curve) = (
         text(&out.join("gamma=2.00/results.jsonl")),
-        text(&out.join("plots/median.svg")),
+        text(&out.join("median.svg")),
     );
     fs::remove_dir_all(out.join("gamma=2.00")).expect("is there");
     let gamma = ["--sweep", "gamma=0.5:2:0.75", "--threads", "3", "--resume"];
     eval(&sequence, &out, &gamma).assert().code(0);
     assert_eq!(text(&out.join("gamma=1.25/results.jsonl")), kept);
     assert_eq!(text(&out.join("gamma=2.00/results.jsonl")), whole);
-    assert_eq!(text(&out.join("plots/median.svg")), curve);
+    assert_eq!(text(&out.join("median.svg")), curve);
 
     let ratio = sequence.path().join("ratio");
     let words = [

@@ -8,6 +8,7 @@ mod result;
 mod select;
 mod single;
 mod timing;
+mod words;
 
 pub use choose::Chooser;
 pub use localizer::{LocalizeError, Localizer, Request, is_one_drive};

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use posescope::measure::{Row, read_rows};
+use posescope::localize::QueryResult;
+use posescope::measure::read_rows;
 use posescope::params::Params;
 use posescope::run::{RunFile, ScenePair, Scenes, inputs, is_called, read_run};
 use posescope::scene::{self, Scene};
@@ -78,7 +79,7 @@ pub fn has_failed(before: &Path) -> Result<bool, CliError> {
 }
 
 /// Queries with a result that is wrong or has no pose.
-fn failed(rows: &[Row]) -> BTreeSet<[String; 3]> {
+fn failed(rows: &[QueryResult]) -> BTreeSet<[String; 3]> {
     rows.iter()
         .filter(|row| row.grade.is_failure())
         .map(|row| {

@@ -9,7 +9,7 @@ use super::{Judged, execute, step_summary};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 use crate::cli::terminal::Terminal;
-use crate::cli::{figures, output};
+use crate::cli::{output, table::figures};
 
 /// Runs every value into a folder of its own below `folder`, and writes there how the results follow it.
 pub fn sweep(
@@ -40,14 +40,10 @@ pub fn sweep(
         });
     }
     let table = write_sweep(folder, sweep, &runs)?;
-    step_summary::append(&format!("{}\n", table.markdown()));
+    step_summary::append(&format!("{}\n", table.to_markdown()));
     if !terminal.is_quiet() {
-        output::print(&figures::text(&table, terminal.width()))?;
-        eprintln!(
-            "Runs: {}, curves in {}",
-            folder.display(),
-            folder.join("plots").display()
-        );
+        output::print(&figures(&table, terminal.width()))?;
+        eprintln!("Runs and curves: {}", folder.display());
     }
     match failures.is_empty() {
         true => Ok(()),

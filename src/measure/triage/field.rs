@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use crate::localize::QueryResult;
+use crate::table::Align;
 use crate::text::UnknownWord;
 
 /// A field of a result.
@@ -154,6 +155,34 @@ impl Field {
         }),
     ];
 
+    /// What a table of results also has: nothing to sort or compare by.
+    pub const POSE: &[Self] = &[
+        number(
+            "max_euler",
+            "greatest Euler angle from the truth [°]",
+            2,
+            |r| Some(r.error?.max_euler_deg),
+        ),
+        number("x", "x of the camera in the world [m]", 3, |r| {
+            position(r, 0)
+        }),
+        number("y", "y of the camera in the world [m]", 3, |r| {
+            position(r, 1)
+        }),
+        number("z", "z of the camera in the world [m]", 3, |r| {
+            position(r, 2)
+        }),
+        number(
+            "qx",
+            "x of the rotation to the world, a quaternion",
+            4,
+            |r| quaternion(r, 0),
+        ),
+        number("qy", "y of the quaternion", 4, |r| quaternion(r, 1)),
+        number("qz", "z of the quaternion", 4, |r| quaternion(r, 2)),
+        number("qw", "scalar of the quaternion", 4, |r| quaternion(r, 3)),
+    ];
+
     /// The field of a name.
     ///
     /// # Errors
@@ -165,11 +194,27 @@ impl Field {
             .ok_or_else(|| UnknownWord::among(name, "field", names))
     }
 
+    /// How its values stand in a table.
+    pub fn align(&self) -> Align {
+        match self.decimals {
+            Some(_) => Align::Right,
+            None => Align::Left,
+        }
+    }
+
     /// Its value in a result.
     pub fn of(&self, result: &QueryResult) -> Value {
         match self.read {
             Read::Words(read) => Value::Words(read(result)),
             Read::Number(read) => read(result).map_or(Value::None, Value::Number),
+        }
+    }
+
+    /// Its value with all digits; nothing where there is none.
+    pub fn whole(&self, result: &QueryResult) -> String {
+        match self.of(result) {
+            Value::Number(number) => number.to_string(),
+            _ => self.text(result),
         }
     }
 
@@ -181,6 +226,14 @@ impl Field {
             Value::None => String::new(),
         }
     }
+}
+
+fn position(result: &QueryResult, axis: usize) -> Option<f64> {
+    Some(result.pose.as_ref()?.position_m[axis])
+}
+
+fn quaternion(result: &QueryResult, part: usize) -> Option<f64> {
+    Some(result.pose.as_ref()?.quaternion_xyzw[part])
 }
 
 /// How a value is read.

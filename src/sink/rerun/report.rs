@@ -1,7 +1,5 @@
 //! The report of one query, as Markdown.
 
-use std::fmt::Write as _;
-
 use super::Identity;
 use super::scene::Origin;
 use crate::diagnosis::Grade;
@@ -9,6 +7,7 @@ use crate::geometry::PoseError;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::problem::Problem;
+use crate::table::{Align, Table};
 
 /// What the methods made of one query, so far.
 pub(super) fn markdown(
@@ -53,32 +52,10 @@ pub(super) fn markdown(
 /// What went wrong, in sentences: the primary verdict of each method, what it leads to, what helped.
 fn story(results: &[QueryResult]) -> String {
     let mut text = String::new();
-    for result in results {
-        let Some((primary, others)) = result.diagnosis.split_first() else {
-            continue;
-        };
-        let name = result.method.name().to_uppercase();
-        let name = match &result.fusion {
-            Some(fusion) => format!("{name} {fusion}"),
-            None => name,
-        };
-        let error = result.error.as_ref();
-        let error = error.map_or(String::new(), |error| format!(", {}", error.translation()));
-        text += &format!("**{name}{error}: {}** {}\n\n", primary.code, primary.text);
-        for other in others {
-            text += &format!("- also {}: {}\n", other.code, other.text);
-        }
-        if let Some(explanation) = &result.explanation {
-            for helped in &explanation.helped {
-                let (args, error) = (helped.args.join(" "), helped.error.translation());
-                text += &format!("- helped: `{args}` ({error})\n");
-            }
-            if explanation.helped.is_empty() {
-                text += &format!("- none of {} remedies helped\n", explanation.runs);
-            }
-            if !explanation.complete {
-                text += "- the explanation was stopped before its end\n";
-            }
+    for result in results.iter().filter(|result| !result.diagnosis.is_empty()) {
+        text += &format!("**{}**\n\n", result.headline());
+        for paragraph in result.paragraphs() {
+            text += &format!("- {paragraph}\n");
         }
         text += "\n";
     }
@@ -86,9 +63,16 @@ fn story(results: &[QueryResult]) -> String {
 }
 
 fn errors(results: &[QueryResult]) -> String {
-    let mut text = "| method | error | rotation | max Euler | grade | confidence | reference |\n\
-                    |:--|--:|--:|--:|:--|--:|:--|\n"
-        .to_owned();
+    let header = [
+        "method",
+        "error",
+        "rotation",
+        "max Euler",
+        "grade",
+        "confidence",
+        "reference",
+    ];
+    let mut table = Table::with_notes(header, &[1, 2, 3, 5], 0);
     for result in results {
         let grade = match (result.grade, &result.reason) {
             (Grade::NoPose, Some(reason)) => format!("{}, **{}**", result.grade, reason.code),
@@ -101,19 +85,17 @@ fn errors(results: &[QueryResult]) -> String {
         };
         let confidence = result.confidence.as_ref();
         let confidence = confidence.map(|one| format!("{} {:.2}", one.word, one.probability));
-        row(
-            &mut text,
-            &[
-                result.method.name(),
-                &part(PoseError::translation),
-                &part(PoseError::rotation),
-                &part(PoseError::max_euler),
-                &grade,
-                &confidence.unwrap_or("–".to_owned()),
-                &result.references.join(", "),
-            ],
-        );
+        table.push([
+            result.method_name(),
+            part(PoseError::translation),
+            part(PoseError::rotation),
+            part(PoseError::max_euler),
+            grade,
+            confidence.unwrap_or("–".to_owned()),
+            result.references.join(", "),
+        ]);
     }
+    let mut text = table.to_markdown();
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
         text += &format!("\nThe first reference itself, from the truth: {error}.\n");
@@ -122,15 +104,20 @@ fn errors(results: &[QueryResult]) -> String {
 }
 
 fn features(results: &[QueryResult]) -> String {
-    let mut text = String::new();
+    let header = [
+        "method",
+        "query",
+        "reference",
+        "ratio test",
+        "unique",
+        "depth",
+        "inliers",
+    ];
+    let mut table = Table::new("", "", header);
     for result in results {
         let Some(counts) = &result.counts else {
             continue;
         };
-        if text.is_empty() {
-            text += "## Features\n\n| method | query | reference | ratio test | unique | depth | \
-                     inliers |\n|:--|--:|--:|--:|--:|--:|--:|\n";
-        }
         let numbers = [
             counts.query_keypoints,
             counts.reference_keypoints,
@@ -138,64 +125,69 @@ fn features(results: &[QueryResult]) -> String {
             counts.unique,
             counts.with_depth,
             counts.inliers,
-        ]
-        .map(|count| count.to_string());
-        let mut cells: Vec<&str> = vec![result.method.name()];
-        cells.extend(numbers.iter().map(String::as_str));
-        row(&mut text, &cells);
+        ];
+        let numbers = numbers.map(|count| count.to_string());
+        table.push([result.method_name()].into_iter().chain(numbers));
     }
-    text + "\n"
+    section("Features", &table)
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or("–".to_owned(), |value| format!("{value:.4}"))
 }
 
 fn costs(results: &[QueryResult]) -> String {
-    let mut text = String::new();
+    let header = [
+        "method",
+        "result",
+        "truth",
+        "reference",
+        "shuffled",
+        "runner-up",
+        "coverage",
+        "evaluations",
+    ];
+    let mut table = Table::new("", "", header);
     for result in results {
         let Some(cost) = &result.cost else { continue };
-        if text.is_empty() {
-            text += "## Costs\n\n| method | result | truth | reference | shuffled | runner-up | \
-                     coverage | evaluations |\n|:--|--:|--:|--:|--:|--:|--:|--:|\n";
-        }
-        let number = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.4}"));
-        row(
-            &mut text,
-            &[
-                result.method.name(),
-                &number(Some(cost.best)),
-                &number(cost.truth),
-                &number(cost.initial),
-                &number(cost.shuffled),
-                &number(cost.runner_up),
-                &format!("{:.2} %", 100.0 * cost.coverage_best),
-                &cost.evaluations.to_string(),
-            ],
-        );
+        table.push([
+            result.method_name(),
+            number(Some(cost.best)),
+            number(cost.truth),
+            number(cost.initial),
+            number(cost.shuffled),
+            number(cost.runner_up),
+            format!("{:.2} %", 100.0 * cost.coverage_best),
+            cost.evaluations.to_string(),
+        ]);
     }
-    text + "\n"
+    section("Costs", &table)
 }
 
 /// What our costs say of the poses of other systems.
 fn costs_at_poses(results: &[QueryResult]) -> String {
-    let mut text = String::new();
+    let mut table = Table::new("", "", ["pose", "cost of", "pose", "truth", "coverage"]);
+    table.align[1] = Align::Left;
     for result in results {
         for at_pose in &result.costs_at_pose {
-            if text.is_empty() {
-                text += "## Costs at the poses of other systems\n\n| pose | cost of | pose | truth | \
-                         coverage |\n|:--|:--|--:|--:|--:|\n";
-            }
-            let number = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.4}"));
-            row(
-                &mut text,
-                &[
-                    result.method.name(),
-                    at_pose.method.name(),
-                    &number(at_pose.cost),
-                    &number(at_pose.truth),
-                    &format!("{:.2} %", 100.0 * at_pose.coverage),
-                ],
-            );
+            table.push([
+                result.method.to_string(),
+                at_pose.method.to_string(),
+                number(at_pose.cost),
+                number(at_pose.truth),
+                format!("{:.2} %", 100.0 * at_pose.coverage),
+            ]);
         }
     }
-    text + "\n"
+    section("Costs at the poses of other systems", &table)
+}
+
+/// A table below its title; nothing without rows.
+fn section(title: &str, table: &Table) -> String {
+    match table.rows.is_empty() {
+        true => "\n".to_owned(),
+        false => format!("## {title}\n\n{}\n", table.to_markdown()),
+    }
 }
 
 fn changes(configuration: &str) -> String {
@@ -214,16 +206,6 @@ fn changes(configuration: &str) -> String {
     text
 }
 
-/// A bar inside a cell would end it.
-fn row(text: &mut String, cells: &[&str]) {
-    for cell in cells {
-        let cell = cell.replace('|', "\\|");
-        // Writing to a string cannot fail.
-        let _ = write!(text, "| {cell} ");
-    }
-    text.push_str("|\n");
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -236,12 +218,5 @@ mod tests {
             text.contains("- `fb.ratio=0.7`") && !text.contains("depth"),
             "{text}"
         );
-    }
-
-    #[test]
-    fn a_bar_in_a_reason_does_not_end_its_cell() {
-        let mut text = String::new();
-        row(&mut text, &["fb", "a|b"]);
-        assert_eq!(text, "| fb | a\\|b |\n");
     }
 }

@@ -1,0 +1,338 @@
+//! Charts as SVG: two axes, marks in their units, and a legend.
+
+use maud::{Markup, PreEscaped, html};
+
+use crate::palette::Rgb;
+
+/// Size of what the axes enclose \[px\].
+const SIZE: (f64, f64) = (500.0, 300.0);
+/// What stands around it: left, above, right, below \[px\].
+const AROUND: [f64; 4] = [52.0, 24.0, 12.0, 44.0];
+/// Height of a line of the legend, and width of one of its entries \[px\].
+const LEGEND: (f64, f64) = (18.0, 92.0);
+
+/// Marks between two axes.
+#[derive(Clone, Debug)]
+pub(crate) struct Chart {
+    /// What it shows.
+    pub title: String,
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// From the lowest to the uppermost.
+    pub marks: Vec<Mark>,
+    /// What colours mean.
+    pub legend: Vec<(String, Rgb)>,
+}
+
+/// An axis with its numbers or names.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    label: String,
+    ends: (f64, f64),
+    is_log: bool,
+    ticks: Vec<(f64, String)>,
+    length_px: Option<f64>,
+}
+
+/// A shape in the units of the axes.
+#[derive(Clone, Debug)]
+pub(crate) struct Mark {
+    /// What is drawn.
+    pub shape: Shape,
+    /// In which colour.
+    pub color: Rgb,
+    /// What a pointer on it reads.
+    pub title: String,
+    /// The part of the page that it leads to.
+    pub link: Option<String>,
+}
+
+/// What is drawn.
+#[derive(Clone, Debug)]
+pub(crate) enum Shape {
+    /// A line through points.
+    Line(Vec<(f64, f64)>),
+    /// A dot; hollow where there is nothing to measure.
+    Dot { at: (f64, f64), filled: bool },
+    /// A rectangle between two corners.
+    Bar { from: (f64, f64), to: (f64, f64) },
+    /// Words, moved by so many pixels.
+    Words {
+        at: (f64, f64),
+        by: (f64, f64),
+        text: String,
+    },
+}
+
+impl Mark {
+    /// A mark without a title.
+    pub(crate) fn new(shape: Shape, color: Rgb) -> Self {
+        Self {
+            shape,
+            color,
+            title: String::new(),
+            link: None,
+        }
+    }
+
+    /// Words in the middle of a place.
+    pub(crate) fn words(text: impl Into<String>, at: (f64, f64), by: (f64, f64)) -> Self {
+        let text = text.into();
+        Self::new(Shape::Words { at, by, text }, [0; 3])
+    }
+
+    /// With what a pointer on it reads.
+    pub(crate) fn titled(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+}
+
+impl Axis {
+    /// Numbers from one to another, with ticks at round ones.
+    pub(crate) fn linear(label: impl Into<String>, from: f64, to: f64) -> Self {
+        let to = if to > from { to } else { from + 1e-3 };
+        let step = round_up((to - from) / 6.0);
+        let first = (from / step).ceil();
+        let ticks = (0..=6).map(|index| first + f64::from(index));
+        let ticks = ticks
+            .map(|count| count * step)
+            .filter(|tick| *tick <= to * (1.0 + 1e-9));
+        let decimals = (-step.log10().floor()).max(0.0) as usize;
+        Self {
+            label: label.into(),
+            ends: (from, to),
+            is_log: false,
+            ticks: ticks
+                .map(|tick| (tick, format!("{tick:.decimals$}")))
+                .collect(),
+            length_px: None,
+        }
+    }
+
+    /// A share of the queries.
+    pub(crate) fn percent(label: impl Into<String>) -> Self {
+        Self::linear(label, 0.0, 100.0)
+    }
+
+    /// Positive numbers by their logarithm, with ticks at powers of ten.
+    pub(crate) fn log(label: impl Into<String>, from: f64, to: f64) -> Self {
+        let powers = from.log10().ceil() as i32..=to.log10().floor() as i32;
+        let ticks = powers.map(|power| 10_f64.powi(power));
+        Self {
+            ticks: ticks.map(|tick| (tick, format!("{tick}"))).collect(),
+            is_log: true,
+            ..Self::linear(label, from, to)
+        }
+    }
+
+    /// A place of width 1 for each name.
+    pub(crate) fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
+        let names = names.into_iter().enumerate();
+        let ticks: Vec<_> = names.map(|(at, name)| (at as f64 + 0.5, name)).collect();
+        Self {
+            ends: (0.0, ticks.len().max(1) as f64),
+            ticks,
+            ..Self::linear(label, 0.0, 1.0)
+        }
+    }
+
+    /// With another length \[px\].
+    pub(crate) fn long(mut self, length_px: f64) -> Self {
+        self.length_px = Some(length_px);
+        self
+    }
+
+    /// The place of a number, from 0 to 1.
+    fn share(&self, value: f64) -> f64 {
+        let scale = |value: f64| if self.is_log { value.log10() } else { value };
+        let (from, to) = (scale(self.ends.0), scale(self.ends.1));
+        (scale(value) - from) / (to - from)
+    }
+}
+
+impl Chart {
+    /// The chart as a part of a page.
+    pub(crate) fn markup(&self) -> Markup {
+        self.svg(false, 0.0)
+    }
+
+    fn inside(&self) -> (f64, f64) {
+        let (width, height) = (self.x.length_px, self.y.length_px);
+        (width.unwrap_or(SIZE.0), height.unwrap_or(SIZE.1))
+    }
+
+    fn legend_rows(&self) -> f64 {
+        let in_row = (self.inside().0 / LEGEND.1).max(1.0).floor();
+        (self.legend.len() as f64 / in_row).ceil()
+    }
+
+    fn size(&self) -> (f64, f64) {
+        let ((width, height), [left, above, right, below]) = (self.inside(), AROUND);
+        (
+            width + left + right,
+            height + above + below + LEGEND.0 * self.legend_rows(),
+        )
+    }
+
+    /// With its title where it stands alone, this far down.
+    fn svg(&self, is_alone: bool, down: f64) -> Markup {
+        let ((width, height), (inner, tall)) = (self.size(), self.inside());
+        let (left, top) = (AROUND[0], AROUND[1]);
+        let x = |value: f64| format!("{:.1}", left + inner * self.x.share(value));
+        let y = |value: f64| format!("{:.1}", top + tall * (1.0 - self.y.share(value)));
+        let bottom = top + tall;
+        let below = bottom + 34.0;
+        html! {
+            svg role="img" aria-label=(self.title) width=(width) height=(height) y=[is_alone.then_some(down)]
+                viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif" font-size="11" {
+                @if is_alone { text x=(left) y="14" font-size="13" { (self.title) } }
+                g stroke="#ddd" {
+                    @for (at, _) in &self.y.ticks { path d={ "M" (left) " " (y(*at)) "h" (inner) } {} }
+                }
+                path d={ "M" (left) " " (top) "v" (tall) "h" (inner) } fill="none" stroke="#000" {}
+                g text-anchor="middle" {
+                    @for (at, name) in &self.x.ticks { text x=(x(*at)) y=(bottom + 15.0) { (name) } }
+                    text x=(left + inner / 2.0) y=(bottom + 31.0) { (self.x.label) }
+                    text transform={ "translate(12 " (top + tall / 2.0) ") rotate(-90)" } { (self.y.label) }
+                }
+                g text-anchor="end" {
+                    @for (at, name) in &self.y.ticks { text x=(left - 5.0) y=(y(*at)) dy="4" { (name) } }
+                }
+                @for mark in &self.marks {
+                    @if let (Some(link), false) = (&mark.link, is_alone) {
+                        a href=(link) { (drawn(mark, &x, &y)) }
+                    } @else { (drawn(mark, &x, &y)) }
+                }
+                @for (at, (name, color)) in self.legend.iter().enumerate() {
+                    @let in_row = (inner / LEGEND.1).max(1.0) as usize;
+                    @let (column, row) = ((at % in_row) as f64, (at / in_row) as f64);
+                    @let (from, line) = (left + LEGEND.1 * column, below + 4.0 + LEGEND.0 * row);
+                    rect x=(from) y=(line) width="10" height="10" fill=(hex(*color)) {}
+                    text x=(from + 14.0) y=(line + 9.0) { (name) }
+                }
+            }
+        }
+    }
+}
+
+fn drawn(mark: &Mark, x: &dyn Fn(f64) -> String, y: &dyn Fn(f64) -> String) -> Markup {
+    let color = hex(mark.color);
+    let title = html! { @if !mark.title.is_empty() { title { (mark.title) } } };
+    match &mark.shape {
+        Shape::Line(points) => {
+            let points: Vec<String> = points
+                .iter()
+                .map(|at| format!("{},{}", x(at.0), y(at.1)))
+                .collect();
+            html! { polyline points=(points.join(" ")) fill="none" stroke=(color) stroke-width="2" { (title) } }
+        }
+        Shape::Dot { at, filled: true } => {
+            html! { circle cx=(x(at.0)) cy=(y(at.1)) r="3" fill=(color) fill-opacity="0.7" { (title) } }
+        }
+        Shape::Dot { at, filled: false } => {
+            html! { circle cx=(x(at.0)) cy=(y(at.1)) r="3" fill="none" stroke=(color) { (title) } }
+        }
+        Shape::Bar { from, to } => html! {
+            path d={ "M" (x(from.0)) " " (y(from.1)) "H" (x(to.0)) "V" (y(to.1)) "H" (x(from.0)) "Z" }
+                fill=(color) { (title) }
+        },
+        Shape::Words { at, by, text } => html! {
+            text x=(x(at.0)) y=(y(at.1)) dx=(by.0) dy=(by.1) text-anchor="middle" { (text) }
+        },
+    }
+}
+
+/// Charts below each other as a file of their own.
+pub(crate) fn file(charts: &[Chart]) -> String {
+    let width = charts
+        .iter()
+        .map(|chart| chart.size().0)
+        .fold(0.0, f64::max);
+    let height: f64 = charts.iter().map(|chart| chart.size().1).sum();
+    let mut down = 0.0;
+    let stacked = charts.iter().map(|chart| {
+        let svg = chart.svg(true, down);
+        down += chart.size().1;
+        svg.into_string()
+    });
+    let stacked: String = stacked.collect();
+    html! {
+        svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height)
+            viewBox={ "0 0 " (width) " " (height) } {
+            rect width="100%" height="100%" fill="#fff" {}
+            (PreEscaped(stacked))
+        }
+    }
+    .into_string()
+        + "\n"
+}
+
+/// A colour as markup says it.
+pub(crate) fn hex([r, g, b]: Rgb) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// The next of 1, 2, 5 times a power of ten.
+pub(crate) fn round_up(width: f64) -> f64 {
+    let power = 10_f64.powf(width.max(1e-9).log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0];
+    let enough = steps.into_iter().find(|step| step * power >= width);
+    enough.unwrap_or(10.0) * power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_lie_between_the_axes_and_their_words_are_no_markup() {
+        let dot = Shape::Dot {
+            at: (1.0, 10.0),
+            filled: true,
+        };
+        let mut mark = Mark::new(dot, [0, 114, 178]).titled("a < \"b\"");
+        mark.link = Some("#r1".to_owned());
+        let chart = Chart {
+            title: "errors".to_owned(),
+            x: Axis::linear("start (m)", 0.0, 2.0),
+            y: Axis::log("error (m)", 1.0, 100.0),
+            marks: vec![mark],
+            legend: vec![("FB".to_owned(), [0, 114, 178])],
+        };
+        let svg = chart.markup().into_string();
+        let (middle, half) = (AROUND[0] + SIZE.0 / 2.0, AROUND[1] + SIZE.1 / 2.0);
+        let dot = format!("<a href=\"#r1\"><circle cx=\"{middle:.1}\" cy=\"{half:.1}\"");
+        assert!(svg.contains(&dot), "{svg}");
+        assert!(svg.contains("<title>a &lt; &quot;b&quot;</title>"), "{svg}");
+        assert!(!svg.contains("xmlns"));
+        let file = file(&[chart.clone(), chart]);
+        assert!(
+            file.starts_with("<svg xmlns=") && !file.contains("href"),
+            "{file}"
+        );
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        let names = |axis: Axis| {
+            axis.ticks
+                .into_iter()
+                .map(|tick| tick.1)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            names(Axis::percent("")),
+            ["0", "20", "40", "60", "80", "100"]
+        );
+        assert_eq!(
+            names(Axis::linear("", 0.5, 2.0)),
+            ["0.5", "1.0", "1.5", "2.0"]
+        );
+        assert_eq!(names(Axis::log("", 0.05, 200.0)), ["0.1", "1", "10", "100"]);
+        let widths = [0.7, 1.0, 1.01, 2.5, 6.0, 30.0].map(round_up);
+        assert_eq!(widths, [1.0, 1.0, 2.0, 5.0, 10.0, 50.0]);
+    }
+}

@@ -1,0 +1,46 @@
+//! The results of a run and what they amount to: all that tables and plots need.
+
+use std::path::Path;
+
+use super::metrics::{Measures, measure};
+use crate::localize::QueryResult;
+use crate::run::{FolderError, read_results, read_run};
+
+/// The results of a run with their figures.
+#[derive(Clone, Debug)]
+pub struct RunResults {
+    /// Every result, in the order of the run.
+    pub results: Vec<QueryResult>,
+    /// The figures by group and method.
+    pub measures: Vec<Measures>,
+    /// The translation error from which on a pose counts as a failure \[m\].
+    pub failure_radius_m: f64,
+}
+
+impl RunResults {
+    /// Measures results.
+    pub fn of(results: Vec<QueryResult>, failure_radius_m: f64) -> Self {
+        Self {
+            measures: measure(&results, failure_radius_m),
+            results,
+            failure_radius_m,
+        }
+    }
+
+    /// Reads and measures the results of a run folder.
+    ///
+    /// # Errors
+    /// A folder without a run, or a line that is no result.
+    pub fn read(folder: &Path) -> Result<Self, FolderError> {
+        let radius_m = read_run(folder)?.failure_radius_m;
+        Ok(Self::of(read_rows(folder)?, radius_m))
+    }
+}
+
+/// Reads the results of a folder.
+///
+/// # Errors
+/// A line that is no result.
+pub fn read_rows(folder: &Path) -> Result<Vec<QueryResult>, FolderError> {
+    read_results(folder)?.collect()
+}

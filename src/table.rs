@@ -1,0 +1,428 @@
+//! Tables of text, for terminals of any width, pipes, Markdown, CSV and LaTeX.
+
+/// How the cells of a column stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    /// Words.
+    Left,
+    /// Numbers.
+    Right,
+    /// Sentences. In a narrow terminal they wrap below their row.
+    Note,
+}
+
+/// Cells of text under a header.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// A name that can be part of a file's name.
+    pub name: String,
+    /// What the table shows.
+    pub caption: String,
+    /// One cell per column.
+    pub header: Vec<String>,
+    /// The rows, each with as many cells as the header.
+    pub rows: Vec<Vec<String>>,
+    /// One per column. Only the last can be [`Align::Note`].
+    pub align: Vec<Align>,
+    /// How many cells at the front several rows have in common.
+    pub shared: usize,
+}
+
+impl Table {
+    /// A table without rows: the first column words, the others numbers.
+    pub fn new(
+        name: impl Into<String>,
+        caption: impl Into<String>,
+        header: impl IntoIterator<Item = impl Into<String>>,
+    ) -> Self {
+        let header: Vec<String> = header.into_iter().map(Into::into).collect();
+        let align = (0..header.len()).map(|at| match at {
+            0 => Align::Left,
+            _ => Align::Right,
+        });
+        Self {
+            name: name.into(),
+            caption: caption.into(),
+            align: align.collect(),
+            header,
+            rows: Vec::new(),
+            shared: 0,
+        }
+    }
+
+    /// A table without name and caption that has words in all columns but those that `right` names, and
+    /// sentences in the last.
+    pub fn with_notes<const N: usize>(header: [&str; N], right: &[usize], shared: usize) -> Self {
+        let align = (0..N).map(|at| match at {
+            at if at + 1 == N => Align::Note,
+            at if right.contains(&at) => Align::Right,
+            _ => Align::Left,
+        });
+        Self {
+            align: align.collect(),
+            shared,
+            ..Self::new("", "", header)
+        }
+    }
+
+    /// Adds a row; cells that are missing stay empty.
+    pub fn push(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
+        let mut row: Vec<String> = cells.into_iter().map(Into::into).collect();
+        row.resize(self.header.len(), String::new());
+        self.rows.push(row);
+    }
+
+    /// For a terminal of this width, or for a pipe, where lines have any length.
+    ///
+    /// A row that does not fit is arranged otherwise. Sentences wrap below it, and what rows share stands
+    /// above them. A table without sentences is turned: a line per column.
+    pub fn to_text(&self, width: Option<usize>) -> String {
+        let limit = width.unwrap_or(usize::MAX);
+        let caption = match self.caption.as_str() {
+            "" => String::new(),
+            caption => wrapped(caption, limit, "") + "\n",
+        };
+        let all: Vec<&[String]> = self.all().collect();
+        let lines = aligned(&all, &self.align);
+        let body = match lines.iter().all(|line| length(line) <= limit) {
+            true => lines.iter().map(|line| line.clone() + "\n").collect(),
+            false if self.align.last() == Some(&Align::Note) => self.with_notes_below(limit),
+            false => self.turned(limit),
+        };
+        caption + &body
+    }
+
+    /// The header and the rows.
+    fn all(&self) -> impl Iterator<Item = &[String]> {
+        [&self.header]
+            .into_iter()
+            .chain(&self.rows)
+            .map(Vec::as_slice)
+    }
+
+    fn with_notes_below(&self, width: usize) -> String {
+        let (from, to) = (self.shared, self.header.len() - 1);
+        let inner: Vec<&[String]> = self.all().map(|row| &row[from..to]).collect();
+        let mut lines = aligned(&inner, &self.align[from..to]).into_iter();
+        let head = format!("  {}\n", lines.next().unwrap_or_default());
+        let mut text = String::new();
+        let mut last: Option<&[String]> = None;
+        for (row, line) in self.rows.iter().zip(lines) {
+            let shared = &row[..from];
+            if last != Some(shared) {
+                if last.is_some() {
+                    text.push('\n');
+                }
+                let parts = self.header.iter().zip(shared);
+                let parts = parts.filter(|(_, cell)| !cell.is_empty());
+                let parts: Vec<String> =
+                    parts.map(|(name, cell)| format!("{name} {cell}")).collect();
+                if !parts.is_empty() {
+                    text += &wrapped(&parts.join(", "), width, "");
+                }
+                text += &head;
+            }
+            last = Some(shared);
+            text += &format!("  {line}\n");
+            if !row[to].is_empty() {
+                text += &wrapped(&format!("    {}", row[to]), width, "    ");
+            }
+        }
+        text
+    }
+
+    /// A line per column, and beside each other as many rows as fit, below what they share.
+    fn turned(&self, width: usize) -> String {
+        let from = self.shared;
+        let labels = self.header.iter().skip(from).enumerate();
+        // The names of rows need none themselves.
+        let labels: Vec<&str> = labels
+            .map(|(at, label)| if at == 0 { "" } else { label.as_str() })
+            .collect();
+        let label_width = labels.iter().map(|label| length(label)).max().unwrap_or(0);
+        let mut text = String::new();
+        for group in self
+            .rows
+            .chunk_by(|a, b| from == 0 || a[..from] == b[..from])
+        {
+            if let (true, Some(first)) = (from > 0, group.first()) {
+                text += &format!("{}\n", first[..from].join(", "));
+            }
+            let mut rest = group;
+            while !rest.is_empty() {
+                let mut taken = 2 + label_width;
+                let fits = rest.iter().take_while(|row| {
+                    let cells = row.iter().skip(from);
+                    taken += 2 + cells.map(|cell| length(cell)).max().unwrap_or(0);
+                    taken <= width
+                });
+                let (now, later) = rest.split_at(fits.count().max(1));
+                let lines: Vec<Vec<String>> = (labels.iter().enumerate())
+                    .map(|(at, label)| {
+                        let cells = now.iter().map(|row| row[from + at].clone());
+                        [(*label).to_owned()].into_iter().chain(cells).collect()
+                    })
+                    .collect();
+                let lines: Vec<&[String]> = lines.iter().map(Vec::as_slice).collect();
+                let mut align = vec![Align::Right; now.len() + 1];
+                align[0] = Align::Left;
+                for line in aligned(&lines, &align) {
+                    text += &format!("  {line}\n");
+                }
+                text.push('\n');
+                rest = later;
+            }
+        }
+        text
+    }
+
+    /// With the caption above.
+    pub fn to_markdown(&self) -> String {
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let rule = self.align.iter().map(|align| match align {
+            Align::Right => "--:|",
+            Align::Left | Align::Note => ":--|",
+        });
+        let caption = match self.caption.as_str() {
+            "" => String::new(),
+            caption => format!("{caption}\n\n"),
+        };
+        let rule: String = rule.collect();
+        let mut text = format!("{caption}{}|{rule}\n", line(&self.header));
+        for row in &self.rows {
+            text += &line(row);
+        }
+        text
+    }
+
+    /// With the header as first record.
+    pub fn to_csv(&self) -> String {
+        let record = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
+            cells.join(",") + "\n"
+        };
+        self.all().map(record).collect()
+    }
+
+    /// A `table` environment with rules of `booktabs`.
+    pub fn to_latex(&self) -> String {
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
+            format!("    {} \\\\\n", cells.join(" & "))
+        };
+        let columns = self.align.iter().map(|align| match align {
+            Align::Right => 'r',
+            Align::Left | Align::Note => 'l',
+        });
+        let columns: String = columns.collect();
+        let mut text = format!(
+            "% needs \\usepackage{{booktabs}}\n\\begin{{table}}\n  \\centering\n  \\caption{{{}}}\n  \
+             \\begin{{tabular}}{{{columns}}}\n    \\toprule\n",
+            escaped(&self.caption)
+        );
+        text += &line(&self.header);
+        text += "    \\midrule\n";
+        for row in &self.rows {
+            text += &line(row);
+        }
+        text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"
+    }
+}
+
+/// A line for each row. Sentences are not filled up.
+fn aligned(rows: &[&[String]], align: &[Align]) -> Vec<String> {
+    let width = |at: usize| rows.iter().map(|row| length(&row[at])).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..align.len()).map(width).collect();
+    let line = |row: &&[String]| {
+        let cells = row.iter().zip(&widths).zip(align);
+        let cells = cells.map(|((cell, &width), align)| match align {
+            Align::Left => format!("{cell:<width$}"),
+            Align::Right => format!("{cell:>width$}"),
+            Align::Note => cell.clone(),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
+}
+
+/// A paragraph in lines of at most this many characters; those after the first start with `indent`. The
+/// first keeps its own indentation. A word that is longer than a line stays whole.
+pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> String {
+    let words = paragraph.trim_start();
+    let mut line = paragraph[..paragraph.len() - words.len()].to_owned();
+    let mut text = String::new();
+    let mut is_empty = true;
+    for word in words.split_whitespace() {
+        if !is_empty && length(&line) + 1 + length(word) > width {
+            text += &line;
+            text.push('\n');
+            line = indent.to_owned();
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line += word;
+        is_empty = false;
+    }
+    text + &line + "\n"
+}
+
+fn length(text: &str) -> usize {
+    text.chars().count()
+}
+
+/// A field of a record, after RFC 4180.
+fn quoted(cell: &str) -> String {
+    match cell.contains(['"', ',', '\n', '\r']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.to_owned(),
+    }
+}
+
+/// Text as LaTeX sets it.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::new();
+    for character in text.chars() {
+        match character {
+            '%' | '&' | '#' | '_' | '$' | '{' | '}' => {
+                escaped.push('\\');
+                escaped.push(character);
+            }
+            '\\' => escaped.push_str("\\textbackslash{}"),
+            '~' => escaped.push_str("\\textasciitilde{}"),
+            '^' => escaped.push_str("\\textasciicircum{}"),
+            '°' => escaped.push_str("\\textdegree{}"),
+            '≥' => escaped.push_str("$\\ge$"),
+            '←' => escaped.push_str("$\\leftarrow$"),
+            '–' => escaped.push_str("--"),
+            _ => escaped.push(character),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_form_holds_what_would_break_it() {
+        let mut table = Table::new("t", "100 % of a_b", ["method", "RMSE (m)"]);
+        table.push(["a|b, \"c\"", "1.0"]);
+        table.push(["only"]);
+        let markdown = "100 % of a_b\n\n| method | RMSE (m) |\n|:--|--:|\n\
+                        | a\\|b, \"c\" | 1.0 |\n| only |  |\n";
+        assert_eq!(table.to_markdown(), markdown);
+        assert_eq!(
+            table.to_csv(),
+            "method,RMSE (m)\n\"a|b, \"\"c\"\"\",1.0\nonly,\n"
+        );
+        let latex = table.to_latex();
+        assert!(latex.contains("\\caption{100 \\% of a\\_b}"), "{latex}");
+        assert!(latex.contains("\\begin{tabular}{lr}"), "{latex}");
+        assert!(latex.contains("    only &  \\\\\n"), "{latex}");
+    }
+
+    fn with_notes() -> Table {
+        let mut table = Table::with_notes(["query", "method", "error", "evidence"], &[2], 1);
+        for row in [
+            [
+                "000070",
+                "fb",
+                "0.1 m",
+                "20 inliers of 61 matches with depth",
+            ],
+            [
+                "000070",
+                "mi",
+                "12.5 m",
+                "D3 the search missed a cheaper pose near the truth",
+            ],
+            ["000071", "fb", "", ""],
+        ] {
+            table.push(row);
+        }
+        table
+    }
+
+    #[test]
+    fn a_row_is_a_line_where_everything_fits() {
+        let expected = "\
+query   method   error  evidence
+000070  fb       0.1 m  20 inliers of 61 matches with depth
+000070  mi      12.5 m  D3 the search missed a cheaper pose near the truth
+000071  fb
+";
+        assert_eq!(with_notes().to_text(None), expected);
+        assert_eq!(with_notes().to_text(Some(80)), expected);
+    }
+
+    #[test]
+    fn where_it_does_not_fit_what_is_shared_stands_above_and_notes_below() {
+        let expected = "\
+query 000070
+  method   error
+  fb       0.1 m
+    20 inliers of 61 matches with depth
+  mi      12.5 m
+    D3 the search missed a cheaper pose
+    near the truth
+
+query 000071
+  method   error
+  fb
+";
+        assert_eq!(with_notes().to_text(Some(40)), expected);
+    }
+
+    #[test]
+    fn a_table_of_figures_is_turned_where_it_is_too_wide() {
+        let mut table = Table::new(
+            "t",
+            "How well it went",
+            ["", "method", "queries", "success (%)"],
+        );
+        table.shared = 1;
+        table.push(["street, 15 m", "FB", "3", "66.7"]);
+        table.push(["street, 15 m", "MI", "3", "100.0"]);
+        table.push(["town, 15 m", "FB", "4", "25.0"]);
+        let wide = "\
+How well it went
+
+              method  queries  success (%)
+street, 15 m      FB        3         66.7
+street, 15 m      MI        3        100.0
+town, 15 m        FB        4         25.0
+";
+        assert_eq!(table.to_text(Some(80)), wide);
+        let narrow = "\
+How well it went
+
+street, 15 m
+                 FB     MI
+  queries         3      3
+  success (%)  66.7  100.0
+
+town, 15 m
+                 FB
+  queries         4
+  success (%)  25.0
+
+";
+        assert_eq!(table.to_text(Some(30)), narrow);
+    }
+
+    #[test]
+    fn words_stay_whole() {
+        assert_eq!(wrapped("  a bc def", 6, "__"), "  a bc\n__def\n");
+        assert_eq!(
+            wrapped("incomprehensible a", 6, ""),
+            "incomprehensible\na\n"
+        );
+        assert_eq!(wrapped("", 6, ""), "\n");
+    }
+}
