@@ -28,7 +28,7 @@ mod triage;
 pub use crate::relation::Relation;
 pub use diff::{Change, Difference, RunComparison};
 #[cfg(feature = "cli")]
-pub use export::{Export, ExportError, ExportedFile, Format, ResultChoice, export};
+pub use export::{Export, ExportError, ExportedFile, Format, export};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownError, KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use posescope::measure::{Export, ExportError, ResultChoice, export};
+use posescope::localize::QueryResult;
+use posescope::measure::{Export, ExportError, export};
 use posescope::run::{FolderError, read_run};
 
 use super::args::ExportArgs;
@@ -13,14 +14,17 @@ use super::terminal::Terminal;
 /// Runs the command.
 pub fn run(args: &ExportArgs, terminal: &Terminal) -> Result<(), CliError> {
     let run = read_run(&args.run)?;
-    let choice = ResultChoice {
-        method: args.method,
-        fusion: args.fusion,
-        radius_m: args.radius,
-        references: args.references,
-        scene: args.scene.clone(),
+    let takes = |result: &QueryResult| {
+        let setting = result.setting;
+        let radius = setting.map(|setting| setting.radius_m);
+        let references = setting.map(|setting| setting.references);
+        args.method.is_none_or(|method| method == result.method)
+            && (args.scene.as_ref()).is_none_or(|scene| *scene == result.scene)
+            && (args.fusion.is_none() || args.fusion == result.fusion)
+            && (args.radius.is_none() || args.radius == radius)
+            && (args.references.is_none() || args.references == references)
     };
-    let Export { files, left_out } = match export(&args.run, &run, args.format, &choice) {
+    let Export { files, left_out } = match export(&args.run, &run, args.format, &takes) {
         Ok(export) => export,
         Err(ExportError::Folder(error)) => return Err(error.into()),
         Err(error) => return Err(CliError::Usage(error.to_string())),

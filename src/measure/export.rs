@@ -11,7 +11,6 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use super::results::{RunResults, read_rows};
 use super::tables::{rows, tables};
 use super::triage::Field;
-use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -55,32 +54,6 @@ impl Format {
     }
 }
 
-/// Which of several results of a query is meant.
-#[derive(Clone, Debug, Default)]
-pub struct ResultChoice {
-    /// The method.
-    pub method: Option<Method>,
-    /// The fusion.
-    pub fusion: Option<Fusion>,
-    /// The uncertainty radius \[m\].
-    pub radius_m: Option<f64>,
-    /// The number of references asked for.
-    pub references: Option<usize>,
-    /// The scene of the references.
-    pub scene: Option<String>,
-}
-
-impl ResultChoice {
-    fn takes(&self, result: &QueryResult) -> bool {
-        let setting = result.setting;
-        (self.method).is_none_or(|method| method == result.method)
-            && (self.scene.as_ref()).is_none_or(|scene| *scene == result.scene)
-            && (self.fusion.is_none() || self.fusion == result.fusion)
-            && (self.radius_m).is_none_or(|radius| setting.is_some_and(|s| s.radius_m == radius))
-            && (self.references).is_none_or(|count| setting.is_some_and(|s| s.references == count))
-    }
-}
-
 /// Why a run cannot be exported in a format.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
@@ -119,6 +92,9 @@ pub enum ExportError {
     },
 }
 
+/// Which results are meant.
+type Choice<'a> = &'a dyn Fn(&QueryResult) -> bool;
+
 /// A file of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExportedFile {
@@ -143,7 +119,7 @@ struct Localized<'a> {
     pose: Option<Pose>,
 }
 
-/// Exports a run.
+/// Exports the results of a run that `takes` chooses: with a pose format, one for each query.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -151,10 +127,10 @@ pub fn export(
     folder: &Path,
     run: &RunFile,
     format: Format,
-    choice: &ResultChoice,
+    takes: Choice<'_>,
 ) -> Result<Export, ExportError> {
     match format {
-        Format::Csv => return single(csv(folder, choice)?),
+        Format::Csv => return single(csv(folder, takes)?),
         Format::Latex => {
             let preset = run.experiment.map(|one| one.name());
             let tables = tables(&RunResults::read(folder)?, preset);
@@ -163,7 +139,7 @@ pub fn export(
         }
         Format::Tum | Format::Kitti | Format::Colmap | Format::Vloc => {}
     }
-    let localized = localized(folder, run, choice)?;
+    let localized = localized(folder, run, takes)?;
     if localized.is_empty() {
         return Err(ExportError::Nothing);
     }
@@ -192,7 +168,7 @@ fn single(text: String) -> Result<Export, ExportError> {
 fn localized<'a>(
     folder: &Path,
     run: &'a RunFile,
-    choice: &ResultChoice,
+    takes: Choice<'_>,
 ) -> Result<Vec<Localized<'a>>, ExportError> {
     let per_item = run.results_per_item();
     let mut all = Vec::new();
@@ -201,7 +177,7 @@ fn localized<'a>(
         let mut chosen: Option<QueryResult> = None;
         for result in results.by_ref().take(per_item) {
             let result = result?;
-            if !choice.takes(&result) {
+            if !takes(&result) {
                 continue;
             }
             if chosen.is_some() {
@@ -317,8 +293,8 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
 }
 
 /// Every chosen result with all its fields, numbers in full.
-fn csv(folder: &Path, choice: &ResultChoice) -> Result<String, FolderError> {
+fn csv(folder: &Path, takes: Choice<'_>) -> Result<String, FolderError> {
     let mut results = read_rows(folder)?;
-    results.retain(|result| choice.takes(result));
+    results.retain(takes);
     Ok(rows(&results, Field::ALL.iter().chain(Field::POSE), Field::whole).to_csv())
 }
