@@ -70,11 +70,10 @@ fn open() -> Window {
     ));
     let query = street.find("000070").expect("a frame");
     let reference = street.find("000062").expect("a frame");
+    let mut task = Task::of("street");
+    task.protocol.name_references(&["000062".to_owned()]);
     let setup = Setup {
-        task: Task {
-            by_hand: true,
-            ..Task::of("street")
-        },
+        task,
         references: Arc::clone(&street),
         queries: Arc::clone(&street),
         offered: vec![query],

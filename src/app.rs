@@ -38,7 +38,6 @@ mod textures;
 mod theme;
 mod timeline;
 mod transport;
-mod vector;
 mod view_context;
 mod view_options;
 pub mod views;
@@ -54,7 +53,7 @@ pub use run_results::results_of_run;
 pub use save_target::SaveTarget;
 pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
 pub use setup::{ReferencePick, Setup};
-pub use shot::{Moment, Shot, ShotError, draw, shoot};
+pub use shot::{Moment, Shot, ShotError, shoot};
 pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note};
 pub use view_context::ViewContext;
@@ -76,7 +75,6 @@ pub struct App {
     commands: command::Queue,
     help: bool,
     pictures: save::Pictures,
-    drawings: vector::Drawings,
     /// Where something is to be saved, while that is asked.
     asking: Option<save::Asking>,
     /// The lesson that somebody goes through.
@@ -96,8 +94,6 @@ impl App {
 
     fn of(ctx: &egui::Context, render_state: Option<&RenderState>, setup: Setup) -> Self {
         theme::install(ctx);
-        let drawings = vector::Drawings::default();
-        ctx.add_plugin(drawings.clone());
         Self {
             state: AppState::new(setup, ctx.clone()),
             layout: Layout::new(render_state),
@@ -106,7 +102,6 @@ impl App {
             commands: command::Queue::default(),
             help: false,
             pictures: save::Pictures::default(),
-            drawings,
             asking: None,
             lesson: None,
             title: String::new(),
@@ -143,7 +138,7 @@ impl App {
     fn update(&mut self, ctx: &egui::Context) {
         self.state.poll();
         let said = self.pictures.write();
-        for said in said.into_iter().chain(self.drawings.take_said()) {
+        for said in said {
             match said {
                 Ok(words) => self.state.note(words, false),
                 Err(why) => self.state.note(why, true),

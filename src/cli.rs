@@ -2,53 +2,54 @@
 
 mod args;
 mod choice;
+mod compare;
 mod compute;
+mod defaults;
 mod demo;
-mod demo_settings;
-mod diff;
 mod doctor;
 #[cfg(test)]
 mod documented;
 mod eval;
 mod event_export;
-mod export;
 mod failure;
 mod failures;
 mod index;
 mod interrupt;
 mod lesson;
-mod manual;
 mod match_export;
 mod observer;
 mod opened;
 mod output;
-mod overview;
 mod params;
-mod report;
+mod results;
 mod run;
 #[cfg(feature = "app")]
-mod shot;
+mod screenshot;
 mod story;
 mod surface;
 mod synth;
 mod table;
 mod terminal;
-mod triage;
 #[cfg(feature = "app")]
 mod view;
 
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser as _;
+use clap::{CommandFactory as _, FromArgMatches as _, Parser as _};
 
 use args::{Arguments, Command};
 use failure::CliError;
 
 /// Parses the arguments, runs the command, says what went wrong in one line.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let matches = args::definition().get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     failure::report_panics_in_one_line();
-    let outcome = std::panic::catch_unwind(|| dispatch(&arguments));
+    let outcome = catch_unwind(AssertUnwindSafe(|| dispatch(&arguments)));
     match outcome {
         Ok(Ok(())) | Ok(Err(CliError::ReaderGone)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
@@ -60,37 +61,74 @@ pub fn main() -> ExitCode {
 }
 
 fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
-    let terminal = terminal::Terminal::new(&arguments.verbosity);
+    let everywhere = &arguments.everywhere;
+    let terminal = terminal::Terminal::new(everywhere);
+    use_threads(everywhere.threads)?;
+    let scored =
+        |command: &dyn Fn() -> Result<(), CliError>| compute::with(everywhere.compute, command);
     match &arguments.command {
         None => demo::demo(&terminal),
-        Some(Command::Run(args)) => {
-            compute::with(args.task.protocol.compute, || run::run(args, &terminal))
-        }
-        #[cfg(feature = "app")]
-        Some(Command::View(args)) => compute::with(args.task.protocol.compute, || {
-            view::view(args, posescope::session::RunMode::Paused, &terminal)
+        Some(Command::Open(words)) => dispatch(&opened_by(words)?),
+        Some(Command::Run(args)) => scored(&|| match &args.surface {
+            Some(path) => surface::surface(args, path, &terminal),
+            None => run::run(args, &terminal),
         }),
         #[cfg(feature = "app")]
-        Some(Command::Shot(args)) => compute::with(args.view_args.task.protocol.compute, || {
-            shot::shot(args, &terminal)
+        Some(Command::View(args)) => scored(&|| match &args.screenshot.screenshot {
+            Some(path) => screenshot::screenshot(args, path, &terminal),
+            None => view::view(args, posescope::session::RunMode::Paused, &terminal),
         }),
         Some(Command::Lesson(args)) => lesson::lesson(args, &terminal),
-        Some(Command::Eval(args)) => {
-            compute::with(args.protocol.compute, || eval::eval(args, &terminal))
-        }
-        Some(Command::Diff(args)) => diff::diff(args, &terminal),
-        Some(Command::Triage(args)) => triage::triage(args, &terminal),
-        Some(Command::Report(args)) => report::report(args, &terminal),
-        Some(Command::Export(args)) => export::run(args, &terminal),
+        Some(Command::Eval(args)) => scored(&|| eval::eval(args, &terminal)),
+        Some(Command::Results(args)) => results::results(args, &terminal),
+        Some(Command::Compare(args)) => compare::compare(args, &terminal),
         Some(Command::Index(args)) => index::index(args, &terminal),
-        Some(Command::Overview(args)) => overview::overview(args, &terminal),
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),
-        Some(Command::Surface(args)) => compute::with(args.task.protocol.compute, || {
-            surface::surface(args, &terminal)
-        }),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),
         Some(Command::Params(params)) => params::print(params, &terminal),
-        Some(Command::Completions { shell }) => manual::completions(*shell),
-        Some(Command::Man { folder }) => manual::pages(folder, &terminal),
+        Some(Command::Completions { shell }) => {
+            let mut command = Arguments::command();
+            clap_complete::generate(*shell, &mut command, "posescope", &mut std::io::stdout());
+            Ok(())
+        }
     }
+}
+
+/// `posescope SCENE` is `posescope view SCENE`. A word that is no scene may be a command with a typing error.
+fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
+    let name = words.first().map(|word| word.to_string_lossy());
+    let name = name.unwrap_or_default();
+    let is_built_in = name.split(':').next() == Some("street");
+    if !is_built_in && !Path::new(name.as_ref()).exists() {
+        return Err(CliError::Usage(no_command(&name)));
+    }
+    let line = ["posescope", "view"].map(OsString::from);
+    Ok(Arguments::parse_from(line.iter().chain(words)))
+}
+
+/// What is said of a word that is neither a command nor a scene.
+fn no_command(name: &str) -> String {
+    let command = Arguments::command();
+    let commands = command
+        .get_subcommands()
+        .filter(|command| !command.is_hide_set());
+    let names: Vec<&str> = commands.map(clap::Command::get_name).collect();
+    match posescope::text::similar(name, names.iter().copied()) {
+        Some(known) => format!("`{name}` is no command; did you mean `{known}`?"),
+        None => format!(
+            "`{name}` is no command, file or folder; the commands are {}",
+            names.join(", ")
+        ),
+    }
+}
+
+/// Restricts parallel work to a number of threads.
+fn use_threads(threads: Option<NonZeroUsize>) -> Result<(), CliError> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.get())
+        .build_global()
+        .map_err(|error| CliError::Usage(error.to_string()))
 }

@@ -7,7 +7,6 @@ mod pictures;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::ValueEnum as _;
 use rayon::prelude::*;
@@ -22,8 +21,8 @@ use crate::measure::{
 };
 use crate::method::Method;
 use crate::params::Params;
-use crate::run::{FAILURES, FolderError, RunFile, ScenePair, Scenes, read_run, recording_name};
-use crate::scene::{self, Scene, SceneError};
+use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
+use crate::scene::SceneError;
 use crate::table::Table;
 use pictures::{FailurePictures, Witness, thumbnail};
 
@@ -97,12 +96,12 @@ pub fn write_html(
 impl RunReport {
     fn of(folder: &Path, baseline: Option<&Path>, pictures: usize) -> Result<Self, FolderError> {
         let run = read_run(folder)?;
-        let measured = RunResults::of(read_rows(folder)?, run.failure_radius_m);
+        let measured = RunResults::of(read_rows(folder)?, run.failure_radius_m());
         let charts = Plot::value_variants()
             .iter()
             .flat_map(|plot| plot.charts(&measured));
         let charts = charts.collect();
-        let tables = tables(&measured, run.experiment.map(|one| one.name()));
+        let tables = tables(&measured, run.protocol.preset.map(|one| one.name()));
         let mut params = Params::default();
         let mut notes = Vec::new();
         if let Err(error) = params.merge_toml(&run.params.to_string()) {
@@ -129,10 +128,7 @@ impl RunReport {
                     .filter(|one| one.result.grade.is_failure())
                     .count();
                 if failures > pictures {
-                    notes.push(format!(
-                        "{pictures} of {failures} failures have pictures; posescope report RUN \
-                         --pictures {failures} draws all"
-                    ));
+                    notes.push(format!("{pictures} of {failures} failures have pictures"));
                 }
             }
             Err(error) => notes.push(format!("There are no photos: {error}")),
@@ -164,7 +160,8 @@ fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<Report
         ];
         let next = queries.len();
         let query = *queries.entry(key).or_insert(next);
-        let recording = pair_of(run, result)
+        let recording = run
+            .pair_of(result)
             .map(|pair| recording_name(pair, &result.query, result.method, several_pairs))
             .map(|name| format!("{FAILURES}/{name}.rrd"))
             .filter(|name| folder.join(name).is_file());
@@ -178,13 +175,6 @@ fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<Report
         }
     });
     results.collect()
-}
-
-/// The scenes that a result is of.
-fn pair_of<'a>(run: &'a RunFile, result: &QueryResult) -> Option<&'a ScenePair> {
-    let queries = result.query_scene.as_ref().unwrap_or(&result.scene);
-    let mut pairs = run.pairs.iter();
-    pairs.find(|pair| pair.scene == result.scene && pair.query_scene == *queries)
 }
 
 fn held_against(
@@ -205,22 +195,18 @@ fn held_against(
     Ok(Baseline {
         name: before.display().to_string(),
         comparison,
-        tables: tables(&measured, run_before.experiment.map(|one| one.name())),
+        tables: tables(&measured, run_before.protocol.preset.map(|one| one.name())),
     })
 }
 
 fn open(run: &RunFile) -> Result<Scenes, SceneError> {
-    let open_all = |arguments: &[String]| -> Result<Vec<Arc<dyn Scene>>, SceneError> {
-        let scenes = arguments.iter();
-        scenes
-            .map(|argument| scene::open(argument, run.format.as_deref()).map(Arc::from))
-            .collect()
-    };
-    let scenes = Scenes {
-        references: open_all(&run.scenes)?,
-        queries: open_all(&run.queries)?,
-    };
-    scenes.as_asked(&run.protocol)
+    let protocol = &run.protocol;
+    let scenes = Scenes::open(
+        &run.scenes,
+        &protocol.query_scene,
+        protocol.format.as_deref(),
+    )?;
+    scenes.as_asked(protocol)
 }
 
 /// The photo of each query, as the methods saw it; one that cannot be read is missing.
@@ -236,7 +222,7 @@ fn thumbnails(
         .take(MOST_PHOTOS)
         .collect();
     let painted = firsts.par_iter().filter_map(|one| {
-        let scene = scenes.of_queries(pair_of(run, &one.result)?);
+        let scene = scenes.of_queries(run.pair_of(&one.result)?);
         let photo = scene.photo(scene.find(&one.result.query).ok()?).ok()?;
         Some((one.query, thumbnail(&photo)?))
     });
@@ -266,7 +252,9 @@ fn draw_failures(
         let localizer = localizer.with_foreign(foreign).explaining(0);
         for &at in &failures {
             let result = &results[at].result;
-            let is_of_pair = pair_of(run, result).is_some_and(|found| std::ptr::eq(found, pair));
+            let is_of_pair = run
+                .pair_of(result)
+                .is_some_and(|found| std::ptr::eq(found, pair));
             if is_of_pair && let Some(pictures) = drawn_failure(&localizer, run, result) {
                 results[at].pictures = pictures;
             }
@@ -285,7 +273,7 @@ fn drawn_failure(
     let reference = localizer.references().find(reference).ok()?;
     let radius_m = match &result.setting {
         Some(setting) => setting.radius_m,
-        None => *run.radii_m.first()?,
+        None => run.protocol.radius_m(),
     };
     let request = Request {
         radius_m,

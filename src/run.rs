@@ -1,24 +1,32 @@
 //! Experiments over many queries, and the folders that their results go to.
 
+#[cfg(feature = "cli")]
+mod arguments;
+mod draw;
 mod estimates_file;
 mod execute;
 mod experiment;
 mod inputs;
+mod limit;
 mod preset;
 mod protocol;
+mod reference;
 mod run_file;
 mod run_folder;
 mod scene_pair;
 mod sweep;
 
+#[cfg(feature = "cli")]
+pub use arguments::{degradations, method, positive, probability};
+pub use draw::{Draw, DrawError};
 pub use estimates_file::EstimatesFile;
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
-pub use experiment::{
-    Defaults, Draw, DrawError, Experiment, PaperProtocol, default_failure_radius_m, defaults,
-};
+pub use experiment::Experiment;
 pub use inputs::inputs;
-pub use preset::{ByDataSet, Preset};
-pub use protocol::Protocol;
+pub use limit::Limit;
+pub use preset::{ByDataSet, Preset, default_failure_radius_m, defaults};
+pub use protocol::{Protocol, ProtocolError, known};
+pub use reference::Reference;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{
     FAILURES, FolderError, RunFolder, merge, read_results, read_run, recording_name, result_lines,

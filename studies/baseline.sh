@@ -19,10 +19,10 @@ run() { # NAME ARGUMENTS…
 }
 
 for condition in overcast sun night rain snow; do
-    run "$condition" street:overcast --queries "street:$condition" --limit 20 --method "$methods"
+    run "$condition" street:overcast --query-scene "street:$condition" --limit 20 --method "$methods"
 done
-run fusion street:night --queries street:overcast --references random:3 --limit 8 --method fb,mi,fb2,nid --fusion maxf,avg,wavg,r-wavg,joint
-run descent street:overcast --queries street:rain --limit 10 --method pm,mi --set pm.search=descent --set mi.search=descent
+run fusion street:night --query-scene street:overcast --reference random:3 --limit 8 --method fb,mi,fb2,nid --fusion maxf,avg,wavg,r-wavg,joint
+run descent street:overcast --query-scene street:rain --limit 10 --method pm,mi --set pm.search=descent --set mi.search=descent
 if [ -n "${POSESCOPE_DATA:-}" ]; then
     run kitti "$POSESCOPE_DATA/kitti/sequences/00" --radius 15 --method "$methods"
     run 7scenes "$POSESCOPE_DATA/7scenes/redkitchen" --limit 6 --method "$methods"

@@ -2,7 +2,7 @@
 """An experiment on a Ray cluster: its parts are spread over the workers and merged.
 
     pip install ray
-    examples/ci/ray_eval.py --parts 32 --out runs/multi -- street --experiment multi
+    examples/ci/ray_eval.py --parts 32 --out runs/multi -- street --preset multi
 
 What stands behind `--` goes to `posescope eval` as it is. The scene, the program and the folder have to
 be the same on all machines, as on a cluster with a common disk. A part whose worker was lost is given to
@@ -89,7 +89,7 @@ def main():
 
     whole = asked.out / "whole"
     shutil.rmtree(whole, ignore_errors=True)
-    merge = [program, "eval", "--merge", *map(str, folders), "--out", str(whole)]
+    merge = [program, "eval", "merge", *map(str, folders), "--out", str(whole)]
     sys.exit(subprocess.run(merge, check=False).returncode)
 
 

@@ -20,10 +20,10 @@ runs=${RUNS:-runs/$experiment}
 if [ "${1:-}" = merge ]; then
     parts=()
     for part in $(seq "$2"); do parts+=("$runs/part-$part"); done
-    exec posescope eval --merge "${parts[@]}" --out "$runs/whole"
+    exec posescope eval merge "${parts[@]}" --out "$runs/whole"
 fi
 
-exec posescope eval "$scene" --experiment "$experiment" "$@" --quiet \
+exec posescope eval "$scene" --preset "$experiment" "$@" --quiet \
     --shard "$SLURM_ARRAY_TASK_ID/${PARTS:-$SLURM_ARRAY_TASK_COUNT}" \
     --threads "${SLURM_CPUS_PER_TASK:-1}" \
     --out "$runs/part-$SLURM_ARRAY_TASK_ID" --resume

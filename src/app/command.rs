@@ -165,7 +165,7 @@ pub enum Command {
     SavePicture {
         /// The view; the whole window without.
         view: Option<&'static str>,
-        /// The file, PNG or SVG by its ending.
+        /// The file, a PNG.
         path: std::path::PathBuf,
     },
     /// Save scene, query, settings and layout.

@@ -108,7 +108,7 @@ impl App {
                 state.restart_run();
             }
             Command::SetRadius(radius_m) => {
-                state.setup.task.radius_m = radius_m;
+                state.setup.task.protocol.radii_m = vec![radius_m];
                 state.setup.go_to(state.setup.query);
                 state.restart_run();
             }
@@ -248,11 +248,7 @@ impl App {
                     state.note(format!("The view {view} is not in sight"), true);
                     return;
                 }
-                let is_svg = path.extension().is_some_and(|ending| ending == "svg");
-                match is_svg {
-                    true => self.drawings.ask(ctx, path, part),
-                    false => self.pictures.ask(ctx, path, part),
-                }
+                self.pictures.ask(ctx, path, part);
             }
             Command::SaveSession(path) => self.save_session(&path),
             Command::RestoreSession(path) => self.restore_session(&path),
@@ -432,11 +428,16 @@ impl AppState {
 
     fn pick_references(&mut self, pick: ReferencePick) {
         self.stop_queries();
-        self.setup.task.by_hand = pick == ReferencePick::ByHand;
-        if let ReferencePick::By(selection) = pick {
-            self.setup.task.protocol.references = selection;
-            self.setup.chosen = References::default();
-            self.start_run(RunMode::Running);
+        match pick {
+            ReferencePick::ByHand => {
+                let chosen = self.setup.chosen.frames.clone();
+                self.setup.choose_by_hand(chosen);
+            }
+            ReferencePick::By(selection) => {
+                self.setup.task.protocol.select(selection);
+                self.setup.chosen = References::default();
+                self.start_run(RunMode::Running);
+            }
         }
     }
 
@@ -446,8 +447,7 @@ impl AppState {
             return;
         }
         self.stop_queries();
-        self.setup.task.by_hand = true;
-        self.setup.chosen = frames.into();
+        self.setup.choose_by_hand(frames);
         self.start_run(RunMode::Running);
     }
 

@@ -120,7 +120,7 @@ pub(super) fn menu(ui: &mut Ui, commands: &Queue) {
         item("Spawn a Rerun viewer", help, Command::SpawnViewer);
         let help = "Put the command line that repeats this run on the clipboard (Ctrl+C)";
         item("Copy the command line", help, Command::CopyCommandLine);
-        let help = "The whole window, as PNG or by the ending .svg (Ctrl+P)";
+        let help = "The whole window, as PNG (Ctrl+P)";
         item(
             "Picture of the window …",
             help,
@@ -129,11 +129,7 @@ pub(super) fn menu(ui: &mut Ui, commands: &Queue) {
         for entry in super::views::ALL {
             let text = format!("Picture of {} …", entry.title);
             let target = SaveTarget::Picture(Some(entry.name));
-            let help = match entry.is_drawn {
-                true => "This view, as PNG or by the ending .svg",
-                false => "This view, as PNG",
-            };
-            item(&text, help, ask(target));
+            item(&text, "This view, as PNG", ask(target));
         }
         let help = "Scene, query, settings and layout";
         item("Session …", help, ask(SaveTarget::Session));

@@ -5,7 +5,7 @@
 pub enum SaveTarget {
     /// All that was told so far, for the Rerun viewer.
     Recording,
-    /// A view as PNG or SVG, or the whole window.
+    /// A view or the whole window, as PNG.
     Picture(Option<&'static str>),
     /// Scene, query, settings and layout.
     Session,

@@ -84,7 +84,7 @@ impl Setup {
             queries: scenes.queries,
             query,
             chosen: references.into(),
-            index: Arc::new(IndexFile::new(&task.scene, None)),
+            index: Arc::new(IndexFile::of(&task)),
             task,
             mode: RunMode::Running,
             folder,
@@ -106,7 +106,7 @@ impl Setup {
     /// Takes the query's own frame from references that were picked by hand for another one: a photo says
     /// nothing about itself.
     pub(super) fn leave_itself_out(&mut self) {
-        if self.task.by_hand && self.is_one_drive() {
+        if self.task.protocol.is_by_hand() && self.is_one_drive() {
             let others = self.chosen.frames.iter().copied();
             let others: Vec<usize> = others.filter(|frame| *frame != self.query).collect();
             if others.len() < self.chosen.frames.len() {
@@ -132,16 +132,17 @@ impl Setup {
 
     /// How the references of queries are chosen.
     pub fn pick(&self) -> ReferencePick {
-        match self.task.by_hand {
-            true => ReferencePick::ByHand,
-            false => ReferencePick::By(self.task.protocol.references),
+        if self.task.protocol.is_by_hand() {
+            ReferencePick::ByHand
+        } else {
+            ReferencePick::By(self.task.protocol.selection())
         }
     }
 
     /// Goes to another query; where references are not chosen by hand, new ones are needed.
     pub(super) fn go_to(&mut self, query: usize) {
         self.query = query;
-        if !self.task.by_hand {
+        if !self.task.protocol.is_by_hand() {
             self.chosen = References::default();
         }
     }
@@ -177,7 +178,7 @@ impl Setup {
                     params.assign(value).map_err(|why| wrong(&why))?;
                 }
                 "--radius" => {
-                    self.task.radius_m = value.parse().map_err(|why| wrong(&why))?;
+                    self.task.protocol.radii_m = vec![value.parse().map_err(|why| wrong(&why))?];
                 }
                 "--method" => {
                     let method = Method::called(value).map_err(|why| wrong(&why))?;
@@ -191,13 +192,19 @@ impl Setup {
                 }
                 "--reference" => {
                     let frame = self.references.find(value).map_err(|why| wrong(&why))?;
-                    self.task.by_hand = true;
-                    self.chosen = vec![frame].into();
+                    self.choose_by_hand(vec![frame]);
                 }
                 _ => return Err(wrong(&"no argument of a remedy")),
             }
         }
         Ok(())
+    }
+
+    /// Takes these frames as the references.
+    pub(super) fn choose_by_hand(&mut self, frames: Vec<usize>) {
+        self.chosen = frames.into();
+        let names = self.reference_names();
+        self.task.protocol.name_references(&names);
     }
 
     /// Degrades the photos of the queries, in the place of any degradation before.

@@ -7,13 +7,12 @@ use std::time::Duration;
 use image::RgbImage;
 
 use super::arrangement::Arrangement;
-use super::camera::NamedPose;
 use super::command::Command;
 use super::headless::Painter;
 use super::selection::KnownResults;
 use super::setup::Setup;
 use super::window::WindowError;
-use super::{App, vector, views};
+use super::{App, views};
 use crate::method::Method;
 use crate::session::RunState;
 
@@ -26,12 +25,6 @@ pub struct Shot {
     pub arrangement: Arrangement,
     /// The moment of the run.
     pub moment: Moment,
-    /// With the methods beside each other, so many steps into each of them.
-    pub lockstep: Option<usize>,
-    /// A pose to take the camera to.
-    pub camera: Option<NamedPose>,
-    /// Whether the cost surface shows every position with every heading.
-    pub is_dense: bool,
     /// Size of the picture \[px\].
     pub size_px: [u32; 2],
     /// Pixels per point: how large words and marks are.
@@ -104,42 +97,16 @@ pub fn shoot(setup: Setup, results: KnownResults, shot: &Shot) -> Result<RgbImag
         None => None,
     };
     let painter = Painter::new(shot.size_px)?;
-    let mut window = Window::new(setup, results, shot, Some(&painter));
+    let mut window = Window::new(setup, results, shot, &painter);
     let output = window.shown(view)?;
     painter.paint(&window.ctx, output).map_err(ShotError::Paint)
-}
-
-/// Runs what is set up to its end and writes one view as SVG, for which no graphics adapter is needed.
-///
-/// # Errors
-/// [`ShotError`] where there is no such view or moment, the view is painted rather than drawn, or bad data.
-pub fn draw(setup: Setup, results: KnownResults, shot: &Shot) -> Result<String, ShotError> {
-    let Some(name) = &shot.view else {
-        let why = "a whole window is painted: name one of its views with --view for an SVG";
-        return Err(ShotError::Unknown(why.to_owned()));
-    };
-    let view = views::find(name).map_err(ShotError::Unknown)?;
-    if !views::ALL
-        .iter()
-        .any(|entry| entry.name == view && entry.is_drawn)
-    {
-        let why = vector::NotDrawn::Painted;
-        return Err(ShotError::Unknown(format!("{view}: {why}")));
-    }
-    let mut window = Window::new(setup, results, shot, None);
-    let output = window.shown(Some(view))?;
-    let ground = window.ctx.global_style().visuals.panel_fill;
-    let area = window.ctx.content_rect();
-    let drawn = window.app.drawings.svg(&output.shapes, area, ground);
-    drawn.map_err(|why| ShotError::Paint(format!("{view}: {why}")))
 }
 
 /// The application with nothing around it.
 struct Window<'a> {
     app: App,
     ctx: egui::Context,
-    /// What paints; nothing where only shapes and words are wanted.
-    painter: Option<&'a Painter>,
+    painter: &'a Painter,
     shot: &'a Shot,
     frames: usize,
 }
@@ -147,19 +114,11 @@ struct Window<'a> {
 impl<'a> Window<'a> {
     /// Between two looks at what other threads have done.
     const PAUSE: Duration = Duration::from_millis(5);
-    /// The greatest side of a picture where nothing paints it \[px\].
-    const MAX_SIDE: usize = 8192;
 
-    fn new(
-        setup: Setup,
-        results: KnownResults,
-        shot: &'a Shot,
-        painter: Option<&'a Painter>,
-    ) -> Self {
+    fn new(setup: Setup, results: KnownResults, shot: &'a Shot, painter: &'a Painter) -> Self {
         let ctx = egui::Context::default();
         ctx.set_theme(shot.theme);
-        let state = painter.map(Painter::render_state);
-        let mut app = App::of(&ctx, state, setup).with_results(results);
+        let mut app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
         app.is_bare = true;
         // Nothing moves in a picture.
         ctx.all_styles_mut(|style| style.animation_time = 0.0);
@@ -177,15 +136,6 @@ impl<'a> Window<'a> {
         let shot = self.shot;
         self.run_to_end()?;
         self.go_to(shot.moment)?;
-        if shot.lockstep.is_some() {
-            self.app.send(Command::StepTogether(shot.lockstep));
-        }
-        if let Some(pose) = shot.camera {
-            self.app.send(Command::JumpCamera(pose));
-        }
-        if shot.is_dense {
-            self.app.send(Command::ShowDenseMap);
-        }
         self.app.send(Command::Arrange(shot.arrangement));
         if view.is_some() {
             self.app.send(Command::Maximize(view));
@@ -241,11 +191,7 @@ impl<'a> Window<'a> {
         loop {
             self.app.update(&self.ctx);
             let mut output = self.frame();
-            match self.painter {
-                Some(painter) => painter.take_textures(&mut output),
-                // The drawings have seen them.
-                None => output.textures_delta.clear(),
-            }
+            self.painter.take_textures(&mut output);
             let state = self.app.app_state();
             let is_waiting = state.is_working_out();
             if !is_waiting && self.frames >= FEWEST {
@@ -260,7 +206,7 @@ impl<'a> Window<'a> {
         let size = size.map(|side| side as f32 / self.ctx.pixels_per_point());
         let mut input = egui::RawInput {
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size.into())),
-            max_texture_side: Some(self.painter.map_or(Self::MAX_SIDE, Painter::max_side)),
+            max_texture_side: Some(self.painter.max_side()),
             time: Some(self.frames as f64 / 60.0),
             focused: true,
             ..egui::RawInput::default()

@@ -146,14 +146,14 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue) {
             }
         }
         ui.separator();
-        let mut radius = setup.task.radius_m;
+        let mut radius = setup.task.radius_m();
         let label = ui.label("Radius");
         let drag = egui::DragValue::new(&mut radius)
             .range(1.0..=500.0)
             .suffix(" m")
             .update_while_editing(false);
         let response = ui.add(drag).labelled_by(label.id);
-        if (response.drag_stopped() || response.lost_focus()) && radius != setup.task.radius_m {
+        if (response.drag_stopped() || response.lost_focus()) && radius != setup.task.radius_m() {
             commands.send(Command::SetRadius(radius));
         }
         let mut seed = setup.task.protocol.seed;

@@ -1,119 +1,174 @@
 //! The arguments.
 
 mod eval;
+mod given;
 mod lesson;
-mod protocol;
-mod run_folder;
+mod look;
 mod scene;
 #[cfg(feature = "app")]
-mod shot;
-mod surface;
+mod screenshot;
 mod task;
-mod triage;
 
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand};
 use posescope::params::Params;
 
-pub use eval::EvalArgs;
+pub use eval::{EvalArgs, EvalCommand, JudgingArgs};
+pub use given::Given;
 pub use lesson::LessonArgs;
-pub use protocol::check_known;
-pub use run_folder::{DiffArgs, ExportArgs, ReportArgs};
-pub use scene::{DoctorArgs, IndexArgs, OverviewArgs, SynthArgs};
+pub use look::{CompareArgs, Form, ResultsArgs};
+pub use scene::{DoctorArgs, IndexArgs, SynthArgs};
 #[cfg(feature = "app")]
-pub use shot::ShotArgs;
-pub use surface::SurfaceArgs;
+pub use screenshot::ScreenshotArgs;
 #[cfg(feature = "app")]
 pub use task::ViewArgs;
-pub use task::{RecordingArgs, RunArgs, TaskArgs};
-pub use triage::TriageArgs;
+pub use task::{RunArgs, TaskArgs};
 
+use super::compute::Compute;
 use super::failure::CliError;
 
 /// See why a camera pose estimate fails.
-///
-/// Without a command: runs all four estimators on the built-in street, prints the table of results,
-/// saves recordings/demo.rrd for the Rerun viewer, and opens the window where there is a display.
 #[derive(Debug, Parser)]
-#[command(version, max_term_width = 100)]
-#[command(after_help = "\
-Exit codes: 0 done, 1 a gate or a regression failed, 2 usage, 3 bad data or output, 4 internal,
-5 no graphics card for --compute gpu.
-A query that cannot be localised is a result, not an error.")]
+#[command(
+    version,
+    max_term_width = 100,
+    help_template = HELP,
+    override_usage = "posescope [OPTIONS] [COMMAND]\n       posescope [SCENE|RUN]",
+    disable_help_subcommand = true
+)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
     #[command(flatten)]
-    pub verbosity: Verbosity,
+    pub everywhere: Everywhere,
 }
+
+/// The commands by what they are for. A test holds the list complete.
+const HELP: &str = "\
+{about}
+
+{usage-heading} {usage}
+
+Without arguments it localises a query of the built-in street, prints the results, saves
+recordings/demo.rrd, and opens the window where there is a display. With a SCENE or a RUN it does
+what `view` does.
+
+Localise:
+  run        Localise a query, or several, and print why each result is right or wrong
+  view       Step through a query, or browse the results of a run, in the window
+  eval       Localise many queries into a run folder; `eval merge` puts shards together
+
+Look at runs:
+  results    List, filter and export the results of a run
+  compare    Show what changed between two runs; exit code 1 if a query broke
+
+Prepare data:
+  doctor     Check scenes: what is there, and the usual mistakes
+  index      Build the retrieval index for --reference retrieve:K
+  synth      Write the built-in street as a KITTI, TUM, COLMAP or scene.toml data set
+
+Learn:
+  lesson     List the lessons, or start one
+  params     List every parameter with unit, range, default and meaning
+
+Options:
+{options}
+
+Exit codes: 0 done, 1 a gate or a comparison failed, 2 usage, 3 bad data or output, 4 internal,
+5 no graphics card for --compute gpu. A query without a pose is a result, not an error.
+
+Try: posescope run street --query 70 --reference 62";
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Localise one query, or several, and record every decision
+    /// Localise a query, or several, and print why each result is right or wrong
     Run(Box<RunArgs>),
-    /// Open the window: step through the estimators, see everything, try another pose
+    /// Step through a query, or browse the results of a run, in the window
     #[cfg(feature = "app")]
     View(Box<ViewArgs>),
-    /// Save a picture of the window, or of one of its views, without a window
-    #[cfg(feature = "app")]
-    Shot(Box<ShotArgs>),
-    /// List the lessons, or go through one: in the window, or with --save as a recording
-    Lesson(LessonArgs),
-    /// Run an experiment over many queries into a run folder
+    /// Localise many queries into a run folder; `eval merge` puts shards together
     Eval(Box<EvalArgs>),
-    /// List the queries that a run fixed, broke or changed against another; exit code 1 if it broke
-    /// any
-    Diff(DiffArgs),
-    /// List the results of a run that meet a condition, in an order
-    Triage(TriageArgs),
-    /// Write report.html: a run, or a run against another, in one file for a browser
-    Report(ReportArgs),
-    /// Write the poses or tables of a run in formats of other programs
-    Export(ExportArgs),
-    /// Say how many photos scenes have and how far the camera went, and draw the routes
-    Overview(OverviewArgs),
-    /// Check a scene: what is there, what is missing, and which of the usual mistakes it has; exit code 3
-    /// if it cannot work
+    /// List, filter and export the results of a run
+    Results(Box<ResultsArgs>),
+    /// Show what changed between two runs; exit code 1 if a query broke
+    Compare(CompareArgs),
+    /// Check scenes: what is there, and the usual mistakes; exit code 3 if a scene cannot work
     Doctor(DoctorArgs),
-    /// Score a dense grid of positions and headings, and write the cheapest heading at each position
-    Surface(Box<SurfaceArgs>),
-    /// Write the built-in street to disk in the layout of a data set, one drive per condition
-    Synth(SynthArgs),
-    /// Build the retrieval index of a scene, which --references retrieve:K asks
+    /// Build the retrieval index for --reference retrieve:K
     Index(IndexArgs),
-    /// List all parameters with unit, range, default and meaning
+    /// Write the built-in street as a data set, one drive per condition
+    Synth(SynthArgs),
+    /// List the lessons, or start one
+    Lesson(LessonArgs),
+    /// List every parameter with unit, range, default and meaning
     Params(ConfigArgs),
-    /// Print what makes a shell complete posescope's arguments
+    /// Print a shell completion script
+    #[command(hide = true)]
     Completions {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// Write the manual pages of posescope and its commands into a folder
-    Man {
-        /// The folder, which is made where there is none
-        folder: PathBuf,
-    },
+    /// A scene or a run, which the window opens
+    #[command(external_subcommand)]
+    Open(Vec<OsString>),
 }
 
+/// The command line, with the options hidden in `run` and `view` that only many queries have.
+pub fn definition() -> clap::Command {
+    let single = |command: clap::Command| {
+        ["limit", "preset"]
+            .into_iter()
+            .fold(command, |command, id| {
+                command.mut_arg(id, |arg| arg.hide(true))
+            })
+    };
+    let command = Arguments::command().mut_subcommand("run", single);
+    #[cfg(feature = "app")]
+    let command = command.mut_subcommand("view", single);
+    command
+}
+
+/// Options of every command.
 #[derive(Debug, Args)]
-pub struct Verbosity {
-    /// No progress and no table; errors only
+#[command(next_help_heading = "Everywhere")]
+pub struct Everywhere {
+    /// Print errors only
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say more on stderr; twice for debugging
+    /// Print more; twice for debugging
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub verbose: u8,
+    /// Number of threads; results do not depend on it [default: one per core]
+    #[arg(long, global = true, value_name = "N", hide_short_help = true)]
+    pub threads: Option<NonZeroUsize>,
+    /// Where hypotheses are scored; results do not depend on it
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHERE",
+        value_enum,
+        default_value_t,
+        hide_short_help = true
+    )]
+    pub compute: Compute,
 }
 
 /// Which parameters differ from their defaults.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ConfigArgs {
-    /// Read parameters from a TOML file with a table per group
-    #[arg(long, value_name = "FILE")]
+    /// Read parameters from a TOML file with a table for each group
+    #[arg(
+        long,
+        help_heading = "Methods",
+        value_name = "FILE.toml",
+        hide_short_help = true
+    )]
     pub config: Option<PathBuf>,
-    /// Set a parameter, after --config; repeatable, for example fb.ratio=0.7
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    /// Set a parameter, for example fb.ratio=0.7; repeatable; `posescope params` lists them
+    #[arg(long = "set", help_heading = "Methods", value_name = "KEY=VALUE")]
     pub assignments: Vec<String>,
 }
 
@@ -141,17 +196,9 @@ impl ConfigArgs {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|number: &f64| *number > 0.0 && number.is_finite())
-        .ok_or_else(|| "a positive number expected".to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
     use posescope::method::Method;
     use posescope::session::Task;
 
@@ -161,13 +208,10 @@ mod tests {
     }
 
     /// The task of a command line.
-    fn task(words: &[&str]) -> (Task, Vec<String>) {
+    fn task(words: &[&str]) -> Task {
         let words = ["posescope"].iter().chain(words);
         match Arguments::try_parse_from(words).map(|parsed| parsed.command) {
-            Ok(Some(Command::Run(args))) => {
-                let task = args.task.task(&args.scene).expect("good parameters");
-                (task, args.task.reference)
-            }
+            Ok(Some(Command::Run(args))) => args.task.task(&args.scene).expect("good parameters"),
             other => panic!("{other:?}"),
         }
     }
@@ -175,63 +219,90 @@ mod tests {
     #[test]
     fn a_task_is_read_from_the_command_line_that_it_writes() {
         for line in [
-            &["run", "street", "--query", "70"][..],
-            &[
-                "run",
-                "my data/00",
-                "--query",
-                "70",
-                "--format",
-                "kitti",
-                "--queries",
-                "it's",
-                "--references",
-                "retrieve:3",
-                "--index",
-                "an index",
-                "--radius",
-                "12.5",
-                "--prior",
-                "80",
-                "--method",
-                "mi,fb",
-                "--fusion",
-                "avg,r-wavg",
-                "--seed",
-                "9",
-                "--degrade",
-                "invert,noise=8,gamma=0.4",
-                "--set",
-                "fb.ratio=0.75",
-                "--break",
-                "inliers < 10",
-                "--break",
-                "fb.ransac",
-            ],
-            &[
-                "run",
-                "street",
-                "--query",
-                "70",
-                "--reference",
-                "62",
-                "--reference",
-                "64",
-                "--prior",
-                "80",
-            ],
+            "run street --query 70",
+            "run it's --query 70 --format kitti --query-scene street --reference retrieve:3 --index i \
+             --radius 12.5 --prior 80 --method mi,fb,other --estimates other=poses.txt --fusion avg,r-wavg --seed 9 \
+             --degrade invert,noise=8,gamma=0.4 --set fb.ratio=0.75 --break inliers<10 --break fb.ransac \
+             --right 0.5m,2deg --min-confidence 0.5 --explain 3 --gps gps.csv --matches hloc",
+            "run street --query 70 --reference 62 --reference 64 --prior 80 --explain",
         ] {
-            let (task, references) = self::task(line);
-            let again = task.arguments("70", &references);
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let task = self::task(&words);
+            let again = task.arguments("70", &[]);
             let again: Vec<&str> = again.iter().map(String::as_str).collect();
-            assert_eq!(self::task(&again), (task, references), "{again:?}");
+            assert_eq!(self::task(&again), task, "{again:?}");
         }
     }
 
     #[test]
     fn methods_run_once_each_in_the_order_of_the_registry() {
-        let (task, _) = task(&["run", "street", "--all", "--method", "mi,fb,mi"]);
-        let expected = [Method::FB, Method::MI];
-        assert_eq!(task.protocol.methods, expected);
+        let task = task(&["run", "street", "--all", "--method", "mi,fb,mi"]);
+        assert_eq!(task.protocol.methods, [Method::FB, Method::MI]);
+    }
+
+    /// Every command with the commands below it, `help` left out.
+    fn commands() -> Vec<clap::Command> {
+        fn below(command: &clap::Command, found: &mut Vec<clap::Command>) {
+            found.push(command.clone());
+            for sub in command.get_subcommands() {
+                below(sub, found);
+            }
+        }
+        let mut command = definition();
+        command.build();
+        let mut found = Vec::new();
+        below(&command, &mut found);
+        found
+    }
+
+    #[test]
+    fn the_help_lists_every_command_with_its_own_words() {
+        let command = Arguments::command();
+        let help = command.clone().render_help().to_string();
+        for sub in command.get_subcommands().filter(|sub| !sub.is_hide_set()) {
+            let line = help.lines().find(|line| {
+                let mut words = line.split_whitespace();
+                words.next() == Some(sub.get_name()) && line.starts_with("  ")
+            });
+            assert!(line.is_some(), "{} is missing in\n{help}", sub.get_name());
+        }
+    }
+
+    #[test]
+    fn every_option_has_help_and_short_help_fits_a_terminal() {
+        for mut command in commands() {
+            for arg in command.get_arguments() {
+                let name = format!("{} {}", command.get_name(), arg.get_id());
+                assert!(arg.get_help().is_some(), "{name} has no help");
+            }
+            let help = command.render_help().to_string();
+            let lines = help.lines().count();
+            assert!(lines <= 60, "{}: {lines} lines\n{help}", command.get_name());
+            let widest = help.lines().map(|line| line.chars().count()).max();
+            assert!(
+                widest <= Some(100),
+                "{}: {widest:?}\n{help}",
+                command.get_name()
+            );
+        }
+    }
+
+    #[test]
+    fn an_option_has_one_meaning_and_there_are_at_most_sixty_that_are_not_rare() {
+        let mut options = std::collections::BTreeMap::new();
+        for command in commands() {
+            for arg in command.get_arguments().filter(|arg| !arg.is_hide_set()) {
+                if let Some(long) = arg.get_long() {
+                    let heading = arg.get_help_heading().map(str::to_owned);
+                    options.insert(long.to_owned(), heading);
+                }
+            }
+        }
+        let names: Vec<&String> = options
+            .iter()
+            .filter(|(_, heading)| heading.as_deref() != Some("Screenshot"))
+            .map(|(name, _)| name)
+            .collect();
+        assert!(names.len() <= 66, "{}: {names:?}", names.len());
     }
 }

@@ -52,7 +52,7 @@ impl LocalizeObserver for ChoiceProgress<'_> {
         if is_many && !std::mem::replace(&mut self.has_advised, true) {
             eprintln!(
                 "Each of {candidates} photos is looked at for the one with the most matches; quicker from \
-                 the second query on: `posescope index {}`, then --references retrieve:1",
+                 the second query on: `posescope index {}`, then --reference retrieve:1",
                 self.scene
             );
         }

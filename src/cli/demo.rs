@@ -1,53 +1,47 @@
 //! The bare command: all four estimators on the built-in street.
 
-use super::args::{RecordingArgs, RunArgs, TaskArgs};
-use super::demo_settings::{Settings, settings};
+use clap::Parser as _;
+
+use super::args::{Arguments, Command};
+use super::defaults::{FOLDER, QUERY, REFERENCE, SCENE};
 use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
-#[cfg(feature = "app")]
-use posescope::session::RunMode;
 
 /// Runs the demonstration and saves its recording.
 pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
-    let Settings {
-        scene,
-        query,
-        reference,
-        recording,
-    } = settings();
-    if let Some(folder) = recording.parent() {
-        std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    std::fs::create_dir_all(FOLDER).map_err(CliError::io(FOLDER))?;
+    let recording = format!("{FOLDER}/demo.rrd");
+    let words = [
+        "posescope",
+        "run",
+        SCENE,
+        "--query",
+        QUERY,
+        "--reference",
+        REFERENCE,
+        "--save",
+        &recording,
+    ];
+    match Arguments::parse_from(words).command {
+        Some(Command::Run(args)) => run::run(&args, terminal)?,
+        _ => unreachable!("the words begin with `run`"),
     }
-    run::run(
-        &RunArgs {
-            scene: scene.clone(),
-            query: vec![query.clone()],
-            all: false,
-            task: TaskArgs {
-                reference: vec![reference.clone()],
-                ..TaskArgs::default()
-            },
-            recording: RecordingArgs {
-                save: Some(recording.clone()),
-                ..RecordingArgs::default()
-            },
-            export_matches: None,
-            events: None,
-            json: None,
-        },
-        terminal,
-    )?;
     view_where_there_is_a_display(terminal)
 }
 
 /// Opens the window on the same query.
 #[cfg(feature = "app")]
 fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
+    use posescope::session::RunMode;
+
     if !posescope::app::has_display() {
         return Ok(());
     }
-    super::view::view(&super::args::ViewArgs::demo(), RunMode::Running, terminal)
+    match Arguments::parse_from(["posescope", "view", SCENE]).command {
+        Some(Command::View(args)) => super::view::view(&args, RunMode::Running, terminal),
+        _ => unreachable!("the words begin with `view`"),
+    }
 }
 
 /// Without a window there is the recording.

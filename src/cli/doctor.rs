@@ -11,9 +11,35 @@ use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
 
-/// Runs the command.
+/// Examines every scene. The error is of the first that cannot work.
 pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let scene = scene::open(&args.scene, args.format.as_deref())?;
+    let files = args.picture.iter().chain(&args.save);
+    if args.scenes.len() > 1 && files.count() > 0 {
+        return Err(CliError::Usage(
+            "--picture and --save are of one scene".to_owned(),
+        ));
+    }
+    let mut broken = None;
+    for (index, argument) in args.scenes.iter().enumerate() {
+        if index > 0 && !terminal.is_quiet() {
+            output::print(&"")?;
+        }
+        let verdict = examine_scene(args, argument, terminal)?;
+        broken = broken.or(verdict);
+    }
+    match broken {
+        Some(verdict) => Err(CliError::Unhealthy(verdict)),
+        None => Ok(()),
+    }
+}
+
+/// Prints what a scene has, and returns why it cannot work.
+fn examine_scene(
+    args: &DoctorArgs,
+    argument: &str,
+    terminal: &Terminal,
+) -> Result<Option<String>, CliError> {
+    let scene = scene::open(argument, args.format.as_deref())?;
     let found = examine(scene.as_ref())?;
     if let (Some(path), Some(picture)) = (&args.picture, &found.picture) {
         let io = |error: image::ImageError| std::io::Error::other(error.to_string());
@@ -33,10 +59,7 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
         let text = report(scene.as_ref(), &found, terminal.width());
         output::print(&text.trim_end())?;
     }
-    match found.is_broken() {
-        true => Err(CliError::Unhealthy(verdict(scene.as_ref(), &found))),
-        false => Ok(()),
-    }
+    Ok(found.is_broken().then(|| verdict(scene.as_ref(), &found)))
 }
 
 /// In one line, why it cannot work.

@@ -6,66 +6,66 @@ mod sweep;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
+use posescope::fusion::Fusion;
 use posescope::localize::{QueryResult, Ranking, Selection};
 use posescope::measure::{
     Change, Gate, KnownFailures, Report, RunComparison, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::report::write_html;
+use posescope::report::{PICTURES, write_html};
 use posescope::run::{
-    Draw, Execution, Experiment, PaperProtocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
-    ScenePair, Scenes, defaults, inputs, merge,
+    Draw, Execution, Experiment, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair,
+    Scenes, Sweep, defaults, inputs, known, merge,
 };
-use posescope::scene::{self, Retriever, Scene};
+use posescope::scene::Retriever;
 use posescope::session::command_line;
 
-use super::args::{EvalArgs, check_known};
-use super::diff;
+use super::args::{EvalArgs, EvalCommand, JudgingArgs};
+use super::compare;
 use super::event_export::EventExport;
 use super::failure::CliError;
-use super::failures::FailureRecordings;
+use super::failures::{self, FailureRecordings};
 use super::interrupt::Interrupt;
 use super::output;
-use super::run::use_threads;
 use super::table;
 use super::terminal::Terminal;
 
 /// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.protocol.threads)?;
-    if args.merge.is_empty() {
-        let gated: Vec<Method> = args.gate.iter().map(Gate::method).collect();
-        let others: Vec<Method> = args
-            .protocol
-            .estimates
-            .iter()
-            .map(|file| file.method)
-            .collect();
-        check_known(&gated, &others)?;
+    if let Some(EvalCommand::Merge(args)) = &args.command {
+        let run = merge(&args.parts, &args.out)?;
+        failures::merge(&args.parts, &args.out, args.judging.kept_failures(), &run)?;
+        return finish(&args.judging, None, &args.out, &run, terminal);
     }
-    // Before anything is run for a list that nobody can read.
-    known_failures(args)?;
-    if let Some(before) = &args.failed
+    let asked = args.protocol.over(Protocol::default())?;
+    let gated: Vec<Method> = args.judging.gate.iter().map(Gate::method).collect();
+    let others: Vec<Method> = asked.estimates.iter().map(|file| file.method).collect();
+    known(&gated, &others)?;
+    // Before anything is run for a list that cannot be read.
+    known_failures(&args.judging)?;
+    if let Some(before) = &args.rerun_failed
         && !again::has_failed(before)?
     {
         eprintln!("No query failed in {}", before.display());
         return Ok(());
     }
-    let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| default_folder(args, &asked));
     if let Some(sweep) = &args.sweep {
         return sweep::sweep(args, sweep, &folder, terminal);
     }
-    let run = if args.merge.is_empty() {
-        execute(args, &folder, terminal)?
-    } else {
-        let run = merge(&args.merge, &folder)?;
-        FailureRecordings::merge(&args.merge, &folder, args, &run)?;
-        run
-    };
-    finish(args, &folder, &run, terminal)
+    let run = execute(args, None, &folder, terminal)?;
+    finish(
+        &args.judging,
+        args.rerun_failed.as_deref(),
+        &folder,
+        &run,
+        terminal,
+    )
 }
 
 /// What is asked, and of which scenes.
@@ -76,13 +76,13 @@ struct Asked {
 }
 
 /// Beside each other below `runs`, named after what is asked.
-fn default_folder(args: &EvalArgs) -> PathBuf {
+fn default_folder(args: &EvalArgs, asked: &Protocol) -> PathBuf {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let mut name: String = args.scenes.join("-").chars().map(plain).collect();
-    if let Some(experiment) = args.experiment {
-        name = format!("{name}-{experiment}").to_lowercase();
+    if let Some(preset) = asked.preset {
+        name = format!("{name}-{preset}").to_lowercase();
     }
-    if let Some(failed) = &args.failed {
+    if let Some(failed) = &args.rerun_failed {
         let run = failed.file_name().unwrap_or_default().to_string_lossy();
         name = format!("{run}-failed");
     }
@@ -95,10 +95,15 @@ fn default_folder(args: &EvalArgs) -> PathBuf {
     Path::new("runs").join(name.trim_matches('-'))
 }
 
-fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFile, CliError> {
-    let asked = match &args.failed {
+fn execute(
+    args: &EvalArgs,
+    swept: Option<(&Sweep, &str)>,
+    folder: &Path,
+    terminal: &Terminal,
+) -> Result<RunFile, CliError> {
+    let asked = match &args.rerun_failed {
         Some(before) => again::asked(args, before)?,
-        None => asked(args)?,
+        None => asked(args, swept)?,
     };
     let Asked {
         run,
@@ -106,28 +111,31 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
         params,
     } = asked;
     let scenes = scenes.as_asked(&run.protocol)?;
-    let indices = indices(args, &run, &scenes, &params)?;
-    // A file of events that cannot be opened leaves no run folder behind, unless it is to lie in that.
-    let opened = |is_inside: bool| {
-        let file = args.events.as_deref();
-        let file = file.filter(|file| file.starts_with(folder) == is_inside);
-        file.map(EventExport::after).transpose()
-    };
-    let outside = opened(false)?;
+    let indices = indices(&run, &scenes, &params)?;
+    if let Some(path) = args.events.as_ref().filter(|path| path.starts_with(folder)) {
+        return Err(CliError::Usage(format!(
+            "--events {}: a file outside of the run folder expected",
+            path.display()
+        )));
+    }
+    let events = args.events.as_deref().map(EventExport::after).transpose()?;
     let mut run_folder = if args.resume {
         RunFolder::resume(folder, &run)?
     } else {
         RunFolder::create(folder, &run)?
     };
-    let events = outside.map_or_else(|| opened(true), |events| Ok(Some(events)))?;
     if let Some(events) = events.as_ref().filter(|_| !args.resume) {
         events.clear()?;
     }
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(run_folder.done() as u64);
     let interrupt = Interrupt::listen();
+    let kept = match &args.sweep {
+        Some(_) => args.judging.keep_failures.unwrap_or(0),
+        None => args.judging.kept_failures(),
+    };
     let mut observer = FailureRecordings::new(
-        args,
+        kept,
         &run_folder,
         &run,
         &params,
@@ -160,17 +168,61 @@ fn execute(args: &EvalArgs, folder: &Path, terminal: &Terminal) -> Result<RunFil
     }
 }
 
-fn asked(args: &EvalArgs) -> Result<Asked, CliError> {
-    let params = args.protocol.config.resolve()?;
-    let scenes = Scenes {
-        references: open_all(&args.scenes, args)?,
-        queries: open_all(&args.queries, args)?,
+/// What is asked, with everything filled in that was left open, at one value of a sweep.
+fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliError> {
+    let mut params = args.config.resolve()?;
+    let given = args.protocol.over(Protocol::default())?;
+    let scenes = Scenes::open(&args.scenes, &given.query_scene, given.format.as_deref())?;
+    let first = scenes.references.first();
+    let defaults = defaults(given.preset, first.map_or("", |scene| scene.name()));
+    let defaults = defaults.map_err(|error| CliError::Usage(error.to_string()))?;
+    let mut protocol = args.protocol.over(defaults)?;
+    if protocol.is_by_hand() {
+        return Err(CliError::Usage(
+            "eval chooses references for each query: --reference takes random:K, nearest:K, matches:K or \
+             retrieve:K"
+                .to_owned(),
+        ));
+    }
+    let has_several = protocol.selection().count() > 1;
+    if has_several && !args.protocol.has("fusions") && protocol.preset.is_none_or(is_large) {
+        protocol.fusions = Fusion::all().filter(|f| f.name == "r-wavg").collect();
+    }
+    if let Some((sweep, value)) = swept {
+        sweep.apply(value, &mut protocol.degrade, &mut params);
+    }
+    let draw = Draw {
+        limit: protocol.limit,
+        only: &args.query,
+        seed: protocol.seed,
+    };
+    let pairs = pairs(&draw, &scenes)?;
+    let run = RunFile {
+        schema: RUN_SCHEMA.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        scenes: args.scenes.clone(),
+        shard: args.shard,
+        inputs: inputs(&protocol)?,
+        protocol,
+        pairs,
+        params: written(&params),
     };
     Ok(Asked {
-        run: describe(args, &scenes, &params)?,
+        run,
         scenes,
         params,
     })
+}
+
+/// One experiment chooses its references by looks, and fuses them as a run without a preset does.
+fn is_large(preset: Experiment) -> bool {
+    preset == Experiment::Large
+}
+
+/// The parameters as `run.toml` has them.
+fn written(params: &Params) -> toml::Table {
+    let table = params.to_toml().parse();
+    table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}"))
 }
 
 /// The command line that goes on with this run.
@@ -182,25 +234,16 @@ fn resuming() -> String {
     command_line(&words)
 }
 
-fn open_all(arguments: &[String], args: &EvalArgs) -> Result<Vec<Arc<dyn Scene>>, CliError> {
-    let format = args.protocol.format.as_deref();
-    let scenes = arguments
-        .iter()
-        .map(|scene| scene::open(scene, format).map(Arc::from));
-    Ok(scenes.collect::<Result<_, _>>()?)
-}
-
 /// Ranked references need an index of each scene.
 fn indices(
-    args: &EvalArgs,
     run: &RunFile,
     scenes: &Scenes,
     params: &Params,
 ) -> Result<Vec<Box<dyn Ranking>>, CliError> {
-    let Selection::Retrieved(_) = run.protocol.references else {
+    let Selection::Retrieved(_) = run.protocol.selection() else {
         return Ok(Vec::new());
     };
-    let (files, scenes) = (&args.index, &scenes.references);
+    let (files, scenes) = (&run.protocol.index, &scenes.references);
     if !files.is_empty() && files.len() != scenes.len() {
         return Err(CliError::Usage(format!(
             "--index is given {} times for {} scenes; each needs its own, in the same order",
@@ -219,54 +262,6 @@ fn indices(
         .collect()
 }
 
-/// What is asked, with everything that was left open filled in.
-fn describe(args: &EvalArgs, scenes: &Scenes, params: &Params) -> Result<RunFile, CliError> {
-    let defaults = defaults(args.experiment);
-    let first = scenes.references.first();
-    let scene_name = first.map(|scene| scene.name()).unwrap_or_default();
-    let paper = args.paper.unwrap_or(PaperProtocol::of_scene(scene_name));
-    let mut protocol = args.protocol.over(defaults.protocol)?;
-    let is_single = protocol.references.count() == 1;
-    if is_single && args.protocol.fusion.is_empty() && args.experiment != Some(Experiment::Multi) {
-        protocol.fusions = Vec::new();
-    }
-    if args.experiment == Some(Experiment::Large) {
-        protocol.prior_m = protocol.prior_m.or(Some(paper.prior_m()));
-    }
-    let radii_m = match args.radius.as_slice() {
-        [] => defaults.radii_m.to_vec(),
-        wanted => wanted.to_vec(),
-    };
-    let share = args.queries_share.unwrap_or(defaults.share);
-    let draw = Draw {
-        share,
-        limit: args.limit.map(|limit| limit as usize),
-        only: &args.only,
-        seed: protocol.seed,
-    };
-    let table = params.to_toml().parse();
-    let inputs = inputs(&protocol)?;
-    Ok(RunFile {
-        schema: RUN_SCHEMA.to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        scenes: args.scenes.clone(),
-        queries: args.queries.clone(),
-        format: args.protocol.format.clone(),
-        experiment: args.experiment,
-        protocol,
-        radii_m,
-        share,
-        limit: args.limit.map(|limit| limit as usize),
-        failure_radius_m: args
-            .failure_radius
-            .unwrap_or_else(|| paper.failure_radius_m()),
-        shard: args.shard,
-        pairs: pairs(&draw, scenes)?,
-        inputs,
-        params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),
-    })
-}
-
 /// Every scene with itself, or every scene of references with every one of queries.
 fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     let mut pairs = Vec::new();
@@ -282,7 +277,7 @@ fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     Ok(pairs)
 }
 
-fn known_failures(args: &EvalArgs) -> Result<KnownFailures, CliError> {
+fn known_failures(args: &JudgingArgs) -> Result<KnownFailures, CliError> {
     match &args.known_failures {
         Some(path) => Ok(KnownFailures::read(path)?),
         None => Ok(KnownFailures::default()),
@@ -298,11 +293,16 @@ struct Judged {
 
 impl Judged {
     /// Writes what follows from the results, and holds the gates against them.
-    fn of(args: &EvalArgs, folder: &Path, run: &RunFile) -> Result<Self, CliError> {
+    fn of(
+        args: &JudgingArgs,
+        again: Option<&Path>,
+        folder: &Path,
+        run: &RunFile,
+    ) -> Result<Self, CliError> {
         let known = known_failures(args)?;
         let report = write_report(folder, run, &args.gate, &known)?;
-        let before = args.baseline.as_deref().or(args.failed.as_deref());
-        write_html(folder, before, args.pictures(), None)?;
+        let before = args.baseline.as_deref().or(again);
+        write_html(folder, before, PICTURES, None)?;
         let failures = report
             .gate_results
             .iter()
@@ -319,7 +319,8 @@ impl Judged {
 
 /// Writes what follows from the results, shows it, and says whether it is good enough.
 fn finish(
-    args: &EvalArgs,
+    args: &JudgingArgs,
+    again: Option<&Path>,
     folder: &Path,
     run: &RunFile,
     terminal: &Terminal,
@@ -328,18 +329,17 @@ fn finish(
         report,
         known,
         mut failures,
-    } = Judged::of(args, folder, run)?;
+    } = Judged::of(args, again, folder, run)?;
     if !terminal.is_quiet() {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
     let mut compared = None;
-    if let Some(before) = args.baseline.as_ref().or(args.failed.as_ref()) {
-        let comparison = against(before, folder, args.failed.is_some())?;
+    if let Some(before) = args.baseline.as_deref().or(again) {
+        let comparison = against(before, folder, again.is_some())?;
         if !terminal.is_quiet() {
-            output::print(&diff::shown(&comparison, terminal.width()).trim_end())?;
+            output::print(&compare::shown(&comparison, terminal.width()).trim_end())?;
         }
-        diff::record(&comparison, (before, folder), None, terminal)?;
         let changes = comparison.differences.iter();
         let broken = changes.filter(|one| one.change == Change::Broken);
         let news = broken.filter(|one| !known.has(&one.after));
@@ -364,7 +364,7 @@ fn finish(
 
 fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
     // The overview of an experiment has a line for every combination.
-    let skipped = usize::from(run.experiment.is_some());
+    let skipped = usize::from(run.protocol.preset.is_some());
     for figures in report.tables.iter().skip(skipped) {
         output::print(&table::figures(figures, width))?;
     }

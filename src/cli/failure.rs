@@ -8,7 +8,7 @@ use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::ChoiceError;
 use posescope::measure::KnownError;
-use posescope::run::{DrawError, FolderError, RunError};
+use posescope::run::{DrawError, FolderError, ProtocolError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::session::JobError;
 use posescope::sink::rerun::RecordError;
@@ -32,6 +32,8 @@ pub enum CliError {
     Usage(String),
     #[error(transparent)]
     Param(#[from] ParamError),
+    #[error(transparent)]
+    Protocol(#[from] ProtocolError),
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error("{}: {source}", .path.display())]
@@ -97,6 +99,7 @@ impl CliError {
             Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
             Self::Usage(_)
             | Self::Param(_)
+            | Self::Protocol(_)
             | Self::Index(NoIndex::NoFolder)
             | Self::Choice(ChoiceError::UnknownPosition { .. } | ChoiceError::NoIndex)
             | Self::Draw(DrawError::NotDrawn { .. })

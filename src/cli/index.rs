@@ -9,20 +9,18 @@ use posescope::scene::{self, IndexOptions, NoIndex, Retriever, Scene};
 
 use super::args::IndexArgs;
 use super::failure::CliError;
-use super::run::use_threads;
 use super::terminal::Terminal;
 
 /// Runs the command. An index that is there and what is asked for is left as it is.
 pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.threads)?;
     let params = args.config.resolve()?;
     let scene = scene::open(&args.scene, args.format.as_deref())?;
-    let path = match &args.output {
+    let path = match &args.out {
         Some(path) => path.clone(),
         None => Retriever::default_path(scene.as_ref(), &args.scene).ok_or(NoIndex::NoFolder)?,
     };
     let options = IndexOptions {
-        words: args.words.get(),
+        words: params.index.words,
         every: args.every.get(),
         seed: args.seed,
     };
@@ -59,7 +57,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         BuildError::Frame(error) => CliError::Scene(error),
         BuildError::Io { path, source } => CliError::Io { path, source },
         BuildError::TooFewDescriptors { .. } => {
-            CliError::Usage(format!("{}: {error}; see --words", scene.name()))
+            CliError::Usage(format!("{}: {error}; see --set index.words", scene.name()))
         }
     })?;
     say(terminal, || {

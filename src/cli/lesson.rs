@@ -1,18 +1,18 @@
-//! `posescope lesson`: the lessons, in the window, as recordings and as text.
+//! `posescope lesson`: the lessons, in the window and as recordings.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use posescope::estimator;
-use posescope::lesson::{Lesson, OpenSetting, Page, PageTurner};
+use posescope::lesson::{Lesson, OpenSetting, PageTurner};
 use posescope::method::Method;
 use posescope::scene::Scene;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 use posescope::table::Table;
 
 use super::args::LessonArgs;
-use super::demo_settings;
+use super::defaults;
 use super::failure::CliError;
 use super::interrupt::Interrupt;
 use super::observer::CliObserver;
@@ -25,9 +25,6 @@ pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
         return list(terminal);
     };
     let lesson = Lesson::open(name)?;
-    if args.text {
-        return output::print(&text(&lesson).trim_end());
-    }
     match &args.save {
         Some(path) => save(&lesson, path, terminal),
         None => window(lesson, terminal),
@@ -44,27 +41,13 @@ fn list(terminal: &Terminal) -> Result<(), CliError> {
     output::print(&table.to_text(terminal.width()).trim_end())
 }
 
-/// All pages, with their answers.
-fn text(lesson: &Lesson) -> String {
-    let pages = lesson.pages.len();
-    let page = |(index, page): (usize, &Page)| {
-        let answered = page.answered(index + 1, pages);
-        format!(
-            "{}\n{}",
-            page.markdown(index + 1, pages),
-            answered.unwrap_or_default()
-        )
-    };
-    lesson.pages.iter().enumerate().map(page).collect()
-}
-
 #[cfg(feature = "app")]
 fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
     use posescope::app::{self, Setup};
 
     let first = &lesson.pages[0].variant;
     let open = lesson.setting(first).open(&|_| None)?;
-    let setup = Setup::of_lesson(open, demo_settings::folder().to_owned());
+    let setup = Setup::of_lesson(open, defaults::FOLDER.into());
     match app::open_lesson(setup, lesson.clone()) {
         Ok(()) => Ok(()),
         Err(why) => save_instead(&lesson, &why, terminal),
@@ -86,7 +69,7 @@ fn save_instead(
     why: &dyn std::fmt::Display,
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let folder = demo_settings::folder();
+    let folder = Path::new(defaults::FOLDER);
     std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     let stem = Path::new(&lesson.name).file_stem().unwrap_or_default();
     let path = folder.join(stem).with_extension("rrd");
@@ -150,7 +133,12 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
         scene: scene.to_owned(),
         query_scene: (queries != scene).then(|| queries.to_owned()),
         queries: vec![format!("lesson {}", lesson.name)],
-        references: lesson.variants[0].1.references.clone().unwrap_or_default(),
+        references: first
+            .task
+            .protocol
+            .named_references()
+            .map(str::to_owned)
+            .collect(),
         configuration: first.task.params.to_toml(),
         degraded: first.task.protocol.degrade,
         seed: first.task.protocol.seed,

@@ -25,26 +25,25 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
     let mut first: Option<Arc<dyn Scene>> = None;
     if args.camera.is_none() && queries.iter().any(|query| Path::new(query).is_file()) {
         // What is called as a frame is that frame.
-        let named = task.queries.as_deref().unwrap_or(scene);
-        let opened = posescope::scene::open(named, task.format.as_deref())?;
+        let named = task.query_scene().unwrap_or(scene);
+        let opened = posescope::scene::open(named, task.protocol.format.as_deref())?;
         let loose = queries.iter().filter(|query| opened.find(query).is_err());
         let loose = loose.count();
         if loose > 0 && loose < queries.len() {
             return Err(CliError::Usage(
-                "some of the queries are frames and others are photos of their own; localise them one \
-                 after the other"
+                "some queries are frames and others are photos; localise them in separate runs"
                     .to_owned(),
             ));
         }
         if loose > 0 {
             task.photos = Some(LoosePhotos::default());
         }
-        first = task.queries.is_none().then(|| Arc::from(opened));
+        first = task.query_scene().is_none().then(|| Arc::from(opened));
     }
     if args.camera.is_some() || task.photos.is_some() {
-        if task.queries.is_some() {
+        if task.query_scene().is_some() {
             return Err(CliError::Usage(
-                "--query names photos of their own, which come from no --queries".to_owned(),
+                "--query names photo files, so --query-scene cannot be used".to_owned(),
             ));
         }
         for query in queries {
@@ -54,8 +53,8 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
             paths: queries.iter().map(Into::into).collect(),
             camera: args.camera.clone(),
         });
-        if args.protocol.references.is_none() && args.protocol.gps.is_none() {
-            task.protocol.references = Selection::Matched(1);
+        if !args.protocol.has("references") && task.protocol.gps.is_none() {
+            task.protocol.select(Selection::Matched(1));
         }
     }
     let opened = |argument: &str| match argument == scene {

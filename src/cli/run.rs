@@ -1,5 +1,6 @@
 //! `posescope run`: queries × references × methods, each told to the recording.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use posescope::estimator;
@@ -40,7 +41,6 @@ struct PlannedQuery {
 
 /// Runs the command.
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.task.protocol.threads)?;
     let OpenedTask {
         task,
         scenes,
@@ -101,7 +101,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     let outcome = tasks.iter().enumerate().try_for_each(|(index, query)| {
         let request = Request {
-            radius_m: task.radius_m,
+            radius_m: task.radius_m(),
             references: query.references.clone(),
             fusions: task.protocol.fusions.clone(),
             setting: None,
@@ -164,17 +164,6 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Restricts parallel work to a number of threads.
-pub fn use_threads(threads: Option<std::num::NonZeroUsize>) -> Result<(), CliError> {
-    let Some(threads) = threads else {
-        return Ok(());
-    };
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.get())
-        .build_global()
-        .map_err(|error| CliError::Usage(error.to_string()))
-}
-
 impl Plan<'_> {
     /// Matches can be written only where some are found.
     fn check_features(&self) -> Result<(), CliError> {
@@ -214,17 +203,15 @@ impl Plan<'_> {
         wanted: Vec<usize>,
         progress: &mut ChoiceProgress<'_>,
     ) -> Result<Vec<PlannedQuery>, CliError> {
-        let (args, task, protocol) = (self.args, self.task, &self.task.protocol);
+        let (task, protocol) = (self.task, &self.task.protocol);
         let references = self.localizer.references();
-        let named = args
-            .task
-            .reference
-            .iter()
+        let named = protocol
+            .named_references()
             .map(|name| references.find(name))
             .collect::<Result<Vec<_>, _>>()?;
-        let index = match protocol.references {
+        let index = match protocol.selection() {
             Selection::Retrieved(_) if named.is_empty() => Some(Retriever::find(
-                task.index.as_deref(),
+                protocol.index.first().map(PathBuf::as_path),
                 references,
                 &task.scene,
                 &task.params,
@@ -234,7 +221,7 @@ impl Plan<'_> {
         let chooser = Chooser {
             localizer: &self.localizer,
             params: &task.params,
-            selection: protocol.references,
+            selection: protocol.selection(),
             radius_m: task.reach_m(),
             seed: protocol.seed,
             index: index.as_ref().map(|index| index as &dyn Ranking),

@@ -1,4 +1,4 @@
-//! `posescope surface`: the cost over a dense grid of positions and headings.
+//! `posescope run --surface`: the cost over a dense grid of positions and headings.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,59 +15,58 @@ use posescope::picture;
 use posescope::problem::Problem;
 use posescope::render::{Score, Scorer};
 
-use super::args::SurfaceArgs;
+use super::args::RunArgs;
 use super::failure::CliError;
 use super::opened::{self, OpenedTask};
 use super::output;
-use super::run::use_threads;
 use super::terminal::Terminal;
 
 /// Side of the square that shows a position \[px\].
 const CELL_PX: u32 = 3;
 
-/// Runs the command.
-pub fn surface(args: &SurfaceArgs, terminal: &Terminal) -> Result<(), CliError> {
-    use_threads(args.task.protocol.threads)?;
-    let method = method(args)?;
-    let writer = writer(&args.out)?;
+/// Writes the surface of the query.
+pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
+    let writer = writer(out)?;
     let OpenedTask {
         task,
         scenes,
         queries,
-    } = opened::open(&args.task, &args.scene, std::slice::from_ref(&args.query))?;
+    } = opened::open(&args.task, &args.scene, &args.query)?;
+    let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;
     let (references, queried) = (scenes.references.as_ref(), scenes.queries.as_ref());
-    let [reference] = args.task.reference.as_slice() else {
+    let named: Vec<&str> = task.protocol.named_references().collect();
+    let (&[query], &[reference]) = (queries.as_slice(), named.as_slice()) else {
         return Err(CliError::Usage(
-            "a surface has one reference; name it with --reference".to_owned(),
+            "a surface has one query and one reference; name them with --query and --reference"
+                .to_owned(),
         ));
     };
-    let (query, reference) = (queries[0], references.find(reference)?);
     let problem = Problem {
         query: queried.query(query)?,
-        reference: references.reference(reference)?,
-        uncertainty_radius_m: task.radius_m,
+        reference: references.reference(references.find(reference)?)?,
+        uncertainty_radius_m: task.radius_m(),
         prior_m: None,
         seed: task.protocol.seed,
         matches: None,
     };
     let grid = GridParams {
-        coarse_step_m: args.step,
-        yaw_step_deg: args.yaw_step,
+        coarse_step_m: task.params.surface.step_m,
+        yaw_step_deg: task.params.surface.yaw_step_deg,
         ..task.params.grid.clone()
     };
     // Before the work, not after it.
-    if let Some(folder) = args.out.parent() {
+    if let Some(folder) = out.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
     let estimator = estimator::entry(method).make(&task.params);
     let start = Instant::now();
     let mut filled = None;
     estimator.with_scorer(&problem, &mut |scorer| {
-        filled = Some(fill(scorer, task.radius_m, &grid, terminal));
+        filled = Some(fill(scorer, task.radius_m(), &grid, terminal));
     });
     let surface = filled.ok_or_else(|| no_cost(method))??;
     let seconds = start.elapsed().as_secs_f64();
-    writer(&surface, &args.out)?;
+    writer(&surface, out)?;
     if !terminal.is_quiet() {
         let truth = queried.pose(query);
         let said = described(&surface, &problem, truth.as_ref());
@@ -76,18 +75,18 @@ pub fn surface(args: &SurfaceArgs, terminal: &Terminal) -> Result<(), CliError> 
         let per_second = hypotheses as f64 / seconds;
         eprintln!(
             "{hypotheses} hypotheses in {seconds:.1} s, {per_second:.0} per second; {}",
-            args.out.display()
+            out.display()
         );
     }
     Ok(())
 }
 
 /// The method whose cost is shown: mi, or the one that was named.
-fn method(args: &SurfaceArgs) -> Result<Method, CliError> {
-    let method = match args.task.protocol.method.as_slice() {
-        [] => Method::MI,
-        [one] => *one,
-        _ => return Err(CliError::Usage("a surface is of one method".to_owned())),
+fn method(is_named: bool, methods: &[Method]) -> Result<Method, CliError> {
+    let method = match (is_named, methods) {
+        (false, _) => Method::MI,
+        (true, [one]) => *one,
+        (true, _) => return Err(CliError::Usage("a surface is of one method".to_owned())),
     };
     let entry = estimator::find(method);
     match entry.map(|entry| &entry.parts) {
@@ -104,8 +103,8 @@ fn no_cost(method: Method) -> CliError {
 
 fn too_large(error: &LatticeTooLarge) -> CliError {
     let (step, less) = match error.phase.is_yaw() {
-        true => ("--yaw-step", "a smaller grid.yaw_range"),
-        false => ("--step", "a smaller --radius"),
+        true => ("surface.yaw_step", "a smaller grid.yaw_range"),
+        false => ("surface.step", "a smaller --radius"),
     };
     CliError::Usage(format!(
         "{step}: {:.0} of them, at most {MOST_CELLS} are scored; take a larger step or {less}",
@@ -141,7 +140,7 @@ fn writer(out: &Path) -> Result<Writer, CliError> {
         Some("csv") => Ok(write_csv),
         Some("png") => Ok(write_png),
         _ => Err(CliError::Usage(format!(
-            "--out {}: a name that ends in .csv or .png expected",
+            "--surface {}: a name that ends in .csv or .png expected",
             out.display()
         ))),
     }

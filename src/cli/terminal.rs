@@ -6,7 +6,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use indicatif_log_bridge::LogWrapper;
 use log::LevelFilter;
 
-use super::args::Verbosity;
+use super::args::Everywhere;
 
 /// Where progress and messages go.
 pub struct Terminal {
@@ -16,8 +16,8 @@ pub struct Terminal {
 
 impl Terminal {
     /// Sets up logging, so that a message does not tear a progress bar apart.
-    pub fn new(verbosity: &Verbosity) -> Self {
-        let (own, foreign) = match (verbosity.quiet, verbosity.verbose) {
+    pub fn new(everywhere: &Everywhere) -> Self {
+        let (own, foreign) = match (everywhere.quiet, everywhere.verbose) {
             (true, _) => (LevelFilter::Error, LevelFilter::Off),
             (false, 0) => (LevelFilter::Warn, LevelFilter::Error),
             (false, 1) => (LevelFilter::Info, LevelFilter::Warn),
@@ -42,7 +42,14 @@ impl Terminal {
         }
         Self {
             bars,
-            quiet: verbosity.quiet,
+            quiet: everywhere.quiet,
+        }
+    }
+
+    /// Prints a message on stderr, unless only errors are wanted.
+    pub fn say(&self, message: impl FnOnce() -> String) {
+        if !self.is_quiet() {
+            eprintln!("{}", message());
         }
     }
 

@@ -4,15 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use clap::Parser as _;
-use posescope::app::{self, KnownResults, ReferencePick, Results, Setup, WindowError};
+use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
-use posescope::params::Params;
-use posescope::run::{Protocol, ScenePair, read_run};
+use posescope::run::{ScenePair, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
 use super::args::{Arguments, Command, ViewArgs};
-use super::demo_settings::{folder as saving_folder, settings as demo_settings};
+use super::defaults;
 use super::failure::CliError;
 use super::opened::{self, OpenedTask};
 use super::run;
@@ -20,7 +19,6 @@ use super::terminal::Terminal;
 
 /// Opens the window, or says why not and does the headless job.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
-    run::use_threads(args.task.protocol.threads)?;
     let (setup, results) = setup(args, mode)?;
     let headless = setup.clone();
     match app::open(setup, results) {
@@ -58,7 +56,7 @@ pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), Cl
         true => of_a_run(args, folder)?,
         false if args.before.is_some() => {
             return Err(CliError::Usage(format!(
-                "--before holds a run against another one, and {} is the folder of none",
+                "--before compares two runs, and {} is not the folder of a run",
                 args.scene
             )));
         }
@@ -93,10 +91,9 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         queries: named,
     } = opened::open(&args.task, &args.scene, &named)?;
     let query = named.first().copied();
-    let named: Vec<usize> = args
-        .task
-        .reference
-        .iter()
+    let named: Vec<usize> = task
+        .protocol
+        .named_references()
         .map(|name| references.find(name))
         .collect::<Result<_, _>>()?;
     let mut setup = Setup {
@@ -105,10 +102,10 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
         queries,
         query: 0,
         chosen: named.into(),
-        index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
+        index: Arc::new(IndexFile::of(&task)),
         task,
         mode: RunMode::Paused,
-        folder: saving_folder().to_owned(),
+        folder: defaults::FOLDER.into(),
     };
     begin_at(args, query, &mut setup)?;
     Ok(setup)
@@ -116,16 +113,17 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
 
 /// The query that was named, the demonstration's, or the first that has a reference.
 fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<(), CliError> {
-    let has_reference =
-        |setup: &Setup, query| setup.task.by_hand || !setup.candidates(query).is_empty();
-    let is_demo = args.scene == demo_settings().scene
+    let has_reference = |setup: &Setup, query| {
+        setup.task.protocol.is_by_hand() || !setup.candidates(query).is_empty()
+    };
+    let is_demo = args.scene == defaults::SCENE
         && args.query.is_none()
-        && setup.task.queries.is_none()
-        && setup.pick() == ReferencePick::By(Protocol::default().references);
+        && setup.task.query_scene().is_none()
+        && !args.task.protocol.has("references");
     setup.query = match named {
         _ if is_demo => {
-            setup.chosen = vec![setup.references.find(&demo_settings().reference)?].into();
-            setup.queries.find(&demo_settings().query)?
+            setup.chosen = vec![setup.references.find(defaults::REFERENCE)?].into();
+            setup.queries.find(defaults::QUERY)?
         }
         Some(query) => query,
         None => {
@@ -149,13 +147,14 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
 
 /// A run has queries of its own.
 fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
+    args.task.refuse_many_queries()?;
     let given = [
-        ("--queries", args.task.queries.is_some()),
+        ("--query-scene", args.task.protocol.has("query_scene")),
         ("--camera", args.task.camera.is_some()),
     ];
     match given.iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => Err(CliError::Usage(format!(
-            "{option} does not go with the folder of a run, which has its own queries; name a scene instead"
+            "{option} does not go with a run folder, which has its own queries; name a scene instead"
         ))),
         None => Ok(()),
     }
@@ -172,31 +171,28 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
     refuse_other_queries(args)?;
-    let given = &args.task.protocol;
-    let format = given.format.as_deref().or(file.format.as_deref());
+    let mut protocol = args.task.protocol.over(file.protocol.clone())?;
+    let format = protocol.format.as_deref();
     let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
-    let other = file
-        .queries
+    let other = protocol
+        .query_scene
         .iter()
         .find(|argument| {
             let scene = scene::open(argument, format);
             scene.is_ok_and(|scene| scene.name() == pair.query_scene)
         })
-        .filter(|_| pair.query_scene != pair.scene);
-    let queries: Arc<dyn Scene> = match other {
+        .filter(|_| pair.query_scene != pair.scene)
+        .cloned();
+    let queries: Arc<dyn Scene> = match &other {
         Some(argument) => scene::open(argument, format)?.into(),
         None => Arc::clone(&references),
     };
-    let protocol = given.over(file.protocol.clone())?;
     let queries = protocol.as_asked(queries, references.as_ref())?;
-    let mut params = Params::default();
-    params
-        .merge_toml(&file.params.to_string())
-        .map_err(|source| CliError::Config {
-            path: folder.join("run.toml"),
-            source,
-        })?;
-    let params = given.config.over(params)?;
+    let params = file.params().map_err(|source| CliError::Config {
+        path: folder.join("run.toml"),
+        source,
+    })?;
+    let params = args.task.config.over(params)?;
     let results_of = |folder: &Path| -> Result<Results, CliError> {
         let mut results = results_of(folder, pair, queries.as_ref())?;
         for result in results.values_mut().flatten() {
@@ -220,26 +216,27 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         (None, None) => 0,
     };
     let of_run = results.get(&query).and_then(|results| results.first());
-    let reference_names = match args.task.reference.as_slice() {
-        [] => of_run.map_or(&[][..], |result| &result.references),
-        named => named,
+    let named: Vec<&str> = protocol.named_references().collect();
+    let reference_names = match named.as_slice() {
+        [] => of_run.map_or_else(Vec::new, |result| {
+            result.references.iter().map(String::as_str).collect()
+        }),
+        named => named.to_vec(),
     };
     let reference_frames = reference_names
-        .iter()
+        .into_iter()
         .map(|name| references.find(name))
         .collect::<Result<Vec<_>, _>>()?;
-    let radius_m = file.radii_m.first().copied();
+    protocol.query_scene = other.into_iter().collect();
+    protocol.limit = None;
+    protocol.preset = None;
+    protocol.failure_radius_m = None;
+    protocol.radii_m.truncate(1);
     let task = Task {
-        scene: scene_argument,
-        queries: other.cloned(),
-        format: format.map(str::to_owned),
-        by_hand: !args.task.reference.is_empty(),
-        index: args.task.index.clone(),
-        radius_m: args.task.radius.or(radius_m).unwrap_or(Protocol::RADIUS_M),
         protocol,
         params,
         breakpoints: args.task.breakpoints.clone(),
-        photos: None,
+        ..Task::of(scene_argument)
     };
     let setup = Setup {
         offered: results.keys().copied().collect(),
@@ -247,10 +244,10 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         queries,
         query,
         chosen: reference_frames.into(),
-        index: Arc::new(IndexFile::new(&task.scene, task.index.clone())),
+        index: Arc::new(IndexFile::of(&task)),
         task,
         mode: RunMode::Paused,
-        folder: saving_folder().to_owned(),
+        folder: defaults::FOLDER.into(),
     };
     let known = KnownResults {
         now: results,

@@ -68,7 +68,7 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
         };
         remarks.push(Remark::Broken(format!(
             "{missing}: nothing can be localised against this scene; its photos can be queries of another \
-             (--queries)"
+             (--query-scene)"
         )));
     }
     steps(&poses, &mut inventory, &mut remarks);

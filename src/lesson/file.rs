@@ -344,9 +344,9 @@ minutes = 1
 [setting]
 scene = "street"
 query = "70"
-references = ["62"]
+reference = ["62"]
 [variant.dark]
-queries = "street:night"
+query-scene = ["street:night"]
 [[claim]]
 variant = "dark"
 holds = "method = mi and error < 1"
@@ -397,9 +397,12 @@ variant = "dark"
             (third.variant.as_str(), &third.at),
             ("dark", &Moment::Start)
         );
-        let dark = lesson.setting("dark");
-        assert_eq!(dark.queries.as_deref(), Some("street:night"));
-        assert_eq!(dark.query, lesson.setting(FIRST).query);
+        let [light, dark] = [FIRST, "dark"].map(|name| {
+            let task = lesson.setting(name).task();
+            task.expect("a task").protocol
+        });
+        assert_eq!(dark.query_scene, ["street:night"]);
+        assert_eq!(dark.references, light.references);
         let shown = first.markdown(1, 3);
         assert!(
             shown.contains("2. that") && !shown.contains("So."),
@@ -413,6 +416,7 @@ variant = "dark"
         for (from, to, line, why) in [
             ("minutes = 1", "minutes = \"one\"", 4, "u32"),
             ("scene = ", "scenery = ", 6, "scenery"),
+            ("[\"street:night\"]", "\"street:night\"", 10, "sequence"),
             ("error < 1\"", "error <\"", 1, "expected"),
             (
                 "variant = \"dark\"\nholds",

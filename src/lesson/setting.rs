@@ -1,48 +1,61 @@
 //! What a lesson localises.
 
+use std::fmt;
 use std::sync::Arc;
 
-use serde::Deserialize;
+use serde::de::{DeserializeSeed, Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 
 use crate::describe::ParamError;
-use crate::fusion::Fusion;
-use crate::image::Degradation;
-use crate::localize::Selection;
-use crate::method::Method;
 use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::{FrameStore, Scene, SceneError};
 use crate::session::{IndexFile, Job, Task, TaskScenes};
 
-/// What is localised: the fields of a lesson's header and of its variants. What is not said is as the
-/// commands have it by default.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Setting {
-    /// The scene of the references.
-    pub scene: Option<String>,
-    /// The scene of the query, if it is another one.
-    pub queries: Option<String>,
-    /// The query frame.
-    pub query: Option<String>,
-    /// The reference frames.
-    pub references: Option<Vec<String>>,
-    /// How references are chosen where none are named.
-    pub choose: Option<Selection>,
-    /// The methods.
-    pub methods: Option<Vec<Method>>,
-    /// How several references are fused.
-    pub fusions: Option<Vec<Fusion>>,
-    /// The uncertainty radius \[m\].
-    pub radius_m: Option<f64>,
-    /// How far from the truth the query's position is known \[m\].
-    pub prior_m: Option<f64>,
-    /// The seed.
-    pub seed: Option<u64>,
-    /// What is done to the query's photo, as `--degrade` takes it.
-    pub degrade: Option<Degradation>,
-    /// Parameters, as `--set` takes them.
-    pub set: Option<Vec<String>>,
+/// What is localised: the fields of a lesson's header and of its variants, which are the options of the
+/// command line by their names, with `scene`, `query` and `set`. What they leave out is as by default.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Setting(toml::Table);
+
+/// Checks each key where it stands, so that an error has its line.
+impl<'de> Deserialize<'de> for Setting {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Keys;
+        struct Checked(String);
+
+        impl<'de> DeserializeSeed<'de> for Checked {
+            type Value = (String, toml::Value);
+
+            fn deserialize<D: Deserializer<'de>>(
+                self,
+                deserializer: D,
+            ) -> Result<Self::Value, D::Error> {
+                let entry = (self.0, toml::Value::deserialize(deserializer)?);
+                let one = Setting(toml::Table::from_iter([entry.clone()]));
+                one.task_of("").map_err(D::Error::custom)?;
+                Ok(entry)
+            }
+        }
+
+        impl<'de> Visitor<'de> for Keys {
+            type Value = Setting;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Setting, A::Error> {
+                let mut table = toml::Table::new();
+                while let Some(key) = map.next_key()? {
+                    let (key, value) = map.next_value_seed(Checked(key))?;
+                    table.insert(key, value);
+                }
+                Ok(Setting(table))
+            }
+        }
+
+        deserializer.deserialize_map(Keys)
+    }
 }
 
 /// A setting that cannot be followed.
@@ -51,6 +64,12 @@ pub enum SettingError {
     /// A field that must be said.
     #[error("the header says no `{0}`")]
     Missing(&'static str),
+    /// A field of another form.
+    #[error("`{0}` is a text in quotation marks")]
+    NoText(&'static str),
+    /// A field that there is not, or a value that it does not take.
+    #[error("{}", .0.message())]
+    Field(#[from] toml::de::Error),
     /// A parameter that there is not.
     #[error(transparent)]
     Param(#[from] ParamError),
@@ -86,7 +105,7 @@ impl OpenSetting {
             query: self.query,
             chosen: self.references.clone().into(),
             task: self.task.clone(),
-            index: Arc::new(IndexFile::new(&self.task.scene, None)),
+            index: Arc::new(IndexFile::of(&self.task)),
             frames: Arc::clone(frames),
         }
     }
@@ -99,30 +118,22 @@ pub fn named_scenes(
     references: &Arc<dyn Scene>,
     queries: &Arc<dyn Scene>,
 ) -> Vec<(String, Arc<dyn Scene>)> {
-    let own = task.queries.iter();
-    let own = own.map(|name| (name.clone(), Arc::clone(queries)));
-    own.chain([(task.scene.clone(), Arc::clone(references))])
+    let own = task.query_scene();
+    let own = own.map(|name| (name.to_owned(), Arc::clone(queries)));
+    own.into_iter()
+        .chain([(task.scene.clone(), Arc::clone(references))])
         .collect()
 }
 
 impl Setting {
     /// This setting where it says something, elsewhere `base`.
     pub(super) fn over(&self, base: &Self) -> Self {
-        let (own, base) = (self.clone(), base.clone());
-        Self {
-            scene: own.scene.or(base.scene),
-            queries: own.queries.or(base.queries),
-            query: own.query.or(base.query),
-            references: own.references.or(base.references),
-            choose: own.choose.or(base.choose),
-            methods: own.methods.or(base.methods),
-            fusions: own.fusions.or(base.fusions),
-            radius_m: own.radius_m.or(base.radius_m),
-            prior_m: own.prior_m.or(base.prior_m),
-            seed: own.seed.or(base.seed),
-            degrade: own.degrade.or(base.degrade),
-            set: own.set.or(base.set),
-        }
+        let entries = base.0.iter().chain(&self.0);
+        Self(
+            entries
+                .map(|(key, value)| (key.clone(), value.clone()))
+                .collect(),
+        )
     }
 
     /// What is asked of posescope.
@@ -130,28 +141,34 @@ impl Setting {
     /// # Errors
     /// No scene, or a parameter that there is not.
     pub fn task(&self) -> Result<Task, SettingError> {
-        let scene = self.scene.clone().ok_or(SettingError::Missing("scene"))?;
-        let default = Protocol::default();
+        let scene = self.text("scene")?;
+        self.task_of(scene.ok_or(SettingError::Missing("scene"))?)
+    }
+
+    fn task_of(&self, scene: &str) -> Result<Task, SettingError> {
+        let mut protocol = self.0.clone();
+        for key in ["scene", "query"] {
+            self.text(key)?;
+            protocol.remove(key);
+        }
+        let assignments = protocol.remove("set").map(Vec::<String>::deserialize);
         let mut params = Params::default();
-        for assignment in self.set.iter().flatten() {
-            params.assign(assignment)?;
+        for assignment in assignments.transpose()?.unwrap_or_default() {
+            params.assign(&assignment)?;
         }
         Ok(Task {
-            queries: self.queries.clone(),
-            by_hand: self.references.is_some(),
-            radius_m: self.radius_m.unwrap_or(Protocol::RADIUS_M),
-            protocol: Protocol {
-                references: self.choose.unwrap_or(default.references),
-                methods: self.methods.clone().unwrap_or(default.methods),
-                fusions: self.fusions.clone().unwrap_or_default(),
-                prior_m: self.prior_m,
-                seed: self.seed.unwrap_or_default(),
-                degrade: self.degrade.unwrap_or_default(),
-                ..default
-            },
+            protocol: Protocol::deserialize(protocol)?,
             params,
             ..Task::of(scene)
         })
+    }
+
+    fn text(&self, key: &'static str) -> Result<Option<&str>, SettingError> {
+        match self.0.get(key) {
+            None => Ok(None),
+            Some(toml::Value::String(text)) => Ok(Some(text)),
+            Some(_) => Err(SettingError::NoText(key)),
+        }
     }
 
     /// Opens the scenes and finds the frames. `opened` may have a scene by its name already.
@@ -163,10 +180,9 @@ impl Setting {
         opened: &dyn Fn(&str) -> Option<Arc<dyn Scene>>,
     ) -> Result<OpenSetting, SettingError> {
         let task = self.task()?;
-        let query = self.query.as_deref();
-        let query = query.ok_or(SettingError::Missing("query"))?;
+        let query = self.text("query")?.ok_or(SettingError::Missing("query"))?;
         let scenes = task.open(opened)?;
-        let references = self.references.iter().flatten();
+        let references = task.protocol.named_references();
         Ok(OpenSetting {
             query: scenes.queries.find(query)?,
             references: references

@@ -8,15 +8,11 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
-use super::results::{RunResults, read_rows};
-use super::tables::{rows, tables};
-use super::triage::Field;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::{FolderError, read_results};
 use crate::run::{QueryCamera, RunFile, RunItem};
-use crate::table::Table;
 
 /// A format to export to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,21 +26,15 @@ pub enum Format {
     Colmap,
     /// visuallocalization.net: `name qw qx qy qz x y z`, world to camera.
     Vloc,
-    /// Every result with its figures.
-    Csv,
-    /// The tables of the run.
-    Latex,
 }
 
 impl Format {
     /// All formats by their names.
-    pub const ALL: [(&'static str, Self); 6] = [
+    pub const ALL: [(&'static str, Self); 4] = [
         ("tum", Self::Tum),
         ("kitti", Self::Kitti),
         ("colmap", Self::Colmap),
         ("vloc", Self::Vloc),
-        ("csv", Self::Csv),
-        ("latex", Self::Latex),
     ];
 
     /// The format of a name.
@@ -62,9 +52,9 @@ pub enum ExportError {
     Folder(#[from] FolderError),
     /// It is not clear what to export.
     #[error(
-        "query {query} has several results; say which with --method ({}), --fusion, --radius, \
-         --references or --scene",
-        methods.iter().map(|method| method.name()).collect::<Vec<_>>().join(", ")
+        "query {query} has several results; choose one of them, as in --where 'method = {}'; the fields that tell \
+         results apart are method, fusion, radius, references and scene",
+        methods.first().map_or("fb", |method| method.name())
     )]
     Ambiguous {
         /// The query.
@@ -78,14 +68,14 @@ pub enum ExportError {
     /// The format cannot hold a missing pose.
     #[error(
         "kitti: line and frame number belong together, so that a missing pose cannot be told: {missing}; \
-         tum, vloc, colmap and csv leave it out"
+         tum, vloc and colmap leave it out"
     )]
     Gap {
         /// What is missing.
         missing: String,
     },
     /// The format wants a time that the scene does not know.
-    #[error("tum: the frames of {scene} have no times; kitti, vloc, colmap and csv need none")]
+    #[error("tum: the frames of {scene} have no times; kitti, vloc and colmap need none")]
     NoTime {
         /// The scene of the queries.
         scene: String,
@@ -129,16 +119,6 @@ pub fn export(
     format: Format,
     takes: Choice<'_>,
 ) -> Result<Export, ExportError> {
-    match format {
-        Format::Csv => return single(csv(folder, takes)?),
-        Format::Latex => {
-            let preset = run.experiment.map(|one| one.name());
-            let tables = tables(&RunResults::read(folder)?, preset);
-            let text: Vec<String> = tables.iter().map(Table::to_latex).collect();
-            return single(text.join("\n"));
-        }
-        Format::Tum | Format::Kitti | Format::Colmap | Format::Vloc => {}
-    }
     let localized = localized(folder, run, takes)?;
     if localized.is_empty() {
         return Err(ExportError::Nothing);
@@ -148,20 +128,13 @@ pub fn export(
         Format::Tum => vec![plain(tum(&localized)?)],
         Format::Kitti => vec![plain(kitti(&localized)?)],
         Format::Vloc => vec![plain(vloc(&localized))],
-        _ => colmap(&localized),
+        Format::Colmap => colmap(&localized),
     };
     Ok(Export { files, left_out })
 }
 
 fn plain(text: String) -> ExportedFile {
     ExportedFile { name: "", text }
-}
-
-fn single(text: String) -> Result<Export, ExportError> {
-    Ok(Export {
-        files: vec![plain(text)],
-        left_out: 0,
-    })
 }
 
 /// One result per query, in the order of the run.
@@ -290,11 +263,4 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
         file("images.txt", images),
         file("points3D.txt", "# no points\n".to_owned()),
     ]
-}
-
-/// Every chosen result with all its fields, numbers in full.
-fn csv(folder: &Path, takes: Choice<'_>) -> Result<String, FolderError> {
-    let mut results = read_rows(folder)?;
-    results.retain(takes);
-    Ok(rows(&results, Field::ALL.iter().chain(Field::POSE), Field::whole).to_csv())
 }

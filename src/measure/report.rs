@@ -135,7 +135,7 @@ pub fn write_report(
     let times = timings::read(folder, &rows)?;
     let timed = rows.iter().zip(times);
     let measured = |timed: Vec<(&QueryResult, Option<f64>)>| {
-        let mut measures = measure(timed.iter().map(|one| one.0), run.failure_radius_m);
+        let mut measures = measure(timed.iter().map(|one| one.0), run.failure_radius_m());
         timings::add_medians(&mut measures, timed.into_iter());
         measures
     };
@@ -145,7 +145,7 @@ pub fn write_report(
     let known_report = known.report(&rows);
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
-        failure_radius_m: run.failure_radius_m,
+        failure_radius_m: run.failure_radius_m(),
         groups: &measures,
         gates: &gate_results,
     };
@@ -159,10 +159,10 @@ pub fn write_report(
     let results = RunResults {
         results: rows,
         measures,
-        failure_radius_m: run.failure_radius_m,
+        failure_radius_m: run.failure_radius_m(),
     };
     Ok(Report {
-        tables: tables(&results, run.experiment.map(|one| one.name())),
+        tables: tables(&results, run.protocol.preset.map(|one| one.name())),
         measures: results.measures,
         gate_results,
         known: known_report,

@@ -32,7 +32,7 @@ impl RunResults {
     /// # Errors
     /// A folder without a run, or a line that is no result.
     pub fn read(folder: &Path) -> Result<Self, FolderError> {
-        let radius_m = read_run(folder)?.failure_radius_m;
+        let radius_m = read_run(folder)?.failure_radius_m();
         Ok(Self::of(read_rows(folder)?, radius_m))
     }
 }

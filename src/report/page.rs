@@ -6,9 +6,8 @@ use super::{Baseline, ReportedResult, RunReport};
 use crate::chart::hex;
 use crate::diagnosis::{Code, Grade};
 use crate::measure::{GateResult, Group};
-use crate::method::Method;
 use crate::palette;
-use crate::run::RunFile;
+use crate::run::{Protocol, RunFile};
 use crate::session::Task;
 use crate::table::{Align, Table};
 
@@ -95,46 +94,23 @@ fn thumbnails(report: &RunReport) -> String {
 
 fn asked(report: &RunReport) -> Markup {
     let (run, protocol) = (&report.run, &report.run.protocol);
-    let joined = |words: Vec<String>| words.join(", ");
-    let methods = joined(protocol.methods.iter().map(Method::to_string).collect());
-    let fusions = joined(protocol.fusions.iter().map(ToString::to_string).collect());
-    let radii = joined(
-        run.radii_m
-            .iter()
-            .map(|radius| format!("{radius} m"))
-            .collect(),
-    );
     html! {
         section aria-labelledby="asked" {
             h2 id="asked" { "What was run" }
             dl {
-                dt { "Scenes" } dd { (run.scenes.join(", ")) }
-                @if !run.queries.is_empty() { dt { "Queries from" } dd { (run.queries.join(", ")) } }
-                @if let Some(experiment) = run.experiment { dt { "Experiment" } dd { (experiment) } }
-                dt { "Queries" } dd { (run.items().count()) }
-                @if let Some(shard) = run.shard { dt { "Part" } dd { (shard) } }
-                dt { "Methods" } dd { (methods) }
-                dt { "References" } dd { (protocol.references) " within " (radii) }
-                @if let Some(prior) = protocol.prior_m { dt { "Prior" } dd { (prior) " m" } }
-                @if !fusions.is_empty() { dt { "Fusions" } dd { (fusions) } }
-                @if !protocol.degrade.is_none() { dt { "Photos degraded" } dd { (protocol.degrade) } }
-                @if let Some(format) = &run.format { dt { "Format" } dd { (format) } }
-                @for file in &protocol.estimates { dt { "Poses of another system" } dd { (file) } }
-                @if let Some(folder) = &protocol.matches { dt { "Matches of another system" } dd { (folder.display()) } }
-                @if let Some(file) = &protocol.gps { dt { "Positions of the queries" } dd { (file.display()) } }
-                @if run.share < 1.0 { dt { "Drawn as queries" } dd { (100.0 * run.share) " % of the frames" } }
-                @if let Some(limit) = run.limit { dt { "At most" } dd { (limit) " queries" } }
-                dt { "Right" } dd { "within " (protocol.right) " of the truth; wrong otherwise" }
-                dt { "Success, as the paper counts it" } dd { "within " (run.failure_radius_m) " m of the truth" }
-                @if let Some(accept) = protocol.accept { dt { "Refused" } dd { "poses with a confidence below " (accept) } }
-                @if protocol.explain > 0 { dt { "Explained" } dd { "failures, by up to " (protocol.explain) " runs each" } }
-                dt { "Seed" } dd { (protocol.seed) }
-                dt { "Parameters" }
+                dt { "scenes" } dd { (run.scenes.join(", ")) }
+                dt { "queries" } dd { (run.items().count()) }
+                @if let Some(shard) = run.shard { dt { "part" } dd { (shard) } }
+                dt { "methods" } dd { (protocol.methods.iter().map(|method| method.name()).collect::<Vec<_>>().join(", ")) }
+                dt { "right" } dd { "within " (protocol.right) " of the truth; wrong otherwise" }
+                dt { "success, as the paper counts it" } dd { "within " (run.failure_radius_m()) " m of the truth" }
+                @for (option, value) in protocol.options() { dt { (option) } dd { (value) } }
+                dt { "parameters" }
                 dd {
                     @if report.changes.is_empty() { "all at their defaults" }
                     @for change in &report.changes { code { (change) } " " }
                 }
-                dt { "Version" } dd { "posescope " (run.version) }
+                dt { "version" } dd { "posescope " (run.version) }
             }
             @for note in &report.notes { p { (note) } }
         }
@@ -458,26 +434,26 @@ fn again(run: &RunFile, one: &ReportedResult) -> String {
     let result = &one.result;
     let place = run.pairs.iter().find(|pair| pair.scene == result.scene);
     let scene = place.and_then(|pair| run.scenes.get(pair.scene_index));
-    let mut params = crate::params::Params::default();
-    // A run of another version is repeated with what this one knows.
-    let _ = params.merge_toml(&run.params.to_string());
-    let mut protocol = run.protocol.clone();
-    protocol.methods = vec![result.method];
-    protocol.fusions = result.fusion.into_iter().collect();
-    protocol.explain = 0;
+    let mut protocol = Protocol {
+        methods: vec![result.method],
+        fusions: result.fusion.into_iter().collect(),
+        explain: 0,
+        limit: None,
+        preset: None,
+        failure_radius_m: None,
+        index: Vec::new(),
+        ..run.protocol.clone()
+    };
+    if let Some(setting) = result.setting {
+        protocol.radii_m = vec![setting.radius_m];
+    }
+    protocol
+        .query_scene
+        .truncate(usize::from(result.query_scene.is_some()));
     let task = Task {
-        queries: match &result.query_scene {
-            Some(_) => run.queries.first().cloned(),
-            None => None,
-        },
-        format: run.format.clone(),
-        by_hand: true,
-        radius_m: result.setting.map_or_else(
-            || run.radii_m.first().copied().unwrap_or_default(),
-            |setting| setting.radius_m,
-        ),
         protocol,
-        params,
+        // A run of another version is repeated with what this one knows.
+        params: run.params().unwrap_or_default(),
         ..Task::of(scene.cloned().unwrap_or_else(|| result.scene.clone()))
     };
     task.command_line(&result.query, &result.references)

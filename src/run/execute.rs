@@ -16,7 +16,7 @@ use crate::localize::{
 };
 use crate::method::Method;
 use crate::params::Params;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{self, Scene, SceneError};
 use crate::trace::Cancelled;
 
 /// The scenes of a run, opened.
@@ -29,6 +29,27 @@ pub struct Scenes {
 }
 
 impl Scenes {
+    /// Opens the scenes of references and those of queries.
+    ///
+    /// # Errors
+    /// A scene that cannot be read.
+    pub fn open(
+        references: &[String],
+        queries: &[String],
+        format: Option<&str>,
+    ) -> Result<Self, SceneError> {
+        let open_all = |arguments: &[String]| -> Result<Vec<Arc<dyn Scene>>, SceneError> {
+            let scenes = arguments.iter();
+            scenes
+                .map(|argument| scene::open(argument, format).map(Arc::from))
+                .collect()
+        };
+        Ok(Self {
+            references: open_all(references)?,
+            queries: open_all(queries)?,
+        })
+    }
+
     /// The same scenes as the protocol asks about their queries: sought where it says, and with their
     /// photos degraded. Latitudes and longitudes are tied to the first scene of references.
     ///
@@ -241,7 +262,7 @@ impl Execution<'_> {
             let chooser = Chooser {
                 localizer,
                 params: self.params,
-                selection: protocol.references,
+                selection: protocol.selection(),
                 radius_m,
                 seed: protocol.seed,
                 index,
@@ -272,16 +293,12 @@ impl Execution<'_> {
         results: &[(QueryResult, StageTimes)],
         observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
-        let methods = &self.run.protocol.methods;
-        let per_method = (results.len() / methods.len().max(1)).max(1);
-        let per_request = self.run.protocol.fusions.len().max(1);
-        for (&method, of_method) in methods.iter().zip(results.chunks(per_method)) {
-            let failed = |(result, _): &(QueryResult, StageTimes)| result.grade.is_failure();
-            let Some(request) = of_method
-                .iter()
-                .position(failed)
-                .and_then(|at| requests.get(at / per_request))
-            else {
+        for &method in &self.run.protocol.methods {
+            let mut results = results.iter().map(|(result, _)| result);
+            let failed = results
+                .find(|result| result.method == method && result.grade.is_failure())
+                .and_then(|failed| requests.iter().find(|one| one.setting == failed.setting));
+            let Some(request) = failed else {
                 continue;
             };
             observer.failed(&FailedQuery {

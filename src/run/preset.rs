@@ -2,6 +2,10 @@
 
 use serde::Deserialize;
 
+use super::experiment::Experiment;
+use super::limit::Limit;
+use super::protocol::Protocol;
+use super::reference::Reference;
 use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;
@@ -74,33 +78,69 @@ impl Preset {
     }
 }
 
+/// The protocol of an experiment, or without one: every frame against one reference. `scene` is the name of
+/// the references' scene; the paper asked other things of RobotCar than of KITTI.
+///
+/// # Errors
+/// A preset that cannot be read; a test reads them all.
+pub fn defaults(experiment: Option<Experiment>, scene: &str) -> Result<Protocol, UnknownWord> {
+    let Some(experiment) = experiment else {
+        return Ok(Protocol {
+            failure_radius_m: Some(default_failure_radius_m(scene)),
+            ..Protocol::default()
+        });
+    };
+    let preset = Preset::named(experiment.name())?;
+    Ok(Protocol {
+        preset: Some(experiment),
+        methods: preset.methods,
+        references: vec![Reference::Chosen(preset.references)],
+        fusions: preset.fusions,
+        radii_m: preset.radii_m,
+        limit: Some(Limit::Percent(100.0 * preset.share)),
+        prior_m: preset.prior_m.map(|prior| prior.of_scene(scene)),
+        failure_radius_m: Some(preset.failure_radius_m.of_scene(scene)),
+        ..Protocol::default()
+    })
+}
+
+/// The translation error from which on a pose counts as a failure \[m\], by the references' scene.
+pub fn default_failure_radius_m(scene: &str) -> f64 {
+    let radius = ByDataSet {
+        kitti: 10.0,
+        robotcar: 20.0,
+    };
+    radius.of_scene(scene)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Experiment, PaperProtocol, defaults};
     use super::*;
 
     #[test]
     fn presets_ask_what_the_experiments_of_the_paper_do() {
+        let of = |name: &str, scene: &str| {
+            let experiment: Experiment = name.parse().expect("an experiment");
+            defaults(Some(experiment), scene).expect("a preset")
+        };
+        let single = of("single", "kitti/00");
+        assert_eq!(single.radii_m, [10.0, 15.0, 20.0, 25.0]);
+        assert_eq!(single.methods, [Method::FB, Method::PM, Method::MI]);
+        assert_eq!(single.limit, Some(Limit::Percent(10.0)));
+        let multi = of("multi", "kitti/00");
+        let five = Reference::Chosen(Selection::Random(5));
+        assert_eq!(multi.references, [five]);
+        assert_eq!(multi.fusions, Fusion::of_the_paper().collect::<Vec<_>>());
+        let large = |scene| {
+            let large = of("large", scene);
+            (large.prior_m, large.failure_radius_m)
+        };
+        assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
+        assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
         for experiment in Experiment::ALL {
             let preset = Preset::named(experiment.name()).expect("a preset");
-            let defaults = defaults(Some(experiment));
-            let protocol = defaults.protocol;
-            assert_eq!(preset.methods, protocol.methods, "{experiment}");
-            assert_eq!(preset.references, protocol.references, "{experiment}");
-            assert_eq!(preset.fusions, protocol.fusions, "{experiment}");
-            assert_eq!(preset.radii_m, defaults.radii_m, "{experiment}");
-            assert_eq!(preset.share, defaults.share, "{experiment}");
             let most = preset.counts.last().copied();
             assert_eq!(most, Some(preset.references.count()), "{experiment}");
-            let by_scene = |of: fn(PaperProtocol) -> f64| ByDataSet {
-                kitti: of(PaperProtocol::Kitti),
-                robotcar: of(PaperProtocol::RobotCar),
-            };
-            let failure_radius_m = by_scene(PaperProtocol::failure_radius_m);
-            assert_eq!(preset.failure_radius_m, failure_radius_m);
-            let prior_m =
-                (experiment == Experiment::Large).then(|| by_scene(PaperProtocol::prior_m));
-            assert_eq!(preset.prior_m, prior_m, "{experiment}");
         }
         assert!(Preset::named("small").is_err());
     }

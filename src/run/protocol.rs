@@ -6,56 +6,275 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::estimates_file::EstimatesFile;
+use super::experiment::Experiment;
+use super::limit::Limit;
+use super::reference::Reference;
 use crate::diagnosis::Tolerance;
+use crate::estimator;
 use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::image::Degradation;
 use crate::localize::{Localizer, Selection};
 use crate::method::Method;
 use crate::scene::{MatchFolder, Scene, SceneError, degraded, located, read_estimates};
+use crate::text::UnknownWord;
 
-/// The protocol of a localisation: what is the same for every query, scene and radius. The defaults
-/// of everything in it are here.
+/// How each query is localised. This one struct is the options of the command line, the table
+/// `[protocol]` of `run.toml`, the header of a lesson and what the window asks. Its keys in files are the
+/// names of the options, and the doc comments are their help.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Protocol {
-    /// How references are chosen.
-    pub references: Selection,
-    /// How far from the query's known position references may be \[m\]; without it, as far as the
-    /// uncertainty radius. See [`Self::reach_m`].
-    pub prior_m: Option<f64>,
-    /// Poses of other systems, which are methods beside ours: read before the methods, some of which
-    /// they name.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub estimates: Vec<EstimatesFile>,
-    /// The methods, in the order of their results.
-    pub methods: Vec<Method>,
-    /// What to make of several references: one pose by each of these, or without any a pose for each
-    /// reference.
-    pub fusions: Vec<Fusion>,
-    /// Seed of every random choice.
-    pub seed: u64,
-    /// How near the truth a pose is right, so that no verdict says why it failed.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub right: Tolerance,
-    /// The least probability of being within 1 m with which a pose is accepted; without it every pose
-    /// is that its method gives.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub accept: Option<f64>,
-    /// How often a query that went wrong is localised again, at most, to see what would have helped.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub explain: usize,
-    /// A folder of matches that take the place of those of SURF.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub matches: Option<PathBuf>,
-    /// A file of rough positions of queries, around which references are sought.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Take the queries from another scene in the same world frame
+    ///
+    /// Repeatable in `eval`: every scene of references is paired with every one of queries.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = "Queries", value_name = "SCENE")
+    )]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub query_scene: Vec<String>,
+    /// Rough positions of the queries
+    ///
+    /// A table with the columns `name x y z` in the world of the scene, or `name latitude longitude` with at
+    /// least three frames of known pose among its lines.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Queries",
+            value_name = "FILE",
+            hide_short_help = true
+        )
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub gps: Option<PathBuf>,
-    /// What is done to the photos of queries before anybody sees them.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Draw 40 queries, or a tenth of the frames
+    ///
+    /// The seed draws them. Of a share, none of the drawn frames is a reference; of a number, each may be one.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = "Queries", value_name = "40|10%")
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<Limit>,
+    /// Degrade the photos of the queries first, as in gamma=0.4,noise=8,invert; --help lists the steps
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Queries",
+            value_name = "STEP=STRENGTH,…",
+            required = false,
+            hide_short_help = true,
+            long_help = crate::run::degradations()
+        )
+    )]
+    #[serde(skip_serializing_if = "is_default")]
     pub degrade: Degradation,
+    /// A frame, or random:K, nearest:K, matches:K, retrieve:K [default: random:1]
+    ///
+    /// Frames with a known pose and a cloud; repeatable. Or how to choose K of the frames around the query's
+    /// known position: at random, the nearest, those with the most feature matches, or the best in the
+    /// index. matches:K and retrieve:K search all frames where the position is unknown. The default for photos
+    /// without --gps is matches:1.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long = "reference",
+            help_heading = "References",
+            value_name = "FRAME|HOW:K"
+        )
+    )]
+    #[serde(rename = "reference")]
+    pub references: Vec<Reference>,
+    /// The uncertainty radius: how far from the reference to search [m] [default: 15]
+    ///
+    /// The disc around the reference that the direct methods search, and how far away references are chosen.
+    /// `eval` takes several and runs one after the other.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long = "radius",
+            help_heading = "References",
+            value_name = "METRES",
+            value_delimiter = ',',
+            value_parser = crate::run::positive
+        )
+    )]
+    #[serde(rename = "radius")]
+    pub radii_m: Vec<f64>,
+    /// Choose references within this distance of the query [m] [default: the radius]
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long = "prior",
+            help_heading = "References",
+            value_name = "METRES",
+            value_parser = crate::run::positive
+        )
+    )]
+    #[serde(rename = "prior", skip_serializing_if = "Option::is_none")]
+    pub prior_m: Option<f64>,
+    /// The index for retrieve:K [default: where `posescope index` puts it]
+    ///
+    /// `eval` takes one for each scene, in their order.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "References",
+            value_name = "FILE",
+            hide_short_help = true
+        )
+    )]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub index: Vec<PathBuf>,
+    // Before the methods, some of which it names.
+    /// Poses of another system, as a method of this name; repeatable
+    ///
+    /// FILE is TUM, KITTI, COLMAP's images.txt or lines of `name qw qx qy qz x y z`.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Methods",
+            value_name = "NAME=FILE",
+            hide_short_help = true
+        )
+    )]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub estimates: Vec<EstimatesFile>,
+    /// The methods; beyond the paper's: mi6, fb2, robust, nid [default: fb,pm,mi,hy]
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long = "method",
+            help_heading = "Methods",
+            value_name = "fb,pm,mi,hy",
+            value_delimiter = ',',
+            value_parser = crate::run::method
+        )
+    )]
+    #[serde(rename = "method")]
+    pub methods: Vec<Method>,
+    /// maxf, avg, wavg, r-wavg or joint: one pose of all references
+    ///
+    /// The poses of all references are averaged, or, joint, all references are used at once (fb, pm, mi, nid,
+    /// hy). Without it each reference gives a pose; `eval` fuses several by r-wavg.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long = "fusion",
+            help_heading = "Methods",
+            value_name = "HOW",
+            value_delimiter = ','
+        )
+    )]
+    #[serde(rename = "fusion", skip_serializing_if = "Vec::is_empty")]
+    pub fusions: Vec<Fusion>,
+    /// Matches of another system, in place of those of fb
+    ///
+    /// hloc's features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Methods",
+            value_name = "DIR",
+            hide_short_help = true
+        )
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub matches: Option<PathBuf>,
+    /// single, multi or large: the options of an experiment of the paper
+    ///
+    /// single: a random reference within 10, 15, 20 and 25 m. multi: 1 to 5 references and all fusions. large:
+    /// retrieve:5 within a prior of 200 m, RobotCar 50 m. All draw a tenth of the frames. Other options change
+    /// what they set.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long = "preset", help_heading = "Methods", value_name = "NAME")
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Experiment>,
+    /// The seed of every random choice [default: 0]
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = "Methods", value_name = "N", required = false)
+    )]
+    pub seed: u64,
+    /// How far from the truth a right pose may be [default: 1m,5deg]
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Judging",
+            value_name = "METRES,DEGREES",
+            required = false
+        )
+    )]
+    #[serde(skip_serializing_if = "is_default")]
+    pub right: Tolerance,
+    /// The paper's success: the greatest translation error of one [m] [default: 10, RobotCar 20]
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long = "failure-radius",
+            help_heading = "Judging",
+            value_name = "METRES",
+            value_parser = crate::run::positive,
+            hide_short_help = true
+        )
+    )]
+    #[serde(rename = "failure-radius", skip_serializing_if = "Option::is_none")]
+    pub failure_radius_m: Option<f64>,
+    /// Refuse poses that are less likely than this
+    ///
+    /// The probability is that of being within 1 m of the truth.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Judging",
+            value_name = "PROBABILITY",
+            value_parser = crate::run::probability
+        )
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_confidence: Option<f64>,
+    /// Try variations of each wrong result and report what helps
+    ///
+    /// At most RUNS for each result, 12 by default.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Judging",
+            value_name = "RUNS",
+            required = false,
+            num_args = 0..=1,
+            default_missing_value = "12"
+        )
+    )]
+    #[serde(skip_serializing_if = "is_default")]
+    pub explain: usize,
+    /// The format of the scenes, where their content does not tell
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = "Everywhere",
+            value_name = "NAME",
+            hide_short_help = true
+        )
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub format: Option<String>,
 }
 
-/// For what is written only where somebody asked for it.
+/// For what is written only where it was asked for.
 pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
@@ -64,20 +283,44 @@ pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 impl Default for Protocol {
     fn default() -> Self {
         Self {
-            references: Selection::Random(1),
+            query_scene: Vec::new(),
+            gps: None,
+            limit: None,
+            degrade: Degradation::default(),
+            references: vec![Reference::Chosen(Selection::Random(1))],
+            radii_m: vec![Self::RADIUS_M],
             prior_m: None,
+            index: Vec::new(),
+            estimates: Vec::new(),
             methods: Method::PAPER.to_vec(),
             fusions: Vec::new(),
+            matches: None,
+            preset: None,
             seed: 0,
             right: Tolerance::default(),
-            accept: None,
+            failure_radius_m: None,
+            min_confidence: None,
             explain: 0,
-            estimates: Vec::new(),
-            matches: None,
-            gps: None,
-            degrade: Degradation::default(),
+            format: None,
         }
     }
+}
+
+/// Options whose values stand in one list, `fb,pm`; others are repeated.
+const LISTS: [&str; 3] = ["method", "fusion", "radius"];
+
+/// A protocol that nothing can be localised by.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ProtocolError {
+    /// A method that is none of ours and that no file of poses brings.
+    #[error("{0}, or a name that --estimates gives")]
+    UnknownMethod(UnknownWord),
+    /// Two files of poses by one name.
+    #[error("--estimates {0} is given twice")]
+    Twice(Method),
+    /// Frames and a way of choosing them.
+    #[error("--reference takes frames, or one of random:K, nearest:K, matches:K and retrieve:K")]
+    References,
 }
 
 impl Protocol {
@@ -87,11 +330,89 @@ impl Protocol {
     /// The uncertainty radius where none is given \[m\].
     pub const RADIUS_M: f64 = 15.0;
 
+    /// The protocol with its methods in the order of the registry, and behind them the other systems.
+    ///
+    /// # Errors
+    /// [`ProtocolError`].
+    pub fn checked(mut self) -> Result<Self, ProtocolError> {
+        let others: Vec<Method> = self.estimates.iter().map(|file| file.method).collect();
+        known(&self.methods, &others)?;
+        if let Some(twice) = (1..others.len()).find(|&at| others[..at].contains(&others[at])) {
+            return Err(ProtocolError::Twice(others[twice]));
+        }
+        let is_frame = |one: &Reference| matches!(one, Reference::Frame(_));
+        if self.references.len() > 1 && !self.references.iter().all(is_frame) {
+            return Err(ProtocolError::References);
+        }
+        let ours = estimator::methods().filter(|method| self.methods.contains(method));
+        self.methods = ours.chain(others).collect();
+        Ok(self)
+    }
+
+    /// The uncertainty radius \[m\], the first of several.
+    pub fn radius_m(&self) -> f64 {
+        self.radii_m.first().copied().unwrap_or(Self::RADIUS_M)
+    }
+
+    /// How references are chosen; one at random where they are named.
+    pub fn selection(&self) -> Selection {
+        let chosen = self.references.iter().find_map(|one| match one {
+            Reference::Chosen(selection) => Some(*selection),
+            Reference::Frame(_) => None,
+        });
+        chosen.unwrap_or(Selection::Random(1))
+    }
+
+    /// Chooses the references of each query.
+    pub fn select(&mut self, selection: Selection) {
+        self.references = vec![Reference::Chosen(selection)];
+    }
+
+    /// Whether references are named, not chosen.
+    pub fn is_by_hand(&self) -> bool {
+        let mut references = self.references.iter();
+        references.all(|one| matches!(one, Reference::Frame(_)))
+    }
+
+    /// The frames that are named as references.
+    pub fn named_references(&self) -> impl Iterator<Item = &str> {
+        self.references.iter().filter_map(|one| match one {
+            Reference::Frame(name) => Some(name.as_str()),
+            Reference::Chosen(_) => None,
+        })
+    }
+
+    /// Names the references of each query.
+    pub fn name_references(&mut self, frames: &[String]) {
+        self.references = frames.iter().cloned().map(Reference::Frame).collect();
+    }
+
+    /// The options that ask for this, each with its value: those that differ from the defaults.
+    pub fn options(&self) -> Vec<(String, String)> {
+        let (own, default) = (table(self), table(&Self::default()));
+        let asked = own
+            .into_iter()
+            .filter(|(key, value)| default.get(key) != Some(value));
+        asked
+            .flat_map(|(key, value)| {
+                let values = match value {
+                    toml::Value::Array(values) if LISTS.contains(&key.as_str()) => {
+                        let words: Vec<String> = values.into_iter().map(word).collect();
+                        vec![words.join(",")]
+                    }
+                    toml::Value::Array(values) => values.into_iter().map(word).collect(),
+                    other => vec![word(other)],
+                };
+                values.into_iter().map(move |value| (key.clone(), value))
+            })
+            .collect()
+    }
+
     /// A localizer that judges and accepts poses as this says.
     pub fn configured<'a>(&self, localizer: Localizer<'a>) -> Localizer<'a> {
         localizer
             .with_tolerance(self.right)
-            .accepting_from(self.accept)
+            .accepting_from(self.min_confidence)
             .explaining(self.explain)
     }
 
@@ -110,8 +431,8 @@ impl Protocol {
         Ok(foreign)
     }
 
-    /// The scene of queries as it is asked about: with the rough positions that were given, and with
-    /// its photos degraded.
+    /// The scene of queries as this asks about it: with the rough positions that were given, and with its
+    /// photos degraded.
     ///
     /// # Errors
     /// The errors of [`located`].
@@ -139,6 +460,39 @@ impl Protocol {
     }
 }
 
+/// Every method is one of ours or goes by the name of given poses.
+///
+/// # Errors
+/// [`ProtocolError::UnknownMethod`].
+pub fn known(methods: &[Method], others: &[Method]) -> Result<(), ProtocolError> {
+    let mut methods = methods.iter();
+    let unknown =
+        methods.find(|method| estimator::find(**method).is_none() && !others.contains(method));
+    match unknown {
+        Some(method) => Err(ProtocolError::UnknownMethod(UnknownWord::among(
+            method.name(),
+            "method",
+            estimator::methods().map(Method::name),
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The protocol as it is written in a file.
+fn table(protocol: &Protocol) -> toml::Table {
+    let written = toml::Table::try_from(protocol);
+    written.unwrap_or_else(|error| unreachable!("every field has a form in TOML: {error}"))
+}
+
+/// A value as it stands on a command line.
+fn word(value: toml::Value) -> String {
+    match value {
+        toml::Value::String(text) => text,
+        toml::Value::Float(number) => number.to_string(),
+        other => other.to_string(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,5 +503,44 @@ mod tests {
         assert_eq!(protocol.reach_m(Protocol::RADIUS_M), 15.0);
         protocol.prior_m = Some(200.0);
         assert_eq!(protocol.reach_m(Protocol::RADIUS_M), 200.0);
+    }
+
+    #[test]
+    fn options_are_what_differs_from_the_defaults() {
+        let asked = Protocol {
+            methods: vec![Method::FB, Method::MI],
+            radii_m: vec![12.5],
+            references: ["62", "64"]
+                .map(|name| Reference::Frame(name.to_owned()))
+                .into(),
+            min_confidence: Some(0.5),
+            ..Protocol::default()
+        };
+        let options = asked.options();
+        let options: Vec<String> = options
+            .iter()
+            .map(|(key, value)| format!("{key} {value}"))
+            .collect();
+        assert_eq!(
+            options,
+            [
+                "method fb,mi",
+                "min-confidence 0.5",
+                "radius 12.5",
+                "reference 62",
+                "reference 64"
+            ]
+        );
+        assert_eq!(Protocol::default().options(), []);
+    }
+
+    #[test]
+    fn frames_and_a_choice_do_not_go_together() {
+        let frame = Reference::Frame("62".to_owned());
+        let mixed = Protocol {
+            references: vec![frame, Reference::Chosen(Selection::Nearest(2))],
+            ..Protocol::default()
+        };
+        assert_eq!(mixed.checked(), Err(ProtocolError::References));
     }
 }

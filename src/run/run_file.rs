@@ -1,22 +1,18 @@
 //! `run.toml`: everything that an evaluation was asked, and over which queries.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::estimates_file::EstimatesFile;
 use super::experiment::Experiment;
-use super::protocol::{Protocol, is_default};
+use super::preset::default_failure_radius_m;
+use super::protocol::{Protocol, known};
 use super::scene_pair::{QueryCamera, ScenePair};
-use crate::diagnosis::Tolerance;
-use crate::estimator::{find, methods};
-use crate::fusion::Fusion;
-use crate::image::Degradation;
-use crate::localize::{References, Request, Selection, Setting};
+use crate::describe::ParamError;
+use crate::localize::{QueryResult, References, Request, Setting};
 use crate::method::Method;
-use crate::text::UnknownWord;
+use crate::params::Params;
 
 /// The version of the file's form.
 pub const RUN_SCHEMA: &str = "posescope.run/1";
@@ -60,7 +56,7 @@ posescope_core::serde_as_text!(Shard);
 
 /// A run as its folder describes it. Threads are missing: results do not depend on them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "RunFileForm", into = "RunFileForm")]
+#[serde(deny_unknown_fields)]
 pub struct RunFile {
     /// The version of the form, [`RUN_SCHEMA`].
     pub schema: String,
@@ -68,144 +64,19 @@ pub struct RunFile {
     pub version: String,
     /// The scenes of the references, as arguments.
     pub scenes: Vec<String>,
-    /// The scenes of the queries, as arguments; none where each scene has its own.
-    pub queries: Vec<String>,
-    /// The format of the scenes, where it was given.
-    pub format: Option<String>,
-    /// Which of the paper's experiments, if any.
-    pub experiment: Option<Experiment>,
-    /// How each query is localised.
-    pub protocol: Protocol,
-    /// Uncertainty radii \[m\].
-    pub radii_m: Vec<f64>,
-    /// Share of the frames that were drawn as queries.
-    pub share: f64,
-    /// How many queries at most.
-    pub limit: Option<usize>,
-    /// A pose with a greater translation error is a failure \[m\].
-    pub failure_radius_m: f64,
     /// Which part of the run this is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
+    /// What was asked, with everything filled in that was left open.
+    pub protocol: Protocol,
     /// What files and folders hold that the protocol names; see [`inputs`](super::inputs).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub inputs: BTreeMap<String, String>,
     /// Scenes paired, with the queries.
+    #[serde(rename = "pair")]
     pub pairs: Vec<ScenePair>,
     /// Every parameter of the estimators, as it was written: another version may have had others.
     pub params: toml::Table,
-}
-
-/// The file, key by key in its order.
-#[derive(Serialize, Deserialize)]
-struct RunFileForm {
-    schema: String,
-    version: String,
-    scenes: Vec<String>,
-    queries: Vec<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    format: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    experiment: Option<Experiment>,
-    // Before the methods, some of which it names.
-    #[serde(default, skip_serializing_if = "is_default")]
-    estimates: Vec<EstimatesFile>,
-    methods: Vec<Method>,
-    references: Selection,
-    fusions: Vec<Fusion>,
-    radii_m: Vec<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    prior_m: Option<f64>,
-    share: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    limit: Option<usize>,
-    failure_radius_m: f64,
-    #[serde(default, skip_serializing_if = "is_default")]
-    right: Tolerance,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    accept: Option<f64>,
-    #[serde(default, skip_serializing_if = "is_default")]
-    explain: usize,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    matches: Option<PathBuf>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    gps: Option<PathBuf>,
-    #[serde(default, skip_serializing_if = "is_default")]
-    degrade: Degradation,
-    seed: u64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shard: Option<Shard>,
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    inputs: BTreeMap<String, String>,
-    #[serde(rename = "pair")]
-    pairs: Vec<ScenePair>,
-    params: toml::Table,
-}
-
-impl From<RunFileForm> for RunFile {
-    fn from(form: RunFileForm) -> Self {
-        Self {
-            schema: form.schema,
-            version: form.version,
-            scenes: form.scenes,
-            queries: form.queries,
-            format: form.format,
-            experiment: form.experiment,
-            protocol: Protocol {
-                references: form.references,
-                prior_m: form.prior_m,
-                methods: form.methods,
-                fusions: form.fusions,
-                seed: form.seed,
-                right: form.right,
-                accept: form.accept,
-                explain: form.explain,
-                estimates: form.estimates,
-                matches: form.matches,
-                gps: form.gps,
-                degrade: form.degrade,
-            },
-            radii_m: form.radii_m,
-            share: form.share,
-            limit: form.limit,
-            failure_radius_m: form.failure_radius_m,
-            shard: form.shard,
-            inputs: form.inputs,
-            pairs: form.pairs,
-            params: form.params,
-        }
-    }
-}
-
-impl From<RunFile> for RunFileForm {
-    fn from(run: RunFile) -> Self {
-        Self {
-            schema: run.schema,
-            version: run.version,
-            scenes: run.scenes,
-            queries: run.queries,
-            format: run.format,
-            experiment: run.experiment,
-            methods: run.protocol.methods,
-            references: run.protocol.references,
-            fusions: run.protocol.fusions,
-            radii_m: run.radii_m,
-            prior_m: run.protocol.prior_m,
-            share: run.share,
-            limit: run.limit,
-            failure_radius_m: run.failure_radius_m,
-            right: run.protocol.right,
-            accept: run.protocol.accept,
-            explain: run.protocol.explain,
-            estimates: run.protocol.estimates,
-            matches: run.protocol.matches,
-            gps: run.protocol.gps,
-            degrade: run.protocol.degrade,
-            seed: run.protocol.seed,
-            shard: run.shard,
-            inputs: run.inputs,
-            pairs: run.pairs,
-            params: run.params,
-        }
-    }
 }
 
 /// What is wrong with the text of a `run.toml`, and where.
@@ -217,13 +88,18 @@ pub(super) struct RunFileError {
     pub message: String,
 }
 
-/// Where the values stand that are held against each other once all are read.
+/// Where the values stand that are checked once all are read.
 #[derive(Deserialize)]
 struct Places {
     schema: Spanned<String>,
-    methods: Spanned<Vec<Method>>,
-    radii_m: Spanned<Vec<f64>>,
+    protocol: ProtocolPlaces,
     pair: Vec<ScenePairPlaces>,
+}
+
+#[derive(Deserialize)]
+struct ProtocolPlaces {
+    method: Option<Spanned<Vec<Method>>>,
+    radius: Option<Spanned<Vec<f64>>>,
 }
 
 #[derive(Deserialize)]
@@ -233,27 +109,32 @@ struct ScenePairPlaces {
 
 impl Places {
     /// The first thing that is wrong, with its place \[bytes\].
-    fn wrong(&self, run: &RunFile) -> Option<(usize, String)> {
+    fn error(&self, run: &RunFile) -> Option<(usize, String)> {
         if run.schema != RUN_SCHEMA {
             let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
             return Some((self.schema.span().start, message));
         }
-        if run.protocol.methods.is_empty() {
-            let message = "a run has at least one method".to_owned();
-            return Some((self.methods.span().start, message));
+        let protocol = &run.protocol;
+        let at_methods = self
+            .protocol
+            .method
+            .as_ref()
+            .map_or(0, |at| at.span().start);
+        if protocol.methods.is_empty() {
+            return Some((at_methods, "a run has at least one method".to_owned()));
         }
-        let unknown = run.protocol.methods.iter().find(|method| {
-            let mut brought = run.protocol.estimates.iter();
-            find(**method).is_none() && !brought.any(|file| file.method == **method)
-        });
-        if let Some(method) = unknown {
-            let error = UnknownWord::among(method.name(), "method", methods().map(Method::name));
-            return Some((self.methods.span().start, error.to_string()));
+        let others: Vec<Method> = protocol.estimates.iter().map(|file| file.method).collect();
+        if let Err(error) = known(&protocol.methods, &others) {
+            return Some((at_methods, error.to_string()));
         }
         let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
-        if run.radii_m.is_empty() || !run.radii_m.iter().all(is_length) {
-            let message = "one positive radius or more expected".to_owned();
-            return Some((self.radii_m.span().start, message));
+        if protocol.radii_m.is_empty() || !protocol.radii_m.iter().all(is_length) {
+            let at = self
+                .protocol
+                .radius
+                .as_ref()
+                .map_or(0, |at| at.span().start);
+            return Some((at, "one positive radius or more expected".to_owned()));
         }
         let scenes = run.scenes.len();
         let mut pairs = self.pair.iter().map(|pair| &pair.scene_index);
@@ -307,12 +188,12 @@ impl RunFile {
 
     /// What is asked of every query, still without references: by radius, then number of references.
     pub fn settings(&self) -> Vec<Setting> {
-        let most_references = self.protocol.references.count();
-        let counts = match self.experiment {
+        let most_references = self.protocol.selection().count();
+        let counts = match self.protocol.preset {
             Some(Experiment::Multi) => 1..=most_references,
             _ => most_references..=most_references,
         };
-        let radii = self.radii_m.iter();
+        let radii = self.protocol.radii_m.iter();
         radii
             .flat_map(|&radius_m| {
                 counts.clone().map(move |references| Setting {
@@ -321,6 +202,29 @@ impl RunFile {
                 })
             })
             .collect()
+    }
+
+    /// The parameters of the estimators: those of the file over the defaults of this version.
+    ///
+    /// # Errors
+    /// A parameter that this version does not have.
+    pub fn params(&self) -> Result<Params, ParamError> {
+        self.params.to_string().parse()
+    }
+
+    /// The translation error from which a pose is a failure, as the paper counts them \[m\].
+    pub fn failure_radius_m(&self) -> f64 {
+        let scene = self.pairs.first().map_or("", |pair| pair.scene.as_str());
+        self.protocol
+            .failure_radius_m
+            .unwrap_or_else(|| default_failure_radius_m(scene))
+    }
+
+    /// The scenes that a result is of.
+    pub fn pair_of(&self, result: &QueryResult) -> Option<&ScenePair> {
+        let queries = result.query_scene.as_ref().unwrap_or(&result.scene);
+        let mut pairs = self.pairs.iter();
+        pairs.find(|pair| pair.scene == result.scene && pair.query_scene == *queries)
     }
 
     /// The request of a setting, with as many of the chosen references.
@@ -355,7 +259,7 @@ impl RunFile {
         };
         let run: Self = toml::from_str(text).map_err(syntax)?;
         let places: Places = toml::from_str(text).map_err(syntax)?;
-        match places.wrong(&run) {
+        match places.error(&run) {
             Some((at, message)) => Err(error_at(at, message)),
             None => Ok(run),
         }

@@ -60,15 +60,32 @@ impl Sweep {
         !self.key.contains('.')
     }
 
-    /// Every value is one that its parameter takes.
-    fn check(&self) -> Result<(), SweepError> {
-        for value in &self.values {
-            match self.is_degradation() {
-                true => Degradation::default().set(&self.key, value)?,
-                false => Params::default().set(&self.key, value)?,
-            }
+    /// Sets the swept setting to one of its values, which the sweep has checked.
+    pub fn apply(&self, value: &str, degradation: &mut Degradation, params: &mut Params) {
+        if let Err(error) = self.try_apply(value, degradation, params) {
+            unreachable!("the sweep was checked: {error}");
+        }
+    }
+
+    fn try_apply(
+        &self,
+        value: &str,
+        degradation: &mut Degradation,
+        params: &mut Params,
+    ) -> Result<(), SweepError> {
+        if self.is_degradation() {
+            degradation.set(&self.key, value)?;
+        } else {
+            params.set(&self.key, value)?;
         }
         Ok(())
+    }
+
+    /// Every value is one that its parameter takes.
+    fn check(&self) -> Result<(), SweepError> {
+        self.values.iter().try_for_each(|value| {
+            self.try_apply(value, &mut Degradation::default(), &mut Params::default())
+        })
     }
 }
 

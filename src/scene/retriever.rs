@@ -36,7 +36,7 @@ pub struct IndexOptions {
 pub enum NoIndex {
     /// There is no cache directory, and no file was named.
     #[error(
-        "there is no cache directory for the retrieval index; name a file with --output of \
+        "there is no cache directory for the retrieval index; name a file with --out of \
          `posescope index`, and with --index"
     )]
     NoFolder,
@@ -172,9 +172,7 @@ impl Retriever {
             .or_else(|| Self::default_path(scene, argument))
             .ok_or(NoIndex::NoFolder)?;
         Self::open(&path, scene, params).map_err(|source| {
-            let output = given.map_or(String::new(), |path| {
-                format!(" --output {}", path.display())
-            });
+            let output = given.map_or(String::new(), |path| format!(" --out {}", path.display()));
             NoIndex::Unusable {
                 source,
                 command: format!("posescope index {argument}{output}"),

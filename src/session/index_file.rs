@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::task::Task;
 use crate::features::SurfParams;
 use crate::params::Params;
 use crate::retrieval::RetrievalParams;
@@ -37,6 +38,11 @@ impl IndexFile {
             file,
             opened: Mutex::default(),
         }
+    }
+
+    /// The index that a task asks.
+    pub fn of(task: &Task) -> Self {
+        Self::new(&task.scene, task.protocol.index.first().cloned())
     }
 
     /// The file, if one was named.

@@ -135,7 +135,7 @@ impl Job {
         let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
         let request = Request {
-            radius_m: task.radius_m,
+            radius_m: task.radius_m(),
             references: chosen,
             fusions: protocol.fusions.clone(),
             setting: None,
@@ -166,10 +166,10 @@ impl Job {
         }
         let query = || self.queries.frames()[self.query].clone();
         let (task, protocol) = (&self.task, &self.task.protocol);
-        if task.by_hand {
+        if protocol.is_by_hand() {
             return Err(JobError::NoneNamed { query: query() });
         }
-        let index = match protocol.references {
+        let index = match protocol.selection() {
             Selection::Retrieved(_) => {
                 Some(self.index.open(self.references.as_ref(), &task.params)?)
             }
@@ -178,7 +178,7 @@ impl Job {
         let chooser = Chooser {
             localizer,
             params: &task.params,
-            selection: protocol.references,
+            selection: protocol.selection(),
             radius_m: task.reach_m(),
             seed: protocol.seed,
             index: index.as_deref().map(|index| index as &dyn Ranking),

@@ -142,7 +142,7 @@ impl Run {
     pub fn of(task: &Task) -> Self {
         Self {
             params: task.params.clone(),
-            radius_m: task.radius_m,
+            radius_m: task.radius_m(),
             seed: task.protocol.seed,
             degraded: task.protocol.degrade,
             ..Self::default()

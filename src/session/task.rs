@@ -1,35 +1,22 @@
 //! What is asked, by `run`, by `view` and in the window: everything but the query.
 
 use std::fmt::Display;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::breakpoint::Breakpoint;
-use crate::diagnosis::Tolerance;
-use crate::method::Method;
 use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::{self, LoosePhotos, Scene, SceneError};
 
-/// Where references and queries are, and how a query is localised. The command line turns into it,
-/// the window and its sessions keep it, and [`Self::command_line`] writes it down again.
+/// Where the references are, and how a query is localised. The command line turns into it, the window and
+/// its sessions keep it, and [`Self::command_line`] writes it down again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// The scene of the references, as it is named on the command line.
     pub scene: String,
-    /// The scene of the queries, if it is another one.
-    pub queries: Option<String>,
-    /// The format of both, where their content does not tell.
-    pub format: Option<String>,
-    /// Whether references are named by hand, rather than chosen as the protocol says.
-    pub by_hand: bool,
-    /// The index that a choice by looks asks; without it, the one in its usual place.
-    pub index: Option<PathBuf>,
-    /// How far the query may be from a reference \[m\].
-    pub radius_m: f64,
-    /// How references are chosen and queries localised.
+    /// How a query is localised.
     pub protocol: Protocol,
     /// Parameters of the estimators.
     #[serde(
@@ -59,20 +46,25 @@ fn write_params<S: Serializer>(params: &Params, serializer: S) -> Result<S::Ok, 
 }
 
 impl Task {
-    /// What is asked of a scene where nobody says more.
+    /// What is asked of a scene by default.
     pub fn of(scene: impl Into<String>) -> Self {
         Self {
             scene: scene.into(),
-            queries: None,
-            format: None,
-            by_hand: false,
-            index: None,
-            radius_m: Protocol::RADIUS_M,
             protocol: Protocol::default(),
             params: Params::default(),
             breakpoints: Vec::new(),
             photos: None,
         }
+    }
+
+    /// The scene of the queries, if it is another one, as it is named on the command line.
+    pub fn query_scene(&self) -> Option<&str> {
+        self.protocol.query_scene.first().map(String::as_str)
+    }
+
+    /// The uncertainty radius \[m\].
+    pub fn radius_m(&self) -> f64 {
+        self.protocol.radius_m()
     }
 
     /// Opens the scenes. `opened` may have one by its argument already.
@@ -85,10 +77,10 @@ impl Task {
     ) -> Result<TaskScenes, SceneError> {
         let open = |argument: &str| match opened(argument) {
             Some(scene) => Ok(scene),
-            None => scene::open(argument, self.format.as_deref()).map(Arc::from),
+            None => scene::open(argument, self.protocol.format.as_deref()).map(Arc::from),
         };
         let references = open(&self.scene)?;
-        let queries = match (&self.photos, &self.queries) {
+        let queries = match (&self.photos, self.query_scene()) {
             (Some(photos), _) => photos.open()?,
             (None, Some(argument)) => open(argument)?,
             (None, None) => Arc::clone(&references),
@@ -101,90 +93,30 @@ impl Task {
 
     /// How far from a query's known position its references may be \[m\].
     pub fn reach_m(&self) -> f64 {
-        self.protocol.reach_m(self.radius_m)
+        self.protocol.reach_m(self.radius_m())
     }
 
     /// The arguments of `posescope` that ask the same of a query: `run`, the scene, the options.
     /// With `references`, against these frames; without, against those that the protocol chooses.
     pub fn arguments(&self, query: &str, references: &[String]) -> Vec<String> {
-        let protocol = &self.protocol;
-        let mut arguments = vec!["run".to_owned(), self.scene.clone()];
-        let mut option = |name: &str, value: &dyn Display| {
-            arguments.extend([format!("--{name}"), value.to_string()]);
+        let mut protocol = self.protocol.clone();
+        if !references.is_empty() {
+            protocol.name_references(references);
+        }
+        let photos = self.photos.as_ref();
+        let query = match photos.and_then(|photos| photos.path_of(query)) {
+            Some(path) => path.display().to_string(),
+            None => query.to_owned(),
         };
-        if let Some(format) = &self.format {
-            option("format", format);
-        }
-        if let Some(queries) = &self.queries {
-            option("queries", queries);
-        }
-        match self
-            .photos
-            .as_ref()
-            .and_then(|photos| photos.path_of(query))
-        {
-            Some(path) => option("query", &path.display()),
-            None => option("query", &query),
-        }
-        if let Some(camera) = self
-            .photos
-            .as_ref()
-            .and_then(|photos| photos.camera.as_ref())
-        {
+        let mut options = vec![("query".to_owned(), query)];
+        let mut option = |name: &str, value: &dyn Display| {
+            options.push((name.to_owned(), value.to_string()));
+        };
+        if let Some(camera) = photos.and_then(|photos| photos.camera.as_ref()) {
             option("camera", camera);
         }
-        for reference in references {
-            option("reference", reference);
-        }
-        if references.is_empty() {
-            option("references", &protocol.references);
-        }
-        if let Some(index) = &self.index {
-            option("index", &index.display());
-        }
-        option("radius", &self.radius_m);
-        if let Some(prior_m) = protocol.prior_m {
-            option("prior", &prior_m);
-        }
-        let ours = |method: &&Method| {
-            protocol
-                .estimates
-                .iter()
-                .all(|file| file.method != **method)
-        };
-        let ours: Vec<Method> = protocol.methods.iter().filter(ours).copied().collect();
-        if ours != Method::PAPER {
-            let methods = if ours.is_empty() {
-                &protocol.methods
-            } else {
-                &ours
-            };
-            option("method", &joined(methods));
-        }
-        if !protocol.fusions.is_empty() {
-            option("fusion", &joined(&protocol.fusions));
-        }
-        option("seed", &protocol.seed);
-        if protocol.right != Tolerance::default() {
-            option("right", &protocol.right);
-        }
-        if let Some(probability) = protocol.accept {
-            option("accept", &probability);
-        }
-        if protocol.explain > 0 {
-            option("explain", &protocol.explain);
-        }
-        for estimates in &protocol.estimates {
-            option("estimates", estimates);
-        }
-        if let Some(path) = &protocol.gps {
-            option("gps", &path.display());
-        }
-        if !protocol.degrade.is_none() {
-            option("degrade", &protocol.degrade);
-        }
-        if let Some(folder) = &protocol.matches {
-            option("matches", &folder.display());
+        for (name, value) in protocol.options() {
+            option(&name, &value);
         }
         for change in self.params.changes() {
             option("set", &change);
@@ -192,7 +124,13 @@ impl Task {
         for breakpoint in &self.breakpoints {
             option("break", breakpoint);
         }
-        arguments
+        let options = options
+            .into_iter()
+            .flat_map(|(name, value)| [format!("--{name}"), value]);
+        ["run".to_owned(), self.scene.clone()]
+            .into_iter()
+            .chain(options)
+            .collect()
     }
 
     /// The command line that asks the same of a query, for a POSIX shell. See [`Self::arguments`].
@@ -205,11 +143,6 @@ impl Task {
 pub fn command_line(arguments: &[String]) -> String {
     let words: Vec<String> = arguments.iter().map(|word| quoted(word)).collect();
     format!("posescope {}", words.join(" "))
-}
-
-fn joined(names: &[impl Display]) -> String {
-    let names: Vec<String> = names.iter().map(ToString::to_string).collect();
-    names.join(",")
 }
 
 /// A word as a POSIX shell reads it back.
@@ -225,31 +158,35 @@ fn quoted(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::method::Method;
 
     /// With nothing as it is by default.
     fn task() -> Task {
         let mut params = Params::default();
         params.assign("fb.ratio=0.75").expect("a good value");
         Task {
-            queries: Some("street:night".to_owned()),
-            format: Some("street".to_owned()),
-            index: Some("my index".into()),
-            radius_m: 12.5,
             protocol: Protocol {
-                references: "retrieve:3".parse().expect("a choice"),
+                query_scene: vec!["street:night".to_owned()],
+                gps: Some("gps.csv".into()),
+                limit: Some("10%".parse().expect("a limit")),
+                degrade: "fog=0.25,gamma=0.5,invert".parse().expect("a degradation"),
+                references: vec!["retrieve:3".parse().expect("a choice")],
+                radii_m: vec![12.5],
                 prior_m: Some(80.0),
+                index: vec!["my index".into()],
+                estimates: vec!["other=my poses.txt".parse().expect("a file")],
                 methods: vec![Method::FB, Method::MI, Method::named("other")],
                 fusions: ["avg", "r-wavg"]
                     .map(|name| name.parse().expect("a fusion"))
                     .to_vec(),
+                matches: Some("hloc".into()),
+                preset: Some("single".parse().expect("a preset")),
                 seed: 9,
                 right: "0.5m,2deg".parse().expect("a tolerance"),
-                accept: Some(0.75),
+                failure_radius_m: Some(20.0),
+                min_confidence: Some(0.75),
                 explain: 4,
-                estimates: vec!["other=my poses.txt".parse().expect("a file")],
-                matches: Some("hloc".into()),
-                gps: Some("gps.csv".into()),
-                degrade: "fog=0.25,gamma=0.5,invert".parse().expect("a degradation"),
+                format: Some("street".to_owned()),
             },
             params,
             breakpoints: vec!["inliers < 10".parse().expect("a breakpoint")],
@@ -265,23 +202,21 @@ mod tests {
     fn the_command_line_leaves_nothing_out() {
         assert_eq!(
             task().command_line("000070", &[]),
-            "posescope run street --format street --queries street:night --query 000070 \
-             --camera 500,500,320,240 --references retrieve:3 --index 'my index' --radius 12.5 --prior 80 --method fb,mi \
-             --fusion avg,r-wavg --seed 9 --right 0.5m,2deg --accept 0.75 --explain 4 \
-             --estimates 'other=my poses.txt' --gps gps.csv --degrade fog=0.25,gamma=0.5,invert --matches hloc --set fb.ratio=0.75 --break 'inliers < 10'"
+            "posescope run street --query 000070 --camera 500,500,320,240 \
+             --degrade fog=0.25,gamma=0.5,invert --estimates 'other=my poses.txt' --explain 4 \
+             --failure-radius 20 --format street --fusion avg,r-wavg --gps gps.csv --index 'my index' --limit '10%' \
+             --matches hloc --method fb,mi,other --min-confidence 0.75 --preset single --prior 80 \
+             --query-scene street:night --radius 12.5 --reference retrieve:3 --right 0.5m,2deg --seed 9 \
+             --set fb.ratio=0.75 --break 'inliers < 10'"
         );
         assert!(
             task()
                 .command_line("a", &[])
                 .contains("--query 'my photos/a.jpg' --camera 500,500,320,240 "),
         );
-        let by_hand = Task {
-            by_hand: true,
-            ..Task::of("street")
-        };
         assert_eq!(
-            by_hand.command_line("000070", &["000062".to_owned()]),
-            "posescope run street --query 000070 --reference 000062 --radius 15 --seed 0"
+            Task::of("street").command_line("000070", &["000062".to_owned()]),
+            "posescope run street --query 000070 --reference 000062"
         );
     }
 

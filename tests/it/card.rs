@@ -88,7 +88,7 @@ fn a_stray_key_of_lock_step_leaves_the_card_where_it_is() {
 #[test]
 fn leaving_the_radius_as_it_is_starts_nothing_again() {
     let mut window = finished(setup());
-    let radius = window.state().app_state().setup.task.radius_m;
+    let radius = window.state().app_state().setup.task.radius_m();
     let menu = window.get_all_by_label("References").next();
     menu.expect("the menu is in the toolbar").click();
     window.run_steps(3);
@@ -97,7 +97,7 @@ fn leaving_the_radius_as_it_is_starts_nothing_again() {
     window.get_by_label("Seed").focus();
     window.run_steps(2);
     let state = window.state().app_state();
-    assert_eq!(state.setup.task.radius_m, radius);
+    assert_eq!(state.setup.task.radius_m(), radius);
     assert!(
         matches!(state.run_state(), RunState::Finished),
         "{:?}",

@@ -24,11 +24,11 @@ fn eval(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> Command {
         "fb",
         "--radius",
         "3",
-        "--references",
+        "--reference",
         "nearest:1",
     ]);
     command.args([
-        "--only", "0", "--only", "1", "--only", "2", "--right", "2m,5deg",
+        "--query", "0", "--query", "1", "--query", "2", "--right", "2m,5deg",
     ]);
     command.arg("--out").arg(out).args(extra);
     command.env_remove("GITHUB_STEP_SUMMARY");

@@ -82,7 +82,7 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
             "fb, pm, mi, hy, fb2, mi6, nid or robust",
         ),
         (
-            &["--query", "5", "--references", "best:1"],
+            &["--query", "5", "--reference", "best:1"],
             "random:K, nearest:K",
         ),
         (&["--query", "5", "--radius=-1"], "a positive number"),
@@ -101,6 +101,38 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
             message.contains(words),
             "`{words}` is missing in: {message}"
         );
+    }
+}
+
+#[test]
+fn a_scene_is_opened_and_a_mistyped_command_gets_its_suggestion() {
+    let said = |words: &[&str]| {
+        let output = posescope().args(words).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said)
+    };
+    let (code, text) = said(&["evla", "street"]);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("did you mean `eval`?"), "{text}");
+    let (code, text) = said(&["nonsense"]);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("no command, file or folder"), "{text}");
+    let sequence = SmallSequence::write();
+    let folder = sequence.folder();
+    let folder = folder.to_str().expect("a plain path");
+    let (code, text) = said(&[folder, "--query", "5", "--limit", "3"]);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(
+        text.contains("--limit is an option of `posescope eval`"),
+        "{text}"
+    );
+    for (option, words) in [
+        ("--radius=1,2", "takes one value here"),
+        ("--failure-radius=3", "--failure-radius is an option of"),
+    ] {
+        let (code, text) = said(&["run", folder, "--query", "5", option]);
+        assert_eq!(code, Some(2), "{text}");
+        assert!(text.contains(words), "{text}");
     }
 }
 
@@ -124,16 +156,16 @@ fn a_reference_is_chosen_within_the_radius_and_never_the_query_itself() {
             names.collect::<Option<Vec<_>>>().expect("names"),
         )
     };
-    let nearest = references(&["--references", "nearest:2"]);
+    let nearest = references(&["--reference", "nearest:2"]);
     assert_eq!(
         nearest,
         (Some(0), vec!["000004".to_owned(), "000007".to_owned()])
     );
-    let within = references(&["--references", "random:5", "--radius", "1.5"]);
+    let within = references(&["--reference", "random:5", "--radius", "1.5"]);
     assert_eq!(within, (Some(0), vec!["000004".to_owned()]));
     assert_eq!(references(&["--radius", "0.5"]).0, Some(3));
     let farther = [
-        "--references",
+        "--reference",
         "random:5",
         "--radius",
         "0.5",

@@ -26,13 +26,13 @@ fn eval(
         "pm,mi,hy,nid",
         "--radius",
         "3",
-        "--references",
+        "--reference",
         "random:2",
     ]);
     command.args([
-        "--only",
+        "--query",
         "0",
-        "--only",
+        "--query",
         "3",
         "--set",
         "grid.coarse_step=0.25",
@@ -75,7 +75,7 @@ fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
     let said = |compute: &str| {
         let mut command = posescope();
         command.arg("run").arg(sequence.folder());
-        command.args(["--query", "0", "--query", "3", "--references", "nearest:1"]);
+        command.args(["--query", "0", "--query", "3", "--reference", "nearest:1"]);
         command.args(["--radius", "2", "--method", "pm,mi6", "--compute", compute]);
         let output = command.output().expect("it starts");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -124,20 +124,12 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
     let surface = |out: &str, extra: &[&str]| {
         let mut command = posescope();
-        command.arg("surface").arg(sequence.folder());
-        command.args([
-            "--query",
-            "2",
-            "--radius",
-            "2",
-            "--yaw-step",
-            "5",
-            "--step",
-            "0.5",
-        ]);
+        command.arg("run").arg(sequence.folder());
+        command.args(["--query", "2", "--radius", "2"]);
+        command.args(["--set", "surface.yaw_step=5", "--set", "surface.step=0.5"]);
         command
             .args(extra)
-            .arg("--out")
+            .arg("--surface")
             .arg(sequence.path().join(out));
         command.output().expect("it starts")
     };
@@ -160,7 +152,7 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
         (
             "surface.csv",
             ["--method", "mi"],
-            "name it with --reference",
+            "name them with --query and --reference",
         ),
         ("surface.csv", ["--method", "fb"], "searches no grid"),
     ] {

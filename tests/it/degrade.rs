@@ -68,7 +68,7 @@ fn a_run_folder_says_what_was_degraded_and_goes_on_with_nothing_else() {
         let mut command = posescope();
         command.arg("eval").arg(sequence.folder());
         command.args(["--method", "fb,mi", "--radius", "3", "-q"]);
-        command.args(["--references", "nearest:1", "--only", "5"]);
+        command.args(["--reference", "nearest:1", "--query", "5"]);
         command.arg("--out").arg(sequence.path().join(name));
         command.args(words);
         command

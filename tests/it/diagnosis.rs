@@ -646,7 +646,7 @@ fn verdicts_in_the_docs_are_those_of_the_rules() {
 fn what_is_no_tolerance_is_refused() {
     for (option, value) in [
         ("--right", "1,5"),
-        ("--accept", "1.5"),
+        ("--min-confidence", "1.5"),
         ("--explain", "many"),
     ] {
         let output = posescope()

@@ -144,7 +144,7 @@ fn a_scene_without_clouds_cannot_be_localised_against() {
     assert_eq!(output.status.code(), Some(3));
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(
-        message.contains("no frame has a cloud") && message.contains("--queries"),
+        message.contains("no frame has a cloud") && message.contains("--query-scene"),
         "{message}"
     );
 }

@@ -73,7 +73,7 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
         ),
     ] {
         let asked = |extra: &[&str]| {
-            let mut arguments = vec!["--queries", queries, "--references", "nearest:2"];
+            let mut arguments = vec!["--query-scene", queries, "--reference", "nearest:2"];
             arguments.extend(["--radius", "8", "--method", "mi"]);
             arguments.extend(wanted.iter().chain(extra));
             results(&run("street:overcast", &arguments))
@@ -89,7 +89,7 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
             let output = run(
                 "street:overcast",
                 &[
-                    "--queries",
+                    "--query-scene",
                     queries,
                     "--query",
                     query,
@@ -243,13 +243,17 @@ fn a_run_folder_knows_the_other_system_and_all_that_reads_it_does_too() {
     assert_eq!(eval(&["--resume"]).status.code(), Some(0));
     let mut export = posescope();
     export
-        .arg("export")
+        .arg("results")
         .arg(&out)
-        .args(["--format", "vloc", "--method", "super-glue"]);
+        .args(["--as", "vloc", "--where", "method = super-glue"]);
     let exported = export.output().expect("the binary starts");
     let lines = String::from_utf8_lossy(&exported.stdout);
     assert_eq!(lines.lines().count(), 2, "{lines}");
-    posescope().arg("diff").arg(&out).arg(&out).assert().code(0);
+    posescope()
+        .arg("compare")
+        .args([&out, &out])
+        .assert()
+        .code(0);
     // A run that names a method which nobody brought is not read.
     let run_file = fs::read_to_string(out.join("run.toml")).expect("text");
     let without: String = run_file
@@ -259,7 +263,7 @@ fn a_run_folder_knows_the_other_system_and_all_that_reads_it_does_too() {
         .collect();
     fs::write(out.join("run.toml"), without).expect("writable");
     let output = posescope()
-        .arg("diff")
+        .arg("compare")
         .arg(&out)
         .arg(&out)
         .output()

@@ -29,7 +29,7 @@ fn references(sequence: &SmallSequence, gps: &Path, more: &[&str]) -> Result<Val
         .arg("--gps")
         .arg(gps)
         .args(["--camera", "100,100,80,32", "--method", "mi"])
-        .args(["--references", "nearest:1", "--json", "-", "-q"])
+        .args(["--reference", "nearest:1", "--json", "-", "-q"])
         .args(more)
         .output()
         .expect("the binary starts");
@@ -140,7 +140,7 @@ fn an_evaluation_seeks_references_where_the_file_says_and_goes_on_with_the_same_
             .args([
                 "--radius",
                 "0.5",
-                "--references",
+                "--reference",
                 "nearest:1",
                 "--method",
                 "mi",

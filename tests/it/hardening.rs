@@ -110,7 +110,7 @@ fn eval(scene: &Path, out: &Path) -> Command {
             "mi",
             "--radius",
             "3",
-            "--max-recordings",
+            "--keep-failures",
             "0",
             "-q",
             "--out",

@@ -45,7 +45,7 @@ fn a_run_ends_with_a_whole_recording_and_what_is_done() {
             "run",
             "street",
             "--all",
-            "--references",
+            "--reference",
             "nearest:1",
             "--method",
             "mi",

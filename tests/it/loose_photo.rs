@@ -103,7 +103,7 @@ fn without_a_position_the_reference_that_looks_most_alike_is_taken() {
     assert_eq!(results.len(), 1);
     assert_eq!(results[0]["references"].as_array().map(Vec::len), Some(1));
     assert!(!results[0]["pose"].is_null());
-    let random = [&words[..], &["--references", "random:1"]].concat();
+    let random = [&words[..], &["--reference", "random:1"]].concat();
     refused(
         &sequence.folder(),
         &random,
@@ -163,7 +163,7 @@ fn photos_without_a_camera_and_words_that_are_none_have_their_exit_codes() {
     for (words, code, part) in [
         (&[][..], 3, "EXIF"),
         (&["--camera", "100,100"], 2, "4 numbers expected, 2 found"),
-        (&["--query", "5"], 2, "some of the queries are frames"),
+        (&["--query", "5"], 2, "some queries are frames"),
     ] {
         refused(&scene, &[&against[..], words].concat(), code, &[part]);
     }

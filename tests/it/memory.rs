@@ -456,7 +456,6 @@ fn a_query_may_have_another_camera_than_its_reference() {
 #[test]
 fn a_run_describes_the_camera_of_each_query_where_they_have_several() {
     let draw = Draw {
-        share: 1.0,
         limit: None,
         only: &[],
         seed: 0,

@@ -69,7 +69,7 @@ fn our_own_matches_read_back_give_our_own_pose_bit_for_bit() {
         "70",
         "--query",
         "300",
-        "--references",
+        "--reference",
         "nearest:2",
         "--method",
         "fb,mi",

@@ -42,15 +42,7 @@ fn results(asked: &[&str], processor: Option<(&Path, &str)>, folder: &Path) -> V
         .env("POSESCOPE_CACHE", CACHE)
         .arg("eval")
         .args(asked);
-    command.args([
-        "--compute",
-        "cpu",
-        "--max-recordings",
-        "0",
-        "--pictures",
-        "0",
-        "-q",
-    ]);
+    command.args(["--compute", "cpu", "--keep-failures", "0", "-q"]);
     let out = folder.join(processor.map_or("here", |(_, name)| name));
     let output = command.arg("--out").arg(&out).output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -77,11 +69,11 @@ fn a_night_photo_of_the_street_has_the_same_results_on_any_processor() {
     assert_same_everywhere(
         &[
             "street:night",
-            "--queries",
+            "--query-scene",
             "street:overcast",
-            "--only",
+            "--query",
             "70",
-            "--references",
+            "--reference",
             "nearest:1",
             "--radius",
             "5",
@@ -101,9 +93,9 @@ fn the_real_pair_has_the_same_results_on_any_processor() {
     assert_same_everywhere(
         &[
             &sequence,
-            "--only",
+            "--query",
             "3823",
-            "--references",
+            "--reference",
             "nearest:1",
             "--radius",
             "10.5",

@@ -124,7 +124,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
 #[test]
 fn references_may_be_as_far_away_as_the_prior_allows() {
     let mut narrow = setup();
-    narrow.task.radius_m = 0.6;
+    narrow.task.protocol.radii_m = vec![0.6];
     assert_eq!(narrow.candidates(1), [2]);
     narrow.task.protocol.prior_m = Some(3.0);
     assert_eq!(narrow.candidates(1), [2, 0]);
@@ -291,8 +291,7 @@ fn the_bar_says_how_many_frames_were_looked_at() {
         mode: RunMode::Running,
         ..setup()
     };
-    slow.task.by_hand = false;
-    slow.task.protocol.references = Selection::Matched(1);
+    slow.task.protocol.select(Selection::Matched(1));
     let mut window = crate::window::window(slow);
     let mut is_told = false;
     while *window.state().app_state().run_state() == RunState::Loading {

@@ -15,7 +15,7 @@ fn run(sequence: &SmallSequence, name: &str, extra: &[&str]) -> PathBuf {
     let mut command = posescope();
     command.arg("eval").arg(sequence.folder());
     command.args(["--method", "fb,mi", "--radius", "3", "-q"]);
-    command.args(["--references", "nearest:1", "--gate", "success@mi >= 0"]);
+    command.args(["--reference", "nearest:1", "--gate", "success@mi >= 0"]);
     command.arg("--out").arg(&out).args(extra);
     command.env_remove("GITHUB_STEP_SUMMARY");
     command.assert().code(0);
@@ -105,21 +105,27 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     // From the folder alone, on any number of threads: the same bytes.
     let again = sequence.path().join("again.html");
     let mut command = posescope();
-    command.arg("report").arg(&out).arg("--out").arg(&again);
-    command.args(["--threads", "3"]).assert().code(0);
+    command
+        .arg("results")
+        .arg(&out)
+        .args(["--as", "html", "--out"]);
+    command.arg(&again).args(["--threads", "3"]);
+    command.assert().code(0);
     assert_eq!(text(&again), page);
 
     // Without the scene there are no photos, which is said; everything else stays.
     fs::rename(sequence.folder(), sequence.path().join("away")).expect("movable");
     let mut command = posescope();
-    command.arg("report").arg(&out).assert().code(0);
+    command.arg("results").arg(&out).args(["--as", "html"]);
+    command.assert().code(0);
     let page = text(&out.join("report.html"));
     assert_self_contained(&page);
     assert!(page.contains("There are no photos: "));
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
     let mut command = posescope();
     let nowhere = sequence.path().join("nowhere");
-    command.arg("report").arg(nowhere).assert().code(3);
+    command.arg("results").arg(nowhere).args(["--as", "html"]);
+    command.assert().code(3);
 }
 
 #[test]
@@ -128,15 +134,15 @@ fn the_report_says_all_that_was_asked() {
     let out = run(
         &sequence,
         "run",
-        &["--limit", "3", "--explain", "1", "--accept", "0.25"],
+        &["--limit", "3", "--explain", "1", "--min-confidence", "0.25"],
     );
     let page = text(&out.join("report.html"));
     for words in [
-        "<dt>At most</dt><dd>3 queries",
-        "by up to 1 runs each",
-        "poses with a confidence below 0.25",
+        "<dt>limit</dt><dd>3</dd>",
+        "<dt>explain</dt><dd>1</dd>",
+        "<dt>min-confidence</dt><dd>0.25</dd>",
         "within 1m,5deg of the truth; wrong otherwise",
-        "Success, as the paper counts it",
+        "success, as the paper counts it",
     ] {
         assert!(page.contains(words), "{words}");
     }
@@ -147,12 +153,15 @@ fn two_runs_are_held_against_each_other() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
     let before = run(&sequence, "before", &["--right", "0.5m,5deg"]);
     let after = run(&sequence, "after", &[]);
+    let compared = sequence.path().join("compared.html");
     posescope()
-        .arg("report")
+        .arg("compare")
         .args([&before, &after])
+        .arg("--html")
+        .arg(&compared)
         .assert()
         .code(0);
-    let page = text(&after.join("report.html"));
+    let page = text(&compared);
     assert_self_contained(&page);
     assert!(page.contains("Changes since <code>"));
     assert!(
@@ -173,7 +182,8 @@ fn what_comes_from_elsewhere_is_no_markup() {
         fs::write(path, spoilt).expect("writable");
     }
     let mut command = posescope();
-    command.arg("report").arg(&out).assert().code(0);
+    command.arg("results").arg(&out).args(["--as", "html"]);
+    command.assert().code(0);
     let page = text(&out.join("report.html"));
     assert!(!page.contains("<script>alert") && !page.contains("<img"));
     assert!(page.contains("&lt;script&gt;alert('&amp;')&lt;/script&gt;"));

@@ -1,4 +1,4 @@
-//! `posescope index` and `--references retrieve:K`, as their user drives them.
+//! `posescope index` and `--reference retrieve:K`, as their user drives them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -31,8 +31,8 @@ fn index(file: &Path) -> Command {
 fn index_of(file: &Path, words: &str) -> Command {
     let mut command = posescope();
     command
-        .args(["index", "street", "--every", "100", "--words", words])
-        .arg("--output")
+        .args(["index", "street", "--every", "100"])
+        .args(["--set", &format!("index.words={words}"), "--out"])
         .arg(file);
     command
 }
@@ -41,7 +41,7 @@ fn run(file: &Path) -> Command {
     let mut command = posescope();
     command
         .args(["run", "street", "--query", "203", "--method", "fb", "-q"])
-        .args(["--references", "retrieve:2", "--radius", "150"])
+        .args(["--reference", "retrieve:2", "--radius", "150"])
         .args(["--json", "-", "--index"])
         .arg(file);
     command
@@ -116,8 +116,8 @@ fn frames_that_are_left_out_of_an_index_are_not_found_and_make_it_another() {
     // The queries of a run, which its folder names.
     let runs = folder.path().join("run");
     let eval = posescope()
-        .args(["eval", "street", "--only", "200", "--method", "fb", "-q"])
-        .args(["--references", "nearest:1", "--out"])
+        .args(["eval", "street", "--query", "200", "--method", "fb", "-q"])
+        .args(["--reference", "nearest:1", "--out"])
         .arg(&runs)
         .output();
     assert!(eval.expect("the binary starts").status.success());
@@ -134,8 +134,8 @@ fn an_experiment_asks_the_index_that_is_named_for_each_scene() {
     let eval = |files: &[&Path]| {
         let mut command = posescope();
         command
-            .args(["eval", "street", "--only", "203", "--method", "fb", "-q"])
-            .args(["--references", "retrieve:2", "--prior", "150"])
+            .args(["eval", "street", "--query", "203", "--method", "fb", "-q"])
+            .args(["--reference", "retrieve:2", "--prior", "150"])
             .arg("--out")
             .arg(&runs);
         for file in files {
@@ -149,7 +149,7 @@ fn an_experiment_asks_the_index_that_is_named_for_each_scene() {
     let elsewhere = folder.path().join("elsewhere");
     let (code, message) = said(&mut eval(&[&elsewhere]));
     assert_eq!(code, Some(3), "{message}");
-    let command = format!("`posescope index street --output {}`", elsewhere.display());
+    let command = format!("`posescope index street --out {}`", elsewhere.display());
     assert!(message.contains(&command), "{message}");
 
     let (code, message) = said(&mut eval(&[&file]));
@@ -163,7 +163,7 @@ fn an_experiment_asks_the_index_that_is_named_for_each_scene() {
 #[test]
 fn an_index_that_cannot_be_used_is_named_with_the_command_that_builds_it() {
     let (_folder, file) = file();
-    let command = format!("`posescope index street --output {}`", file.display());
+    let command = format!("`posescope index street --out {}`", file.display());
     let (code, message) = said(&mut run(&file));
     assert_eq!(code, Some(3), "{message}");
     assert!(message.contains("there is no retrieval index"), "{message}");
@@ -214,7 +214,7 @@ fn a_vocabulary_larger_than_its_descriptors_is_a_usage_error() {
     let (code, message) = said(&mut index_of(&file, "1000000"));
     assert_eq!(code, Some(2), "{message}");
     assert!(message.contains("too few"), "{message}");
-    assert!(message.contains("--words"), "{message}");
+    assert!(message.contains("--set index.words"), "{message}");
     assert!(!file.exists());
 }
 
@@ -226,7 +226,7 @@ fn without_a_cache_directory_a_file_has_to_be_named() {
             .args(["index", "street"]),
     );
     assert_eq!(code, Some(2), "{message}");
-    assert!(message.contains("--output"), "{message}");
+    assert!(message.contains("--out"), "{message}");
 }
 
 /// Writes down what comes between the beginning of a query and that of its first method.

@@ -24,9 +24,9 @@ fn job(query: usize) -> Job {
         query,
         chosen: vec![0].into(),
         task: Task {
-            by_hand: true,
-            radius_m: 3.0,
             protocol: Protocol {
+                references: Vec::new(),
+                radii_m: vec![3.0],
                 seed: 7,
                 ..Protocol::default()
             },
@@ -259,8 +259,8 @@ fn references_that_are_ranked_can_be_stopped_too() {
         chosen: Default::default(),
         ..job(1)
     };
-    ranked.task.by_hand = false;
-    ranked.task.protocol.references = "maxf:2".parse().expect("a selection");
+    let selection = "matches:2".parse().expect("a selection");
+    ranked.task.protocol.select(selection);
     let mut stopped = UntilStopped(Arc::new(AtomicBool::new(true)));
     let error = ranked.work(0, &mut stopped, |_| panic!("none was chosen"));
     assert!(error.expect_err("it was stopped").is_cancelled());
@@ -351,7 +351,7 @@ fn several_references_are_fused_as_without_a_session() {
     let scene = Walls::new();
     let localizer = Localizer::new(&scene, &scene, &task.params, task.protocol.seed);
     let request = Request {
-        radius_m: task.radius_m,
+        radius_m: task.radius_m(),
         references: several.chosen.clone(),
         fusions: task.protocol.fusions.clone(),
         setting: None,

@@ -31,7 +31,7 @@ fn eval(sequence: &SmallSequence, out: &Path) -> Command {
     command
         .current_dir(sequence.path())
         .args(["eval", "sequences/42", "--format", "kitti"])
-        .args(["--method", "fb,mi", "--references", "random:2", "-q"])
+        .args(["--method", "fb,mi", "--reference", "random:2", "-q"])
         .args(["--radius", "2", "--prior", "3", "--seed", "1"])
         .args(["--set", "fb.ratio=0.75", "--out"])
         .arg(out);
@@ -66,13 +66,13 @@ fn a_run_of_an_earlier_program_serves_as_baseline_and_is_exported() {
         .assert()
         .code(0);
     let mut diff = posescope();
-    diff.arg("diff").arg(&baseline).arg(&out);
+    diff.arg("compare").arg(&baseline).arg(&out);
     let output = diff.output().expect("the binary starts");
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(said.contains("of 6 results in both runs"), "{said}");
     let mut export = posescope();
-    export.arg("export").arg(&baseline);
-    export.args(["--format", "csv", "--method", "mi", "--fusion", "r-wavg"]);
+    export.arg("results").arg(&baseline);
+    export.args(["--as", "csv", "--where", "method = mi and fusion = r-wavg"]);
     let output = export.output().expect("the binary starts");
     assert_eq!(String::from_utf8_lossy(&output.stdout).lines().count(), 4);
 }
@@ -103,28 +103,28 @@ fn what_is_wrong_in_a_run_file_is_told_with_its_line() {
         (
             "\"mi\"]",
             "\"mo\"]",
-            "methods",
+            "method",
             "`mo` is no method; fb, pm, mi, hy",
         ),
         (
-            "methods = [\"fb\", \"mi\"]",
-            "methods = []",
-            "methods",
+            "method = [\"fb\", \"mi\"]",
+            "method = []",
+            "method",
             "at least one method",
         ),
         (
             "random:2",
             "best:2",
-            "references",
+            "reference",
             "`best:2` is no choice of references",
         ),
         (
             "r-wavg",
             "mean",
-            "fusions",
+            "fusion",
             "`mean` is no fusion; maxf, avg, wavg, r-wavg or joint expected",
         ),
-        ("[2.0]", "[-2.0]", "radii_m", "positive radius"),
+        ("[2.0]", "[-2.0]", "radius", "positive radius"),
         (
             "scene_index = 0",
             "scene_index = 1",
@@ -134,13 +134,13 @@ fn what_is_wrong_in_a_run_file_is_told_with_its_line() {
         ("run/1", "run/9", "schema", "posescope.run/1 expected"),
         (
             "seed = 1",
-            "seed = 1\nexperiment = \"huge\"",
-            "experiment",
-            "`huge` is no experiment; single, multi or large expected",
+            "seed = 1\npreset = \"huge\"",
+            "preset",
+            "`huge` is no preset; single, multi or large expected",
         ),
         (
-            "seed = 1",
-            "seed = 1\nshard = \"3/2\"",
+            "version =",
+            "shard = \"3/2\"\nversion =",
             "shard",
             "I/N expected",
         ),
@@ -150,7 +150,7 @@ fn what_is_wrong_in_a_run_file_is_told_with_its_line() {
         fs::write(&file, &bad).expect("writable");
         let place = format!("run.toml:{}:", line_of(&bad, key));
         let mut export = posescope();
-        export.arg("export").arg(&run).args(["--format", "csv"]);
+        export.arg("results").arg(&run).args(["--as", "csv"]);
         refused(&mut export, &[&place, words]);
         let mut view = posescope();
         refused(view.arg("view").arg(&run), &[&place, words]);
@@ -186,12 +186,12 @@ fn what_is_wrong_in_a_result_is_told_with_its_line() {
         fs::write(&file, lines.join("\n") + "\n").expect("writable");
         let words = ["results.jsonl:4: ", words];
         let mut export = posescope();
-        export.arg("export").arg(&run).args(["--format", "csv"]);
+        export.arg("results").arg(&run).args(["--as", "csv"]);
         refused(&mut export, &words);
         let mut view = posescope();
         view.current_dir(sequence.path()).arg("view").arg("run");
         refused(&mut view, &words);
         let mut diff = posescope();
-        refused(diff.arg("diff").arg(&run).arg(&run), &words);
+        refused(diff.arg("compare").arg(&run).arg(&run), &words);
     }
 }

@@ -1,4 +1,4 @@
-//! `eval --sweep` and `eval --failed`.
+//! `eval --sweep` and `eval --rerun-failed`.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn eval(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> Command {
     let mut command = posescope();
     command.arg("eval").arg(sequence.folder());
     command.args(["--method", "fb,mi", "--radius", "3", "-q"]);
-    command.args(["--references", "nearest:1"]);
+    command.args(["--reference", "nearest:1"]);
     command.arg("--out").arg(out).args(extra);
     command
 }
@@ -112,7 +112,7 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
 
     let again = sequence.path().join("again");
     let mut command = posescope();
-    command.args(["eval", "--failed"]).arg(&before);
+    command.args(["eval", "--rerun-failed"]).arg(&before);
     command.arg("--out").arg(&again);
     command.args(["--set", "mi.bins=32", "--degrade", "exposure=1"]);
     let output = command.output().expect("it starts");
@@ -148,12 +148,12 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
     eval(
         &sequence,
         &fine,
-        &["--only", "0", "--method", "fb", "--right", "9m,90deg"],
+        &["--query", "0", "--method", "fb", "--right", "9m,90deg"],
     )
     .assert()
     .code(0);
     let mut command = posescope();
-    command.args(["eval", "--failed"]).arg(&fine);
+    command.args(["eval", "--rerun-failed"]).arg(&fine);
     // It has no --out, so that a failure of this test would leave a run where it is started.
     command.current_dir(sequence.path());
     let output = command.output().expect("it starts");

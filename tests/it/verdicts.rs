@@ -79,15 +79,8 @@ fn the_window_counts_the_failures_that_the_run_counts() {
         posescope()
             .arg("eval")
             .arg(sequence.folder())
-            .args([
-                "--method",
-                "mi",
-                "--references",
-                "random:1",
-                "--radius",
-                "3",
-            ])
-            .args(["--max-recordings", "0", "--right", right, "--out"])
+            .args(["--method", "mi", "--reference", "random:1", "--radius", "3"])
+            .args(["--keep-failures", "0", "--right", right, "--out"])
             .arg(out)
             .assert()
             .code(0);

@@ -40,7 +40,7 @@ fn the_options_beside_the_folder_of_a_run_are_obeyed_or_refused() {
             "fb,mi",
             "--radius",
             "2",
-            "--max-recordings",
+            "--keep-failures",
             "0",
             "--out",
         ])
@@ -89,7 +89,11 @@ fn the_options_beside_the_folder_of_a_run_are_obeyed_or_refused() {
     assert!(table.contains("▲ wrong"), "{table}{said}");
     let (_, table, said) = view(&["--query", "0", "--reference", "3", "--method", "fb"]);
     assert!(table.contains("000003"), "{table}{said}");
-    for refused in [["--queries", "street"], ["--camera", "1,1,1,1"]] {
+    for refused in [
+        ["--query-scene", "street"],
+        ["--camera", "1,1,1,1"],
+        ["--limit", "3"],
+    ] {
         let options = [&["--query", "0"][..], &refused[..]].concat();
         let (code, _, said) = view(&options);
         assert_eq!(code, Some(2), "{said}");

@@ -52,6 +52,26 @@ parameters! {
     }
 }
 
+parameters! {
+    /// The dense grid of costs that a picture shows: every position with every heading.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SurfaceParams {
+        /// Step of the positions within the uncertainty radius.
+        pub step_m: f64 = number("step", "m", 0.001..=100.0),
+        /// Step of the headings within `grid.yaw_range`.
+        pub yaw_step_deg: f64 = number("yaw_step", "°", 0.01..=90.0),
+    }
+}
+
+impl Default for SurfaceParams {
+    fn default() -> Self {
+        Self {
+            step_m: 0.1,
+            yaw_step_deg: 0.5,
+        }
+    }
+}
+
 impl GridParams {
     /// Whether an offset lies where the grid of a search within `radius_m` ends, in position or yaw: its
     /// basin may go on outside.

@@ -10,10 +10,10 @@ use crate::descent::DescentParams;
 use crate::describe::{Describe, Described, ParamError, Value, list, set};
 use crate::estimator::{FeatureParams, GuidedParams, RobustParams, SixParams};
 use crate::features::SurfParams;
-use crate::grid::GridParams;
+use crate::grid::{GridParams, SurfaceParams};
 use crate::judge::JudgeParams;
 use crate::render::RenderParams;
-use crate::retrieval::RetrievalParams;
+use crate::retrieval::{IndexParams, RetrievalParams};
 
 /// All parameters of all estimators, by group.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,6 +40,10 @@ pub struct Params {
     pub robust: RobustParams,
     /// `retrieval`: visual words, and the verification of what they find.
     pub retrieval: RetrievalParams,
+    /// `index`: what an index is built of.
+    pub index: IndexParams,
+    /// `surface`: a dense grid of costs.
+    pub surface: SurfaceParams,
 }
 
 /// Reads a configuration over the defaults, as [`Params::merge_toml`] does.
@@ -69,6 +73,8 @@ impl Params {
         visit("mi6", &mut self.mi6);
         visit("robust", &mut self.robust);
         visit("retrieval", &mut self.retrieval);
+        visit("index", &mut self.index);
+        visit("surface", &mut self.surface);
     }
 
     /// All parameters with their present values.

@@ -37,7 +37,7 @@ pub use build::{BuildProgress, BuildRequest, BuildStep, BuildSummary, build};
 pub use error::{BuildError, IndexError};
 pub use index::{Geometry, Index, Ranked, Retrieval};
 pub use layout::{Description, RecordCounts};
-pub use params::RetrievalParams;
+pub use params::{IndexParams, RetrievalParams};
 pub use ranking::{Criterion, RankedReference, ReferenceRanking};
 pub use verification::{Verification, VerifiedMatch};
 pub use vocabulary::{Clustering, Vocabulary};

@@ -39,6 +39,16 @@ impl UnknownWord {
     }
 }
 
+/// The name that is most like a mistyped word, if one is.
+pub fn similar<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    names
+        .into_iter()
+        .map(|name| (strsim::jaro_winkler(name, word), name))
+        .filter(|(similarity, _)| *similarity > 0.8)
+        .max_by(|(a, _), (b, _)| a.total_cmp(b))
+        .map(|(_, name)| name)
+}
+
 /// What is wrong with a piece of JSON, without the line, which its reader counts in the whole file.
 pub fn json_message(error: &serde_json::Error) -> String {
     let text = error.to_string();

@@ -1,4 +1,4 @@
-//! The arguments of what takes a scene as a whole: `overview`, `synth`, `doctor` and `index`.
+//! The arguments of what takes a scene as a whole: `doctor`, `index` and `synth`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -9,19 +9,6 @@ use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
 
 use super::ConfigArgs;
-
-#[derive(Debug, Args)]
-pub struct OverviewArgs {
-    /// Where the frames are, as for `run`
-    #[arg(value_name = "SCENE", required = true)]
-    pub scenes: Vec<String>,
-    /// The format of the scenes, if their content does not tell
-    #[arg(long, value_name = "NAME")]
-    pub format: Option<String>,
-    /// Write the table as Markdown, CSV and LaTeX, and a map of each route as SVG, into this folder
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-}
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
@@ -59,48 +46,44 @@ pub struct SynthArgs {
 
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
-    /// Where the frames are, as for `run`
-    pub scene: String,
-    /// The format of the scene, if its content does not tell
+    /// The scenes, as for `run`
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<String>,
+    /// The format of the scenes, where their content does not tell
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
-    /// Write the cloud of a frame on its photo
+    /// Save a picture: the cloud of a frame on its photo, and the route
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
-    /// Save a recording of the frames that were compared, with their clouds in the world and on the photos
+    /// Save a recording of the frames that were compared
     #[arg(long, value_name = "FILE.rrd")]
     pub save: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
 pub struct IndexArgs {
-    /// Where the frames are, as for `run`
+    /// The scene, as for `run`
     pub scene: String,
-    /// The format of the scene, if its content does not tell
+    /// The format of the scene, where its content does not tell
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
-    /// Number of visual words
-    #[arg(long, value_name = "N", default_value = "10000")]
-    pub words: NonZeroUsize,
     /// Index every Nth frame only
     #[arg(long, value_name = "N", default_value = "1")]
     pub every: NonZeroUsize,
-    /// Leave out a frame, or the queries of a run folder; repeatable. Where queries are of the same drive,
-    /// an index with their own photos knows more of them than another drive would
+    /// Leave out a frame, or the queries of a run folder; repeatable
+    ///
+    /// Use this where queries and index are of the same drive: retrieval would find the query itself.
     #[arg(long, value_name = "FRAME|RUN")]
     pub without: Vec<String>,
     /// The file to write [default: in the user's cache directory, where `run` finds it]
     #[arg(long, value_name = "FILE")]
-    pub output: Option<PathBuf>,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 0)]
+    pub out: Option<PathBuf>,
+    /// The seed of every random choice
+    #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Build it even if it is up to date, and replace whatever the file is
+    /// Build the index even if it is up to date, and replace any file
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// Number of threads [default: one per core]; the index does not depend on it
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
 }

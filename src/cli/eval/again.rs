@@ -1,16 +1,13 @@
-//! `eval --failed`: the queries that failed in a run, once more and otherwise.
+//! `eval --rerun-failed`: the queries that failed in a run, with other settings.
 
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::Arc;
 
 use posescope::localize::QueryResult;
 use posescope::measure::read_rows;
-use posescope::params::Params;
 use posescope::run::{RunFile, ScenePair, Scenes, inputs, is_called, read_run};
-use posescope::scene::{self, Scene};
 
-use super::Asked;
+use super::{Asked, written};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 
@@ -18,25 +15,14 @@ use crate::cli::failure::CliError;
 pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
     let run = read_run(before)?;
     let failed = failed(&read_rows(before)?);
-    let mut params = Params::default();
-    let given = params.merge_toml(&run.params.to_string());
-    given.map_err(|source| CliError::Config {
+    let params = run.params().map_err(|source| CliError::Config {
         path: before.join("run.toml"),
         source,
     })?;
-    let params = args.protocol.config.over(params)?;
-    let format = args.protocol.format.clone().or_else(|| run.format.clone());
-    let open_all = |arguments: &[String]| -> Result<Vec<Arc<dyn Scene>>, CliError> {
-        let scenes = arguments
-            .iter()
-            .map(|argument| scene::open(argument, format.as_deref()).map(Arc::from));
-        Ok(scenes.collect::<Result<_, _>>()?)
-    };
-    let scenes = Scenes {
-        references: open_all(&run.scenes)?,
-        queries: open_all(&run.queries)?,
-    };
+    let params = args.config.over(params)?;
     let protocol = args.protocol.over(run.protocol.clone())?;
+    let format = protocol.format.as_deref();
+    let scenes = Scenes::open(&run.scenes, &protocol.query_scene, format)?;
     let pairs: Vec<ScenePair> = run
         .pairs
         .iter()
@@ -44,28 +30,21 @@ pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
             let is_wanted = |query: &str| {
                 let is_failed = failed.contains(&key(&pair.scene, &pair.query_scene, query));
                 let is_named =
-                    args.only.is_empty() || args.only.iter().any(|name| is_called(query, name));
+                    args.query.is_empty() || args.query.iter().any(|name| is_called(query, name));
                 is_failed && is_named
             };
             pair.only(is_wanted)
         })
         .filter(|pair| !pair.queries.is_empty())
         .collect();
-    let table = params.to_toml().parse();
     Ok(Asked {
         run: RunFile {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            format,
             inputs: inputs(&protocol)?,
             protocol,
-            failure_radius_m: args.failure_radius.unwrap_or(run.failure_radius_m),
-            radii_m: match args.radius.as_slice() {
-                [] => run.radii_m.clone(),
-                wanted => wanted.to_vec(),
-            },
             shard: args.shard,
             pairs,
-            params: table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}")),
+            params: written(&params),
             ..run
         },
         scenes,

@@ -23,12 +23,12 @@ pub fn sweep(
     for value in sweep.values() {
         let name = format!("{}={value}", sweep.key());
         let path = folder.join(&name);
-        let run = execute(&with(args, sweep, value), &path, terminal)?;
+        let run = execute(args, Some((sweep, value)), &path, terminal)?;
         let Judged {
             report,
             failures: of_run,
             ..
-        } = Judged::of(args, &path, &run)?;
+        } = Judged::of(&args.judging, None, &path, &run)?;
         failures.extend(
             of_run
                 .into_iter()
@@ -49,24 +49,4 @@ pub fn sweep(
         true => Ok(()),
         false => Err(CliError::NotGoodEnough(failures.join("; "))),
     }
-}
-
-/// The arguments of one value. The sweep has made sure that its setting takes it.
-fn with(args: &EvalArgs, sweep: &Sweep, value: &str) -> EvalArgs {
-    let mut args = args.clone();
-    let protocol = &mut args.protocol;
-    match sweep.is_degradation() {
-        true => {
-            let mut degradation = protocol.degrade.unwrap_or_default();
-            if let Err(error) = degradation.set(sweep.key(), value) {
-                unreachable!("the sweep was checked: {error}");
-            }
-            protocol.degrade = Some(degradation);
-        }
-        false => {
-            let assignment = format!("{}={value}", sweep.key());
-            protocol.config.assignments.push(assignment);
-        }
-    }
-    args
 }

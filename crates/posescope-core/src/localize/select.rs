@@ -35,7 +35,7 @@ pub enum Selection {
 }
 
 impl Selection {
-    const NAMES: [&'static str; 4] = ["random", "nearest", "maxf", "retrieve"];
+    const NAMES: [&'static str; 4] = ["random", "nearest", "matches", "retrieve"];
 
     fn parts(self) -> (&'static str, usize) {
         match self {
@@ -44,6 +44,11 @@ impl Selection {
             Self::Matched(count) => (Self::NAMES[2], count),
             Self::Retrieved(count) => (Self::NAMES[3], count),
         }
+    }
+
+    /// Whether this is the name of a way of choosing: the part before the colon.
+    pub fn is_name(text: &str) -> bool {
+        Self::NAMES.contains(&text)
     }
 
     /// How many references are chosen: the K of its name.
@@ -76,7 +81,7 @@ impl FromStr for Selection {
         let expected = || UnknownWord {
             found: text.to_owned(),
             kind: "choice of references",
-            expected: "random:K, nearest:K, maxf:K or retrieve:K with K from 1".to_owned(),
+            expected: "random:K, nearest:K, matches:K or retrieve:K with K from 1".to_owned(),
         };
         let (how, count) = text.split_once(':').ok_or_else(expected)?;
         let count: usize = count.parse().map_err(|_| expected())?;
@@ -86,7 +91,7 @@ impl FromStr for Selection {
         match how {
             "random" => Ok(Self::Random(count)),
             "nearest" => Ok(Self::Nearest(count)),
-            "maxf" => Ok(Self::Matched(count)),
+            "matches" => Ok(Self::Matched(count)),
             "retrieve" => Ok(Self::Retrieved(count)),
             _ => Err(expected()),
         }
@@ -197,7 +202,7 @@ pub enum ChoiceError {
     /// References are sought around the query, whose position nobody knows.
     #[error(
         "the position of query {query} is not known; name a frame with --reference, say where it is \
-         with --gps, or choose by looks with --references maxf:K or retrieve:K"
+         with --gps, or choose by looks with --reference matches:K or retrieve:K"
     )]
     UnknownPosition {
         /// The query frame's name.
@@ -273,7 +278,7 @@ mod tests {
 
     #[test]
     fn selections_are_read_and_written_and_nonsense_is_refused() {
-        for text in ["random:3", "nearest:1", "maxf:5", "retrieve:20"] {
+        for text in ["random:3", "nearest:1", "matches:5", "retrieve:20"] {
             let selection: Selection = text.parse().expect("a selection");
             assert_eq!(selection.to_string(), text);
         }

@@ -27,6 +27,21 @@ parameters! {
     }
 }
 
+parameters! {
+    /// What an index is built of.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct IndexParams {
+        /// Number of visual words.
+        pub words: usize = count("words", "", 1..=10_000_000),
+    }
+}
+
+impl Default for IndexParams {
+    fn default() -> Self {
+        Self { words: 10_000 }
+    }
+}
+
 impl Default for RetrievalParams {
     /// Eight trees as in the paper.
     fn default() -> Self {

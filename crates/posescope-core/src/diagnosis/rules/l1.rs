@@ -13,7 +13,7 @@ use crate::diagnosis::{Diagnosis, Proof};
 pub(super) const RULE: Rule = Rule {
     code: Code::L1,
     title: "low confidence",
-    advice: "do not rely on it; --accept 0.9 refuses such poses",
+    advice: "do not rely on it; --min-confidence 0.9 refuses such poses",
     applies_to: Family::ALL,
     needs_truth: false,
     is_conclusive: false,

@@ -1,4 +1,4 @@
-//! `posescope triage` as a process.
+//! `posescope results` as a process.
 
 use std::path::{Path, PathBuf};
 
@@ -19,10 +19,10 @@ fn run() -> (SmallSequence, PathBuf) {
     (sequence, folder)
 }
 
-/// What a triage prints and says, and its exit code.
-fn triage(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
+/// The exit code, what is printed, and what is said on stderr.
+fn results_of(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
     let output = posescope()
-        .arg("triage")
+        .arg("results")
         .arg(folder)
         .args(more)
         .output()
@@ -62,7 +62,7 @@ fn results_are_chosen_sorted_and_counted() {
         "--columns",
         "error,query",
     ];
-    let (code, table, said) = triage(&folder, &asked);
+    let (code, table, said) = results_of(&folder, &asked);
     assert_eq!(code, Some(0), "{said}");
     let words = format!("{} of {} results", wanted.len(), results.len());
     assert_eq!(said.trim(), words);
@@ -83,7 +83,8 @@ fn results_are_chosen_sorted_and_counted() {
 
     // Of one order the other is the reverse, and what has no error comes last in both.
     let order = |order: &str| -> Vec<f64> {
-        let (code, table, said) = triage(&folder, &["--sort", order, "--columns", "error,method"]);
+        let (code, table, said) =
+            results_of(&folder, &["--sort", order, "--columns", "error,method"]);
         assert_eq!(code, Some(0), "{said}");
         let rows = table.lines().skip(1);
         rows.filter_map(|line| line.split_whitespace().next()?.parse().ok())
@@ -95,8 +96,8 @@ fn results_are_chosen_sorted_and_counted() {
     assert_eq!(down, up);
 
     // As JSON the lines are those of the run.
-    let asked = ["--where", "error >= 0", "--json", "-", "--limit", "1"];
-    let (code, json, said) = triage(&folder, &asked);
+    let asked = ["--where", "error >= 0", "--as", "json", "--rows", "1"];
+    let (code, json, said) = results_of(&folder, &asked);
     assert_eq!(code, Some(0), "{said}");
     assert_eq!(json.lines().count(), 1);
     assert!(lines.contains(json.trim()));
@@ -114,11 +115,37 @@ fn what_cannot_be_asked_is_said_with_what_can() {
         (["--sort", "size"], "coverage"),
         (["--columns", "query,size"], "coverage"),
     ] {
-        let (code, table, said) = triage(&folder, &more);
+        let (code, table, said) = results_of(&folder, &more);
         assert_eq!(code, Some(2), "{said}");
         assert!(said.contains(words) && table.is_empty(), "{said}");
     }
-    let (code, _, said) = triage(&folder.join("nothing"), &[]);
+    let (code, _, said) = results_of(&folder.join("nothing"), &[]);
     assert_eq!(code, Some(3), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
+}
+
+#[test]
+fn tables_and_figures_come_in_the_form_that_is_asked_for() {
+    let (sequence, folder) = run();
+    let text = |more: &[&str]| {
+        let (code, text, said) = results_of(&folder, more);
+        assert_eq!(code, Some(0), "{more:?}: {said}");
+        text
+    };
+    let csv = text(&["--as", "csv", "--where", "method = fb"]);
+    assert!(csv.starts_with("scene,") || csv.contains("query,"), "{csv}");
+    let queries = text(&["--where", "method = fb"]).lines().count();
+    assert_eq!(csv.lines().count(), queries);
+    let markdown = text(&["--as", "markdown", "--columns", "query,method"]);
+    assert!(markdown.starts_with("| query | method |"), "{markdown}");
+    let summary = text(&["--table", "summary", "--as", "markdown"]);
+    assert!(summary.contains("| success (%) |"), "{summary}");
+    assert!(text(&["--table", "summary", "--as", "latex"]).contains("\\begin{tabular}"));
+    assert!(text(&["--table", "paper:1"]).contains("kitti/00"));
+
+    let plot = sequence.path().join("recall.svg");
+    let out = plot.to_str().expect("a plain path");
+    text(&["--plot", "recall", "--out", out]);
+    let svg = std::fs::read_to_string(&plot).expect("written");
+    assert!(svg.starts_with("<svg") && svg.contains("kitti/42"), "{svg}");
 }

@@ -1,0 +1,46 @@
+//! Options of a struct, as far as they were given.
+
+use clap::{ArgMatches, Args, Command, FromArgMatches};
+use posescope::run::Protocol;
+
+use crate::cli::failure::CliError;
+
+/// The options of a protocol, to be laid over another protocol.
+#[derive(Clone, Debug)]
+pub struct Given(ArgMatches);
+
+impl FromArgMatches for Given {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self(matches.clone()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        self.0 = matches.clone();
+        Ok(())
+    }
+}
+
+impl Args for Given {
+    fn augment_args(command: Command) -> Command {
+        Protocol::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Protocol::augment_args_for_update(command)
+    }
+}
+
+impl Given {
+    /// What was given, and `defaults` for the rest.
+    pub fn over(&self, defaults: Protocol) -> Result<Protocol, CliError> {
+        let mut protocol = defaults;
+        let updated = protocol.update_from_arg_matches(&self.0);
+        updated.map_err(|error| CliError::Usage(error.to_string()))?;
+        Ok(protocol.checked()?)
+    }
+
+    /// Whether the option of this field was given.
+    pub fn has(&self, field: &str) -> bool {
+        self.0.try_contains_id(field).unwrap_or(false)
+    }
+}

@@ -1,0 +1,107 @@
+//! The arguments of `posescope view --screenshot`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use posescope::app::{Arrangement, Moment, views};
+
+/// A picture of the window instead of the window.
+#[derive(Debug, Args)]
+pub struct ScreenshotArgs {
+    /// Save a picture of the window, without a display: PNG or JPEG, by its ending
+    #[arg(
+        long,
+        help_heading = "Screenshot",
+        value_name = "FILE.png|FILE.jpg",
+        hide_short_help = true
+    )]
+    pub screenshot: Option<PathBuf>,
+    /// The moment of the run: its end, the end of a method, or the step of a number
+    #[arg(
+        long,
+        help_heading = "Screenshot",
+        value_name = "end|METHOD|STEP",
+        default_value_t = Moment::End,
+        requires = "screenshot",
+        hide_short_help = true
+    )]
+    pub at: Moment,
+    /// The size of the window [px]
+    #[arg(
+        long,
+        help_heading = "Screenshot",
+        value_name = "WIDTHxHEIGHT",
+        default_value = "1500x950",
+        value_parser = size,
+        requires = "screenshot",
+        hide_short_help = true
+    )]
+    pub window: [u32; 2],
+    /// Pixels per point
+    #[arg(
+        long,
+        help_heading = "Screenshot",
+        value_name = "FACTOR",
+        default_value_t = 1.0,
+        value_parser = scale,
+        requires = "screenshot",
+        hide_short_help = true
+    )]
+    pub scale: f32,
+    /// On a light ground
+    #[arg(
+        long,
+        help_heading = "Screenshot",
+        requires = "screenshot",
+        hide_short_help = true
+    )]
+    pub light: bool,
+    /// One view of the window, without the bars around it
+    #[arg(
+        long,
+        hide = true,
+        requires = "screenshot",
+        value_parser = PossibleValuesParser::new(views::ALL.iter().map(|entry| entry.name))
+    )]
+    pub view: Option<String>,
+    /// What the window is arranged for
+    #[arg(
+        long,
+        hide = true,
+        requires = "screenshot",
+        default_value = "inspect",
+        value_parser = PossibleValuesParser::new(["inspect", "teach", "batch"])
+            .try_map(|name: String| arrangement(&name).ok_or("a layout expected"))
+    )]
+    pub layout: Arrangement,
+}
+
+fn arrangement(name: &str) -> Option<Arrangement> {
+    let mut all = Arrangement::ALL.into_iter();
+    all.find(|(_, title, _)| title.eq_ignore_ascii_case(name))
+        .map(|(arrangement, ..)| arrangement)
+}
+
+/// The smallest and the largest side of a picture \[px\].
+const SIDES: std::ops::RangeInclusive<u32> = 64..=8192;
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let side = |word: &str| word.parse().ok().filter(|side| SIDES.contains(side));
+    text.split_once('x')
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .ok_or_else(|| {
+            format!(
+                "two sides such as 1500x950 expected, each of {} to {} px",
+                SIDES.start(),
+                SIDES.end()
+            )
+        })
+}
+
+fn scale(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|scale| (0.5..=4.0).contains(scale))
+        .ok_or_else(|| "a number of 0.5 to 4 expected".to_owned())
+}

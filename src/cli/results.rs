@@ -1,0 +1,170 @@
+//! `posescope results`: the results of a run, filtered, sorted and in other forms.
+
+use std::path::{Path, PathBuf};
+
+use posescope::localize::QueryResult;
+use posescope::measure::{
+    Export, ExportError, Field, Format, Plot, RunResults, TableName, export, read_rows, rows,
+    select,
+};
+use posescope::report::{PICTURES, write_html};
+use posescope::run::{FolderError, RunFile, read_run, result_lines};
+use posescope::table::Table;
+
+use super::args::{Form, ResultsArgs};
+use super::failure::CliError;
+use super::output::{self, JsonLines};
+use super::terminal::Terminal;
+
+/// The fields that a terminal shows.
+const COLUMNS: [&str; 8] = [
+    "query",
+    "reference",
+    "method",
+    "grade",
+    "error",
+    "rotation",
+    "code",
+    "probability",
+];
+
+/// Runs the command.
+pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> {
+    let run = read_run(&args.run)?;
+    if let Some(plot) = args.plot {
+        return draw(args, plot, terminal);
+    }
+    let form = match args.form {
+        Form::Html => {
+            let path = write_html(&args.run, None, PICTURES, args.out.as_deref())?;
+            terminal.say(|| format!("Report: {}", path.display()));
+            return Ok(());
+        }
+        Form::Poses(format) => return poses(args, &run, format, terminal),
+        form => form,
+    };
+    let mut results = read_rows(&args.run)?;
+    if let Some(right) = args.right {
+        let graded = results.into_iter().map(|result| result.graded(right));
+        results = graded.collect();
+    }
+    let all: Vec<&QueryResult> = results.iter().collect();
+    let chosen = select(&all, args.condition.as_ref(), args.sort);
+    let shown = &chosen[..chosen.len().min(args.rows.unwrap_or(usize::MAX))];
+    if form == Form::Json {
+        // The run's own bytes.
+        let lines: Vec<String> = result_lines(&args.run)?.collect::<Result<_, _>>()?;
+        let stdout = PathBuf::from("-");
+        let mut output = JsonLines::create(args.out.as_ref().unwrap_or(&stdout))?;
+        for &index in shown {
+            output.write_line(&lines[index])?;
+        }
+    } else {
+        let results = shown.iter().map(|&index| &results[index]);
+        let tables = match args.table {
+            TableName::Rows => vec![row_table(args, form, results)?],
+            table => table.of(&RunResults::of(
+                results.cloned().collect(),
+                run.failure_radius_m(),
+            )),
+        };
+        if tables.is_empty() {
+            return Err(CliError::Usage(
+                "the run has nothing to show in this table".to_owned(),
+            ));
+        }
+        let width = terminal.width().filter(|_| args.out.is_none());
+        let texts = tables.iter().map(|table| match form {
+            Form::Csv => table.to_csv(),
+            Form::Markdown => table.to_markdown(),
+            Form::Latex => table.to_latex(),
+            _ => table.to_text(width),
+        });
+        let texts: Vec<String> = texts.collect();
+        write(&texts.join("\n"), args.out.as_deref())?;
+    }
+    terminal.say(|| {
+        let (shown, met, all) = (shown.len(), chosen.len(), results.len());
+        let of_those = if shown == met {
+            String::new()
+        } else {
+            format!(" of {met} that meet it,")
+        };
+        format!("{shown}{of_those} of {all} results")
+    });
+    Ok(())
+}
+
+/// A row for each result: the columns that were named, by default a few for the terminal and all in files.
+fn row_table<'a>(
+    args: &ResultsArgs,
+    form: Form,
+    results: impl Iterator<Item = &'a QueryResult>,
+) -> Result<Table, CliError> {
+    let is_text = form == Form::Text;
+    let columns: Vec<&Field> = match args.columns.as_slice() {
+        [] if is_text => {
+            let found: Result<Vec<&Field>, _> = COLUMNS.into_iter().map(Field::find).collect();
+            found.map_err(|error| CliError::Usage(error.to_string()))?
+        }
+        [] => Field::ALL.iter().chain(Field::POSE).collect(),
+        named => named.to_vec(),
+    };
+    let text = if is_text { Field::text } else { Field::whole };
+    Ok(rows(results, columns, text))
+}
+
+/// Writes a figure of the run as SVG.
+fn draw(args: &ResultsArgs, plot: Plot, terminal: &Terminal) -> Result<(), CliError> {
+    let svg = plot.svg(&RunResults::read(&args.run)?);
+    let svg = svg.ok_or_else(|| CliError::Usage("the run has nothing to draw in it".to_owned()))?;
+    write(&svg, args.out.as_deref())?;
+    if let Some(path) = &args.out {
+        terminal.say(|| format!("Plot: {}", path.display()));
+    }
+    Ok(())
+}
+
+/// Writes the poses of the results that are chosen, one for each query.
+fn poses(
+    args: &ResultsArgs,
+    run: &RunFile,
+    format: Format,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    let condition = args.condition.as_ref();
+    let takes = |result: &QueryResult| condition.is_none_or(|one| one.is_met(result));
+    let exported = export(&args.run, run, format, &takes);
+    let Export { files, left_out } = exported.map_err(|error| match error {
+        ExportError::Folder(error) => CliError::Folder(error),
+        error => CliError::Usage(error.to_string()),
+    })?;
+    match (files.as_slice(), &args.out) {
+        ([only], out) => write(&only.text, out.as_deref())?,
+        (_, None) => {
+            let names: Vec<&str> = files.iter().map(|file| file.name).collect();
+            return Err(CliError::Usage(format!(
+                "this form has several files ({}); name a folder with --out",
+                names.join(", ")
+            )));
+        }
+        (files, Some(folder)) => {
+            std::fs::create_dir_all(folder).map_err(FolderError::io(folder))?;
+            for file in files {
+                write(&file.text, Some(&folder.join(file.name)))?;
+            }
+        }
+    }
+    if left_out > 0 {
+        terminal.say(|| format!("{left_out} queries without a pose are left out"));
+    }
+    Ok(())
+}
+
+/// Writes a text to a file or to stdout.
+fn write(text: &str, out: Option<&Path>) -> Result<(), CliError> {
+    match out {
+        Some(path) => Ok(std::fs::write(path, text).map_err(FolderError::io(path))?),
+        None => output::print(&text.trim_end_matches('\n')),
+    }
+}

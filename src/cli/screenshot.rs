@@ -1,0 +1,42 @@
+//! `posescope view --screenshot`: a picture of the window, without a window.
+
+use std::path::Path;
+
+use posescope::app::{self, Shot, ShotError};
+use posescope::session::RunMode;
+
+use super::args::ViewArgs;
+use super::failure::CliError;
+use super::terminal::Terminal;
+use super::view;
+
+/// Saves the picture.
+pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
+    let (setup, results) = view::setup(args, RunMode::Running)?;
+    let options = &args.screenshot;
+    let shot = Shot {
+        view: options.view.clone(),
+        arrangement: options.layout,
+        moment: options.at,
+        size_px: options.window,
+        scale: options.scale,
+        theme: if options.light {
+            egui::Theme::Light
+        } else {
+            egui::Theme::Dark
+        },
+    };
+    let picture = app::shoot(setup, results, &shot).map_err(|error| match error {
+        ShotError::Unknown(why) => CliError::Usage(why),
+        other => CliError::Picture(other.to_string()),
+    })?;
+    if let Some(folder) = out.parent() {
+        std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    }
+    let saved = picture.save(out);
+    saved.map_err(|error| CliError::Picture(format!("{}: {error}", out.display())))?;
+    if !terminal.is_quiet() {
+        eprintln!("Picture: {}", out.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,60 @@
+//! What the options of a protocol take.
+
+use crate::describe::Domain;
+use crate::estimator;
+use crate::image::Degradation;
+use crate::method::Method;
+use crate::text::UnknownWord;
+
+/// A method of ours, or a name that another system may go by.
+///
+/// # Errors
+/// No such name.
+pub fn method(name: &str) -> Result<Method, String> {
+    Method::called(name).map_err(|_| {
+        let known = estimator::methods().map(Method::name);
+        let error = UnknownWord::among(name, "method", known);
+        format!("{error}, or a name that --estimates gives")
+    })
+}
+
+/// A number above 0.
+///
+/// # Errors
+/// Any other text.
+pub fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|number: &f64| *number > 0.0 && number.is_finite())
+        .ok_or_else(|| "a positive number expected".to_owned())
+}
+
+/// A probability above 0.
+///
+/// # Errors
+/// Any other text.
+pub fn probability(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|share: &f64| *share > 0.0 && *share <= 1.0)
+        .ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
+}
+
+/// The help of `--degrade`: every step with its range.
+pub fn degradations() -> String {
+    let mut text = "Degrade the photos of the queries first, as in gamma=0.4,noise=8,invert. References stay \
+                    as they are. The steps are taken in this order, whatever the order of their names:"
+        .to_owned();
+    for step in Degradation::default().steps() {
+        let range = match step.domain {
+            Domain::Flag => String::new(),
+            domain => format!("={domain}"),
+        };
+        let unit = match step.about.unit {
+            "" => String::new(),
+            unit => format!(" [{unit}]"),
+        };
+        text += &format!("\n- {}{range}{unit}: {}", step.key, step.about.help());
+    }
+    text
+}

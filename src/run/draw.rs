@@ -1,0 +1,129 @@
+//! Which frames of a scene are queries.
+
+use std::collections::BTreeSet;
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_pcg::Pcg64;
+
+use super::limit::Limit;
+use super::scene_pair::{ScenePair, cameras_of, times_of};
+use crate::scene::{Scene, SceneError};
+
+/// Which frames become queries.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw<'a> {
+    /// How many of the frames with a known pose; without a limit all.
+    pub limit: Option<Limit>,
+    /// Only these of those drawn; all, if none is named.
+    pub only: &'a [String],
+    /// The seed of the choice.
+    pub seed: u64,
+}
+
+/// Why there are no queries.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// Errors could not be measured, nor references be found.
+    #[error("{scene}: no frame has a known pose")]
+    NoPose {
+        /// The scene.
+        scene: String,
+    },
+    /// It exists, but is not one of the queries.
+    #[error("{scene}: frame {frame} is not among the {drawn} queries drawn")]
+    NotDrawn {
+        /// The scene.
+        scene: String,
+        /// The frame.
+        frame: String,
+        /// Number of queries.
+        drawn: usize,
+    },
+    /// There is no such frame.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+impl Draw<'_> {
+    /// Pairs a scene of references, the one at `scene_index`, with one of queries.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn pair(
+        &self,
+        scene_index: usize,
+        references: &dyn Scene,
+        queries: &dyn Scene,
+    ) -> Result<ScenePair, DrawError> {
+        let drawn = self.frames(queries)?;
+        let wanted: BTreeSet<usize> = self
+            .only
+            .iter()
+            .map(|name| {
+                let frame = queries.find(name)?;
+                if drawn.contains(&frame) {
+                    return Ok(frame);
+                }
+                Err(DrawError::NotDrawn {
+                    scene: queries.name().to_owned(),
+                    frame: queries.frames()[frame].clone(),
+                    drawn: drawn.len(),
+                })
+            })
+            .collect::<Result<_, DrawError>>()?;
+        let asked: Vec<usize> = drawn
+            .iter()
+            .copied()
+            .filter(|frame| wanted.is_empty() || wanted.contains(frame))
+            .collect();
+        let names = |frames: &[usize]| {
+            let frames = frames.iter();
+            let names = frames.map(|&frame| queries.frames()[frame].clone());
+            names.collect::<Vec<_>>()
+        };
+        let (camera, cameras) = cameras_of(queries, &asked);
+        // Where every frame is a query, all the others are its references.
+        let left_out = match self.limit {
+            Some(Limit::Percent(percent)) if percent < 100.0 => &drawn[..],
+            _ => &[],
+        };
+        Ok(ScenePair {
+            scene_index,
+            scene: references.name().to_owned(),
+            query_scene: queries.name().to_owned(),
+            camera,
+            cameras,
+            drawn: names(left_out),
+            queries: names(&asked),
+            times_s: times_of(queries, &asked),
+        })
+    }
+
+    /// In the order of the scene. Which ones depends on the seed and the scene's name.
+    fn frames(&self, scene: &dyn Scene) -> Result<Vec<usize>, DrawError> {
+        let mut frames: Vec<usize> = (0..scene.frames().len())
+            .filter(|&frame| scene.pose(frame).is_some())
+            .collect();
+        if frames.is_empty() {
+            return Err(DrawError::NoPose {
+                scene: scene.name().to_owned(),
+            });
+        }
+        let count = match self.limit {
+            None => frames.len(),
+            Some(Limit::Count(count)) => count,
+            Some(Limit::Percent(percent)) => {
+                ((percent / 100.0 * frames.len() as f64).round() as usize).max(1)
+            }
+        };
+        if count < frames.len() {
+            let text = format!("{}/{}/queries", self.seed, scene.name());
+            let seed = xxhash_rust::xxh3::xxh3_64(text.as_bytes());
+            frames.shuffle(&mut Pcg64::seed_from_u64(seed));
+            frames.truncate(count);
+            frames.sort_unstable();
+        }
+        Ok(frames)
+    }
+}
