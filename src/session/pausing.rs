@@ -150,6 +150,11 @@ impl PausingObserver {
         (control, observer)
     }
 
+    /// Nobody to tell means that the session was dropped, which the next event answers.
+    fn tell(&self, message: Message) {
+        let _ = self.outbox.send(message);
+    }
+
     fn obey(&mut self, command: Command) {
         match command {
             Command::Go(mode) => {
@@ -176,15 +181,13 @@ impl PausingObserver {
     fn wait(&mut self, breakpoint: Option<String>) -> Result<(), Cancelled> {
         self.outbox.send(Message::Waits { breakpoint })?;
         let since = Instant::now();
-        loop {
+        let mut goes = false;
+        while !goes {
             let command = self.commands.recv().map_err(|_| Cancelled)?;
-            let goes = matches!(command, Command::Go(mode) if mode != RunMode::Paused);
+            goes = matches!(command, Command::Go(mode) if mode != RunMode::Paused);
             self.obey(command);
             if self.is_cancelled {
                 return Err(Cancelled);
-            }
-            if goes {
-                break;
             }
         }
         self.waited += since.elapsed();
@@ -192,53 +195,50 @@ impl PausingObserver {
     }
 }
 
-/// Nobody to tell means that the session was dropped, which the next event answers.
 impl LocalizeObserver for PausingObserver {
     fn begin_query(&mut self, _index: usize, problems: &[Problem], truth: Option<&Pose>) {
         let loaded = Loaded {
             problems: problems.to_vec(),
             truth: truth.copied(),
         };
-        let _ = self.outbox.send(Message::Loaded(Arc::new(loaded)));
+        self.tell(Message::Loaded(Arc::new(loaded)));
     }
 
     fn begin_retrieval(&mut self) {
-        let _ = self.outbox.send(Message::Began(Part::Retrieval));
+        self.tell(Message::Began(Part::Retrieval));
     }
 
     fn choosing(&mut self, looked_at: usize, candidates: usize) {
-        let _ = self.outbox.send(Message::Ranking {
+        self.tell(Message::Ranking {
             looked_at,
             candidates,
         });
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
-        let _ = self
-            .outbox
-            .send(Message::Began(Part::Reference(method, problem)));
+        self.tell(Message::Began(Part::Reference(method, problem)));
     }
 
     fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
-        let _ = self.outbox.send(Message::Ended {
+        self.tell(Message::Ended {
             result: Box::new(result.clone()),
             times: Some(times.clone()),
         });
     }
 
     fn begin_fusion(&mut self, method: Method) {
-        let _ = self.outbox.send(Message::Began(Part::Fusion(method)));
+        self.tell(Message::Began(Part::Fusion(method)));
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {
-        let _ = self.outbox.send(Message::Ended {
+        self.tell(Message::Ended {
             result: Box::new(result.clone()),
             times: None,
         });
     }
 
     fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
-        let _ = self.outbox.send(Message::Explaining {
+        self.tell(Message::Explaining {
             method: result.method,
             tried,
             remedies,
