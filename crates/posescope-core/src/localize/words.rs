@@ -113,3 +113,49 @@ impl QueryResult {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::super::result::SCHEMA;
+    use super::*;
+
+    #[test]
+    fn a_wrong_pose_has_its_verdict_and_what_helped() {
+        let error =
+            |off_m: f64| json!({"translation_m": off_m, "rotation_deg": 1.0, "max_euler_deg": 1.0});
+        let finding =
+            |code: &str| json!({"code": code, "text": "The cost is wrong.", "evidence": {}});
+        let result = json!({
+            "schema": SCHEMA, "scene": "street", "query": "000070", "references": ["000062"],
+            "method": "mi", "fusion": "avg", "seed": 0, "status": "ok", "grade": "wrong",
+            "error": error(12.5), "diagnosis": [finding("D2"), finding("L1")]
+        });
+        let mut result: QueryResult = serde_json::from_value(result).expect("a result");
+        assert_eq!(
+            result.headline(),
+            "000070 mi avg, 12.500 m: D2 The cost is wrong."
+        );
+        assert!(result.evidence().starts_with("D2 "));
+        let [also, advice] = result.paragraphs().try_into().expect("two paragraphs");
+        assert_eq!(also, "also L1: The cost is wrong.");
+        assert!(advice.starts_with("try: "), "{advice}");
+
+        let explanation = json!({
+            "helped": [{"args": ["--radius", "20"], "error": error(0.5)}], "runs": 3, "complete": false
+        });
+        result.explanation = serde_json::from_value(explanation).expect("an explanation");
+        let paragraphs = result.paragraphs();
+        assert!(
+            paragraphs[1].starts_with("helped: --radius 20 (0.500 m"),
+            "{paragraphs:?}"
+        );
+        assert_eq!(paragraphs[2], "stopped before all remedies were tried");
+
+        result.diagnosis.clear();
+        result.error = None;
+        assert_eq!(result.headline(), "000070 mi avg, wrong");
+        assert!(result.paragraphs().is_empty() && result.evidence().is_empty());
+    }
+}
