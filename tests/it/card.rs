@@ -274,7 +274,7 @@ fn a_batch_is_filtered_sorted_and_opened() {
         &window,
         "1 of 8 results; wrong or without a pose: MI 1"
     ));
-    filter(&mut window, "method == mi");
+    filter(&mut window, "method = = mi");
     assert!(is_said(&window, "a value expected"));
     filter(&mut window, "error >= 0");
     let known = [results(&all), results(&grey)].concat();

@@ -711,7 +711,8 @@ fn the_truth_is_seen_whatever_else_is_there() {
     window.state_mut().send(Command::Maximize(Some("surface")));
     window.run_steps(3);
     // The colour of the truth, which recordings have too.
-    let truth = egui::Color32::from_rgb(0x00, 0x9E, 0x73);
+    let [r, g, b] = posescope::palette::TRUTH;
+    let truth = egui::Color32::from_rgb(r, g, b);
     let map = |window: &mut Harness<'_, App>| {
         let rect = window.get_by_label_contains("Cost map").rect();
         let picture = window.render().expect("painted");

@@ -332,7 +332,7 @@ fn count(window: &mut Harness<'_, App>, [r, g, b]: [u8; 3]) -> usize {
 fn the_layers_are_drawn_and_can_be_taken_away() {
     let Some(mut painted) = drawn() else { return };
     let window = &mut painted.window;
-    const TRUTH: [u8; 3] = [0x00, 0x9E, 0x73];
+    const TRUTH: [u8; 3] = posescope::palette::TRUTH;
     assert!(window.query_by_label_contains("No graphics card").is_none());
     assert!(window.query_by_label_contains("Nothing is drawn").is_none());
     let with_truth = count(window, TRUTH);
