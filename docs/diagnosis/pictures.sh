@@ -12,7 +12,7 @@ made=$(mktemp -d)
 trap 'rm -rf "$made"' EXIT
 "$posescope" synth "$made" --layout toml --condition overcast --every 200 --quiet
 sed -i 's/^\(f[xy]\) = .*/\1 = 900/' "$made/overcast/scene.toml"
-"$posescope" index street --every 10 --words 1000 --output "$made/street.index" --quiet
+"$posescope" index street --every 10 --set index.words=1000 --out "$made/street.index" --quiet
 echo 000450 1 0 0 0 0 0 0 > "$made/poses.txt"
 
 # NAME SCENE QUERIES QUERY REFERENCE VIEW AT [ARGUMENTS OF ITS OWN …]
@@ -20,8 +20,8 @@ picture() {
     local view=() reference=()
     [ "$6" = whole ] || view=(--view "$6")
     [ "$5" = retrieved ] || reference=(--reference "$5")
-    "$posescope" shot "$2" --queries "$3" --query "$4" "${reference[@]}" "${view[@]}" --at "$7" \
-        --size "$size" --out "$1.jpg" "${more[@]}" "${@:8}"
+    "$posescope" view "$2" --query-scene "$3" --query "$4" "${reference[@]}" "${view[@]}" --at "$7" \
+        --window "$size" --screenshot "$1.jpg" "${more[@]}" "${@:8}"
 }
 size=1500x950
 more=(--explain)
@@ -49,7 +49,7 @@ picture D8 street street:night 147 154 surface pm --method pm
 picture H1 street street:night 147 154 surface hy --method fb,mi,hy
 picture F1 street street:night 147 154 fusion fb --method fb --reference 150 --reference 143 --fusion avg
 picture F2 street street 589 583 fusion end --method mi6 --reference 595 --fusion joint
-picture V1 street street:snow 75 retrieved retrieval end --method fb --references retrieve:1 --prior 400 \
+picture V1 street street:snow 75 retrieved retrieval end --method fb --reference retrieve:1 --prior 400 \
     --index "$made/street.index"
 picture E1 street street 589 583 report end --method other,mi --estimates other="$made/poses.txt"
 picture L1 street:snow street:night 719 709 surface mi --method mi

@@ -279,7 +279,7 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
     let results: usize = now.values().map(Vec::len).sum();
     let words = format!("1 of {results} verdicts changed: MI {code} → ok 1");
     assert!(is_said(&window, &words), "{words}");
-    // As `posescope diff` counts it.
+    // As `posescope compare` counts it.
     let rows =
         |results: &Results| -> Vec<QueryResult> { results.values().flatten().cloned().collect() };
     let compared = posescope::measure::RunComparison::of(

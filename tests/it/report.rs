@@ -1,4 +1,4 @@
-//! `report.html`: what `eval` leaves in a run folder and `posescope report` makes of one.
+//! `report.html`: what `eval` leaves in a run folder and `posescope results --as html` makes of one.
 
 use std::fs;
 use std::path::{Path, PathBuf};
