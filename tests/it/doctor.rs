@@ -32,10 +32,29 @@ const EXPECTED: [(Fault, Option<Mistake>); 16] = [
     (Fault::UndistortedTwice, Some(Mistake::UndistortedTwice)),
 ];
 
+/// The faults that every change is held to: of a pose, a cloud and a camera, of nothing, and of too little.
+const FEW: [Fault; 5] = [
+    Fault::Nothing,
+    Fault::InversePose,
+    Fault::MirroredCloud,
+    Fault::WrongCamera,
+    Fault::HalfPixel,
+];
+
 #[test]
 fn planted_mistakes_are_named() {
+    are_named(|fault| FEW.contains(&fault));
+}
+
+#[test]
+#[ignore = "nightly"]
+fn all_planted_mistakes_are_named() {
+    are_named(|fault| !FEW.contains(&fault));
+}
+
+fn are_named(is_planted: impl Fn(Fault) -> bool) {
     let street = scene::open("street", None).expect("is built in");
-    for (fault, expected) in EXPECTED {
+    for (fault, expected) in EXPECTED.into_iter().filter(|(fault, _)| is_planted(*fault)) {
         let planted = Planted::new(street.as_ref(), fault, 0, 40);
         let found = examine(&planted).expect("readable");
         let named = found.finding.as_ref().map(|finding| finding.mistake);
@@ -63,11 +82,16 @@ fn healthy(scene: &dyn Scene) {
 }
 
 #[test]
-fn nothing_is_wrong_with_the_street() {
-    for condition in ["street:night", "street:rain"] {
-        let street = scene::open(condition, None).expect("is built in");
-        healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
-    }
+fn nothing_is_wrong_with_the_street_at_night() {
+    let street = scene::open("street:night", None).expect("is built in");
+    healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
+}
+
+#[test]
+#[ignore = "nightly"]
+fn nothing_is_wrong_with_the_street_in_rain() {
+    let street = scene::open("street:rain", None).expect("is built in");
+    healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
 }
 
 #[test]

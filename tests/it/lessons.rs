@@ -231,14 +231,32 @@ fn check_moment(window: &Harness<'_, App>, moment: &Moment, title: &str) {
     assert_eq!(state.cursor(), place, "{title}: {moment}");
 }
 
+/// The lesson that every change is held to.
+const ONE: &str = "four-points";
+
 #[test]
-fn every_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
+fn every_lesson_shows_views_that_there_are() {
     for lesson in Lesson::all().expect("our own") {
-        for page in &lesson.pages {
-            for view in &page.show {
-                assert!(views::find(view).is_ok(), "{}: {view}", lesson.name);
-            }
+        for view in lesson.pages.iter().flat_map(|page| &page.show) {
+            assert!(views::find(view).is_ok(), "{}: {view}", lesson.name);
         }
+    }
+}
+
+#[test]
+fn a_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
+    claims_hold(|lesson| lesson.name == ONE);
+}
+
+#[test]
+#[ignore = "nightly"]
+fn every_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
+    claims_hold(|lesson| lesson.name != ONE);
+}
+
+fn claims_hold(is_meant: impl Fn(&Lesson) -> bool) {
+    let lessons = Lesson::all().expect("our own").into_iter();
+    for lesson in lessons.filter(is_meant) {
         let mut results = go_through(&lesson);
         // What no page shows is run for its claims alone.
         for (variant, setting) in &lesson.variants {
@@ -269,7 +287,7 @@ fn every_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
 }
 
 #[test]
-fn lessons_are_listed_printed_and_recorded() {
+fn lessons_are_listed_and_recorded() {
     let output = posescope()
         .arg("lesson")
         .output()
@@ -327,8 +345,19 @@ fn recorded_pages(path: &std::path::Path) -> Vec<(i64, String)> {
 
 #[test]
 fn a_recorded_lesson_turns_its_pages_in_order_and_answers_after_it_has_asked() {
+    turn_their_pages(|lesson| lesson.name == ONE);
+}
+
+#[test]
+#[ignore = "nightly"]
+fn every_recorded_lesson_turns_its_pages_in_order() {
+    turn_their_pages(|lesson| lesson.name != ONE);
+}
+
+fn turn_their_pages(is_meant: impl Fn(&Lesson) -> bool) {
     let folder = tempfile::tempdir().expect("a folder");
-    for lesson in Lesson::all().expect("our own") {
+    let lessons = Lesson::all().expect("our own").into_iter();
+    for lesson in lessons.filter(is_meant) {
         let path = folder.path().join(format!("{}.rrd", lesson.name));
         posescope()
             .args(["lesson", &lesson.name, "--save"])
