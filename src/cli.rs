@@ -51,7 +51,7 @@ pub fn main() -> ExitCode {
     failure::report_panics_in_one_line();
     let outcome = catch_unwind(AssertUnwindSafe(|| dispatch(&arguments)));
     match outcome {
-        Ok(Ok(())) | Ok(Err(CliError::ReaderGone)) => ExitCode::SUCCESS,
+        Ok(Ok(()) | Err(CliError::ReaderGone)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             eprintln!("posescope: {error}");
             error.exit_code()

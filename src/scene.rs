@@ -76,12 +76,15 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
         None => {
             let found = ALL.iter().find(|entry| (entry.recognizes)(argument));
             let argument = argument.to_owned();
-            found.ok_or_else(|| match std::path::Path::new(&argument).exists() {
-                true => SceneError::NotRecognized {
-                    argument,
-                    known: names(),
-                },
-                false => SceneError::NotFound { argument },
+            found.ok_or_else(|| {
+                if std::path::Path::new(&argument).exists() {
+                    SceneError::NotRecognized {
+                        argument,
+                        known: names(),
+                    }
+                } else {
+                    SceneError::NotFound { argument }
+                }
             })?
         }
     };

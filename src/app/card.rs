@@ -68,9 +68,10 @@ fn row(ui: &mut Ui, state: &AppState, commands: &Queue, method: Method) {
                     span.part.method() == Some(method) && span.result.is_none()
                 });
             cell(ui, GRADE, |ui| {
-                ui.weak(match has_begun {
-                    true => state.run_state().of_what_has_begun(),
-                    false => "not run yet",
+                ui.weak(if has_begun {
+                    state.run_state().of_what_has_begun()
+                } else {
+                    "not run yet"
                 });
             });
             return;

@@ -39,7 +39,7 @@ impl App {
             },
             Command::Run => match state.run_state() {
                 RunState::Paused { .. } | RunState::Running | RunState::Loading => {
-                    state.resume(RunMode::Running)
+                    state.resume(RunMode::Running);
                 }
                 _ => state.start_run(RunMode::Running),
             },
@@ -151,7 +151,7 @@ impl App {
             }
             Command::Blink => state.options.blinking = !state.options.blinking,
             Command::OnlyDifferences => {
-                state.options.only_differences = !state.options.only_differences
+                state.options.only_differences = !state.options.only_differences;
             }
             Command::ShowTruth => state.options.shows_truth = !state.options.shows_truth,
             Command::Filter => {

@@ -69,9 +69,10 @@ impl OpenLesson {
 
     /// Goes on by a page, or back; whether there is one.
     pub(super) fn turn(&mut self, back: bool) -> bool {
-        let next = match back {
-            true => self.page.checked_sub(1),
-            false => Some(self.page + 1).filter(|page| *page < self.lesson.pages.len()),
+        let next = if back {
+            self.page.checked_sub(1)
+        } else {
+            Some(self.page + 1).filter(|page| *page < self.lesson.pages.len())
         };
         if let Some(page) = next {
             self.page = page;
@@ -281,9 +282,10 @@ fn place(state: &AppState, camera: &Pose) -> Option<String> {
     let run = state.run();
     let problem = run.loaded.as_deref()?.problems.first()?;
     let offset = Offset::of(&problem.reference_from_query(camera));
-    let side = match offset.right_m < 0.0 {
-        true => "left",
-        false => "right",
+    let side = if offset.right_m < 0.0 {
+        "left"
+    } else {
+        "right"
     };
     Some(format!(
         "Your guess: {:.1} m ahead of the reference, {:.1} m to the {side}",

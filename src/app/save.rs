@@ -42,9 +42,12 @@ fn name_of(setup: &Setup) -> String {
     }
     words.push(setup.query_name().to_owned());
     words.extend(setup.reference_names());
-    let plain = |c: char| match c.is_alphanumeric() || "-_.".contains(c) {
-        true => c,
-        false => '-',
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
     };
     words.join("-").chars().map(plain).collect()
 }

@@ -80,12 +80,13 @@ impl SavedSession {
         let TaskScenes {
             references,
             queries,
-        } = match is_same_format && is_same_scene {
-            true => TaskScenes {
+        } = if is_same_format && is_same_scene {
+            TaskScenes {
                 references: Arc::clone(&present.references),
                 queries: task.protocol.degraded(&present.queries),
-            },
-            false => task.open(&opened).map_err(words)?,
+            }
+        } else {
+            task.open(&opened).map_err(words)?
         };
         let query = queries.find(&self.query).map_err(words)?;
         let reference_frames: Vec<usize> = self
@@ -94,9 +95,10 @@ impl SavedSession {
             .map(|name| references.find(name).map_err(words))
             .collect::<Result<_, _>>()?;
         Ok(Setup {
-            offered: match is_same_scene {
-                true => present.offered.clone(),
-                false => (0..queries.frames().len()).collect(),
+            offered: if is_same_scene {
+                present.offered.clone()
+            } else {
+                (0..queries.frames().len()).collect()
             },
             references,
             queries,

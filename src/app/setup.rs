@@ -234,9 +234,10 @@ impl Setup {
             Side::Query => &self.queries,
             Side::Reference => &self.references,
         };
-        match self.queries.name() == self.references.name() {
-            true => name.to_owned(),
-            false => format!("{} {name}", scene.name()),
+        if self.queries.name() == self.references.name() {
+            name.to_owned()
+        } else {
+            format!("{} {name}", scene.name())
         }
     }
 
@@ -247,18 +248,21 @@ impl Setup {
             .map(|&frame| self.label(Side::Reference, frame))
             .collect();
         let query = self.label(Side::Query, self.query);
-        let from = match references.is_empty() {
-            true => String::new(),
-            false => format!(" ← {}", references.join(", ")),
+        let from = if references.is_empty() {
+            String::new()
+        } else {
+            format!(" ← {}", references.join(", "))
         };
-        let scene = match self.queries.name() == self.references.name() {
-            true => format!("{} ", self.task.scene),
-            false => String::new(),
+        let scene = if self.queries.name() == self.references.name() {
+            format!("{} ", self.task.scene)
+        } else {
+            String::new()
         };
         let degradation = self.task.protocol.degrade;
-        let degraded = match degradation.is_none() {
-            true => String::new(),
-            false => format!(" ({degradation})"),
+        let degraded = if degradation.is_none() {
+            String::new()
+        } else {
+            format!(" ({degradation})")
         };
         format!("posescope: {scene}{query}{degraded}{from}")
     }

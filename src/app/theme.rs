@@ -132,9 +132,10 @@ fn over(ground: Color32, color: Color32) -> Color32 {
 /// The colour of something as text: as near to its own as can be read on every ground of the theme.
 pub fn text(visuals: &Visuals, color: Color32) -> Color32 {
     const STEPS: usize = 20;
-    let end = match visuals.dark_mode {
-        true => Color32::WHITE,
-        false => Color32::BLACK,
+    let end = if visuals.dark_mode {
+        Color32::WHITE
+    } else {
+        Color32::BLACK
     };
     let grounds = grounds(visuals);
     let mixed = (0..=STEPS).map(|step| color.lerp_to_gamma(end, step as f32 / STEPS as f32));
@@ -157,9 +158,10 @@ pub fn contrast(a: Color32, b: Color32) -> f32 {
     let luminance = |color: Color32| {
         let linear = |channel: u8| {
             let share = f32::from(channel) / 255.0;
-            match share <= 0.04045 {
-                true => share / 12.92,
-                false => ((share + 0.055) / 1.055).powf(2.4),
+            if share <= 0.04045 {
+                share / 12.92
+            } else {
+                ((share + 0.055) / 1.055).powf(2.4)
             }
         };
         0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())

@@ -129,9 +129,10 @@ impl Timeline {
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
         // Who hides the future shows no stage that has not begun.
-        let end = match state.options.hides_future {
-            true => state.cursor() + 1,
-            false => usize::MAX,
+        let end = if state.options.hides_future {
+            state.cursor() + 1
+        } else {
+            usize::MAX
         };
         for span in run.spans().iter().filter(|span| span.records.start < end) {
             let (left, right) = (place.begin(span.records.start), place.end(span.records.end));
@@ -235,9 +236,10 @@ fn share_of(run: &Run, axis: Axis, record: usize) -> f64 {
 
 fn share_of_time(run: &Run, record: usize) -> f64 {
     let all = run.worked_until(usize::MAX).as_secs_f64();
-    match all > 0.0 {
-        true => run.worked_until(record).as_secs_f64() / all,
-        false => 0.0,
+    if all > 0.0 {
+        run.worked_until(record).as_secs_f64() / all
+    } else {
+        0.0
     }
 }
 
@@ -348,10 +350,17 @@ fn color_of(bar: &StageBar) -> Color32 {
         (_, Some(false)) => theme::ESTIMATE,
         (Stage::Estimator(method), _) => theme::method(method),
         (Stage::Detect | Stage::Color, _) => theme::STAGE_PREPARE,
-        (Stage::Descend | Stage::SearchCoarse | Stage::RefinePlane | Stage::RefineSix, _)
-        | (Stage::Retrieve | Stage::Match | Stage::MatchGuided | Stage::Search(_), _) => {
-            theme::STAGE_SEARCH
-        }
+        (
+            Stage::Descend
+            | Stage::SearchCoarse
+            | Stage::RefinePlane
+            | Stage::RefineSix
+            | Stage::Retrieve
+            | Stage::Match
+            | Stage::MatchGuided
+            | Stage::Search(_),
+            _,
+        ) => theme::STAGE_SEARCH,
         (Stage::DepthLift, _) => theme::STAGE_LIFT,
         (Stage::Consensus, _) => theme::STAGE_CONSENSUS,
         (Stage::Accept | Stage::Judge | Stage::Assess | Stage::Fuse, _) => theme::STAGE_JUDGE,

@@ -349,9 +349,10 @@ impl<'a> ViewContext<'a> {
         }
         // A hybrid's views are those of the direct method inside it. Where it kept the other's pose it
         // has none.
-        let within_hybrid = match self.is_inside_hybrid(method) {
-            true => self.latest(),
-            false => None,
+        let within_hybrid = if self.is_inside_hybrid(method) {
+            self.latest()
+        } else {
+            None
         };
         let event: &ViewRendered = within_hybrid.or_else(|| self.latest_of(method))?;
         let problem = self.problem()?;

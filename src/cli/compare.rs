@@ -60,8 +60,9 @@ pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> 
 /// The comparison in lines of at most `width` characters; without a width, for a pipe, as Markdown.
 pub fn shown(comparison: &RunComparison, width: Option<usize>) -> String {
     let summary = wrapped(&comparison.summary(), width.unwrap_or(usize::MAX), "");
-    match comparison.differences.is_empty() {
-        true => summary,
-        false => format!("{summary}\n{}", figures(&comparison.table(), width)),
+    if comparison.differences.is_empty() {
+        summary
+    } else {
+        format!("{summary}\n{}", figures(&comparison.table(), width))
     }
 }

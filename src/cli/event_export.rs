@@ -45,9 +45,10 @@ impl EventExport {
     /// What the file had is gone. A file that cannot be cut, a pipe say, has nothing before it is written.
     pub fn clear(&self) -> Result<(), CliError> {
         let is_file = |meta: fs::Metadata| meta.is_file();
-        match self.file.metadata().is_ok_and(is_file) {
-            true => self.file.set_len(0).map_err(CliError::io(&self.path)),
-            false => Ok(()),
+        if self.file.metadata().is_ok_and(is_file) {
+            self.file.set_len(0).map_err(CliError::io(&self.path))
+        } else {
+            Ok(())
         }
     }
 

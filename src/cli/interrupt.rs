@@ -46,9 +46,10 @@ impl Interrupt {
 
     /// Ends what looks up, once it was pressed.
     pub fn check(&self) -> Result<(), Cancelled> {
-        match self.is_raised() {
-            true => Err(Cancelled),
-            false => Ok(()),
+        if self.is_raised() {
+            Err(Cancelled)
+        } else {
+            Ok(())
         }
     }
 }

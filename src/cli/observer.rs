@@ -85,7 +85,7 @@ impl Sink for CliObserver {
             return KindSet::ALL;
         }
         let recorder = self.recorder.as_ref();
-        let recorded = recorder.map_or(KindSet::NONE, |recorder| recorder.wanted());
+        let recorded = recorder.map_or(KindSet::NONE, posescope::trace::Sink::wanted);
         match &self.export {
             Some(_) => recorded.union(MatchExport::wanted()),
             None => recorded,

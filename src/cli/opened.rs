@@ -57,9 +57,12 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
             task.protocol.select(Selection::Matched(1));
         }
     }
-    let opened = |argument: &str| match argument == scene {
-        true => first.clone(),
-        false => None,
+    let opened = |argument: &str| {
+        if argument == scene {
+            first.clone()
+        } else {
+            None
+        }
     };
     let scenes = task.open(&opened)?;
     let queries = match &task.photos {

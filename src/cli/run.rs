@@ -58,9 +58,10 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         task: &task,
         localizer: localizer.with_foreign(task.protocol.foreign(queries)?),
     };
-    let wanted = match args.all {
-        true => (0..queries.frames().len()).collect(),
-        false => wanted,
+    let wanted = if args.all {
+        (0..queries.frames().len()).collect()
+    } else {
+        wanted
     };
     let interrupt = Interrupt::listen();
     let mut progress = ChoiceProgress::new(terminal, &interrupt, &args.scene);
@@ -169,14 +170,15 @@ impl Plan<'_> {
     fn check_features(&self) -> Result<(), CliError> {
         let mut methods = self.task.protocol.methods.iter().copied();
         let has_features = |method: Method| {
-            let hybrid = estimator::find(method).and_then(|entry| entry.hybrid());
+            let hybrid = estimator::find(method).and_then(posescope::estimator::Entry::hybrid);
             method == Method::FB || hybrid.is_some_and(|parts| parts.first == Method::FB)
         };
-        match methods.any(has_features) {
-            true => Ok(()),
-            false => Err(CliError::Usage(
+        if methods.any(has_features) {
+            Ok(())
+        } else {
+            Err(CliError::Usage(
                 "--export-matches writes the matches of fb; --method fb expected".to_owned(),
-            )),
+            ))
         }
     }
 

@@ -102,9 +102,10 @@ fn no_cost(method: Method) -> CliError {
 }
 
 fn too_large(error: &LatticeTooLarge) -> CliError {
-    let (step, less) = match error.phase.is_yaw() {
-        true => ("surface.yaw_step", "a smaller grid.yaw_range"),
-        false => ("surface.step", "a smaller --radius"),
+    let (step, less) = if error.phase.is_yaw() {
+        ("surface.yaw_step", "a smaller grid.yaw_range")
+    } else {
+        ("surface.step", "a smaller --radius")
     };
     CliError::Usage(format!(
         "{step}: {:.0} of them, at most {MOST_CELLS} are scored; take a larger step or {less}",

@@ -120,11 +120,13 @@ impl Lesson {
         for (variant, setting) in header.variant {
             variants.push((variant, setting.over(&header.setting)));
         }
-        let known =
-            |variant: &str, at: usize| match variants.iter().any(|(name, _)| name == variant) {
-                true => Ok(variant.to_owned()),
-                false => Err(source.malformed(at, &format!("there is no variant `{variant}`"))),
-            };
+        let known = |variant: &str, at: usize| {
+            if variants.iter().any(|(name, _)| name == variant) {
+                Ok(variant.to_owned())
+            } else {
+                Err(source.malformed(at, &format!("there is no variant `{variant}`")))
+            }
+        };
         let mut claims = Vec::new();
         for claim in header.claim {
             claims.push(Claim {

@@ -162,9 +162,10 @@ pub(super) fn curves(
     let least = points().map(|point| point.0).reduce(f64::min)?;
     let most = points().map(|point| point.0).fold(least, f64::max);
     let highest = points().map(|point| point.1).fold(1e-3, f64::max);
-    let y = match y_axis.ends_with("(%)") {
-        true => Axis::percent(y_axis),
-        false => Axis::linear(y_axis, 0.0, 1.1 * highest),
+    let y = if y_axis.ends_with("(%)") {
+        Axis::percent(y_axis)
+    } else {
+        Axis::linear(y_axis, 0.0, 1.1 * highest)
     };
     let legend = legend(lines.iter().map(|(method, _)| *method));
     let marks = lines.into_iter().map(|(method, points)| {

@@ -228,9 +228,10 @@ fn shaped(measures: &[Measures], is_wanted: impl Fn(&Shape) -> bool) -> Vec<Tabl
     let all: Vec<&Measures> = measures.iter().collect();
     let mut tables = Vec::new();
     for shape in shapes.table.iter().filter(|shape| is_wanted(shape)) {
-        let pairs = match shape.each {
-            true => keys(&all, &[Dimension::Pair]),
-            false => vec![Vec::new()],
+        let pairs = if shape.each {
+            keys(&all, &[Dimension::Pair])
+        } else {
+            vec![Vec::new()]
         };
         for pair in pairs {
             let mut of_pair = all.clone();
@@ -301,9 +302,10 @@ impl<'a> Filling<'a> {
     fn ours(&self, name: &str, one: &Measures) -> Option<String> {
         let figure = self.figures.get(name)?;
         let (value, decimals) = (one.figure(name)?, figure.decimals);
-        Some(match figure.percent {
-            true => format!("{:.1}", 100.0 * value),
-            false => format!("{value:.decimals$}"),
+        Some(if figure.percent {
+            format!("{:.1}", 100.0 * value)
+        } else {
+            format!("{value:.decimals$}")
         })
     }
 

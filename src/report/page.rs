@@ -74,13 +74,13 @@ fn colors() -> String {
 }
 
 fn title(run: &RunFile) -> String {
-    let names = run
-        .pairs
-        .iter()
-        .map(|pair| match pair.scene == pair.query_scene {
-            true => pair.scene.clone(),
-            false => format!("{} ← {}", pair.scene, pair.query_scene),
-        });
+    let names = run.pairs.iter().map(|pair| {
+        if pair.scene == pair.query_scene {
+            pair.scene.clone()
+        } else {
+            format!("{} ← {}", pair.scene, pair.query_scene)
+        }
+    });
     names.collect::<Vec<_>>().join(", ")
 }
 

@@ -46,9 +46,10 @@ fn jpeg(picture: &DynamicImage, width: u32, quality: u8) -> Option<String> {
     if picture.width() == 0 || picture.height() == 0 {
         return None;
     }
-    let small = match picture.width() > width {
-        true => picture.thumbnail(width, u32::MAX),
-        false => picture.clone(),
+    let small = if picture.width() > width {
+        picture.thumbnail(width, u32::MAX)
+    } else {
+        picture.clone()
     };
     let mut bytes = Vec::new();
     let encoder = JpegEncoder::new_with_quality(&mut bytes, quality);

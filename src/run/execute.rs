@@ -70,9 +70,10 @@ impl Scenes {
             // References keep their photos as they were taken.
             queries.clone_from(&references);
         }
-        let of_queries = match queries.is_empty() {
-            true => &mut references,
-            false => &mut queries,
+        let of_queries = if queries.is_empty() {
+            &mut references
+        } else {
+            &mut queries
         };
         for scene in of_queries {
             *scene = protocol.as_asked(Arc::clone(scene), first.as_ref())?;

@@ -50,9 +50,10 @@ pub struct ByDataSet {
 impl ByDataSet {
     /// The number for a scene of this name.
     pub fn of_scene(self, name: &str) -> f64 {
-        match name.starts_with("robotcar") {
-            true => self.robotcar,
-            false => self.kitti,
+        if name.starts_with("robotcar") {
+            self.robotcar
+        } else {
+            self.kitti
         }
     }
 }

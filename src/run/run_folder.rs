@@ -35,7 +35,7 @@ pub fn recording_name(
     let name = if several_pairs {
         format!("{}-{}-{}-{method}", pair.scene, pair.query_scene, query)
     } else {
-        format!("{}-{method}", query)
+        format!("{query}-{method}")
     };
     let plain = |c: char| {
         if c.is_alphanumeric() || "-_.".contains(c) {
@@ -208,7 +208,7 @@ impl RunFolder {
         };
         let results = open(RESULTS)?;
         // A file system without locks cannot tell; then nobody asks it to.
-        if let Err(TryLockError::WouldBlock) = results.try_lock() {
+        if matches!(results.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(FolderError::InUse {
                 path: path.to_owned(),
             });

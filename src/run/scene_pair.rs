@@ -84,9 +84,10 @@ pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (QueryCamera, V
     let camera = |frame: usize| QueryCamera::from(scene.intrinsics(frame));
     let first = camera(frames.first().copied().unwrap_or(0));
     let cameras: Vec<QueryCamera> = frames.iter().map(|&frame| camera(frame)).collect();
-    match cameras.iter().all(|camera| *camera == first) {
-        true => (first, Vec::new()),
-        false => (first, cameras),
+    if cameras.iter().all(|camera| *camera == first) {
+        (first, Vec::new())
+    } else {
+        (first, cameras)
     }
 }
 

@@ -134,9 +134,10 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
         let name = found[name];
         rows.push(Row { line, name, place });
     }
-    match rows.is_empty() {
-        true => Err(file.error("a line per frame below the names of columns expected")),
-        false => Ok((kind, rows)),
+    if rows.is_empty() {
+        Err(file.error("a line per frame below the names of columns expected"))
+    } else {
+        Ok((kind, rows))
     }
 }
 

@@ -126,9 +126,10 @@ fn scans<'a>(
     correct: bool,
 ) -> Result<Vec<Option<Scan>>, SceneError> {
     let data = folder.join("data");
-    let files: BTreeMap<usize, PathBuf> = match data.is_dir() {
-        true => numbered(&data, "bin")?,
-        false => BTreeMap::new(),
+    let files: BTreeMap<usize, PathBuf> = if data.is_dir() {
+        numbered(&data, "bin")?
+    } else {
+        BTreeMap::new()
     };
     let starts = timestamps::read(&folder.join("timestamps_start.txt"))?;
     let ends = timestamps::read(&folder.join("timestamps_end.txt"))?;

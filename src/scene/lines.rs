@@ -215,7 +215,7 @@ mod tests {
         let file = file("# a comment\n\n 1 2,3\nx 1 2\n4 5\n1 nan 2\n");
         let read: Vec<_> = file.lines().map(|line| said(line.numbers::<3>())).collect();
         assert_eq!(read[0], Ok([1.0, 2.0, 3.0]));
-        let errors: Vec<_> = read[1..].iter().flat_map(|r| r.as_ref().err()).collect();
+        let errors: Vec<_> = read[1..].iter().filter_map(|r| r.as_ref().err()).collect();
         assert_eq!(
             errors,
             [

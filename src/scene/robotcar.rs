@@ -184,16 +184,18 @@ fn photos(
 ) -> Result<Vec<(u64, PathBuf)>, SceneError> {
     let folder = traversal.join(camera.folder);
     let list = traversal.join(format!("{}.timestamps", camera.rig()));
-    let times = match list.is_file() {
-        true => times(&list)?,
-        false => numbered(&folder, "png")?.into_keys().collect(),
+    let times = if list.is_file() {
+        times(&list)?
+    } else {
+        numbered(&folder, "png")?.into_keys().collect()
     };
     let moving = first_and_last_motion(driven);
     let is_moving =
         |time: &u64| moving.is_none_or(|(first, last)| (first..=last).contains(&(*time as f64)));
-    let kept: Vec<u64> = match keeps_all {
-        true => times.into_iter().collect(),
-        false => times.into_iter().filter(is_moving).step_by(KEPT).collect(),
+    let kept: Vec<u64> = if keeps_all {
+        times.into_iter().collect()
+    } else {
+        times.into_iter().filter(is_moving).step_by(KEPT).collect()
     };
     let photos = kept
         .into_iter()

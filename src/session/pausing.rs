@@ -171,9 +171,10 @@ impl PausingObserver {
         while let Ok(command) = self.commands.try_recv() {
             self.obey(command);
         }
-        match self.is_cancelled {
-            true => Err(Cancelled),
-            false => Ok(()),
+        if self.is_cancelled {
+            Err(Cancelled)
+        } else {
+            Ok(())
         }
     }
 

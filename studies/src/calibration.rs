@@ -319,9 +319,12 @@ fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
     let labels = DVector::from_fn(samples.len(), |row, _| {
         f64::from(u8::from(samples[row].is_near))
     });
-    let counts = DVector::from_fn(samples.len(), |row, _| match samples[row].shows_place {
-        true => 1.0,
-        false => UNKNOWABLE_COUNTS,
+    let counts = DVector::from_fn(samples.len(), |row, _| {
+        if samples[row].shows_place {
+            1.0
+        } else {
+            UNKNOWABLE_COUNTS
+        }
     });
     let mut weights = DVector::zeros(columns + 1);
     for _ in 0..50 {

@@ -75,7 +75,7 @@ pub const ALL: &[Fault] = &[
     ("bend", bend),
     ("coarse_steps", |place| {
         params(place, |p| {
-            (p.grid.coarse_step_m, p.grid.fine_range_m) = (5.0, 0.6)
+            (p.grid.coarse_step_m, p.grid.fine_range_m) = (5.0, 0.6);
         })
     }),
     ("raised_camera", raised_camera),
@@ -192,7 +192,7 @@ fn photo(place: &Place<'_>, change: impl FnOnce(&mut RgbImage)) -> Option<Case> 
 
 fn pixels(place: &Place<'_>, mut change: impl FnMut(&Rgb<u8>) -> Rgb<u8>) -> Option<Case> {
     photo(place, |photo| {
-        photo.pixels_mut().for_each(|pixel| *pixel = change(pixel))
+        photo.pixels_mut().for_each(|pixel| *pixel = change(pixel));
     })
 }
 
@@ -234,7 +234,7 @@ fn moved_scenery(place: &Place<'_>) -> Option<Case> {
     let street = place.street()?;
     let other = street.drives.day.image(street.frame_at(street.query, 6));
     photo(place, |photo| {
-        paste(photo, &other, photo.width() * 35 / 100..photo.width())
+        paste(photo, &other, photo.width() * 35 / 100..photo.width());
     })
 }
 

@@ -82,9 +82,10 @@ fn alone(what: &str, path: &Path, frames: usize, options: &Options) -> Result<St
     let mut command = Command::new(std::env::current_exe()?);
     command.arg("index").arg(what).arg(path).args(numbers);
     let done = command.stderr(Stdio::inherit()).output()?;
-    match done.status.success() {
-        true => Ok(String::from_utf8(done.stdout)?),
-        false => Err(format!("{what} of {frames} frames ended with {}", done.status).into()),
+    if done.status.success() {
+        Ok(String::from_utf8(done.stdout)?)
+    } else {
+        Err(format!("{what} of {frames} frames ended with {}", done.status).into())
     }
 }
 

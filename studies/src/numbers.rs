@@ -45,9 +45,10 @@ pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
 /// The value below which a share of all lies; no number where there is none.
 pub fn percentile(values: &mut [f64], share: f64) -> f64 {
     let index = (values.len().saturating_sub(1) as f64 * share).round() as usize;
-    match values.is_empty() {
-        true => f64::NAN,
-        false => *values.select_nth_unstable_by(index, f64::total_cmp).1,
+    if values.is_empty() {
+        f64::NAN
+    } else {
+        *values.select_nth_unstable_by(index, f64::total_cmp).1
     }
 }
 

@@ -130,9 +130,10 @@ impl<'a> Place<'a> {
         let frames = drives.day.frame_count();
         let query = rng.random_range(0..frames);
         let apart = rng.random_range(3..8);
-        let reference = match rng.random() {
-            true => (query + apart) % frames,
-            false => (query + frames - apart) % frames,
+        let reference = if rng.random() {
+            (query + apart) % frames
+        } else {
+            (query + frames - apart) % frames
         };
         let place = StreetPlace {
             drives,

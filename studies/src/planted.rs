@@ -73,12 +73,13 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let only = options.only.as_deref();
     let found = options.chosen.each(|place| at(place, only))?;
     let found: Vec<Judged> = found.into_iter().flatten().collect();
-    let halves: &[(&str, usize)] = match options.chosen.real {
-        true => &[("Pairs of real photos", 2)],
-        false => &[
+    let halves: &[(&str, usize)] = if options.chosen.real {
+        &[("Pairs of real photos", 2)]
+    } else {
+        &[
             ("Places that the rules were made with", 0),
             ("Places that were set aside", 1),
-        ],
+        ]
     };
     for &(title, half) in halves {
         for (is_withheld, truth) in [(false, "truth known"), (true, "truth withheld")] {
@@ -165,9 +166,10 @@ fn report(
                 let is_doubted = codes.iter().any(|code| code == Code::L1.name());
                 let is_unsure = one.found == UNSURE;
                 // A pose that is right carries at most L1, whatever was done to it.
-                let is_hit = match one.is_right {
-                    true => ["none", UNSURE, Code::L1.name()].contains(&one.found.as_str()),
-                    false => codes.contains(&one.found) || is_unsure && is_doubted,
+                let is_hit = if one.is_right {
+                    ["none", UNSURE, Code::L1.name()].contains(&one.found.as_str())
+                } else {
+                    codes.contains(&one.found) || is_unsure && is_doubted
                 };
                 if !is_hit && prints_misses {
                     let codes = if one.is_right {

@@ -60,9 +60,10 @@ fn every_link_within_the_project_leads_somewhere() {
                 Some((file, anchor)) => (file, Some(anchor)),
                 None => (&*dest_url, None),
             };
-            let target = match file.is_empty() {
-                true => path.clone(),
-                false => path.with_file_name(file),
+            let target = if file.is_empty() {
+                path.clone()
+            } else {
+                path.with_file_name(file)
             };
             assert!(target.exists(), "{}: {dest_url}", path.display());
             if let Some(anchor) = anchor {

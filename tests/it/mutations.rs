@@ -133,9 +133,10 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).expect("readable") {
         let path = entry.expect("readable").path();
-        match path.is_dir() {
-            true => found.extend(files(&path)),
-            false => found.push(path),
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.push(path);
         }
     }
     found.sort();
@@ -152,9 +153,10 @@ fn read_all(argument: &str, format: &str, sound: usize) -> Result<(), Vec<SceneE
     let frames = 0..scene.frames().len();
     let of_frame = |frame| [scene.query(frame).err(), scene.reference(frame).err()];
     let errors: Vec<_> = frames.flat_map(of_frame).flatten().collect();
-    match errors.len() <= sound {
-        true => Ok(()),
-        false => Err(errors),
+    if errors.len() <= sound {
+        Ok(())
+    } else {
+        Err(errors)
     }
 }
 

@@ -221,10 +221,10 @@ type Write = fn(&Path);
 /// By the name of the form.
 pub const FORMS: [(&str, Write); 3] = [
     ("matches as text", |folder| {
-        text(&folder.join("000070_000062_matches.txt"))
+        text(&folder.join("000070_000062_matches.txt"));
     }),
     ("matches as npz", |folder| {
-        npz(&folder.join("000070_000062_matches.npz"))
+        npz(&folder.join("000070_000062_matches.npz"));
     }),
     ("matches of hloc", hloc),
 ];

@@ -90,9 +90,10 @@ fn bent(photo: &GrayImage, camera: &Intrinsics, k1: f64) -> GrayImage {
             && from_y >= 0.0
             && from_x < f64::from(width)
             && from_y < f64::from(height);
-        match is_inside {
-            true => *photo.get_pixel(from_x as u32, from_y as u32),
-            false => image::Luma([0]),
+        if is_inside {
+            *photo.get_pixel(from_x as u32, from_y as u32)
+        } else {
+            image::Luma([0])
         }
     })
 }

@@ -153,7 +153,7 @@ pub fn times(chunks: &[Chunk], entity: &str, timeline: &str) -> Vec<i64> {
     let of_entity = chunks
         .iter()
         .filter(|chunk| chunk.entity_path().to_string().trim_start_matches('/') == entity);
-    let columns = of_entity.flat_map(|chunk| {
+    let columns = of_entity.filter_map(|chunk| {
         let mut columns = chunk.timelines().iter();
         columns.find_map(|(name, column)| {
             (name.as_str() == timeline).then(|| column.times_raw().to_vec())

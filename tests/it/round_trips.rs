@@ -30,8 +30,8 @@ pub fn written(layout: &Layout, street: &Street, root: &Path) -> Box<dyn Scene> 
     let drive = Drive {
         intrinsics: street.intrinsics(0),
         names: street.frames().to_vec(),
-        poses: all.clone().flat_map(|frame| street.pose(frame)).collect(),
-        times_s: all.flat_map(|frame| street.time_s(frame)).collect(),
+        poses: all.clone().filter_map(|frame| street.pose(frame)).collect(),
+        times_s: all.filter_map(|frame| street.time_s(frame)).collect(),
         written: WRITTEN.to_vec(),
         scanner: Street::scanner_position(),
     };

@@ -29,7 +29,7 @@ pub fn photo(forward_m: f64, seed: u32) -> GrayImage {
         let hash = |a: u32, b: u32| {
             let mixed = a.wrapping_mul(0x9E37_79B9) ^ b.wrapping_mul(0x85EB_CA6B) ^ seed;
             let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2C1B_3C6D);
-            ((mixed ^ (mixed >> 12)) >> 24) as f64
+            f64::from((mixed ^ (mixed >> 12)) >> 24)
         };
         let coarse = hash(cell(right, 0.9), cell(down, 0.7));
         let fine = hash(cell(right, 0.31), cell(down, 0.29));

@@ -127,7 +127,9 @@ fn take(
 fn first_row(text: &egui::epaint::TextShape) -> Rect {
     let rows = text.galley.rows.iter();
     let mut written = rows.filter(|row| !row.glyphs.is_empty());
-    let row = written.next().map(|row| row.rect_without_leading_space());
+    let row = written
+        .next()
+        .map(egui::epaint::text::PlacedRow::rect_without_leading_space);
     row.map_or(text.visual_bounding_rect(), |row| {
         row.translate(text.pos.to_vec2())
     })
@@ -152,9 +154,10 @@ fn contrast(a: Color32, b: Color32) -> f64 {
     let luminance = |color: Color32| {
         let linear = |channel: u8| {
             let share = f64::from(channel) / 255.0;
-            match share <= 0.04045 {
-                true => share / 12.92,
-                false => ((share + 0.055) / 1.055).powf(2.4),
+            if share <= 0.04045 {
+                share / 12.92
+            } else {
+                ((share + 0.055) / 1.055).powf(2.4)
             }
         };
         0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())

@@ -149,11 +149,12 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         return failure.map(Diagnosis::of_failure).into_iter().collect();
     };
     let is_searched = matches!(family, Family::Grid | Family::Given);
-    let mut found = match is_searched && grade != Grade::Right {
-        true => Search::of(subject, family == Family::Given, |search| {
+    let mut found = if is_searched && grade != Grade::Right {
+        Search::of(subject, family == Family::Given, |search| {
             tried(&Case::new(subject, family, search), grade)
-        }),
-        false => tried(&Case::new(subject, family, None), grade),
+        })
+    } else {
+        tried(&Case::new(subject, family, None), grade)
     };
     // A method's own failure, unless a rule says more than that something else is suspect.
     let is_explained = found

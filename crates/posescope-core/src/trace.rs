@@ -140,9 +140,10 @@ impl<'a> Trace<'a> {
             return Ok(());
         };
         observer.attend_if_asked()?;
-        match observer.wanted.contains(E::KIND) {
-            true => observer.deliver(make().into())?,
-            false => observer.next += 1,
+        if observer.wanted.contains(E::KIND) {
+            observer.deliver(make().into())?;
+        } else {
+            observer.next += 1;
         }
         Ok(())
     }

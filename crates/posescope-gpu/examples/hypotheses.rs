@@ -101,9 +101,10 @@ fn resized(points: &[ColoredPoint], count: usize) -> Vec<ColoredPoint> {
     let mut aside = || random.random_range(-0.02_f32..0.02);
     let spread = points.len() as f64 / count as f64;
     (0..count)
-        .map(|place| match spread >= 1.0 {
-            true => points[(place as f64 * spread) as usize],
-            false => {
+        .map(|place| {
+            if spread >= 1.0 {
+                points[(place as f64 * spread) as usize]
+            } else {
                 let mut point = points[place % points.len()];
                 point.position += Vector3::new(aside(), aside(), aside());
                 point

@@ -64,7 +64,7 @@ impl Spot {
 
     /// Whether there is no window here: in gables, and at most places of the side walls.
     pub(super) fn is_blind(&self, facade: &Facade, part: Part) -> bool {
-        let top = self.floor as f64 * facade.storey + facade.sill + facade.window[1] + 0.6;
+        let top = f64::from(self.floor) * facade.storey + facade.sill + facade.window[1] + 0.6;
         let skipped = part == Part::Side && unit(derive(facade.seed, self.bay as u32)) < 0.35;
         self.floor < 0 || top > facade.eaves || skipped
     }

@@ -106,7 +106,7 @@ fn costs_of(context: &ViewContext<'_>, method: Method) -> String {
         Some(looked_at) if looked_at != method => {
             format!("{}, by the cost of {}", looked_at.label(), method.label())
         }
-        _ => method.label().to_owned(),
+        _ => method.label().clone(),
     }
 }
 

@@ -61,9 +61,10 @@ impl View for BreakpointsView {
                     let mut state = is_set;
                     if ui.checkbox(&mut state, stage).clicked() {
                         let mut all = breakpoints.clone();
-                        match is_set {
-                            true => all.retain(|text| text != stage),
-                            false => all.push(stage.to_owned()),
+                        if is_set {
+                            all.retain(|text| text != stage);
+                        } else {
+                            all.push(stage.to_owned());
                         }
                         context.send(Command::SetBreakpoints(all));
                     }

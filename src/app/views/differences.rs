@@ -23,9 +23,10 @@ impl View for DifferencesView {
             );
             return;
         };
-        let (a, b) = match context.is_present() {
-            true => (other, context.run),
-            false => (context.run, other),
+        let (a, b) = if context.is_present() {
+            (other, context.run)
+        } else {
+            (context.run, other)
         };
         ui.horizontal(|ui| {
             ui.checkbox(&mut self.shows_same, "What is the same too");

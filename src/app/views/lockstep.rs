@@ -102,9 +102,10 @@ impl LockstepView {
             ui.label(name.strong());
             let stages = context.run.stages_at(cursor).skip(1);
             let stages: Vec<_> = stages.map(|bar| bar.stage.name()).collect();
-            match is_over {
-                true => ui.label(format!("over after {steps} steps")),
-                false => ui.label(stages.join(" › ")),
+            if is_over {
+                ui.label(format!("over after {steps} steps"))
+            } else {
+                ui.label(stages.join(" › "))
             };
             if let (true, Some(result)) = (is_over, &span.result) {
                 let shows_truth = context.options.shows_truth;
@@ -128,9 +129,10 @@ impl LockstepView {
         ui.push_id(method.name(), |ui| {
             // A hybrid is seen in the pictures of the part that is at work.
             let searches = here.latest::<PoseScored>().is_some();
-            match searches || context.direct_methods().contains(&method) {
-                true => panel.surface.ui(ui, &here),
-                false => panel.images.ui(ui, &here),
+            if searches || context.direct_methods().contains(&method) {
+                panel.surface.ui(ui, &here);
+            } else {
+                panel.images.ui(ui, &here);
             }
         });
     }

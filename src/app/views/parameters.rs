@@ -35,9 +35,10 @@ impl View for ParametersView {
                 context.send(Command::ResetParams);
             }
         });
-        let mut params = match present {
-            true => context.setup.task.params.clone(),
-            false => context.run.params.clone(),
+        let mut params = if present {
+            context.setup.task.params.clone()
+        } else {
+            context.run.params.clone()
         };
         let other = context.other_run().map(|run| run.params.clone());
         let reference = other.clone().unwrap_or_default();

@@ -74,9 +74,10 @@ impl View for RansacView {
 fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
     let is_inside =
         context.is_inside_hybrid(Method::FB) && context.latest::<HypothesisTried>().is_some();
-    let (span, cursor) = match is_inside {
-        true => (context.span()?, context.cursor),
-        false => context.part_of(Method::FB)?,
+    let (span, cursor) = if is_inside {
+        (context.span()?, context.cursor)
+    } else {
+        context.part_of(Method::FB)?
     };
     Some((span, span.records.end.min(cursor + 1)))
 }

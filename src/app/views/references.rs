@@ -138,9 +138,12 @@ fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
             let response = ui.selectable_label(is_on, fusion.name);
             if response.on_hover_text(fusion.about).clicked() {
                 // In the order of the registry.
-                let wanted = Fusion::all().filter(|other| match *other == fusion {
-                    true => !is_on,
-                    false => present.contains(other),
+                let wanted = Fusion::all().filter(|other| {
+                    if *other == fusion {
+                        !is_on
+                    } else {
+                        present.contains(other)
+                    }
                 });
                 context.send(Command::SetFusions(wanted.collect()));
             }
@@ -158,9 +161,10 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
             .widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_used, name));
         if checkbox.changed() {
             let mut frames = setup.chosen.frames.clone();
-            match is_used {
-                true => frames.push(frame),
-                false => frames.retain(|other| *other != frame),
+            if is_used {
+                frames.push(frame);
+            } else {
+                frames.retain(|other| *other != frame);
             }
             context.send(Command::SetReferences(frames));
         }

@@ -79,11 +79,11 @@ impl RetrievalView {
             for (index, frame) in ranking.frames.iter().enumerate() {
                 let name = RichText::new(&frame.name).monospace();
                 let is_looked_at = index == self.looked_at;
-                let name = match index < ranking.chosen && !is_looked_at {
-                    true => name
-                        .color(theme::text(ui.visuals(), theme::REFERENCE))
-                        .strong(),
-                    false => name,
+                let name = if index < ranking.chosen && !is_looked_at {
+                    name.color(theme::text(ui.visuals(), theme::REFERENCE))
+                        .strong()
+                } else {
+                    name
                 };
                 ui.label((index + 1).to_string());
                 if ui.selectable_label(is_looked_at, name).clicked() {

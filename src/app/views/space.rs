@@ -422,13 +422,14 @@ impl SpaceView {
             return;
         };
         let (ctx, textures) = (ui.ctx(), context.textures);
-        let texture = match camera.kind.is_query() {
-            true => textures.of(ctx, "photo in space", &problem.query, |query| {
+        let texture = if camera.kind.is_query() {
+            textures.of(ctx, "photo in space", &problem.query, |query| {
                 color_image(&picture::photo(&query.photo))
-            }),
-            false => textures.of(ctx, "photo in space", &problem.reference, |reference| {
+            })
+        } else {
+            textures.of(ctx, "photo in space", &problem.reference, |reference| {
                 color_image(&picture::photo(&reference.photo))
-            }),
+            })
         };
         let intrinsics = &camera.intrinsics;
         let corner = |x: f64, y: f64| {

@@ -45,8 +45,9 @@ pub fn sweep(
         output::print(&figures(&table, terminal.width()))?;
         eprintln!("Runs and curves: {}", folder.display());
     }
-    match failures.is_empty() {
-        true => Ok(()),
-        false => Err(CliError::NotGoodEnough(failures.join("; "))),
+    if failures.is_empty() {
+        Ok(())
+    } else {
+        Err(CliError::NotGoodEnough(failures.join("; ")))
     }
 }

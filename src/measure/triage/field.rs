@@ -52,9 +52,10 @@ impl Value {
             (Self::Words(_), Self::Number(_)) => Ordering::Greater,
             (Self::Number(_), Self::Words(_)) => Ordering::Less,
         };
-        match descending {
-            true => forward.reverse(),
-            false => forward,
+        if descending {
+            forward.reverse()
+        } else {
+            forward
         }
     }
 }

@@ -61,7 +61,7 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
 /// Checks the layout, and says how many bytes a point takes at least.
 fn expect_fields(meta: &PcdMeta) -> Result<u64, String> {
     let mut record: u64 = 0;
-    for field in meta.field_defs.iter() {
+    for field in &meta.field_defs {
         let bytes = match meta.data {
             // A digit and what separates it from the next.
             DataKind::Ascii => 2,

@@ -195,9 +195,10 @@ fn direct_row(method: Method, focus: &Focus, viewpoints: &Viewpoints<'_>) -> Blu
     let name = method.label();
     // What the search compares lies beside what it should have found.
     let at = |place: &str, what: &str| {
-        let pictures = match has_histogram(method) {
-            true => ["synthetic", "joint_histogram"],
-            false => ["synthetic", "residual"],
+        let pictures = if has_histogram(method) {
+            ["synthetic", "joint_histogram"]
+        } else {
+            ["synthetic", "residual"]
         };
         BlueprintNode::Column(equal(pictures.map(|part| {
             let title = format!("{name} at the {what}: {}", part.replace('_', " "));
@@ -220,15 +221,16 @@ fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     let name = method.label();
     let of = |part: &str| entities::direct(method, part);
     let image = |what: &str, part: &str| view("2D", format!("{name} {what}"), of(part));
-    let comparison = BlueprintNode::Tabs(match has_histogram(method) {
-        false => vec![image("residual", "residual"), image("weights", "weights")],
-        true => vec![
+    let comparison = BlueprintNode::Tabs(if !has_histogram(method) {
+        vec![image("residual", "residual"), image("weights", "weights")]
+    } else {
+        vec![
             image(
                 "joint histogram (right: synthetic, up: query)",
                 "joint_histogram",
             ),
             plot(format!("{name} entropy"), of("entropy")),
-        ],
+        ]
     });
     let query = view("2D", "Query", entities::QUERY_IMAGE);
     let views = BlueprintNode::Tabs(vec![image("synthetic", "synthetic"), query]);

@@ -90,9 +90,10 @@ fn table(event: &ReferencesFused, method: Method) -> String {
     }
     let is_joint = event.shares.iter().any(|share| share.support.is_some());
     if event.pose.is_none() {
-        text += match is_joint {
-            true => "\nTogether the references give no pose.\n",
-            false => "\nEvery reference with a weight failed.\n",
+        text += if is_joint {
+            "\nTogether the references give no pose.\n"
+        } else {
+            "\nEvery reference with a weight failed.\n"
         };
     }
     text + "\n"

@@ -228,9 +228,10 @@ impl Recording {
 
     fn result_in_words(&mut self, result: &QueryResult) {
         let outcome = result.words();
-        let level = match result.grade.is_failure() {
-            false => TextLogLevel::INFO,
-            true => TextLogLevel::WARN,
+        let level = if !result.grade.is_failure() {
+            TextLogLevel::INFO
+        } else {
+            TextLogLevel::WARN
         };
         self.say(&format!("{} result: {outcome}", result.method), level);
     }

@@ -184,9 +184,10 @@ fn costs_at_poses(results: &[QueryResult]) -> String {
 
 /// A table below its title; nothing without rows.
 fn section(title: &str, table: &Table) -> String {
-    match table.rows.is_empty() {
-        true => "\n".to_owned(),
-        false => format!("## {title}\n\n{}\n", table.to_markdown()),
+    if table.rows.is_empty() {
+        "\n".to_owned()
+    } else {
+        format!("## {title}\n\n{}\n", table.to_markdown())
     }
 }
 

@@ -126,9 +126,10 @@ fn places(ranking: &ReferenceRanking, origin: Origin) -> Points3D {
     };
     Points3D::new(known().map(|(.., pose)| origin.place(&pose.translation.vector)))
         .with_colors(known().map(|(rank, ..)| {
-            super::color(match rank < ranking.chosen {
-                true => palette::REFERENCE,
-                false => palette::UNDECIDED,
+            super::color(if rank < ranking.chosen {
+                palette::REFERENCE
+            } else {
+                palette::UNDECIDED
             })
         }))
         .with_radii([Radius::new_ui_points(4.0)])

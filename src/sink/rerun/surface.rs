@@ -74,9 +74,12 @@ pub(super) fn log_maps(
         ))
     };
     let fine = surface.lattice.phase == Phase::PositionFine;
-    let part = |name: &str| match fine {
-        true => format!("{name}/fine"),
-        false => name.to_owned(),
+    let part = |name: &str| {
+        if fine {
+            format!("{name}/fine")
+        } else {
+            name.to_owned()
+        }
     };
     let path = |name: &str| entities::search(context.method, &part(name));
     stream.log(&path("cost"), &grid_map(&surface.lattice, context, cost));
@@ -177,9 +180,10 @@ pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, context: &Ev
         .with_abscissa(vector(angles))
         .with_color(super::color(color));
     let path = entities::yaw_curve(context.method);
-    match is_fine {
-        true => stream.log(&format!("{path}/fine"), &chart),
-        false => stream.log(&path, &chart),
+    if is_fine {
+        stream.log(&format!("{path}/fine"), &chart);
+    } else {
+        stream.log(&path, &chart);
     }
 }
 

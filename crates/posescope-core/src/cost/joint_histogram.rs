@@ -118,9 +118,10 @@ impl Entropies {
 
     /// NMI in 0 … 1, normalised by the larger entropy; `None` where an image is constant.
     pub fn normalized_mutual_information(&self) -> Option<f64> {
-        let (smaller, larger) = match self.query < self.synthetic {
-            true => (self.query, self.synthetic),
-            false => (self.synthetic, self.query),
+        let (smaller, larger) = if self.query < self.synthetic {
+            (self.query, self.synthetic)
+        } else {
+            (self.synthetic, self.query)
         };
         (smaller > LEAST_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
     }

@@ -140,8 +140,7 @@ fn the_gradient_of_the_distance_is_that_of_finite_differences() {
         let slope = (more - less) / (2.0 * step);
         assert!(
             (slope - said).abs() < 1e-5 + 1e-3 * slope.abs(),
-            "{i}: {slope} {}",
-            said
+            "{i}: {slope} {said}"
         );
     }
     assert!(gradient.iter().any(|slope| slope.abs() > 0.01));
@@ -200,9 +199,10 @@ fn nothing_in_view_is_no_reason_to_move() {
             end = step.camera_from_reference;
             Ok::<_, Infallible>(())
         };
-        let Ok(()) = match descends {
-            true => photometric::descend(&view, 20, tell),
-            false => information::descend(&view, 16, 20, tell),
+        let Ok(()) = if descends {
+            photometric::descend(&view, 20, tell)
+        } else {
+            information::descend(&view, 16, 20, tell)
         };
         assert_eq!(end, behind);
     }

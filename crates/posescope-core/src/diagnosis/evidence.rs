@@ -104,7 +104,7 @@ impl Sink for Evidence {
                 self.settled = Some(Arc::clone(&starts.refinements));
             }
             Event::CandidatesJudged(judged) => {
-                self.candidates = Some(Arc::clone(&judged.candidates))
+                self.candidates = Some(Arc::clone(&judged.candidates));
             }
             _ => {}
         }

@@ -67,9 +67,10 @@ pub fn fused_confidence(pose: &Pose, members: &[Member<'_>]) -> Option<PoseConfi
             return member.share.support.map(|_| 0.0);
         };
         let apart = PoseError::between(pose, own).translation_m;
-        Some(match apart <= WITHIN_M {
-            true => member.share.weight * confidence.probability,
-            false => 0.0,
+        Some(if apart <= WITHIN_M {
+            member.share.weight * confidence.probability
+        } else {
+            0.0
         })
     };
     let kept = members

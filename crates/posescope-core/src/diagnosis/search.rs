@@ -110,9 +110,10 @@ impl Search<'_, '_> {
         is_given: bool,
         work: impl FnOnce(Option<&Search<'_, '_>>) -> T,
     ) -> T {
-        let responsible = match is_given {
-            true => JUDGE,
-            false => confidence::responsible(subject.method, subject.outcome),
+        let responsible = if is_given {
+            JUDGE
+        } else {
+            confidence::responsible(subject.method, subject.outcome)
         };
         let entry = estimator::find(responsible);
         let cost = entry.and_then(|entry| entry.cost());
@@ -128,9 +129,10 @@ impl Search<'_, '_> {
             .make(subject.params)
             .with_scorer(subject.problem, &mut |scorer| {
                 let Some(work) = work.take() else { return };
-                let ended = match is_given {
-                    true => ended_as_given(subject, scorer, measure.as_ref()),
-                    false => ended(subject),
+                let ended = if is_given {
+                    ended_as_given(subject, scorer, measure.as_ref())
+                } else {
+                    ended(subject)
                 };
                 done = Some(match ended {
                     None => work(None),

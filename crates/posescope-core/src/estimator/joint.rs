@@ -114,9 +114,10 @@ fn lead(references: &[JointReference<'_>]) -> usize {
 
 /// The frame of a reference's camera seen from that of another; exactly the identity for the same.
 fn between(to: &Problem, from: &Problem) -> Pose {
-    match Arc::ptr_eq(&to.reference, &from.reference) {
-        true => Pose::identity(),
-        false => to.reference.world_from_camera.inverse() * from.reference.world_from_camera,
+    if Arc::ptr_eq(&to.reference, &from.reference) {
+        Pose::identity()
+    } else {
+        to.reference.world_from_camera.inverse() * from.reference.world_from_camera
     }
 }
 

@@ -187,9 +187,10 @@ fn why(candidates: &[JudgedPose]) -> String {
             others.push(said(candidate));
         }
     }
-    match others.is_empty() {
-        true => format!("{}, and nothing to compare with", said(best)),
-        false => format!("{} against {}", said(best), others.join(", ")),
+    if others.is_empty() {
+        format!("{}, and nothing to compare with", said(best))
+    } else {
+        format!("{} against {}", said(best), others.join(", "))
     }
 }
 

@@ -172,9 +172,10 @@ impl Degradation {
         let fog = self.fog as f32;
         let foggy = |&value: &u8| (1.0 - fog) * f32::from(value) + fog * VEIL;
         let values: Vec<f32> = photo.as_raw().iter().map(foggy).collect();
-        let values = match self.blur_px > 0.0 && !values.is_empty() {
-            true => P::smoothed(photo.dimensions(), values, self.blur_px as f32),
-            false => values,
+        let values = if self.blur_px > 0.0 && !values.is_empty() {
+            P::smoothed(photo.dimensions(), values, self.blur_px as f32)
+        } else {
+            values
         };
         let gain = (self.exposure_stops / STORED_GAMMA).exp2() as f32;
         let gamma = self.gamma as f32;

@@ -15,9 +15,10 @@ pub fn corrected_distance(counts: &[u32], bins: usize, corrected: bool) -> Optio
     if larger <= LEAST_ENTROPY {
         return None;
     }
-    let by_chance = match corrected {
-        true => chance_level(counts, bins),
-        false => 0.0,
+    let by_chance = if corrected {
+        chance_level(counts, bins)
+    } else {
+        0.0
     };
     Some(1.0 - (entropies.mutual_information() - by_chance) / larger)
 }

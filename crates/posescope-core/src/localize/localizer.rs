@@ -397,21 +397,19 @@ impl<'a> Localizer<'a> {
                 let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
                 let times = StageTimes::inside(method.name(), runs.into_iter().take(used));
-                let (outcome, evidence) = match observer.wanted() == KindSet::NONE {
-                    true => {
-                        let outcome = hybrid_outcome(&feature.outcome, &direct.estimated);
-                        let evidence = match outcome.fell_back {
-                            true => feature.evidence.followed_by(&direct.evidence),
-                            false => feature.evidence.clone(),
-                        };
-                        (outcome, evidence)
-                    }
-                    // Whoever watches wants to see the hybrid at work. It has everything at hand, so
-                    // what it takes now says nothing.
-                    false => {
-                        let again = self.estimate(work, problem, method, observer)?;
-                        (again.estimated, again.evidence)
-                    }
+                let (outcome, evidence) = if observer.wanted() == KindSet::NONE {
+                    let outcome = hybrid_outcome(&feature.outcome, &direct.estimated);
+                    let evidence = if outcome.fell_back {
+                        feature.evidence.followed_by(&direct.evidence)
+                    } else {
+                        feature.evidence.clone()
+                    };
+                    (outcome, evidence)
+                } else {
+                    // An observer wants to see the hybrid at work. Everything is at hand, so the time that
+                    // it takes now says nothing.
+                    let again = self.estimate(work, problem, method, observer)?;
+                    (again.estimated, again.evidence)
                 };
                 // A fallback has the verdicts of the method that it fell back to.
                 let verdicts = outcome.fell_back.then(|| direct.result.diagnosis.clone());

@@ -331,10 +331,10 @@ pub(super) fn evaluate_as(
             let estimator = estimator::find(method)?.make(subject.params);
             let truth = [problem.reference_from_query(truth_pose)];
             let mut cost = None;
-            match estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost)
-            {
-                true => cost,
-                false => estimator.score_at(problem, truth_pose)?.cost,
+            if estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost) {
+                cost
+            } else {
+                estimator.score_at(problem, truth_pose)?.cost
             }
         });
     let basin = truth.and_then(|truth| {

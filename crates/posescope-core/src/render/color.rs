@@ -82,13 +82,12 @@ impl VisibleCloud {
             .collect();
         let outside = cloud.len() - in_view.len();
         let projected = in_view.len();
-        let points = match params.visibility {
-            false => in_view,
-            true => {
-                let hidden_beyond = HorizonMap::new(&in_view, intrinsics, params);
-                let is_seen = |point: &Projected| hidden_beyond.shows(point);
-                in_view.into_par_iter().filter(is_seen).collect()
-            }
+        let points = if !params.visibility {
+            in_view
+        } else {
+            let hidden_beyond = HorizonMap::new(&in_view, intrinsics, params);
+            let is_seen = |point: &Projected| hidden_beyond.shows(point);
+            in_view.into_par_iter().filter(is_seen).collect()
         };
         let counts = ColoringCounts {
             colored: points.len(),

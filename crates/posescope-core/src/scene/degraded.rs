@@ -20,13 +20,14 @@ pub fn degraded(scene: &Arc<dyn Scene>, degradation: Degradation, seed: u64) -> 
         Some(before) => &before.scene,
         None => scene,
     };
-    match degradation.is_none() {
-        true => Arc::clone(taken),
-        false => Arc::new(DegradedScene {
+    if degradation.is_none() {
+        Arc::clone(taken)
+    } else {
+        Arc::new(DegradedScene {
             scene: Arc::clone(taken),
             degradation,
             seed,
-        }),
+        })
     }
 }
 

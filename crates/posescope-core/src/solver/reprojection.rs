@@ -125,9 +125,10 @@ impl Reprojection {
             let [u, v] = &seen.residual;
             let mut losses = [0.0; LANES];
             for i in 0..LANES {
-                losses[i] = match seen.is_in_front[i] {
-                    true => loss.rho(u[i] * u[i] + v[i] * v[i]),
-                    false => f64::INFINITY,
+                losses[i] = if seen.is_in_front[i] {
+                    loss.rho(u[i] * u[i] + v[i] * v[i])
+                } else {
+                    f64::INFINITY
                 };
             }
             for i in 0..block.count {

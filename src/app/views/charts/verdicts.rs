@@ -92,9 +92,10 @@ impl Pair {
 
     /// Such as `street:night ← street:overcast`.
     fn words(&self) -> String {
-        match self.queries == self.references {
-            true => self.references.clone(),
-            false => format!("{} ← {}", self.queries, self.references),
+        if self.queries == self.references {
+            self.references.clone()
+        } else {
+            format!("{} ← {}", self.queries, self.references)
         }
     }
 }

@@ -83,9 +83,10 @@ impl Segment {
         let visuals = ui.visuals();
         let painter = ui.painter_at(rect);
         let color = color(self.kind);
-        let (fill, text) = match is_shown {
-            true => (color.gamma_multiply(0.38), visuals.strong_text_color()),
-            false => (visuals.faint_bg_color, visuals.text_color()),
+        let (fill, text) = if is_shown {
+            (color.gamma_multiply(0.38), visuals.strong_text_color())
+        } else {
+            (visuals.faint_bg_color, visuals.text_color())
         };
         painter.rect_filled(rect, 3.0, fill);
         let outline = match (is_hovered, is_shown) {
@@ -100,9 +101,10 @@ impl Segment {
         let (upper, lower) = (rect.top() + 10.0, rect.bottom() - 9.0);
         let mut mesh = MeshPainter::new(ui.pixels_per_point());
         // Pale colours are hard to see on their own tints.
-        let mark_color = match is_shown {
-            true => color.lerp_to_gamma(visuals.strong_text_color(), 0.3),
-            false => visuals.weak_text_color(),
+        let mark_color = if is_shown {
+            color.lerp_to_gamma(visuals.strong_text_color(), 0.3)
+        } else {
+            visuals.weak_text_color()
         };
         mesh.mark(
             mark(self.kind),

@@ -178,18 +178,20 @@ impl<'a> FeatureProgress<'a> {
     pub(super) fn differing(&self, other: &FeatureProgress<'_>) -> Vec<bool> {
         let (mine, theirs) = (self.query(), other.query());
         let same_keypoints = mine == theirs;
-        let places: HashMap<[u32; 3], usize> = match same_keypoints {
-            true => HashMap::new(),
-            false => theirs.iter().map(place).zip(0..).collect(),
+        let places: HashMap<[u32; 3], usize> = if same_keypoints {
+            HashMap::new()
+        } else {
+            theirs.iter().map(place).zip(0..).collect()
         };
         (0..mine.len())
             .map(|feature| {
                 let Some(state) = self.state(feature) else {
                     return false;
                 };
-                let twin = match same_keypoints {
-                    true => Some(feature),
-                    false => places.get(&place(&mine[feature])).copied(),
+                let twin = if same_keypoints {
+                    Some(feature)
+                } else {
+                    places.get(&place(&mine[feature])).copied()
                 };
                 let there = twin.and_then(|twin| other.state(twin));
                 there.is_none_or(|there| there.index() != state.index())

@@ -123,9 +123,10 @@ impl VisibleFeatures {
         strength: f32,
     ) {
         let area = at.visible();
-        let (mark, radius, color) = match progress.is_unmatched() {
-            true => (MarkShape::Square, radius(UNDECIDED), color(UNDECIDED)),
-            false => (MarkShape::Disc, 1.3, color(0)),
+        let (mark, radius, color) = if progress.is_unmatched() {
+            (MarkShape::Square, radius(UNDECIDED), color(UNDECIDED))
+        } else {
+            (MarkShape::Disc, 1.3, color(0))
         };
         let color = color.gamma_multiply(strength);
         for (keypoint, is_matched) in progress.reference().iter().zip(&self.is_matched) {

@@ -37,9 +37,10 @@ impl CameraDrag {
             WidgetInfo::labeled(Role::Button, true, what)
         });
         let is_held = response.dragged();
-        let response = response.on_hover_and_drag_cursor(match is_held {
-            true => CursorIcon::Grabbing,
-            false => CursorIcon::Grab,
+        let response = response.on_hover_and_drag_cursor(if is_held {
+            CursorIcon::Grabbing
+        } else {
+            CursorIcon::Grab
         });
         let Some(pointer) = response.interact_pointer_pos().filter(|_| is_held) else {
             self.grip = None;

@@ -188,9 +188,10 @@ pub(super) fn cameras(
             kind,
             world,
             scene_from_camera: geometry.scene_from_world * world,
-            intrinsics: match kind.is_query() {
-                true => problem.query.intrinsics,
-                false => problem.reference.intrinsics,
+            intrinsics: if kind.is_query() {
+                problem.query.intrinsics
+            } else {
+                problem.reference.intrinsics
             },
             depth_m: kind.size() * geometry.camera_m(),
             about,

@@ -51,9 +51,10 @@ pub(super) fn cameras(
         painter.line_segment([at, place.left_center()], Stroke::new(1.0, color));
         painter.circle_filled(at, 2.5, color);
         let fill = visuals.window_fill.gamma_multiply(0.85);
-        let border = match response.hovered() {
-            true => visuals.strong_text_color(),
-            false => color,
+        let border = if response.hovered() {
+            visuals.strong_text_color()
+        } else {
+            color
         };
         painter.rect(
             place,

@@ -36,9 +36,10 @@ pub(super) struct LiftedRay {
 impl<'a> LiftedFeatures<'a> {
     /// From the estimator at the cursor, if it lifts matches; else from FB's part.
     pub(super) fn at(context: &ViewContext<'a>) -> Self {
-        let here = match context.is_inside_hybrid(Method::FB) {
-            true => Self::told(context.run, context.cursor),
-            false => Self::default(),
+        let here = if context.is_inside_hybrid(Method::FB) {
+            Self::told(context.run, context.cursor)
+        } else {
+            Self::default()
         };
         if !here.lifted.is_empty() {
             return here;

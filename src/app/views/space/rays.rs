@@ -38,9 +38,10 @@ pub(super) fn rays(
             None => (theme::CAMERA, &mut rays.undecided),
         };
         *count += 1;
-        let (color, width) = match is_selected {
-            true => (color, 4.0),
-            false => (color.gamma_multiply(0.55), 1.0),
+        let (color, width) = if is_selected {
+            (color, 4.0)
+        } else {
+            (color.gamma_multiply(0.55), 1.0)
         };
         let along = |share: f64| geometry.spot(&(centre + share * (ray.point - centre)));
         let mut piece = |from: f64, to: f64| {

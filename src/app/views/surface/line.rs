@@ -158,9 +158,10 @@ impl Profile {
         }
         let far = self.way(self.length);
         let (Some(result), Some(truth)) = (self.at(0.0), self.at(self.length)) else {
-            return match self.is_complete {
-                true => format!("{far} apart; one of both covers too little to have a say"),
-                false => format!("{far} apart"),
+            return if self.is_complete {
+                format!("{far} apart; one of both covers too little to have a say")
+            } else {
+                format!("{far} apart")
             };
         };
         let costs = format!(
@@ -180,15 +181,17 @@ impl Profile {
         let wall = number(highest);
         let lower_end = result.min(truth);
         if highest <= result.max(truth) {
-            let leads = match truth < result {
-                true => "it falls from the result to the truth: the search stopped early",
-                false => "it falls from the truth to the result: the cost prefers the result",
+            let leads = if truth < result {
+                "it falls from the result to the truth: the search stopped early"
+            } else {
+                "it falls from the truth to the result: the cost prefers the result"
             };
             return format!("{costs}; between them {leads}");
         }
-        let meaning = match truth < result {
-            true => "the search did not find what lies behind it",
-            false => "the cost prefers the result",
+        let meaning = if truth < result {
+            "the search did not find what lies behind it"
+        } else {
+            "the cost prefers the result"
         };
         format!(
             "{costs}; between them it rises to {wall}, {} from the result and {} above the lower of both: {meaning}",

@@ -252,9 +252,10 @@ fn plot(
     side: f32,
     images: Vec<PlotImage>,
 ) -> egui_plot::PlotResponse<()> {
-    let pan = match ui.input(|input| input.modifiers.shift) {
-        true => PointerButton::Primary,
-        false => PointerButton::Middle,
+    let pan = if ui.input(|input| input.modifiers.shift) {
+        PointerButton::Primary
+    } else {
+        PointerButton::Middle
     };
     // The numbers are kept from pushing the maps about.
     let narrow = |axis: AxisHints<'static>, thickness| {
@@ -368,9 +369,10 @@ fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> Str
         None => "no cost".to_owned(),
     };
     let coverage = shown.search.coverage(score.covered);
-    let note = match score.covered < shown.search.least_covered(shown.floor) {
-        true => ", below the floor",
-        false => "",
+    let note = if score.covered < shown.search.least_covered(shown.floor) {
+        ", below the floor"
+    } else {
+        ""
     };
     format!("{cost}, coverage {coverage:.2} at {at}{note}")
 }
@@ -431,9 +433,10 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
     let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
     for mark in shown.marks {
         let at = screen(&mark.offset);
-        match mark.kind == MarkKind::Truth && !transform.frame().contains(at) {
-            true => mark.paint_beyond(&painter, *transform.frame(), at, reach),
-            false => mark.paint(&painter, at, reach),
+        if mark.kind == MarkKind::Truth && !transform.frame().contains(at) {
+            mark.paint_beyond(&painter, *transform.frame(), at, reach);
+        } else {
+            mark.paint(&painter, at, reach);
         }
     }
     if let Some(cell) = pointed_at {

@@ -228,9 +228,10 @@ pub(super) fn place(offset: &Offset) -> String {
     let [right, forward] =
         [offset.right_m, offset.forward_m].map(|m| (100.0 * m).round() / 100.0 + 0.0);
     let is_round = |m: f64| ((10.0 * m).round() - 10.0 * m).abs() < 1e-9;
-    match is_round(right) && is_round(forward) {
-        true => format!("({right:.1}, {forward:.1}) m"),
-        false => format!("({right:.2}, {forward:.2}) m"),
+    if is_round(right) && is_round(forward) {
+        format!("({right:.1}, {forward:.1}) m")
+    } else {
+        format!("({right:.2}, {forward:.2}) m")
     }
 }
 

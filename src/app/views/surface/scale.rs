@@ -103,9 +103,10 @@ impl Scale {
 
 /// 1 for the least cost, 0 for the greatest; what differs by rounding alone has one colour.
 fn merit(least: f64, greatest: f64, cost: f64) -> f64 {
-    match greatest - least > LEAST_DIFFERENCE {
-        true => (greatest - cost) / (greatest - least),
-        false => 1.0,
+    if greatest - least > LEAST_DIFFERENCE {
+        (greatest - cost) / (greatest - least)
+    } else {
+        1.0
     }
 }
 

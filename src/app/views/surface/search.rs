@@ -182,9 +182,10 @@ pub(super) struct Minimum {
 /// others inside itself, one of which is then the one at the cursor.
 fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usize)> {
     let is_inside = context.is_inside_hybrid(method) && context.latest::<PoseScored>().is_some();
-    match is_inside {
-        true => Some((context.span()?, context.cursor)),
-        false => context.part_of(method),
+    if is_inside {
+        Some((context.span()?, context.cursor))
+    } else {
+        context.part_of(method)
     }
 }
 

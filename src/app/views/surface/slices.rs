@@ -111,9 +111,10 @@ impl CostScale {
 
     fn words(&self) -> String {
         let (zero, one) = (number(self.zero), number(self.one));
-        match self.is_assessed {
-            true => format!("0 = {zero} at the result, 1 = {one} with shuffled pixels"),
-            false => format!("0 = {zero}, the least so far, 1 = {one}, the greatest"),
+        if self.is_assessed {
+            format!("0 = {zero} at the result, 1 = {one} with shuffled pixels")
+        } else {
+            format!("0 = {zero}, the least so far, 1 = {one}, the greatest")
         }
     }
 }

@@ -148,16 +148,17 @@ impl fmt::Display for PreferredBySix {
             );
         }
         let (result, near) = pair(self.cost_at_result, self.cost_near_truth);
-        match self.turned_by_prior {
-            false => write!(
+        if !self.turned_by_prior {
+            write!(
                 f,
                 "The cost prefers a wrong place: {result} at the result, {near} near the truth (lower is better)."
-            ),
-            true => write!(
+            )
+        } else {
+            write!(
                 f,
                 "The prior on likely poses decided against the truth: cost {near} near it, {result} at the result (lower is \
-                 better)."
-            ),
+             better)."
+            )
         }
     }
 }

@@ -148,9 +148,10 @@ impl fmt::Display for MissedBySix {
             f,
             "The search missed it: cost {near} near the truth, {result} at the result (lower is better). "
         )?;
-        f.write_str(match self.turned_by_prior {
-            false => "No start led there.",
-            true => "With the prior on likely poses the truth wins.",
+        f.write_str(if !self.turned_by_prior {
+            "No start led there."
+        } else {
+            "With the prior on likely poses the truth wins."
         })
     }
 }

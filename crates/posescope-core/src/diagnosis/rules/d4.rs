@@ -70,18 +70,19 @@ struct Outside {
 
 impl fmt::Display for Outside {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.is_turned {
-            false => write!(
+        if !self.is_turned {
+            write!(
                 f,
                 "The truth is outside of the search: {} from the reference, {} is searched.",
                 metres(self.distance_m),
                 metres(self.radius_m)
-            ),
-            true => write!(
+            )
+        } else {
+            write!(
                 f,
                 "The query is turned too far: its yaw is {:.1}° against the reference, and ±{:.1}° is searched.",
                 self.yaw_deg, self.yaw_range_deg
-            ),
+            )
         }
     }
 }
@@ -119,16 +120,17 @@ struct Unreached {
 
 impl fmt::Display for Unreached {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.distance_m > self.radius_m {
-            true => write!(
+        if self.distance_m > self.radius_m {
+            write!(
                 f,
                 "The truth is outside of the search: {} from the reference, {} is searched.",
                 metres(self.distance_m),
                 metres(self.radius_m)
-            ),
-            false => f.write_str(
-                "The search cannot end at the truth: too little of the cloud is visible there, or it leaves the disc.",
-            ),
+            )
+        } else {
+            f.write_str(
+            "The search cannot end at the truth: too little of the cloud is visible there, or it leaves the disc.",
+        )
         }
     }
 }

@@ -69,18 +69,19 @@ struct Rim {
 
 impl fmt::Display for Rim {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.is_position {
-            true => write!(
+        if self.is_position {
+            write!(
                 f,
                 "The search ended at its edge: {} from the reference, where its coarse grid ends at {}.",
                 metres(self.distance_m),
                 metres(self.radius_m)
-            )?,
-            false => write!(
+            )?;
+        } else {
+            write!(
                 f,
                 "The search ended at its edge: a yaw of {:.1}°, where its coarse grid ends at ±{:.1}°.",
                 self.yaw_deg, self.yaw_range_deg
-            )?,
+            )?;
         }
         f.write_str(" The minimum may lie outside.")
     }

@@ -28,9 +28,10 @@ pub(super) const RULE: Rule = Rule {
 fn test(case: &FusionCase<'_>) -> Option<Diagnosis> {
     let pose = case.pose.as_ref().ok()?;
     let error = PoseError::between(case.truth, pose);
-    match case.is_joint {
-        true => resting(heaviest(case.members)?, case.truth, error),
-        false => dragging(case, error),
+    if case.is_joint {
+        resting(heaviest(case.members)?, case.truth, error)
+    } else {
+        dragging(case, error)
     }
 }
 

@@ -102,9 +102,10 @@ impl fmt::Display for PassedOver {
             "A right pose of {}, cost {right}, lost to a wrong one of {}, cost {kept} (lower is better).",
             self.passed_over, self.kept
         )?;
-        match self.cost_passed_over < self.cost_kept {
-            true => f.write_str(" The prior, or the credit of features, decided."),
-            false => Ok(()),
+        if self.cost_passed_over < self.cost_kept {
+            f.write_str(" The prior, or the credit of features, decided.")
+        } else {
+            Ok(())
         }
     }
 }

@@ -31,9 +31,10 @@ pub(super) const RULE: Rule = Rule {
 fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     let funnel = matches.funnel;
-    let without_depth = match matches.many_without_depth() {
-        true => matches.wrong_depth + matches.lost_for_depth(),
-        false => 0,
+    let without_depth = if matches.many_without_depth() {
+        matches.wrong_depth + matches.lost_for_depth()
+    } else {
+        0
     };
     let true_ones = funnel.unique.max(funnel.lifted) + without_depth;
     if true_ones >= FEW_MATCHES || case.consensus_is_right() {

@@ -246,9 +246,10 @@ impl fmt::Display for CameraByMatches {
 /// In what a camera differs from the stated one, to the pixel.
 fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
     let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
-    match centre(camera) == centre(stated) {
-        true => format!("{:.0} px", camera.fx),
-        false => format!("{:.0} px and another centre", camera.fx),
+    if centre(camera) == centre(stated) {
+        format!("{:.0} px", camera.fx)
+    } else {
+        format!("{:.0} px and another centre", camera.fx)
     }
 }
 

@@ -121,9 +121,10 @@ impl FeatureBased {
         BeyondChance {
             acceptance,
             tested: places.count(),
-            counted: match reach_px >= 0.0 {
-                true => Counted::Places,
-                false => Counted::Correspondences,
+            counted: if reach_px >= 0.0 {
+                Counted::Places
+            } else {
+                Counted::Correspondences
             },
         }
     }

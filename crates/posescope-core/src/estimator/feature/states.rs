@@ -87,9 +87,10 @@ impl FeatureStates {
         threshold_px: f64,
     ) {
         for (query, residual_px) in residuals_px {
-            self.states[query] = match residual_px <= threshold_px {
-                true => FeatureState::Inlier { residual_px },
-                false => FeatureState::Outlier { residual_px },
+            self.states[query] = if residual_px <= threshold_px {
+                FeatureState::Inlier { residual_px }
+            } else {
+                FeatureState::Outlier { residual_px }
             };
         }
     }

@@ -220,9 +220,10 @@ impl Octave {
         let level = (extremum.level.round() as usize).min(self.smoothed.len() - 1);
         let image = &self.smoothed[level];
         let at = Point2::new(extremum.x, extremum.y);
-        let angles = match params.upright {
-            true => vec![0.0],
-            false => directions(image, at, sigma),
+        let angles = if params.upright {
+            vec![0.0]
+        } else {
+            directions(image, at, sigma)
         };
         // The first octave of an enlarged image has its pixels at even halves of the photo's.
         angles

@@ -125,9 +125,10 @@ impl PipelineSet {
             blit: PipelineSpec {
                 layout: &blit_layout,
                 vertex: (&blit, "cover"),
-                fragment: match target.is_srgb() {
-                    true => (&blit, "linear"),
-                    false => (&blit, "encoded"),
+                fragment: if target.is_srgb() {
+                    (&blit, "linear")
+                } else {
+                    (&blit, "encoded")
                 },
                 buffer: None,
                 topology: wgpu::PrimitiveTopology::TriangleList,
