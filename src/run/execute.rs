@@ -23,7 +23,7 @@ use crate::trace::Cancelled;
 pub struct Scenes {
     /// The scenes of references, in the order of [`RunFile::scenes`].
     pub references: Vec<Arc<dyn Scene>>,
-    /// The scenes of queries, in the order of [`RunFile::queries`]; none where each scene has its own,
+    /// The scenes of queries, in the order of [`Protocol::query_scene`]; none where each scene has its own,
     /// unless their photos are degraded.
     pub queries: Vec<Arc<dyn Scene>>,
 }

@@ -89,7 +89,7 @@ pub struct Protocol {
     )]
     #[serde(rename = "reference")]
     pub references: Vec<Reference>,
-    /// The uncertainty radius: how far from the reference to search [m] [default: 15]
+    /// The uncertainty radius: how many metres from the reference to search [default: 15]
     ///
     /// The disc around the reference that the direct methods search, and how far away references are chosen.
     /// `eval` takes several and runs one after the other.
@@ -105,7 +105,7 @@ pub struct Protocol {
     )]
     #[serde(rename = "radius")]
     pub radii_m: Vec<f64>,
-    /// Choose references within this distance of the query [m] [default: the radius]
+    /// Choose references within this many metres of the query [default: the radius]
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -217,7 +217,7 @@ pub struct Protocol {
     )]
     #[serde(skip_serializing_if = "is_default")]
     pub right: Tolerance,
-    /// The paper's success: the greatest translation error of one [m] [default: 10, RobotCar 20]
+    /// The paper's success: the metres from which a pose is a failure [default: 10, RobotCar 20]
     #[cfg_attr(
         feature = "cli",
         arg(
