@@ -106,7 +106,7 @@ fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
     Ok(Arguments::parse_from(line.iter().chain(words)))
 }
 
-/// What is said of a word that is neither a command nor a scene.
+/// The error for a word that is neither a command nor a scene.
 fn no_command(name: &str) -> String {
     let command = Arguments::command();
     let commands = command

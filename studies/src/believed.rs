@@ -136,7 +136,7 @@ fn between(place: &Place<'_>, street: &StreetPlace<'_>, drives: [&Traversal; 2])
     }
 }
 
-/// Counts what is said of a right pose, and of a wrong one.
+/// Counts the verdicts and the confidence of a right pose, and of a wrong one.
 fn grade(case: &Case, counts: &mut Counts) -> Result<(), Failure> {
     let is_alarm = |result: &QueryResult| result.diagnosis.iter().any(|d| d.code.is_failure());
     let (known, withheld) = (

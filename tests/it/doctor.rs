@@ -47,7 +47,7 @@ fn planted_mistakes_are_named() {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn all_planted_mistakes_are_named() {
     are_named(|fault| !FEW.contains(&fault));
 }
@@ -88,7 +88,7 @@ fn nothing_is_wrong_with_the_street_at_night() {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn nothing_is_wrong_with_the_street_in_rain() {
     let street = scene::open("street:rain", None).expect("is built in");
     healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));

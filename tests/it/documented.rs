@@ -157,49 +157,49 @@ fn the_readme_can_be_followed() {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_ci_can_be_followed() {
     go_through(PAGES[1]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_where_it_computes_can_be_followed() {
     go_through(PAGES[2]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_diagnosis_can_be_followed() {
     go_through(PAGES[3]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_lessons_can_be_followed() {
     go_through(PAGES[4]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_other_systems_can_be_followed() {
     go_through(PAGES[5]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_retrieval_can_be_followed() {
     go_through(PAGES[6]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_scenes_can_be_followed() {
     go_through(PAGES[7]);
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_start_can_be_followed() {
     go_through(PAGES[8]);
 }

@@ -496,6 +496,27 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
     );
 }
 
+#[test]
+fn a_share_of_the_frames_is_held_out_of_the_references_and_a_number_is_not() {
+    let sequence = SmallSequence::of(&FRAMES);
+    let folder = sequence.folder();
+    let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
+    let drawn = |limit: &str| {
+        let draw = Draw {
+            limit: Some(limit.parse().expect("a limit")),
+            only: &[],
+            seed: 0,
+        };
+        draw.pair(0, scene.as_ref(), scene.as_ref())
+            .expect("queries")
+    };
+    let (share, number) = (drawn("25%"), drawn("3"));
+    assert_eq!(share.queries.len(), 3);
+    assert_eq!(share.drawn, share.queries);
+    assert_eq!(number.queries, share.queries);
+    assert!(number.drawn.is_empty());
+}
+
 /// A scene whose photo of one frame makes the program panic.
 struct PanickingScene {
     scene: Box<dyn Scene>,

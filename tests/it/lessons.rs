@@ -249,7 +249,7 @@ fn a_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
 fn every_lesson_is_gone_through_to_its_end_and_its_claims_hold() {
     claims_hold(|lesson| lesson.name != ONE);
 }
@@ -349,7 +349,7 @@ fn a_recorded_lesson_turns_its_pages_in_order_and_answers_after_it_has_asked() {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
 fn every_recorded_lesson_turns_its_pages_in_order() {
     turn_their_pages(|lesson| lesson.name != ONE);
 }

@@ -65,7 +65,7 @@ fn assert_same_everywhere(asked: &[&str], processors: &[&str]) {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "emulates processors; .ci/nightly runs it"]
 fn a_night_photo_of_the_street_has_the_same_results_on_any_processor() {
     assert_same_everywhere(
         &[
@@ -86,7 +86,7 @@ fn a_night_photo_of_the_street_has_the_same_results_on_any_processor() {
 }
 
 #[test]
-#[ignore = "nightly"]
+#[ignore = "emulates processors; .ci/nightly runs it"]
 fn the_real_pair_has_the_same_results_on_any_processor() {
     let Some(sequence) = authors_pair() else {
         return;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::binary::posescope;
+use crate::binary::{posescope, said};
 use crate::small_sequence::SmallSequence;
 
 /// A run over the frames of a small sequence.
@@ -21,18 +21,7 @@ fn run() -> (SmallSequence, PathBuf) {
 
 /// The exit code, what is printed, and what is said on stderr.
 fn results_of(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
-    let output = posescope()
-        .arg("results")
-        .arg(folder)
-        .args(more)
-        .output()
-        .expect("the binary starts");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (
-        output.status.code(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
+    said(posescope().arg("results").arg(folder).args(more))
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::binary::{CACHE, posescope};
+use crate::binary::{CACHE, posescope, said};
 use crate::small_sequence::SmallSequence;
 
 #[test]
@@ -48,21 +48,10 @@ fn the_options_beside_the_folder_of_a_run_are_obeyed_or_refused() {
         .assert()
         .code(0);
     let view = |options: &[&str]| {
-        let output = posescope()
-            .current_dir(sequence.path())
-            .env_remove("DISPLAY")
-            .env_remove("WAYLAND_DISPLAY")
-            .arg("view")
-            .arg(&run)
-            .args(options)
-            .output()
-            .expect("the binary starts");
-        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        (
-            output.status.code(),
-            text(&output.stdout),
-            text(&output.stderr),
-        )
+        let mut command = posescope();
+        command.current_dir(sequence.path());
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+        said(command.arg("view").arg(&run).args(options))
     };
     let methods = |table: &str| {
         let is_method = |word: &&str| ["fb", "pm", "mi", "hy"].contains(word);

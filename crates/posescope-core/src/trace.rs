@@ -462,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn an_event_has_the_same_number_whoever_listens() {
+    fn the_number_of_an_event_does_not_depend_on_the_sink() {
         let indices = |wanted, second| {
             let mut sink = RecordingSink::wanting(wanted);
             let mut trace = Trace::to(&mut sink);
