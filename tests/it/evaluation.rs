@@ -210,7 +210,16 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         sequence.path().join("whole"),
         sequence.path().join("killed"),
     );
-    let extra = ["--failure-radius", "0.5", "--resume", "--threads", "1"];
+    // Hardly a pose is within a micrometre, so that more fail than are recorded.
+    let extra = [
+        "--right",
+        "0.000001m,5deg",
+        "--keep-failures",
+        "5",
+        "--resume",
+        "--threads",
+        "1",
+    ];
     run(&sequence, &whole, &extra);
     let (results, all) = (
         killed.join("results.jsonl"),
@@ -230,6 +239,13 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
     }
     run(&sequence, &killed, &extra);
     assert_same(&whole, &killed);
+    let recorded = |run: &Path| {
+        let entries = fs::read_dir(run.join("failures")).expect("a folder");
+        let names = entries.map(|entry| entry.expect("an entry").file_name());
+        names.collect::<std::collections::BTreeSet<_>>()
+    };
+    assert_eq!(recorded(&whole).len(), 5);
+    assert_eq!(recorded(&whole), recorded(&killed));
 }
 
 /// Versions before did not write all parameters.
