@@ -23,42 +23,11 @@ pub use index_file::IndexFile;
 pub use job::{Job, JobError};
 pub use loaded::Loaded;
 pub use pausing::RunMode;
-pub use run::{Explaining, Part, Run, Span, StageBar};
+pub use run::{Explaining, Part, Run, RunState, Span, StageBar};
 pub use task::{Task, TaskScenes, command_line};
 
 use message::{Message, Outbox};
 use pausing::{Command, Control, PausingObserver};
-
-/// What a session is doing.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RunState {
-    /// Photos and clouds are being read.
-    Loading,
-    /// Events are coming in.
-    Running,
-    /// The estimator waits behind the last event.
-    Paused {
-        /// The breakpoint that stopped it, if one did.
-        breakpoint: Option<String>,
-    },
-    /// All that was asked for is done.
-    Finished,
-    /// It was told to stop.
-    Cancelled,
-    /// It cannot go on: bad data, or a fault of ours.
-    Broken(String),
-}
-
-impl RunState {
-    /// What has become, in a word or two, of a method that has begun and has no result.
-    pub fn of_what_has_begun(&self) -> &'static str {
-        match self {
-            Self::Loading | Self::Running => "at work",
-            Self::Paused { .. } => "paused",
-            Self::Finished | Self::Cancelled | Self::Broken(_) => "not finished",
-        }
-    }
-}
 
 /// A run on its own thread, and what it has told so far.
 ///
@@ -67,8 +36,6 @@ pub struct Session {
     control: Control,
     inbox: Receiver<Message>,
     run: Run,
-    chosen: Option<References>,
-    state: RunState,
 }
 
 impl Session {
@@ -93,48 +60,15 @@ impl Session {
             control,
             inbox,
             run,
-            chosen: None,
-            state: RunState::Loading,
         }
     }
 
     /// Takes in what the worker told since the last call. Whether there was anything.
     pub fn drain(&mut self) -> bool {
         let mut is_new = false;
-        while let Ok(message) = self.inbox.try_recv() {
+        while let Ok(change) = self.inbox.try_recv() {
             is_new = true;
-            match message {
-                Message::Chosen(chosen) => {
-                    self.run.ranking = None;
-                    self.chosen = Some(chosen);
-                }
-                Message::Ranking {
-                    looked_at,
-                    candidates,
-                } => self.run.ranking = Some([looked_at, candidates]),
-                Message::Loaded(loaded) => {
-                    self.run.loaded = Some(loaded);
-                    self.state = RunState::Running;
-                }
-                Message::Began(part) => self.run.begin(part),
-                Message::Told(record, worked) => {
-                    self.run.push(*record, worked);
-                    // It was told to go on, or is about to say that it waits.
-                    self.state = RunState::Running;
-                }
-                Message::Waits { breakpoint } => self.state = RunState::Paused { breakpoint },
-                Message::Goes => self.state = RunState::Running,
-                Message::Ended { result, times } => self.run.end(*result, times),
-                Message::Explaining {
-                    method,
-                    tried,
-                    remedies,
-                } => self.run.go_on_explaining(method, tried, remedies),
-                Message::Explained(result) => self.run.explain(*result),
-                Message::Finished => self.state = RunState::Finished,
-                Message::Cancelled => self.state = RunState::Cancelled,
-                Message::Broke(why) => self.state = RunState::Broken(why),
-            }
+            change(&mut self.run);
         }
         is_new
     }
@@ -146,18 +80,18 @@ impl Session {
 
     /// The references, once they are chosen.
     pub fn chosen(&self) -> Option<&References> {
-        self.chosen.as_ref()
+        self.run.chosen.as_ref()
     }
 
     /// What the session is doing, as of the last [`Self::drain`].
     pub fn state(&self) -> &RunState {
-        &self.state
+        &self.run.state
     }
 
     /// Whether more events may come.
     pub fn is_alive(&self) -> bool {
         matches!(
-            self.state,
+            self.run.state,
             RunState::Loading | RunState::Running | RunState::Paused { .. }
         )
     }

@@ -359,16 +359,10 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
 
 /// Removes files that a killed process did not finish.
 fn sweep(folder: &Path) -> io::Result<()> {
-    for below in ["", "tables", "plots"] {
-        let entries = match fs::read_dir(folder.join(below)) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-            entries => entries?,
-        };
-        for entry in entries {
-            let entry = entry?;
-            if entry.file_name().to_string_lossy().starts_with("tmp-") {
-                fs::remove_file(entry.path())?;
-            }
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with("tmp-") {
+            fs::remove_file(entry.path())?;
         }
     }
     Ok(())

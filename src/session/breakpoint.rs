@@ -18,112 +18,49 @@ struct Quantity {
     of: fn(&Event) -> Option<f64>,
 }
 
+/// A quantity that one kind of event carries.
+macro_rules! quantity {
+    ($name:literal, $about:literal, $kind:ident, $event:ident => $value:expr) => {
+        Quantity {
+            name: $name,
+            about: $about,
+            of: |event| match event {
+                Event::$kind($event) => $value,
+                _ => None,
+            },
+        }
+    };
+}
+
 /// Every number that a breakpoint can watch.
+#[rustfmt::skip]
 const QUANTITIES: &[Quantity] = &[
-    Quantity {
-        name: "keypoints",
-        about: "keypoints of a photo",
-        of: |event| match event {
-            Event::FeaturesDetected(event) => Some(event.features.keypoints.len() as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "matches",
-        about: "matches that are distinct and unique",
-        of: |event| match event {
-            Event::MatchesDecided(event) => Some(event.candidates() as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "depths",
-        about: "matches with a depth",
-        of: |event| match event {
-            Event::DepthsLifted(event) => Some(event.with_depth() as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "trial",
-        about: "number of the MLESAC trial",
-        of: |event| match event {
-            Event::HypothesisTried(event) => Some(event.trial.index as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "best_inliers",
-        about: "inliers of the best MLESAC hypothesis so far",
-        of: |event| match event {
-            Event::HypothesisTried(event) => Some(event.trial.best?.score.inliers as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "inliers",
-        about: "inliers of the refined pose",
-        of: |event| match event {
-            Event::PoseRefined(event) => Some(event.inliers as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "distance",
-        about: "distance of the refined pose from the reference [m]",
-        of: |event| match event {
-            Event::ConsensusJudged(event) => Some(event.distance_m),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "evaluation",
-        about: "number of the hypothesis of the grid search",
-        of: |event| match event {
-            Event::PoseScored(event) => Some(event.evaluation as f64),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "cost",
-        about: "cost of a hypothesis that is the best of its phase so far",
-        of: |event| match event {
-            Event::PoseScored(event) if event.is_best => event.score.cost,
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "coverage",
-        about: "coverage of such a hypothesis, as a share of that at the reference pose",
-        of: |event| match event {
-            Event::PoseScored(event) if event.is_best => Some(event.coverage),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "tried_cost",
-        about: "cost of any hypothesis of the grid search",
-        of: |event| match event {
-            Event::PoseScored(event) => event.score.cost,
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "tried_coverage",
-        about: "coverage of any hypothesis of the grid search",
-        of: |event| match event {
-            Event::PoseScored(event) => Some(event.coverage),
-            _ => None,
-        },
-    },
-    Quantity {
-        name: "margin",
-        about: "cost of the second-best local minimum less that of the best",
-        of: |event| match event {
-            Event::MinimumAssessed(event) => Some(event.runner_up? - event.best),
-            _ => None,
-        },
-    },
+    quantity!("keypoints", "keypoints of a photo",
+        FeaturesDetected, event => Some(event.features.keypoints.len() as f64)),
+    quantity!("matches", "matches that are distinct and unique",
+        MatchesDecided, event => Some(event.candidates() as f64)),
+    quantity!("depths", "matches with a depth",
+        DepthsLifted, event => Some(event.with_depth() as f64)),
+    quantity!("trial", "number of the MLESAC trial",
+        HypothesisTried, event => Some(event.trial.index as f64)),
+    quantity!("best_inliers", "inliers of the best MLESAC hypothesis so far",
+        HypothesisTried, event => Some(event.trial.best?.score.inliers as f64)),
+    quantity!("inliers", "inliers of the refined pose",
+        PoseRefined, event => Some(event.inliers as f64)),
+    quantity!("distance", "distance of the refined pose from the reference [m]",
+        ConsensusJudged, event => Some(event.distance_m)),
+    quantity!("evaluation", "number of the hypothesis of the grid search",
+        PoseScored, event => Some(event.evaluation as f64)),
+    quantity!("cost", "cost of a hypothesis that is the best of its phase so far",
+        PoseScored, event => event.score.cost.filter(|_| event.is_best)),
+    quantity!("coverage", "coverage of such a hypothesis, as a share of that at the reference pose",
+        PoseScored, event => event.is_best.then_some(event.coverage)),
+    quantity!("tried_cost", "cost of any hypothesis of the grid search",
+        PoseScored, event => event.score.cost),
+    quantity!("tried_coverage", "coverage of any hypothesis of the grid search",
+        PoseScored, event => Some(event.coverage)),
+    quantity!("margin", "cost of the second-best local minimum less that of the best",
+        MinimumAssessed, event => Some(event.runner_up? - event.best)),
 ];
 
 /// What a breakpoint waits for.
@@ -303,14 +240,12 @@ struct Watched {
 impl Breakpoints {
     /// A list of breakpoints, none of which was reached yet.
     pub fn new(breakpoints: impl IntoIterator<Item = Breakpoint>) -> Self {
+        let watched = breakpoints.into_iter().map(|breakpoint| Watched {
+            breakpoint,
+            was_true: false,
+        });
         Self {
-            watched: breakpoints
-                .into_iter()
-                .map(|breakpoint| Watched {
-                    breakpoint,
-                    was_true: false,
-                })
-                .collect(),
+            watched: watched.collect(),
         }
     }
 

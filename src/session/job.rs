@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::thread;
 
 use super::index_file::IndexFile;
-use super::message::{Message, Outbox};
+use super::message::Outbox;
 use super::pausing::PausingObserver;
+use super::run::RunState;
 use super::task::Task;
 use crate::localize::{
     ChoiceError, Chooser, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking,
@@ -85,25 +86,28 @@ pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
         .name("estimator".to_owned())
         .spawn(move || {
             let on_choice = |chosen: &References| {
-                // The session may be gone; the next event finds out.
-                let _ = worker.send(Message::Chosen(chosen.clone()));
+                let chosen = chosen.clone();
+                // If the session is gone, the next event finds out.
+                let _ = worker.change(|run| {
+                    run.ranking = None;
+                    run.chosen = Some(chosen);
+                });
             };
             let outcome = catch_unwind(AssertUnwindSafe(|| job.work(0, &mut observer, on_choice)));
-            let last_words = match outcome {
-                Ok(Ok(_)) => Message::Finished,
-                Ok(Err(error)) if error.is_cancelled() => Message::Cancelled,
-                Ok(Err(error)) => Message::Broke(error.to_string()),
+            let last = match outcome {
+                Ok(Ok(_)) => RunState::Finished,
+                Ok(Err(error)) if error.is_cancelled() => RunState::Cancelled,
+                Ok(Err(error)) => RunState::Broken(error.to_string()),
                 Err(panic) => {
-                    Message::Broke(format!("internal error: {}", words_of(panic.as_ref())))
+                    RunState::Broken(format!("internal error: {}", words_of(panic.as_ref())))
                 }
             };
             // Nobody to tell: the session was dropped.
-            let _ = worker.send(last_words);
+            let _ = worker.state(last);
         });
     if let Err(error) = started {
-        let _ = outbox.send(Message::Broke(format!(
-            "no thread could be started: {error}"
-        )));
+        let broken = RunState::Broken(format!("no thread could be started: {error}"));
+        let _ = outbox.state(broken);
     }
 }
 

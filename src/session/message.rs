@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
-use std::time::Duration;
 
-use super::loaded::Loaded;
-use super::run::Part;
-use crate::localize::{QueryResult, References, StageTimes};
-use crate::method::Method;
-use crate::trace::{Cancelled, Record};
+use super::run::{Run, RunState};
+use crate::trace::Cancelled;
+
+/// What the worker says: a change to what the session knows of the run.
+pub(super) type Message = Box<dyn FnOnce(&mut Run) + Send>;
 
 /// The way from the worker to the session.
 #[derive(Clone)]
@@ -19,43 +18,26 @@ pub(super) struct Outbox {
 }
 
 impl Outbox {
-    /// Sends to the session. A session that is gone has cancelled.
-    pub(super) fn send(&self, message: Message) -> Result<(), Cancelled> {
-        self.messages.send(message).map_err(|_| Cancelled)?;
+    /// Changes what the session knows of the run.
+    ///
+    /// # Errors
+    /// [`Cancelled`] where the session is gone. Who goes on all the same finds out at the next event.
+    pub(super) fn change(
+        &self,
+        change: impl FnOnce(&mut Run) + Send + 'static,
+    ) -> Result<(), Cancelled> {
+        self.messages
+            .send(Box::new(change))
+            .map_err(|_| Cancelled)?;
         (self.wake)();
         Ok(())
     }
-}
 
-/// What the worker says to the session.
-pub(super) enum Message {
-    Chosen(References),
-    /// So many of the candidates for references were looked at.
-    Ranking {
-        looked_at: usize,
-        candidates: usize,
-    },
-    Loaded(Arc<Loaded>),
-    Began(Part),
-    /// An event, and how long the run had worked when it was told.
-    Told(Box<Record>, Duration),
-    Waits {
-        breakpoint: Option<String>,
-    },
-    Goes,
-    Ended {
-        result: Box<QueryResult>,
-        times: Option<StageTimes>,
-    },
-    /// Remedies are being tried on a result.
-    Explaining {
-        method: Method,
-        tried: usize,
-        remedies: usize,
-    },
-    /// A result that was told before, explained.
-    Explained(Box<QueryResult>),
-    Finished,
-    Cancelled,
-    Broke(String),
+    /// Says which state the run is in.
+    ///
+    /// # Errors
+    /// [`Cancelled`] where the session is gone.
+    pub(super) fn state(&self, state: RunState) -> Result<(), Cancelled> {
+        self.change(|run| run.state = state)
+    }
 }

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use super::breakpoint::Breakpoints;
 use super::loaded::Loaded;
-use super::message::{Message, Outbox};
-use super::run::Part;
+use super::message::Outbox;
+use super::run::{Part, Run, RunState};
 use crate::event::Event;
 use crate::geometry::Pose;
 use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
@@ -150,9 +150,9 @@ impl PausingObserver {
         (control, observer)
     }
 
-    /// Nobody to tell means that the session was dropped, which the next event answers.
-    fn tell(&self, message: Message) {
-        let _ = self.outbox.send(message);
+    /// If the session is gone, the next event finds out.
+    fn change(&self, change: impl FnOnce(&mut Run) + Send + 'static) {
+        let _ = self.outbox.change(change);
     }
 
     fn obey(&mut self, command: Command) {
@@ -180,7 +180,7 @@ impl PausingObserver {
 
     /// Waits for a mode to go on in. To pause is none.
     fn wait(&mut self, breakpoint: Option<String>) -> Result<(), Cancelled> {
-        self.outbox.send(Message::Waits { breakpoint })?;
+        self.outbox.state(RunState::Paused { breakpoint })?;
         let since = Instant::now();
         let mut goes = false;
         while !goes {
@@ -192,64 +192,56 @@ impl PausingObserver {
             }
         }
         self.waited += since.elapsed();
-        self.outbox.send(Message::Goes)
+        self.outbox.state(RunState::Running)
     }
 }
 
 impl LocalizeObserver for PausingObserver {
     fn begin_query(&mut self, _index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        let loaded = Loaded {
+        let loaded = Arc::new(Loaded {
             problems: problems.to_vec(),
             truth: truth.copied(),
-        };
-        self.tell(Message::Loaded(Arc::new(loaded)));
+        });
+        self.change(|run| {
+            run.loaded = Some(loaded);
+            run.state = RunState::Running;
+        });
     }
 
     fn begin_retrieval(&mut self) {
-        self.tell(Message::Began(Part::Retrieval));
+        self.change(|run| run.begin(Part::Retrieval));
     }
 
     fn choosing(&mut self, looked_at: usize, candidates: usize) {
-        self.tell(Message::Ranking {
-            looked_at,
-            candidates,
-        });
+        self.change(move |run| run.ranking = Some([looked_at, candidates]));
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
-        self.tell(Message::Began(Part::Reference(method, problem)));
+        self.change(move |run| run.begin(Part::Reference(method, problem)));
     }
 
     fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
-        self.tell(Message::Ended {
-            result: Box::new(result.clone()),
-            times: Some(times.clone()),
-        });
+        let (result, times) = (result.clone(), times.clone());
+        self.change(|run| run.end(result, Some(times)));
     }
 
     fn begin_fusion(&mut self, method: Method) {
-        self.tell(Message::Began(Part::Fusion(method)));
+        self.change(move |run| run.begin(Part::Fusion(method)));
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {
-        self.tell(Message::Ended {
-            result: Box::new(result.clone()),
-            times: None,
-        });
+        let result = result.clone();
+        self.change(|run| run.end(result, None));
     }
 
     fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
-        self.tell(Message::Explaining {
-            method: result.method,
-            tried,
-            remedies,
-        });
+        let method = result.method;
+        self.change(move |run| run.go_on_explaining(method, tried, remedies));
     }
 
     fn explained(&mut self, result: &QueryResult) {
-        let _ = self
-            .outbox
-            .send(Message::Explained(Box::new(result.clone())));
+        let result = result.clone();
+        self.change(|run| run.explain(result));
     }
 
     fn attention(&self) -> Option<Arc<AtomicBool>> {
@@ -261,8 +253,12 @@ impl Sink for PausingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
         // Time that it waited is no work.
         let worked = self.begun.elapsed().saturating_sub(self.waited);
-        let told = Message::Told(Box::new(record.clone()), worked);
-        self.outbox.send(told)?;
+        let told = record.clone();
+        self.outbox.change(move |run| {
+            run.push(told, worked);
+            // It was told to go on, or is about to say that it waits.
+            run.state = RunState::Running;
+        })?;
         // A mode that was set before this event starts from the event before it.
         self.obey_all()?;
         self.steps = Some(Steps::from(record));

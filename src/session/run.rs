@@ -10,10 +10,42 @@ use super::task::Task;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
 use crate::history::History;
 use crate::image::Degradation;
-use crate::localize::{QueryResult, StageTimes};
+use crate::localize::{QueryResult, References, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
 use crate::trace::Record;
+
+/// What a session is doing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum RunState {
+    /// Photos and clouds are being read.
+    #[default]
+    Loading,
+    /// Events are coming in.
+    Running,
+    /// The estimator waits behind the last event.
+    Paused {
+        /// The breakpoint that stopped it, if one did.
+        breakpoint: Option<String>,
+    },
+    /// All that was asked for is done.
+    Finished,
+    /// It was told to stop.
+    Cancelled,
+    /// It cannot go on: bad data, or a fault of ours.
+    Broken(String),
+}
+
+impl RunState {
+    /// What has become, in a word or two, of a method that has begun and has no result.
+    pub fn of_what_has_begun(&self) -> &'static str {
+        match self {
+            Self::Loading | Self::Running => "at work",
+            Self::Paused { .. } => "paused",
+            Self::Finished | Self::Cancelled | Self::Broken(_) => "not finished",
+        }
+    }
+}
 
 /// The records of all parts of a run, one after the other, and their results.
 ///
@@ -29,8 +61,11 @@ pub struct Run {
     pub seed: u64,
     /// What was done to the photo of its query before.
     pub degraded: Degradation,
+    /// Its references, once they are chosen.
+    pub chosen: Option<References>,
     /// Its photos and clouds, once they are read.
     pub loaded: Option<Arc<Loaded>>,
+    pub(super) state: RunState,
     history: History,
     /// How long the run had worked when each record was told.
     worked: Vec<Duration>,
