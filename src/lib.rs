@@ -43,6 +43,8 @@ pub mod palette;
 pub mod picture;
 #[cfg(feature = "rerun")]
 mod place;
+#[cfg(feature = "rerun")]
+pub mod proof;
 mod relation;
 #[cfg(feature = "rerun")]
 pub mod report;

@@ -1,6 +1,7 @@
 //! The colours of the window, of recordings, plots and reports: each means one thing everywhere. They stay apart
 //! for colour-blind eyes (after Okabe and Ito), and a name, label or shape always says the same.
 
+use crate::diagnosis::Grade;
 use crate::estimator;
 use crate::features::FeatureState;
 use crate::method::Method;
@@ -63,6 +64,15 @@ pub fn method(method: Method) -> Rgb {
     match METHODS.get(place) {
         Some(&color) => color,
         None => METHODS[paper + (place - paper) % (METHODS.len() - paper)],
+    }
+}
+
+/// The colour of a grade.
+pub fn grade(grade: Grade) -> Rgb {
+    match grade {
+        Grade::Right => TRUTH,
+        Grade::Wrong => ESTIMATE,
+        Grade::NoPose | Grade::Unmeasured => NO_POSE,
     }
 }
 

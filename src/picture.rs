@@ -2,15 +2,14 @@
 
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 
-#[cfg(feature = "app")]
 use crate::cost::Explanation;
+use crate::cost::IntensityPair;
 use crate::cost::JointHistogram;
 #[cfg(feature = "app")]
-use crate::cost::{IntensityPair, PhotometricWeights};
+use crate::cost::PhotometricWeights;
 use crate::grid::ScoredLattice;
 use crate::image::Photo;
 use crate::palette;
-#[cfg(feature = "app")]
 use crate::render::Comparison;
 use crate::render::{SplattedPixel, SyntheticView};
 
@@ -21,7 +20,6 @@ pub(crate) const RESIDUAL_RANGE: f64 = 64.0;
 #[cfg(feature = "app")]
 const CONTRIBUTION_RANGE: f64 = 2.0;
 /// Side of the tiles that speak for one of two poses \[px\]: single pixels of two views hardly ever meet.
-#[cfg(feature = "app")]
 const TILE: u32 = 24;
 
 /// The grey of a pixel that the photometric cost ignored, and of one that it counted.
@@ -67,7 +65,6 @@ fn one_above_the_other<P: Pixel>(
 }
 
 /// The synthetic view in its grey values.
-#[cfg(feature = "app")]
 pub(crate) fn synthetic(view: &SyntheticView) -> GrayImage {
     Painter::new(view).synthetic()
 }
@@ -135,7 +132,6 @@ pub(crate) fn contributions(
 /// Which parts of the query speak for one of two poses, tile by tile: orange for the first, blue for the
 /// second, the stronger the more of the difference of the costs comes from there. `None` where one of the
 /// poses has no cost.
-#[cfg(feature = "app")]
 pub(crate) fn preference(
     query: &GrayImage,
     first: &Comparison,
@@ -170,7 +166,6 @@ pub(crate) fn preference(
 
 /// What each covered pixel contributes to the fit; over all pixels it adds up to what the cost is made of:
 /// mutual information \[nat\], or less the mean squared difference \[grey values²\].
-#[cfg(feature = "app")]
 fn evidence(comparison: &Comparison) -> Option<Vec<f64>> {
     let pairs = &comparison.pairs;
     Some(match comparison.explanation.as_ref()? {

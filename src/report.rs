@@ -24,7 +24,7 @@ use crate::params::Params;
 use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
 use crate::scene::SceneError;
 use crate::table::Table;
-use pictures::{FailurePictures, Witness, thumbnail};
+use pictures::{DrawnProof, Witness, thumbnail};
 
 /// Pictures of so many failures, where nobody says how many.
 pub const PICTURES: usize = 24;
@@ -72,7 +72,7 @@ struct ReportedResult {
     recording: Option<String>,
     /// What happened to it since the baseline.
     change: Option<Change>,
-    pictures: FailurePictures,
+    proof: Option<DrawnProof>,
 }
 
 /// Writes the report of a run into its folder or to `out`, held against a baseline if there is one, with
@@ -170,7 +170,7 @@ fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<Report
             query,
             recording,
             change: None,
-            pictures: FailurePictures::default(),
+            proof: None,
             result: result.clone(),
         }
     });
@@ -255,8 +255,8 @@ fn draw_failures(
             let is_of_pair = run
                 .pair_of(result)
                 .is_some_and(|found| std::ptr::eq(found, pair));
-            if is_of_pair && let Some(pictures) = drawn_failure(&localizer, run, result) {
-                results[at].pictures = pictures;
+            if is_of_pair {
+                results[at].proof = drawn_failure(&localizer, run, result, params);
             }
         }
     }
@@ -266,7 +266,8 @@ fn drawn_failure(
     localizer: &Localizer<'_>,
     run: &RunFile,
     result: &QueryResult,
-) -> Option<FailurePictures> {
+    params: &Params,
+) -> Option<DrawnProof> {
     let method: Method = result.method;
     let query = localizer.queries().find(&result.query).ok()?;
     let reference = result.references.first()?;
@@ -282,21 +283,11 @@ fn drawn_failure(
         setting: None,
     };
     let mut witness = Witness::default();
-    let mut again = None;
     localizer
-        .localize(
-            0,
-            query,
-            &[request],
-            &[method],
-            &mut witness,
-            |result, _| {
-                again = Some(result);
-                Ok::<(), LocalizeError>(())
-            },
-        )
+        .localize(0, query, &[request], &[method], &mut witness, |_, _| {
+            Ok::<(), LocalizeError>(())
+        })
         .ok()?;
     let truth = localizer.queries().pose(query);
-    let pose = again.as_ref().and_then(|result| result.pose.as_ref());
-    Some(witness.pictures(truth.as_ref(), pose))
+    witness.proof(truth.as_ref(), result, params)
 }

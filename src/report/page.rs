@@ -417,14 +417,7 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
                     }
                 }
             }
-            div.pictures {
-                @if let Some(svg) = &one.pictures.matches {
-                    figure { (svg) figcaption { "Matches with a depth: inliers whole, outliers dashed" } }
-                }
-                @if let Some(svg) = &one.pictures.surface {
-                    figure { (svg) figcaption { "Costs around the reference, its front up: yellow is lower" } }
-                }
-            }
+            @if let Some(proof) = &one.proof { img.proof src=(proof.picture) alt=(proof.words); }
         }
     }
 }

@@ -1,0 +1,180 @@
+//! Where the panels of a proof are.
+
+use super::{Panel, ProofPicture};
+
+/// Between two panels \[px\].
+const GAP: f32 = 8.0;
+/// Height of a title \[px\].
+const TITLE: f32 = 18.0;
+/// What the large panel and the strip below it take of the width, where something is beside them.
+const LARGE_SHARE: f32 = 0.58;
+
+/// A rectangle: left, top, width and height \[px\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// From the left edge.
+    pub left: f32,
+    /// From the upper edge.
+    pub top: f32,
+    /// Its width.
+    pub width: f32,
+    /// Its height.
+    pub height: f32,
+}
+
+impl Place {
+    /// The largest place for a panel inside, at its upper left corner.
+    fn fitted(self, panel: &Panel) -> Self {
+        let aspect = panel.aspect();
+        let mut width = self.width.min(self.height * aspect);
+        if panel.is_plain {
+            width = width.min(panel.picture.width() as f32);
+        }
+        Self {
+            width,
+            height: width / aspect,
+            ..self
+        }
+    }
+
+    /// Without the title above.
+    fn below_title(self) -> Self {
+        Self {
+            top: self.top + TITLE,
+            height: (self.height - TITLE).max(1.0),
+            ..self
+        }
+    }
+}
+
+impl ProofPicture {
+    /// The place of each panel's picture in an area of this size, in the order of [`Self::panels`]; titles stand
+    /// right above. A wide large picture has the others below it, another one has them to its right.
+    pub fn places(&self, width: f32, height: f32) -> Vec<Place> {
+        let all = Place {
+            left: 0.0,
+            top: 0.0,
+            width,
+            height,
+        };
+        if self.is_wide() {
+            self.stacked(all)
+        } else {
+            self.side_by_side(all)
+        }
+    }
+
+    /// The height that fits a width.
+    pub fn height_for(&self, width: f32) -> f32 {
+        const MOST: f32 = 1.2;
+        let places = self.places(width, MOST * width);
+        let bottoms = places.iter().map(|place| place.top + place.height);
+        bottoms.fold(1.0, f32::max).ceil()
+    }
+
+    fn is_wide(&self) -> bool {
+        self.large.aspect() > 1.8 && !self.large.has_cells
+    }
+
+    fn side_by_side(&self, all: Place) -> Vec<Place> {
+        let share = if self.beside.is_empty() {
+            1.0
+        } else {
+            LARGE_SHARE
+        };
+        let left = Place {
+            width: (all.width - GAP) * share,
+            ..all
+        };
+        let strip = self
+            .below
+            .as_ref()
+            .map(|below| left.width / below.aspect() + TITLE + GAP);
+        let strip = strip.unwrap_or(0.0).min(0.3 * all.height);
+        let large = Place {
+            height: all.height - strip,
+            ..left
+        };
+        let large = large.below_title().fitted(&self.large);
+        let mut places = vec![large];
+        if let Some(below) = &self.below {
+            let place = Place {
+                top: large.top + large.height + GAP,
+                height: strip,
+                ..left
+            };
+            places.push(place.below_title().fitted(below));
+        }
+        let beside_left = left.width + GAP;
+        let column = Place {
+            left: beside_left,
+            width: all.width - beside_left,
+            ..all
+        };
+        places.extend(column_of(&self.beside, column));
+        places
+    }
+
+    fn stacked(&self, all: Place) -> Vec<Place> {
+        let rows = self.below.iter().map(Panel::aspect);
+        let below_height: f32 = rows
+            .map(|aspect| (all.width / aspect).min(0.2 * all.height) + TITLE + GAP)
+            .sum();
+        let count = self.beside.len().max(1) as f32;
+        let cell = (all.width - GAP * (count - 1.0)) / count;
+        let tallest = self
+            .beside
+            .iter()
+            .map(|panel| cell / panel.aspect() + TITLE);
+        let row_height = tallest.fold(0.0, f32::max).min(0.45 * all.height);
+        let large = Place {
+            height: (all.height - below_height - row_height - GAP).max(1.0),
+            ..all
+        };
+        let large = large.below_title().fitted(&self.large);
+        let mut top = large.top + large.height + GAP;
+        let mut places = vec![large];
+        if let Some(below) = &self.below {
+            let place = Place {
+                top,
+                height: below_height - GAP,
+                ..all
+            };
+            let place = place.below_title().fitted(below);
+            top = place.top + place.height + GAP;
+            places.push(place);
+        }
+        for (at, panel) in self.beside.iter().enumerate() {
+            let place = Place {
+                left: at as f32 * (cell + GAP),
+                top,
+                width: cell,
+                height: row_height,
+            };
+            places.push(place.below_title().fitted(panel));
+        }
+        places
+    }
+}
+
+/// Panels below each other that share a height, each as wide as it may be.
+fn column_of(panels: &[Panel], column: Place) -> Vec<Place> {
+    let gaps = GAP * panels.len().saturating_sub(1) as f32;
+    let wanted: f32 = panels
+        .iter()
+        .map(|panel| column.width / panel.aspect() + TITLE)
+        .sum();
+    let shrink = ((column.height - gaps) / wanted.max(1.0)).min(1.0);
+    let mut top = column.top;
+    let mut places = Vec::new();
+    for panel in panels {
+        let place = Place {
+            top,
+            height: (column.width / panel.aspect() + TITLE) * shrink,
+            ..column
+        };
+        top += place.height + GAP;
+        places.push(place.below_title().fitted(panel));
+    }
+    places
+}

@@ -1,0 +1,387 @@
+//! Proofs of methods that minimise a cost: the map of costs, and what the map looks like from two poses.
+
+use image::{GrayImage, Rgb, RgbImage};
+
+use super::{ColorScale, Panel, ProofCase, ProofPicture, Thing, responsible};
+use crate::cost::Explanation;
+use crate::diagnosis::MapOverlay;
+use crate::estimator::{self, Estimator};
+use crate::event::PhaseSearched;
+use crate::geometry::Pose;
+use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
+use crate::palette;
+use crate::picture;
+use crate::render::{Comparison, SyntheticView};
+
+/// Poses that are tried between two poses, and beyond each of them at the same distances.
+const BETWEEN: usize = 40;
+const BEYOND: usize = 8;
+/// Size of the curve of costs \[px\].
+const CURVE: (u32, u32) = (640, 150);
+
+/// What the cost says at a pose.
+struct Seen {
+    comparison: Comparison,
+    label: &'static str,
+    world_from_query: Pose,
+}
+
+/// The costs around the reference with truth and result, the query, and the map seen from both.
+pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<ProofPicture> {
+    let method = responsible(case.result)?;
+    let estimator = estimator::find(method)?.make(case.params);
+    let seen = |label, pose: Option<Pose>| {
+        let world_from_query = pose?;
+        Some(Seen {
+            comparison: estimator.compare_at(case.problem, &world_from_query)?,
+            label,
+            world_from_query,
+        })
+    };
+    let result = seen("result", case.pose());
+    let truth = seen("truth", case.truth.copied());
+    let mut beside: Vec<Panel> = Vec::new();
+    let query = &case.problem.query.photo.gray;
+    match (overlay, &truth, &result) {
+        (MapOverlay::Preference, Some(truth), Some(result)) => {
+            let parts = picture::preference(query, &result.comparison, &truth.comparison);
+            let title = "Which parts prefer which pose: orange the result, blue the truth";
+            beside.extend(parts.map(|parts| Panel::new(title, parts)));
+        }
+        (MapOverlay::Flat, ..) => beside.extend(histogram(truth.as_ref().or(result.as_ref()))),
+        _ => {}
+    }
+    if beside.is_empty() {
+        beside.push(Panel::new(
+            "Query",
+            picture::photo(&case.problem.query.photo).into_rgb8(),
+        ));
+    }
+    for seen in result.iter().chain(&truth) {
+        beside.push(view_panel(query, seen));
+    }
+    let below = result.as_ref().zip(truth.as_ref());
+    let below = below.and_then(|(result, truth)| curve(case, estimator.as_ref(), result, truth));
+    let coarse = case.all::<PhaseSearched>().map(|event| &event.surface);
+    let coarse = coarse
+        .rev()
+        .find(|surface| surface.lattice.phase == Phase::PositionCoarse);
+    let large = match coarse {
+        Some(surface) => map(case, surface, overlay, result.as_ref(), truth.as_ref()),
+        // Without a grid, the view from the result is what decided.
+        None if beside.len() > 1 => beside.remove(1),
+        None => return None,
+    };
+    Some(ProofPicture {
+        large,
+        below,
+        beside,
+    })
+}
+
+/// The views from the result as it is, and with the height, pitch and roll of the truth.
+pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let (pose, truth) = (case.pose()?, case.truth?);
+    let method = responsible(case.result)?;
+    let estimator = estimator::find(method)?.make(case.params);
+    let reference_from_truth = case.problem.reference_from_query(truth);
+    let on_plane = Offset::of(&reference_from_truth).reference_from_camera();
+    let off_plane = on_plane.inverse() * reference_from_truth;
+    let query = &case.problem.query.photo.gray;
+    let panel = |label, world_from_query: Pose| {
+        let comparison = estimator.compare_at(case.problem, &world_from_query)?;
+        Some(view_panel(
+            query,
+            &Seen {
+                comparison,
+                label,
+                world_from_query,
+            },
+        ))
+    };
+    Some(ProofPicture {
+        large: panel("result", pose)?,
+        below: None,
+        beside: [
+            panel(
+                "result, with the truth's height, pitch and roll",
+                pose * off_plane,
+            ),
+            panel("truth", *truth),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
+    })
+}
+
+fn map(
+    case: &ProofCase<'_>,
+    surface: &ScoredLattice,
+    overlay: MapOverlay,
+    result: Option<&Seen>,
+    truth: Option<&Seen>,
+) -> Panel {
+    let lattice = &surface.lattice;
+    let mut panel = match overlay {
+        MapOverlay::Coverage => coverage_map(surface),
+        _ => {
+            let mut panel = Panel::new(
+                "Cost of each position around the reference",
+                picture::surface(surface),
+            );
+            panel.scale = cost_scale(surface);
+            panel
+        }
+    };
+    panel.has_cells = true;
+    let place =
+        |world_from_query: &Pose| Offset::of(&case.problem.reference_from_query(world_from_query));
+    match overlay {
+        MapOverlay::Ranks => {
+            if let Some(truth) = case.truth {
+                outline_right_cell(&mut panel, surface, &place(truth));
+            }
+        }
+        MapOverlay::Reach => {
+            let radius_m = case.problem.uncertainty_radius_m;
+            let around = (0..=72).map(|step| {
+                let angle = f64::from(step) * std::f64::consts::TAU / 72.0;
+                let offset = Offset {
+                    right_m: radius_m * angle.cos(),
+                    forward_m: radius_m * angle.sin(),
+                    yaw_rad: 0.0,
+                };
+                cell_place(lattice, &offset)
+            });
+            panel.line([0xFF; 3], 1.5, around);
+        }
+        MapOverlay::Rim => {
+            let (right, bottom) = (lattice.columns as f32 - 0.1, lattice.rows as f32 - 0.1);
+            let corners = [
+                [0.1, 0.1],
+                [right, 0.1],
+                [right, bottom],
+                [0.1, bottom],
+                [0.1, 0.1],
+            ];
+            panel.line(palette::ESTIMATE, 3.0, corners);
+        }
+        MapOverlay::Preference | MapOverlay::Coverage | MapOverlay::Flat => {}
+    }
+    panel.mark(
+        Thing::Reference,
+        cell_place(lattice, &Offset::default()),
+        "reference",
+    );
+    if let Some(result) = result {
+        let at = cell_place(lattice, &place(&result.world_from_query));
+        panel.marks.push(case.result_mark(at, result.label()));
+    }
+    if let Some(truth) = truth {
+        let at = cell_place(lattice, &place(&truth.world_from_query));
+        panel.mark(Thing::Truth, at, truth.label());
+    }
+    panel
+}
+
+/// The coarse cell at the truth, with its rank among all that may win.
+fn outline_right_cell(panel: &mut Panel, surface: &ScoredLattice, truth: &Offset) {
+    let lattice = &surface.lattice;
+    let [x, y] = cell_place(lattice, truth);
+    let (left, top) = (x.floor(), y.floor());
+    if left < 0.0 || top < 0.0 || left >= lattice.columns as f32 || top >= lattice.rows as f32 {
+        return;
+    }
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
+    let corners = corners.map(|[across, down]| [left + across, top + down]);
+    panel.line(palette::TRUTH, 2.0, corners);
+    let cell = (lattice.rows - 1 - top as usize) * lattice.columns + left as usize;
+    let Some(own) = surface.eligible_cost(cell) else {
+        panel.title += ", the right cell covers too little to be ranked";
+        return;
+    };
+    let costs = (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
+    let costs: Vec<f64> = costs.collect();
+    let rank = 1 + costs.iter().filter(|cost| **cost < own).count();
+    panel.title += &format!(", the right cell is number {rank} of {}", costs.len());
+}
+
+fn cost_scale(surface: &ScoredLattice) -> Option<ColorScale> {
+    let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
+    let (least, most) = (costs().reduce(f64::min)?, costs().reduce(f64::max)?);
+    Some(ColorScale {
+        dark: format!("{most:.3}"),
+        bright: format!("{least:.3} (lowest cost)"),
+    })
+}
+
+/// How much of the image each position covers.
+fn coverage_map(surface: &ScoredLattice) -> Panel {
+    let lattice = &surface.lattice;
+    let covered = |cell: usize| surface.scores[cell].map(|score| score.covered);
+    let most = (0..surface.scores.len())
+        .filter_map(covered)
+        .max()
+        .unwrap_or(1)
+        .max(1);
+    let cells = RgbImage::from_fn(lattice.columns as u32, lattice.rows as u32, |x, y| {
+        let cell = (lattice.rows - 1 - y as usize) * lattice.columns + x as usize;
+        Rgb(covered(cell).map_or(palette::NOTHING, |covered| {
+            palette::viridis(f64::from(covered) / f64::from(most))
+        }))
+    });
+    let mut panel = Panel::new("How much of the image each position covers", cells);
+    panel.scale = Some(ColorScale {
+        dark: "nothing".to_owned(),
+        bright: format!("{most} px"),
+    });
+    panel
+}
+
+/// Where an offset is on a map of a lattice.
+fn cell_place(lattice: &Lattice, offset: &Offset) -> [f32; 2] {
+    let along = |metres: f64, centre: f64, count: usize| {
+        (metres - centre) / lattice.step + count as f64 / 2.0
+    };
+    let x = along(offset.right_m, lattice.centre.right_m, lattice.columns);
+    let y = along(offset.forward_m, lattice.centre.forward_m, lattice.rows);
+    [x as f32, (lattice.rows as f64 - y) as f32]
+}
+
+impl Seen {
+    fn words(&self) -> String {
+        match self.comparison.score.cost {
+            Some(cost) => format!("{}: cost {cost:.3}", self.label),
+            None => format!("{}: no cost", self.label),
+        }
+    }
+
+    fn label(&self) -> String {
+        match self.comparison.score.cost {
+            Some(cost) => format!("{} {cost:.3}", self.label),
+            None => format!("{}: no cost", self.label),
+        }
+    }
+}
+
+fn view_panel(query: &GrayImage, seen: &Seen) -> Panel {
+    let view = &seen.comparison.view;
+    let share = 100.0 * view.pixels.len() as f64 / f64::from(view.width * view.height).max(1.0);
+    let title = format!("Map seen from the {}, covers {share:.0} %", seen.words());
+    Panel::new(title, over(query, view))
+}
+
+/// The view in its grey values over the darkened query.
+fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
+    const GROUND: f64 = 0.35;
+    let synthetic = picture::synthetic(view);
+    let mut covered = vec![false; (view.width * view.height) as usize];
+    for pixel in &view.pixels {
+        covered[pixel.index as usize] = true;
+    }
+    RgbImage::from_fn(view.width, view.height, |x, y| {
+        let ground = f64::from(query.get_pixel(x, y).0[0]) * GROUND;
+        let painted = f64::from(synthetic.get_pixel(x, y).0[0]);
+        let is_painted = painted > 0.0 || covered[(y * view.width + x) as usize];
+        // Warm and a little brighter than the query, so that thin lines of points are seen.
+        let lifted = 50.0 + painted * 205.0 / 255.0;
+        let [red, green, blue] = if is_painted {
+            [lifted, 0.92 * lifted, 0.72 * lifted]
+        } else {
+            [0.6 * ground, 0.7 * ground, ground]
+        };
+        Rgb([red as u8, green as u8, blue as u8])
+    })
+}
+
+fn histogram(seen: Option<&Seen>) -> Option<Panel> {
+    let seen = seen?;
+    match seen.comparison.explanation.as_ref()? {
+        Explanation::JointHistogram(histogram) => {
+            let title = format!(
+                "Grey values at the {}: query upwards, map to the right",
+                seen.label
+            );
+            let mut panel = Panel::new(title, picture::joint_histogram(histogram));
+            panel.has_cells = true;
+            Some(panel)
+        }
+        Explanation::Weights(_) => None,
+    }
+}
+
+/// The cost on the line from the result to the truth.
+fn curve(
+    case: &ProofCase<'_>,
+    estimator: &dyn Estimator,
+    result: &Seen,
+    truth: &Seen,
+) -> Option<Panel> {
+    let (from, to) = (result.world_from_query, truth.world_from_query);
+    let steps = BETWEEN as isize + 2 * BEYOND as isize;
+    let share = |step: isize| (step - BEYOND as isize) as f64 / BETWEEN as f64;
+    let poses: Vec<Pose> = (0..=steps)
+        .map(|step| {
+            case.problem
+                .reference_from_query(&between(&from, &to, share(step)))
+        })
+        .collect();
+    let mut costs: Vec<Option<f64>> = Vec::new();
+    estimator.with_scorer(case.problem, &mut |scorer| {
+        costs = scorer
+            .score(&poses)
+            .into_iter()
+            .map(|score| score.cost)
+            .collect();
+    });
+    let known = || costs.iter().flatten().copied();
+    let (least, most) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
+    let (width, height) = (CURVE.0 as f32, CURVE.1 as f32);
+    let x = |step: f64| 70.0 + (width - 150.0) * (step / steps as f64) as f32;
+    let y = |cost: f64| {
+        let share = (cost - least) / (most - least).max(f64::MIN_POSITIVE);
+        height - 24.0 - (height - 52.0) * share as f32
+    };
+    let length_m = (to.translation.vector - from.translation.vector).norm();
+    let title =
+        format!("Cost on the line from the result to the truth ({length_m:.2} m), lower is better");
+    let mut panel = Panel::plain(title, CURVE.0, CURVE.1);
+    for cost in [least, most] {
+        panel.line(
+            [0x50; 3],
+            1.0,
+            [[x(0.0), y(cost)], [x(steps as f64), y(cost)]],
+        );
+        panel.mark(Thing::Words, [6.0, y(cost)], format!("{cost:.3}"));
+    }
+    let mut piece: Vec<[f32; 2]> = Vec::new();
+    for (step, cost) in costs.iter().enumerate() {
+        match cost {
+            Some(cost) => piece.push([x(step as f64), y(*cost)]),
+            None => panel.line([0xE0; 3], 2.0, std::mem::take(&mut piece)),
+        }
+    }
+    panel.line([0xE0; 3], 2.0, piece);
+    let ends = [(BEYOND, result), (BEYOND + BETWEEN, truth)];
+    for (step, seen) in ends {
+        let Some(cost) = costs.get(step).copied().flatten() else {
+            continue;
+        };
+        let at = [x(step as f64), y(cost)];
+        if step == BEYOND {
+            panel.marks.push(case.result_mark(at, seen.label()));
+        } else {
+            panel.mark(Thing::Truth, at, seen.label());
+        }
+    }
+    Some(panel)
+}
+
+/// The pose at a share of the way; below 0 and above 1 it goes on in the same direction.
+fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+    const PARALLEL: f64 = 1e-12;
+    let translation = from.translation.vector.lerp(&to.translation.vector, share);
+    let rotation = from.rotation.try_slerp(&to.rotation, share, PARALLEL);
+    Pose::from_parts(translation.into(), rotation.unwrap_or(from.rotation))
+}

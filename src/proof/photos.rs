@@ -1,0 +1,379 @@
+//! Proofs of methods that match features: what they matched, and where the map lies on the photos.
+
+use std::sync::Arc;
+
+use image::{Rgb, RgbImage};
+use nalgebra::{Point2, Point3};
+
+use super::places::from_above;
+use super::{Panel, ProofCase, ProofPicture, Thing};
+use crate::camera::Intrinsics;
+use crate::event::{
+    DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided, MatchesGuided, Side,
+};
+use crate::features::{FeatureState, Features, Keypoint};
+use crate::geometry::Pose;
+use crate::image::Photo;
+use crate::palette::{self, Rgb as Color};
+use crate::picture;
+
+/// Lines of one kind at most; more hide each other.
+const MOST_LINES: usize = 80;
+/// Side of a patch \[px of the photo\], and how much it is enlarged.
+const PATCH: u32 = 48;
+const ENLARGED: u32 = 6;
+/// Patches at most.
+const PATCHES: usize = 4;
+/// Position of inliers among the states of features.
+const INLIER: usize = 4;
+/// What is drawn but does not count.
+const FAINT: Color = [0x70; 3];
+
+/// A match as FB left it.
+struct Matched<'a> {
+    query: &'a Keypoint,
+    reference: &'a Keypoint,
+    state: FeatureState,
+    /// Its point in the reference camera's frame \[m\].
+    point: Option<Point3<f64>>,
+    /// The depths around it \[m\].
+    depth_range_m: Option<(f64, f64)>,
+    /// Whether the truth explains it; `None` without a truth or a point.
+    is_true: Option<bool>,
+}
+
+/// All matches of a run of FB.
+struct Matches<'a> {
+    states: &'a [FeatureState],
+    all: Vec<Matched<'a>>,
+}
+
+impl<'a> Matches<'a> {
+    fn of(case: &ProofCase<'a>) -> Option<Self> {
+        let of_side = |side: Side| -> Option<&'a Features> {
+            let mut detected = case.all::<FeaturesDetected>();
+            let found = detected.rfind(|event| event.side == side)?;
+            Some(&*found.features)
+        };
+        let (query, reference) = (of_side(Side::Query)?, of_side(Side::Reference)?);
+        let decisions = &case.latest::<MatchesDecided>()?.decisions;
+        let states: &'a [FeatureState] = &case.latest::<FeaturesClassified>()?.states;
+        let guided = case.latest::<MatchesGuided>().map(|event| &event.matches);
+        let lifted = guided.or_else(|| case.latest::<DepthsLifted>().map(|event| &event.matches));
+        let threshold_px = case.params.fb.mlesac.inlier_threshold_px;
+        let query_from_reference = case.query_from_reference();
+        let camera = &case.problem.query.intrinsics;
+        let matched = states.iter().enumerate().filter_map(|(at, &state)| {
+            let own = lifted.and_then(|lifted| lifted.iter().find(|one| one.query == at));
+            let decided = decisions.get(at).copied().flatten();
+            let other = own
+                .map(|one| one.reference)
+                .or(decided.map(|one| one.reference))?;
+            let keypoint = query.keypoints.get(at)?;
+            let point = own.and_then(|one| one.point);
+            let is_true = query_from_reference.zip(point).map(|(pose, point)| {
+                let seen = camera.project(&(pose * point));
+                seen.is_some_and(|seen| (seen - pixel(keypoint)).norm() <= threshold_px)
+            });
+            Some(Matched {
+                query: keypoint,
+                reference: reference.keypoints.get(other)?,
+                state,
+                point,
+                depth_range_m: own.and_then(|one| one.depth_range_m),
+                is_true,
+            })
+        });
+        Some(Self {
+            states,
+            all: matched.collect(),
+        })
+    }
+
+    fn inliers(&self) -> impl Iterator<Item = &Matched<'a>> {
+        self.all.iter().filter(|one| one.is_inlier())
+    }
+
+    fn true_ones(&self) -> impl Iterator<Item = &Matched<'a>> {
+        self.all.iter().filter(|one| one.is_true == Some(true))
+    }
+}
+
+impl Matched<'_> {
+    fn is_inlier(&self) -> bool {
+        self.state.index() == INLIER
+    }
+}
+
+impl ProofCase<'_> {
+    /// The true pose of the reference camera in the query's frame.
+    fn query_from_reference(&self) -> Option<Pose> {
+        Some(self.problem.reference_from_query(self.truth?).inverse())
+    }
+}
+
+/// Both photos with inliers and true matches, and how many features passed each step.
+pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let matches = Matches::of(case)?;
+    let (canvas, top) = picture::stacked(&case.problem.query.photo, &case.problem.reference.photo);
+    let title = if case.truth.is_some() {
+        "Query above reference; green: true matches, orange: false inliers"
+    } else {
+        "Query above reference; the inliers"
+    };
+    let mut panel = Panel::new(title, canvas.into_rgb8());
+    let kinds: [(Color, f32, &dyn Fn(&Matched<'_>) -> bool); 4] = [
+        (FAINT, 0.5, &|one| {
+            one.point.is_some() && !one.is_inlier() && one.is_true != Some(true)
+        }),
+        (palette::TRUTH, 1.0, &|one| {
+            one.is_true == Some(true) && !one.is_inlier()
+        }),
+        (palette::ESTIMATE, 1.5, &|one| {
+            one.is_true == Some(false) && one.is_inlier()
+        }),
+        (palette::TRUTH, 2.0, &|one| {
+            one.is_true != Some(false) && one.is_inlier()
+        }),
+    ];
+    for (color, width, is_kind) in kinds {
+        let of_kind: Vec<&Matched<'_>> = matches.all.iter().filter(|one| is_kind(one)).collect();
+        let stride = of_kind.len().div_ceil(MOST_LINES).max(1);
+        for one in of_kind.into_iter().step_by(stride) {
+            let [x, y] = place(one.reference);
+            panel.line(color, width, [place(one.query), [x, y + top as f32]]);
+        }
+    }
+    Some(ProofPicture {
+        large: panel,
+        below: None,
+        beside: vec![funnel(&matches)],
+    })
+}
+
+/// How many query features passed each step, as bars.
+fn funnel(matches: &Matches<'_>) -> Panel {
+    const ROW: f32 = 26.0;
+    const LEFT: f32 = 130.0;
+    const LONGEST: f32 = 240.0;
+    let at_least = |index: usize| {
+        let states = matches.states.iter();
+        states.filter(|state| state.index() >= index).count()
+    };
+    let mut rows = vec![
+        ("detected", at_least(0)),
+        ("distinct", at_least(1)),
+        ("unique", at_least(2)),
+        ("with a depth", at_least(3)),
+    ];
+    let has_truth = matches.all.iter().any(|one| one.is_true.is_some());
+    if has_truth {
+        rows.push(("true matches", matches.true_ones().count()));
+    }
+    rows.push(("inliers", at_least(INLIER)));
+    if has_truth {
+        let both = matches.inliers().filter(|one| one.is_true == Some(true));
+        rows.push(("true inliers", both.count()));
+    }
+    let height = ROW * rows.len() as f32 + 8.0;
+    let mut panel = Panel::plain(
+        "Features of the query that passed each step",
+        440,
+        height as u32,
+    );
+    let most = rows[0].1.max(1) as f32;
+    for (row, (name, count)) in rows.into_iter().enumerate() {
+        let y = ROW * (row as f32 + 0.5) + 4.0;
+        let end = LEFT + LONGEST * count as f32 / most;
+        panel.line(
+            [0x56, 0xB4, 0xE9],
+            12.0,
+            [[LEFT, y], [end.max(LEFT + 1.0), y]],
+        );
+        panel.mark(Thing::Words, [6.0, y], name);
+        panel.mark(Thing::Words, [end + 8.0, y], count.to_string());
+    }
+    panel
+}
+
+/// The depths around the matches whose depths differ most.
+pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let matches = Matches::of(case)?;
+    let spread = |one: &Matched<'_>| one.depth_range_m.map_or(-1.0, |(near, far)| far - near);
+    let mut doubtful: Vec<&Matched<'_>> = matches
+        .all
+        .iter()
+        .filter(|one| one.is_true != Some(true))
+        .collect();
+    doubtful.retain(|one| one.state.index() >= 2);
+    doubtful.sort_by(|a, b| spread(b).total_cmp(&spread(a)));
+    let reference = &case.problem.reference;
+    let mut large = Panel::new(
+        "Depths of the cloud on the reference photo, and the matches without a right depth",
+        cloud_picture(
+            &reference.photo,
+            &reference.intrinsics,
+            case,
+            &Pose::identity(),
+        ),
+    );
+    for one in &doubtful {
+        large.mark(Thing::Dot(palette::ESTIMATE), place(one.reference), "");
+    }
+    let beside = doubtful
+        .iter()
+        .take(PATCHES)
+        .map(|one| depth_patch(&large.picture, one));
+    Some(ProofPicture {
+        beside: beside.collect(),
+        large,
+        below: None,
+    })
+}
+
+fn depth_patch(photo: &RgbImage, one: &Matched<'_>) -> Panel {
+    let [x, y] = place(one.reference);
+    let corner = |at: f32, length: u32| {
+        (at as u32)
+            .saturating_sub(PATCH / 2)
+            .min(length.saturating_sub(PATCH))
+    };
+    let (left, top) = (corner(x, photo.width()), corner(y, photo.height()));
+    let patch = image::imageops::crop_imm(photo, left, top, PATCH, PATCH).to_image();
+    let large = image::imageops::resize(
+        &patch,
+        patch.width() * ENLARGED,
+        patch.height() * ENLARGED,
+        image::imageops::FilterType::Nearest,
+    );
+    let title = match one.depth_range_m {
+        Some((near, far)) => format!("Depths {near:.1} to {far:.1} m around this match"),
+        None => "No depth near this match".to_owned(),
+    };
+    let mut panel = Panel::new(title, large);
+    let at = [x - left as f32, y - top as f32].map(|along| along * ENLARGED as f32);
+    for [across, down] in [[1.0, 0.0], [0.0, 1.0]] {
+        for side in [-1.0, 1.0] {
+            let from = [at[0] + side * across * 6.0, at[1] + side * down * 6.0];
+            let to = [at[0] + side * across * 30.0, at[1] + side * down * 30.0];
+            panel.line([0xFF; 3], 1.5, [from, to]);
+        }
+    }
+    panel
+}
+
+/// The inliers in the photo, and their points from above.
+pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let matches = Matches::of(case)?;
+    let photo = picture::photo(&case.problem.query.photo).into_rgb8();
+    let title = format!("The {} inliers in the query", matches.inliers().count());
+    let mut large = Panel::new(title, photo);
+    for one in matches.inliers() {
+        large.mark(Thing::Dot(palette::TRUTH), place(one.query), "");
+    }
+    let points: Vec<Point3<f64>> = matches.inliers().filter_map(|one| one.point).collect();
+    Some(ProofPicture {
+        large,
+        below: None,
+        beside: vec![from_above(case, &points)],
+    })
+}
+
+/// What the truth explains beside what the result explains.
+pub(super) fn rival_inliers(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let matches = Matches::of(case)?;
+    let panel = |title: String, color: Color, ones: &mut dyn Iterator<Item = &Matched<'_>>| {
+        let mut panel = Panel::new(title, picture::photo(&case.problem.query.photo).into_rgb8());
+        for one in ones {
+            panel.mark(Thing::Dot(color), place(one.query), "");
+        }
+        panel
+    };
+    let (of_truth, of_result) = (matches.true_ones().count(), matches.inliers().count());
+    let large = panel(
+        format!("The truth explains {of_truth} matches"),
+        palette::TRUTH,
+        &mut matches.true_ones(),
+    );
+    let result = panel(
+        format!("The result explains {of_result} matches"),
+        palette::ESTIMATE,
+        &mut matches.inliers(),
+    );
+    Some(ProofPicture {
+        large,
+        below: None,
+        beside: vec![result],
+    })
+}
+
+/// The cloud on the reference's photo, and on the query's where its pose is known.
+pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let (query, reference) = (&case.problem.query, &case.problem.reference);
+    let large = Panel::new(
+        "The cloud on the reference photo, coloured by depth",
+        cloud_picture(
+            &reference.photo,
+            &reference.intrinsics,
+            case,
+            &Pose::identity(),
+        ),
+    );
+    let on_query = |what: &str, query_from_reference: &Pose| {
+        Panel::new(
+            format!("The cloud on the query photo, from the {what}"),
+            cloud_picture(&query.photo, &query.intrinsics, case, query_from_reference),
+        )
+    };
+    let truth = case
+        .query_from_reference()
+        .map(|pose| on_query("truth", &pose));
+    let found = case
+        .pose()
+        .map(|pose| case.problem.reference_from_query(&pose).inverse());
+    let result = found.map(|pose| on_query("result", &pose));
+    Some(ProofPicture {
+        large,
+        below: None,
+        beside: truth.into_iter().chain(result).collect(),
+    })
+}
+
+/// A darkened photo with the points of the reference's cloud in the colours of their depths, near ones above.
+fn cloud_picture(
+    photo: &Arc<Photo>,
+    camera: &Intrinsics,
+    case: &ProofCase<'_>,
+    camera_from_reference: &Pose,
+) -> RgbImage {
+    let mut canvas = picture::photo(photo).into_rgb8();
+    for pixel in canvas.pixels_mut() {
+        pixel.0 = pixel.0.map(|value| value / 3);
+    }
+    let points = case.problem.reference.cloud.points.iter();
+    let seen = points.filter_map(|point| {
+        let point = camera_from_reference * point.cast::<f64>();
+        let pixel = camera.project(&point)?;
+        camera.contains(&pixel).then_some((point.z, pixel))
+    });
+    let mut seen: Vec<(f64, Point2<f64>)> = seen.collect();
+    seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (depth_m, pixel) in seen {
+        let (x, y) = (pixel.x.round() as u32, pixel.y.round() as u32);
+        for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
+            if let Some(here) = canvas.get_pixel_mut_checked(x, y) {
+                *here = Rgb(palette::depth(depth_m));
+            }
+        }
+    }
+    canvas
+}
+
+fn pixel(keypoint: &Keypoint) -> Point2<f64> {
+    Point2::new(f64::from(keypoint.x), f64::from(keypoint.y))
+}
+
+/// The place of a keypoint in a picture, whose first pixel has its centre at (0.5, 0.5).
+fn place(keypoint: &Keypoint) -> [f32; 2] {
+    [keypoint.x + 0.5, keypoint.y + 0.5]
+}

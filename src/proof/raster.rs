@@ -1,0 +1,325 @@
+//! Painting a proof on the processor: what reports and recordings show.
+
+use std::sync::LazyLock;
+
+use image::imageops::{self, FilterType};
+use image::{Rgb, RgbImage};
+use skrifa::instance::{LocationRef, Size};
+use skrifa::{FontRef, MetadataProvider as _};
+use vello_cpu::color::AlphaColor;
+use vello_cpu::kurbo::{Affine, BezPath, Circle, Rect, Shape as _, Stroke};
+use vello_cpu::peniko::{Blob, FontData};
+use vello_cpu::{Glyph, Level, Pixmap, RenderContext, RenderSettings, Resources};
+
+use super::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
+use crate::palette::{self, Rgb as Color};
+
+/// The ground between panels.
+const GROUND: Color = [0x22, 0x24, 0x28];
+const WORDS: Color = [0xE8; 3];
+/// Size of titles and labels \[px\].
+const FONT_PX: f32 = 13.0;
+/// Half the size of a mark \[px\].
+const MARK: f64 = 7.0;
+
+static FONT: LazyLock<FontData> = LazyLock::new(|| {
+    let bytes: &'static [u8] = epaint_default_fonts::UBUNTU_LIGHT;
+    FontData::new(Blob::from(bytes.to_vec()), 0)
+});
+
+impl ProofPicture {
+    /// The picture in this width \[px\].
+    pub fn raster(&self, width: u32) -> RgbImage {
+        let width = width.clamp(200, 4096);
+        let height = (self.height_for(width as f32) as u32).clamp(1, 8192);
+        let mut canvas = RgbImage::from_pixel(width, height, Rgb(GROUND));
+        let places = self.places(width as f32, height as f32);
+        for (panel, place) in self.panels().zip(&places) {
+            paste(&mut canvas, panel, place);
+        }
+        // The same on every processor.
+        let settings = RenderSettings {
+            level: Level::baseline(),
+            num_threads: 0,
+        };
+        let mut painter = Painter {
+            context: RenderContext::new_with(width as u16, height as u16, settings),
+            resources: Resources::new(),
+            width: width as f32,
+        };
+        for (panel, place) in self.panels().zip(&places) {
+            painter.panel(panel, place);
+        }
+        painter.lay_over(&mut canvas);
+        canvas
+    }
+}
+
+/// Puts the panel's picture into its place.
+fn paste(canvas: &mut RgbImage, panel: &Panel, place: &Place) {
+    let size = [place.width, place.height].map(|length| (length.round() as u32).max(1));
+    let filter = if panel.has_cells {
+        FilterType::Nearest
+    } else {
+        FilterType::Triangle
+    };
+    let picture = imageops::resize(panel.picture.as_ref(), size[0], size[1], filter);
+    imageops::replace(
+        canvas,
+        &picture,
+        place.left.round() as i64,
+        place.top.round() as i64,
+    );
+}
+
+struct Painter {
+    context: RenderContext,
+    resources: Resources,
+    width: f32,
+}
+
+impl Painter {
+    fn panel(&mut self, panel: &Panel, place: &Place) {
+        self.words(&panel.title, [place.left, place.top - 5.0], WORDS);
+        let scale = [
+            place.width / panel.picture.width().max(1) as f32,
+            place.height / panel.picture.height().max(1) as f32,
+        ];
+        let on_canvas =
+            |at: [f32; 2]| [place.left + at[0] * scale[0], place.top + at[1] * scale[1]];
+        let clip = Rect::new(
+            place.left.into(),
+            place.top.into(),
+            (place.left + place.width).into(),
+            (place.top + place.height).into(),
+        );
+        self.context.push_clip_layer(&clip.to_path(0.1));
+        for line in &panel.lines {
+            let mut path = BezPath::new();
+            for (at, point) in line.points.iter().enumerate() {
+                let point = on_canvas(*point).map(f64::from);
+                if at == 0 {
+                    path.move_to((point[0], point[1]));
+                } else {
+                    path.line_to((point[0], point[1]));
+                }
+            }
+            self.stroke(&path, line.color, line.width.into());
+        }
+        let mut taken: Vec<[f32; 4]> = Vec::new();
+        for mark in &panel.marks {
+            self.mark(mark, on_canvas(mark.at));
+        }
+        for mark in panel.marks.iter().filter(|mark| !mark.label.is_empty()) {
+            let at = label_place(
+                mark,
+                on_canvas(mark.at),
+                width_of(&mark.label),
+                place,
+                &mut taken,
+            );
+            self.label(&mark.label, at, mark.thing != Thing::Words);
+        }
+        self.context.pop_layer();
+        if let Some(scale) = &panel.scale {
+            self.scale(scale, place);
+        }
+    }
+
+    fn mark(&mut self, mark: &Mark, at: [f32; 2]) {
+        let (x, y) = (f64::from(at[0]), f64::from(at[1]));
+        let shape = match mark.thing {
+            Thing::Reference => Circle::new((x, y), MARK).to_path(0.1),
+            Thing::Truth => path(&[
+                &[(x - MARK, y), (x + MARK, y)],
+                &[(x, y - MARK), (x, y + MARK)],
+            ]),
+            Thing::Result(_) => {
+                let corners = [
+                    (x, y - MARK),
+                    (x + MARK, y),
+                    (x, y + MARK),
+                    (x - MARK, y),
+                    (x, y - MARK),
+                ];
+                path(&[&corners])
+            }
+            Thing::Dot(_) => Circle::new((x, y), 3.0).to_path(0.1),
+            Thing::Words => return,
+        };
+        self.stroke(&shape, [0; 3], 5.0);
+        self.stroke(&shape, mark.thing.color(), 2.5);
+    }
+
+    /// Words on a dark ground.
+    fn label(&mut self, words: &str, at: [f32; 2], has_ground: bool) {
+        if has_ground {
+            let (x, y) = (f64::from(at[0]), f64::from(at[1]));
+            let ground = Rect::new(
+                x - 3.0,
+                y - 12.0,
+                x + f64::from(width_of(words)) + 3.0,
+                y + 5.0,
+            );
+            self.context.set_paint(AlphaColor::from_rgba8(0, 0, 0, 190));
+            self.context.fill_rect(&ground);
+        }
+        self.words(words, at, WORDS);
+    }
+
+    fn stroke(&mut self, path: &BezPath, color: Color, width: f64) {
+        let [red, green, blue] = color;
+        self.context
+            .set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
+        self.context.set_stroke(Stroke::new(width));
+        self.context.stroke_path(path);
+    }
+
+    /// Words that begin at a place, on their base line; what does not fit is cut off with an ellipsis.
+    fn words(&mut self, words: &str, at: [f32; 2], color: Color) {
+        let words = elided(words, self.width - at[0]);
+        let [red, green, blue] = color;
+        self.context
+            .set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
+        let glyphs = glyphs(&words, at);
+        let run = self.context.glyph_run(&mut self.resources, &FONT);
+        run.font_size(FONT_PX)
+            .hint(false)
+            .fill_glyphs(glyphs.into_iter());
+    }
+
+    /// A bar of colours in the lower left corner of a panel.
+    fn scale(&mut self, scale: &ColorScale, place: &Place) {
+        const STEPS: u32 = 64;
+        let (left, top) = (place.left + 8.0, place.top + place.height - 24.0);
+        let ends = [width_of(&scale.dark), width_of(&scale.bright)];
+        let bar = 90.0;
+        let ground = Rect::new(
+            (left - 4.0).into(),
+            (top - 4.0).into(),
+            (left + ends[0] + ends[1] + bar + 16.0).into(),
+            (top + 20.0).into(),
+        );
+        self.context.set_paint(AlphaColor::from_rgba8(0, 0, 0, 190));
+        self.context.fill_rect(&ground);
+        self.words(&scale.dark, [left, top + 12.0], WORDS);
+        let start = left + ends[0] + 6.0;
+        for step in 0..STEPS {
+            let [red, green, blue] = palette::viridis((f64::from(step) + 0.5) / f64::from(STEPS));
+            self.context
+                .set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
+            let x = f64::from(start + bar * step as f32 / STEPS as f32);
+            let width = f64::from(bar) / f64::from(STEPS) + 0.5;
+            self.context
+                .fill_rect(&Rect::new(x, top.into(), x + width, f64::from(top) + 14.0));
+        }
+        self.words(&scale.bright, [start + bar + 6.0, top + 12.0], WORDS);
+    }
+
+    fn lay_over(mut self, canvas: &mut RgbImage) {
+        self.context.flush();
+        let mut pixmap = Pixmap::new(self.context.width(), self.context.height());
+        self.context.render(&mut pixmap, &mut self.resources);
+        for (below, above) in canvas.pixels_mut().zip(pixmap.data()) {
+            let through = 255 - u32::from(above.a);
+            let premultiplied = [above.r, above.g, above.b];
+            below.0 = std::array::from_fn(|channel| {
+                let mixed =
+                    u32::from(premultiplied[channel]) * 255 + u32::from(below.0[channel]) * through;
+                (mixed / 255) as u8
+            });
+        }
+    }
+}
+
+fn path(lines: &[&[(f64, f64)]]) -> BezPath {
+    let mut path = BezPath::new();
+    for line in lines {
+        for (at, &point) in line.iter().enumerate() {
+            if at == 0 {
+                path.move_to(point);
+            } else {
+                path.line_to(point);
+            }
+        }
+    }
+    path.apply_affine(Affine::IDENTITY);
+    path
+}
+
+/// Beside the mark, inside the panel, where no other label is.
+fn label_place(
+    mark: &Mark,
+    at: [f32; 2],
+    width: f32,
+    panel: &Place,
+    taken: &mut Vec<[f32; 4]>,
+) -> [f32; 2] {
+    if mark.thing == Thing::Words {
+        return [at[0], at[1] + 4.5];
+    }
+    let gap = MARK as f32 + 6.0;
+    let right = panel.left + panel.width;
+    let x = if at[0] + gap + width + 4.0 < right {
+        at[0] + gap
+    } else {
+        (at[0] - gap - width).max(panel.left + 4.0)
+    };
+    let overlaps = |y: f32, other: &[f32; 4]| {
+        x < other[0] + other[2] + 6.0 && other[0] < x + width + 6.0 && (y - other[1]).abs() < 18.0
+    };
+    let rows = [0.0, 18.0, -18.0, 36.0, -36.0, 54.0, -54.0].map(|down| at[1] + 4.5 + down);
+    let is_inside = |y: &f32| *y > panel.top + 12.0 && *y < panel.top + panel.height - 4.0;
+    let free = rows
+        .into_iter()
+        .filter(is_inside)
+        .find(|y| !taken.iter().any(|other| overlaps(*y, other)));
+    let y = free.unwrap_or(at[1] + 4.5);
+    taken.push([x, y, width, 16.0]);
+    [x, y]
+}
+
+/// The glyphs of words that begin at a place.
+fn glyphs(words: &str, at: [f32; 2]) -> Vec<Glyph> {
+    let Ok(font) = FontRef::new(epaint_default_fonts::UBUNTU_LIGHT) else {
+        return Vec::new();
+    };
+    let (map, metrics) = (
+        font.charmap(),
+        font.glyph_metrics(Size::new(FONT_PX), LocationRef::default()),
+    );
+    let mut x = at[0];
+    let glyph = |letter: char| {
+        let id = map.map(letter).unwrap_or_default();
+        let glyph = Glyph {
+            id: id.to_u32(),
+            x,
+            y: at[1],
+        };
+        x += metrics.advance_width(id).unwrap_or_default();
+        glyph
+    };
+    words.chars().map(glyph).collect()
+}
+
+/// How wide words are \[px\].
+fn width_of(words: &str) -> f32 {
+    // One letter more, whose place is the end of the words.
+    let glyphs = glyphs(&format!("{words}."), [0.0, 0.0]);
+    glyphs.last().map_or(0.0, |last| last.x)
+}
+
+/// As much of the words as fits.
+fn elided(words: &str, width: f32) -> String {
+    if width_of(words) <= width {
+        return words.to_owned();
+    }
+    let mut kept: Vec<char> = words.chars().collect();
+    while kept.pop().is_some() {
+        let shorter: String = kept.iter().chain(&['…']).collect();
+        if width_of(&shorter) <= width {
+            return shorter;
+        }
+    }
+    String::new()
+}

@@ -1,0 +1,124 @@
+use super::*;
+use crate::diagnosis::RULES;
+use crate::history::History;
+use crate::localize::{LocalizeError, LocalizeObserver, Localizer, Request};
+use crate::scene;
+use crate::trace::{Cancelled, Sink};
+
+/// Keeps what a proof is made from.
+#[derive(Default)]
+struct Kept {
+    history: History,
+    problems: Vec<Problem>,
+    truth: Option<Pose>,
+}
+
+impl Sink for Kept {
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        self.history.accept(record)
+    }
+}
+
+impl LocalizeObserver for Kept {
+    fn begin_query(&mut self, _index: usize, problems: &[Problem], truth: Option<&Pose>) {
+        self.problems = problems.to_vec();
+        self.truth = truth.copied();
+    }
+}
+
+/// The first query of the street against its neighbour, by one method.
+fn localized(method: Method) -> (Kept, QueryResult) {
+    let street = scene::open("street", None).expect("the built-in scene");
+    let params = Params::default();
+    let localizer = Localizer::new(street.as_ref(), street.as_ref(), &params, 0).explaining(0);
+    let request = Request {
+        radius_m: 5.0,
+        references: vec![1].into(),
+        fusions: Vec::new(),
+        setting: None,
+    };
+    let (mut kept, mut found) = (Kept::default(), None);
+    localizer
+        .localize(0, 0, &[request], &[method], &mut kept, |result, _| {
+            found = Some(result);
+            Ok::<(), LocalizeError>(())
+        })
+        .expect("nobody stops it");
+    (kept, found.expect("a result"))
+}
+
+/// Every kind of proof that a method's run has something to show for.
+fn pictures(kept: &Kept, result: &QueryResult) -> Vec<(&'static str, ProofPicture)> {
+    let params = Params::default();
+    let drawn = RULES.iter().filter_map(|rule| {
+        let mut result = result.clone();
+        result.diagnosis = vec![crate::diagnosis::Diagnosis {
+            code: rule.code,
+            text: String::new(),
+            evidence: Default::default(),
+        }];
+        let case = ProofCase {
+            problem: &kept.problems[0],
+            records: kept.history.records(),
+            result: &result,
+            truth: kept.truth.as_ref(),
+            params: &params,
+        };
+        Some((rule.code.name(), ProofPicture::of(&case)?))
+    });
+    drawn.collect()
+}
+
+/// A picture for every verdict that a method can get, none of whose panels leaves the picture or lies on another.
+#[test]
+fn every_verdict_has_a_picture_without_overlap() {
+    for (method, least) in [(Method::FB, 15), (Method::MI, 13)] {
+        let (kept, result) = localized(method);
+        let drawn = pictures(&kept, &result);
+        assert!(drawn.len() >= least, "{method}: {}", drawn.len());
+        for (code, picture) in drawn {
+            let width = 960.0;
+            let height = picture.height_for(width);
+            let places = picture.places(width, height);
+            assert_eq!(places.len(), picture.panels().count());
+            for (at, one) in places.iter().enumerate() {
+                let ends = [one.left + one.width, one.top + one.height];
+                assert!(
+                    one.left >= 0.0 && one.top >= 0.0,
+                    "{method} {code}: {one:?}"
+                );
+                assert!(
+                    ends[0] <= width + 0.5 && ends[1] <= height + 0.5,
+                    "{method} {code}: {one:?} in {height}"
+                );
+                assert!(
+                    one.width >= 60.0 && one.height >= 30.0,
+                    "{method} {code}: {one:?}"
+                );
+                for other in &places[..at] {
+                    let is_apart = ends[0] <= other.left
+                        || other.left + other.width <= one.left
+                        || ends[1] <= other.top
+                        || other.top + other.height <= one.top;
+                    assert!(is_apart, "{method} {code}: {one:?} on {other:?}");
+                }
+            }
+            if let Some(folder) = std::env::var_os("POSESCOPE_PAINT") {
+                let path = std::path::Path::new(&folder).join(format!("{method}-{code}.png"));
+                picture
+                    .raster(960)
+                    .save(path)
+                    .expect("a folder to write to");
+            }
+        }
+    }
+}
+
+/// The same bytes each time: reports are compared by them.
+#[test]
+fn a_proof_is_painted_the_same_twice() {
+    let (kept, result) = localized(Method::MI);
+    let first = pictures(&kept, &result);
+    let again = pictures(&kept, &result);
+    assert_eq!(first[0].1.raster(640), again[0].1.raster(640));
+}
