@@ -17,17 +17,11 @@ echo 000450 1 0 0 0 0 0 0 > "$made/poses.txt"
 
 # NAME SCENE QUERIES QUERY REFERENCE VIEW AT [ARGUMENTS OF ITS OWN …]
 picture() {
-    local view=() reference=()
-    [ "$6" = whole ] || view=(--view "$6")
+    local reference=()
     [ "$5" = retrieved ] || reference=(--reference "$5")
-    "$posescope" view "$2" --query-scene "$3" --query "$4" "${reference[@]}" "${view[@]}" --at "$7" \
-        --window "$size" --screenshot "$1.jpg" "${more[@]}" "${@:8}"
+    "$posescope" view "$2" --query-scene "$3" --query "$4" "${reference[@]}" --view "$6" --at "$7" \
+        --window 800x440 --screenshot "$1.jpg" "${@:8}"
 }
-size=1500x950
-more=(--explain)
-picture card street:snow street:night 450 450 whole mi
-size=800x440
-more=()
 picture X1 street "$made/overcast" 600 600 images fb --method fb --set surf.max_keypoints=150
 picture R1 street:snow street:night 138 122 space fb
 picture R2 street street 589 583 images fb --method fb --degrade fog=0.9
