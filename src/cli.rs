@@ -7,8 +7,6 @@ mod compute;
 mod defaults;
 mod demo;
 mod doctor;
-#[cfg(test)]
-mod documented;
 mod eval;
 mod event_export;
 mod failure;
@@ -30,6 +28,8 @@ mod surface;
 mod synth;
 mod table;
 mod terminal;
+#[cfg(test)]
+mod tests;
 #[cfg(feature = "app")]
 mod view;
 
