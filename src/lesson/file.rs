@@ -1,15 +1,13 @@
 //! The file of a lesson.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::PathBuf;
 
-use pulldown_cmark::{CodeBlockKind, Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 use serde::Deserialize;
 
 use super::moment::Moment;
 use super::page::{Answer, Page, Question};
-use super::setting::Setting;
+use super::setting::{Fields, Setting};
 use super::{Claim, Lesson};
 use crate::measure::Condition;
 use crate::method::Method;
@@ -52,9 +50,9 @@ struct Header {
     title: String,
     about: String,
     minutes: u32,
-    setting: Setting,
+    setting: Fields,
     #[serde(default)]
-    variant: BTreeMap<String, Setting>,
+    variant: BTreeMap<String, Fields>,
     #[serde(default)]
     claim: Vec<ClaimText>,
 }
@@ -91,12 +89,19 @@ struct QuestionText {
     reveal: Option<Moment>,
 }
 
+/// TOML in the file.
+struct Block {
+    /// The line above it, from 1.
+    line: usize,
+    text: String,
+}
+
 /// A page as it stands in the file.
-#[derive(Default)]
 struct Section {
     title: String,
-    heading: Range<usize>,
-    header: Option<(Range<usize>, String)>,
+    line: usize,
+    header: Option<Block>,
+    text: String,
 }
 
 /// The name of the setting that a lesson begins with.
@@ -111,38 +116,41 @@ impl Lesson {
     /// # Errors
     /// [`LessonError::Malformed`], with the line.
     pub fn parse(name: &str, text: &str) -> Result<Self, LessonError> {
-        let source = Source { name, text };
-        let (header, sections) = source.sections()?;
-        let (range, header) =
-            header.ok_or_else(|| source.malformed(0, "a header between lines of +++ expected"))?;
-        let header: Header = source.toml(&header, range.start)?;
-        let mut variants = vec![(FIRST.to_owned(), header.setting.clone())];
-        for (variant, setting) in header.variant {
-            variants.push((variant, setting.over(&header.setting)));
+        let source = Source { name };
+        let (header, sections) = source.sections(text)?;
+        let block =
+            header.ok_or_else(|| source.malformed(1, "a header between lines of +++ expected"))?;
+        let header: Header = source.toml(&block)?;
+        let setting = |fields: &Fields| {
+            Setting::of(fields).map_err(|(at, why)| source.malformed_at(&block, at, &why))
+        };
+        let first = setting(&header.setting)?;
+        let mut variants = vec![(FIRST.to_owned(), first.clone())];
+        for (variant, fields) in header.variant {
+            variants.push((variant, setting(&fields)?.over(&first)));
         }
-        let known = |variant: &str, at: usize| {
+        let known = |variant: &str, line: usize| {
             if variants.iter().any(|(name, _)| name == variant) {
                 Ok(variant.to_owned())
             } else {
-                Err(source.malformed(at, &format!("there is no variant `{variant}`")))
+                Err(source.malformed(line, &format!("there is no variant `{variant}`")))
             }
         };
         let mut claims = Vec::new();
         for claim in header.claim {
             claims.push(Claim {
-                variant: known(claim.variant.as_deref().unwrap_or(FIRST), range.start)?,
+                variant: known(claim.variant.as_deref().unwrap_or(FIRST), block.line)?,
                 holds: (claim.holds.parse::<Condition>())
-                    .map_err(|why| source.malformed(range.start, &why.to_string()))?,
+                    .map_err(|why| source.malformed(block.line, &why))?,
             });
         }
         let mut pages: Vec<Page> = Vec::new();
-        for (index, section) in sections.iter().enumerate() {
-            let end = sections.get(index + 1);
-            let end = end.map_or(text.len(), |next| next.heading.start);
-            pages.push(source.page(section, end, pages.last(), &known)?);
+        for section in sections {
+            pages.push(source.page(section, pages.last(), &known)?);
         }
         if pages.is_empty() {
-            return Err(source.malformed(text.len(), "a page, which begins with `## `, expected"));
+            let end = text.lines().count();
+            return Err(source.malformed(end, "a page, which begins with `## `, expected"));
         }
         Ok(Self {
             name: name.to_owned(),
@@ -158,91 +166,71 @@ impl Lesson {
 
 struct Source<'a> {
     name: &'a str,
-    text: &'a str,
 }
 
-/// A text and where it is.
-type Placed = (Range<usize>, String);
-
 impl Source<'_> {
-    fn malformed(&self, at: usize, why: &str) -> LessonError {
-        let before = &self.text.as_bytes()[..at.min(self.text.len())];
+    fn malformed(&self, line: usize, why: &(impl ToString + ?Sized)) -> LessonError {
         LessonError::Malformed {
             name: self.name.to_owned(),
-            line: 1 + before.iter().filter(|byte| **byte == b'\n').count(),
-            why: why.to_owned(),
+            line,
+            why: why.to_string(),
         }
     }
 
-    /// Reads TOML that begins behind a line at `at`.
-    fn toml<T: serde::de::DeserializeOwned>(
+    /// An error at a byte of a block.
+    fn malformed_at(
         &self,
-        text: &str,
+        block: &Block,
         at: usize,
-    ) -> Result<T, LessonError> {
-        toml::from_str(text).map_err(|error| {
-            let lines = error.span().map_or(0, |span| {
-                let before = text.as_bytes().iter().take(span.start);
-                before.filter(|byte| **byte == b'\n').count()
-            });
-            let line = self.malformed(at, "");
-            match line {
-                LessonError::Malformed { name, line, .. } => LessonError::Malformed {
-                    name,
-                    // The block's first line is its fence.
-                    line: line + 1 + lines,
-                    why: error.message().to_owned(),
-                },
-                other => other,
-            }
+        why: &(impl ToString + ?Sized),
+    ) -> LessonError {
+        let before = block.text.bytes().take(at);
+        let lines = before.filter(|byte| *byte == b'\n').count();
+        self.malformed(block.line + 1 + lines, why)
+    }
+
+    fn toml<T: serde::de::DeserializeOwned>(&self, block: &Block) -> Result<T, LessonError> {
+        toml::from_str(&block.text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            self.malformed_at(block, at, error.message())
         })
     }
 
     /// The header of the file and its pages.
-    fn sections(&self) -> Result<(Option<Placed>, Vec<Section>), LessonError> {
+    fn sections(&self, text: &str) -> Result<(Option<Block>, Vec<Section>), LessonError> {
         let mut header = None;
         let mut sections: Vec<Section> = Vec::new();
-        // What the text that comes next belongs to.
-        let mut block: Option<(Block, Placed)> = None;
-        let options = Options::ENABLE_PLUSES_DELIMITED_METADATA_BLOCKS;
-        for (event, range) in Parser::new_ext(self.text, options).into_offset_iter() {
-            match event {
-                Event::Start(Tag::MetadataBlock(_)) => {
-                    block = Some((Block::Header, (range, String::new())));
-                }
-                Event::Start(Tag::Heading {
-                    level: HeadingLevel::H2,
-                    ..
-                }) => block = Some((Block::Heading, (range, String::new()))),
-                Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(kind))) if &*kind == "page" => {
-                    block = Some((Block::Page, (range, String::new())));
-                }
-                Event::Text(words) | Event::Code(words) => {
-                    if let Some((_, (_, text))) = &mut block {
-                        text.push_str(&words);
+        let mut is_code = false;
+        let mut lines = (1..).zip(text.lines());
+        while let Some((line, text)) = lines.next() {
+            let mut block_until = |fence: &str| {
+                let inside = lines.by_ref().map(|(_, text)| text);
+                let inside = inside.take_while(|text| text.trim_end() != fence);
+                let text = inside.map(|text| format!("{text}\n")).collect();
+                Block { line, text }
+            };
+            match text.trim_end() {
+                "+++" if line == 1 => header = Some(block_until("+++")),
+                "```page" if !is_code => match sections.last_mut() {
+                    Some(page) if page.header.is_none() => page.header = Some(block_until("```")),
+                    _ => {
+                        return Err(
+                            self.malformed(line, "a page has one header, below its heading")
+                        );
+                    }
+                },
+                heading if heading.starts_with("## ") && !is_code => sections.push(Section {
+                    title: heading[3..].trim().to_owned(),
+                    line,
+                    header: None,
+                    text: String::new(),
+                }),
+                words => {
+                    is_code ^= words.starts_with("```");
+                    if let Some(page) = sections.last_mut() {
+                        page.text += &format!("{text}\n");
                     }
                 }
-                Event::End(TagEnd::MetadataBlock(_) | TagEnd::Heading(_) | TagEnd::CodeBlock) => {
-                    match (block.take(), sections.last_mut()) {
-                        (Some((Block::Header, placed)), _) => header = Some(placed),
-                        (Some((Block::Heading, (heading, title))), _) => sections.push(Section {
-                            title,
-                            heading,
-                            header: None,
-                        }),
-                        (Some((Block::Page, placed)), Some(section))
-                            if section.header.is_none() =>
-                        {
-                            section.header = Some(placed);
-                        }
-                        (Some((Block::Page, (range, _))), _) => {
-                            let why = "a page has one header, below its heading";
-                            return Err(self.malformed(range.start, why));
-                        }
-                        (None, _) => {}
-                    }
-                }
-                _ => {}
             }
         }
         Ok((header, sections))
@@ -250,30 +238,16 @@ impl Source<'_> {
 
     fn page(
         &self,
-        section: &Section,
-        end: usize,
+        section: Section,
         before: Option<&Page>,
         known: &dyn Fn(&str, usize) -> Result<String, LessonError>,
     ) -> Result<Page, LessonError> {
-        let start = section.heading.end;
-        let (header, at, text) = match &section.header {
-            Some((range, toml)) => {
-                let header: PageHeader = self.toml(toml, range.start)?;
-                let words = format!(
-                    "{}{}",
-                    &self.text[start..range.start],
-                    &self.text[range.end..end]
-                );
-                (header, range.start, words)
-            }
-            None => (
-                PageHeader::default(),
-                section.heading.start,
-                self.text[start..end].to_owned(),
-            ),
+        let (header, line) = match &section.header {
+            Some(block) => (self.toml(block)?, block.line),
+            None => (PageHeader::default(), section.line),
         };
         let variant = match (&header.variant, before) {
-            (Some(variant), _) => known(variant, at)?,
+            (Some(variant), _) => known(variant, line)?,
             (None, Some(before)) => before.variant.clone(),
             (None, None) => FIRST.to_owned(),
         };
@@ -286,13 +260,13 @@ impl Source<'_> {
         let moment = header.at.or_else(|| left.cloned());
         let moment = moment.unwrap_or(Moment::Start);
         let question = match header.question {
-            Some(question) => Some(self.question(question, &moment, at)?),
+            Some(question) => Some(self.question(question, &moment, line)?),
             None => None,
         };
         let shown = header.show.or_else(|| Some(before?.show.clone()));
         Ok(Page {
-            title: section.title.trim().to_owned(),
-            text: text.trim().to_owned(),
+            title: section.title,
+            text: section.text.trim().to_owned(),
             variant,
             at: moment,
             show: shown.unwrap_or_else(|| SHOWN.map(str::to_owned).to_vec()),
@@ -305,7 +279,7 @@ impl Source<'_> {
         &self,
         text: QuestionText,
         moment: &Moment,
-        at: usize,
+        line: usize,
     ) -> Result<Question, LessonError> {
         let answer = match (text.place, text.right) {
             (Some(method), None) if text.choices.is_empty() => Answer::Place(method),
@@ -315,7 +289,7 @@ impl Source<'_> {
             },
             _ => {
                 let why = "a question has either `choices` with `right` counted from 1, or `place`";
-                return Err(self.malformed(at, why));
+                return Err(self.malformed(line, why));
             }
         };
         Ok(Question {
@@ -325,14 +299,6 @@ impl Source<'_> {
             reveal: text.reveal.unwrap_or_else(|| moment.clone()),
         })
     }
-}
-
-/// A part of the file that has a meaning.
-#[derive(Clone, Copy)]
-enum Block {
-    Header,
-    Heading,
-    Page,
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! What a lesson localises.
 
-use std::fmt;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde::de::{DeserializeSeed, Error as _, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize as _;
+use toml::Spanned;
 
 use crate::describe::ParamError;
 use crate::params::Params;
@@ -17,46 +17,8 @@ use crate::session::{IndexFile, Job, Task, TaskScenes};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Setting(toml::Table);
 
-/// Checks each key where it stands, so that an error has its line.
-impl<'de> Deserialize<'de> for Setting {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Keys;
-        struct Checked(String);
-
-        impl<'de> DeserializeSeed<'de> for Checked {
-            type Value = (String, toml::Value);
-
-            fn deserialize<D: Deserializer<'de>>(
-                self,
-                deserializer: D,
-            ) -> Result<Self::Value, D::Error> {
-                let entry = (self.0, toml::Value::deserialize(deserializer)?);
-                let one = Setting(toml::Table::from_iter([entry.clone()]));
-                one.task_of("").map_err(D::Error::custom)?;
-                Ok(entry)
-            }
-        }
-
-        impl<'de> Visitor<'de> for Keys {
-            type Value = Setting;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Setting, A::Error> {
-                let mut table = toml::Table::new();
-                while let Some(key) = map.next_key()? {
-                    let (key, value) = map.next_value_seed(Checked(key))?;
-                    table.insert(key, value);
-                }
-                Ok(Setting(table))
-            }
-        }
-
-        deserializer.deserialize_map(Keys)
-    }
-}
+/// The fields as they stand in a file.
+pub(super) type Fields = BTreeMap<String, Spanned<toml::Value>>;
 
 /// A setting that cannot be followed.
 #[derive(Debug, thiserror::Error)]
@@ -126,14 +88,26 @@ pub fn named_scenes(
 }
 
 impl Setting {
+    /// Checks each field by itself, so that an error comes with its place.
+    pub(super) fn of(fields: &Fields) -> Result<Self, (usize, SettingError)> {
+        let mut all = toml::Table::new();
+        for (key, value) in fields {
+            let one = Self(toml::Table::from_iter([(
+                key.clone(),
+                value.get_ref().clone(),
+            )]));
+            one.task_of("")
+                .map_err(|error| (value.span().start, error))?;
+            all.extend(one.0);
+        }
+        Ok(Self(all))
+    }
+
     /// This setting where it says something, elsewhere `base`.
     pub(super) fn over(&self, base: &Self) -> Self {
-        let entries = base.0.iter().chain(&self.0);
-        Self(
-            entries
-                .map(|(key, value)| (key.clone(), value.clone()))
-                .collect(),
-        )
+        let mut table = base.0.clone();
+        table.extend(self.0.clone());
+        Self(table)
     }
 
     /// What is asked of posescope.
