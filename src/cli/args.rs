@@ -145,14 +145,8 @@ pub struct Everywhere {
     #[arg(long, global = true, value_name = "N", hide_short_help = true)]
     pub threads: Option<NonZeroUsize>,
     /// Where hypotheses are scored; results do not depend on it
-    #[arg(
-        long,
-        global = true,
-        value_name = "WHERE",
-        value_enum,
-        default_value_t,
-        hide_short_help = true
-    )]
+    #[arg(long, global = true, value_name = "WHERE", value_enum, default_value_t)]
+    #[arg(hide_short_help = true)]
     pub compute: Compute,
 }
 
@@ -160,12 +154,8 @@ pub struct Everywhere {
 #[derive(Clone, Debug, Default, Args)]
 pub struct ConfigArgs {
     /// Read parameters from a TOML file with a table for each group
-    #[arg(
-        long,
-        help_heading = "Methods",
-        value_name = "FILE.toml",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "FILE.toml")]
+    #[arg(help_heading = "Methods", hide_short_help = true)]
     pub config: Option<PathBuf>,
     /// Set a parameter, for example fb.ratio=0.7; repeatable; `posescope params` lists them
     #[arg(long = "set", help_heading = "Methods", value_name = "KEY=VALUE")]

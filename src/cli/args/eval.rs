@@ -29,11 +29,10 @@ pub struct EvalArgs {
     /// fb.ratio=0.5:0.9:0.05.
     #[arg(
         long,
-        help_heading = "Methods",
         value_name = "PARAM=FROM:TO:STEP",
-        conflicts_with_all = ["shard", "baseline", "rerun_failed", "events"],
-        hide_short_help = true
+        conflicts_with_all = ["shard", "baseline", "rerun_failed", "events"]
     )]
+    #[arg(help_heading = "Methods", hide_short_help = true)]
     pub sweep: Option<Sweep>,
     #[command(flatten)]
     pub judging: JudgingArgs,
@@ -43,33 +42,25 @@ pub struct EvalArgs {
     /// Write every event as JSON, one object per line
     ///
     /// With --resume they are appended to the file.
-    #[arg(
-        long,
-        help_heading = "Output",
-        value_name = "FILE.jsonl",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "FILE.jsonl")]
+    #[arg(help_heading = "Output", hide_short_help = true)]
     pub events: Option<PathBuf>,
     /// Continue the run in the folder
     #[arg(long, help_heading = "Runs")]
     pub resume: bool,
     /// Run part I of N; `posescope eval merge` puts the parts together
-    #[arg(
-        long,
-        help_heading = "Runs",
-        value_name = "I/N",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "I/N")]
+    #[arg(help_heading = "Runs", hide_short_help = true)]
     pub shard: Option<Shard>,
     /// Repeat the failed queries of RUN with other settings
     ///
     /// Prints what changed. Exit code 1 if a query broke.
     #[arg(
         long,
-        help_heading = "Runs",
         value_name = "RUN",
         conflicts_with_all = ["scenes", "baseline", "query_scene", "preset", "limit"]
     )]
+    #[arg(help_heading = "Runs")]
     pub rerun_failed: Option<PathBuf>,
 }
 
@@ -104,23 +95,15 @@ pub struct JudgingArgs {
     ///
     /// `QUERY METHOD` or `QUERY METHOD CODE` in each line; # starts a comment. Entries that are right now are
     /// reported.
-    #[arg(
-        long,
-        help_heading = "Judging",
-        value_name = "FILE",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Judging", hide_short_help = true)]
     pub known_failures: Option<PathBuf>,
     /// Exit with code 1 if a query fails that succeeded in this run
     #[arg(long, help_heading = "Runs", value_name = "RUN")]
     pub baseline: Option<PathBuf>,
     /// Keep recordings of the first N failures [default: 20; with --sweep 0]
-    #[arg(
-        long,
-        help_heading = "Output",
-        value_name = "N",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "N")]
+    #[arg(help_heading = "Output", hide_short_help = true)]
     pub keep_failures: Option<usize>,
 }
 

@@ -8,62 +8,52 @@ use posescope::app::{Arrangement, Moment, views};
 
 /// A picture of the window instead of the window.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Screenshot")]
 pub struct ScreenshotArgs {
     /// Save a picture of the window, without a display: PNG or JPEG, by its ending
-    #[arg(
-        long,
-        help_heading = "Screenshot",
-        value_name = "FILE.png|FILE.jpg",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "FILE.png|FILE.jpg")]
+    #[arg(hide_short_help = true)]
     pub screenshot: Option<PathBuf>,
     /// The moment of the run: its end, the end of a method, or the step of a number
     #[arg(
         long,
-        help_heading = "Screenshot",
         value_name = "end|METHOD|STEP",
         default_value_t = Moment::End,
-        requires = "screenshot",
-        hide_short_help = true
+        requires = "screenshot"
     )]
+    #[arg(hide_short_help = true)]
     pub at: Moment,
     /// The size of the window [px]
     #[arg(
         long,
-        help_heading = "Screenshot",
         value_name = "WIDTHxHEIGHT",
         default_value = "1500x950",
         value_parser = size,
-        requires = "screenshot",
-        hide_short_help = true
+        requires = "screenshot"
     )]
+    #[arg(hide_short_help = true)]
     pub window: [u32; 2],
     /// Pixels per point
     #[arg(
         long,
-        help_heading = "Screenshot",
         value_name = "FACTOR",
         default_value_t = 1.0,
         value_parser = scale,
-        requires = "screenshot",
-        hide_short_help = true
+        requires = "screenshot"
     )]
+    #[arg(hide_short_help = true)]
     pub scale: f32,
     /// On a light ground
-    #[arg(
-        long,
-        help_heading = "Screenshot",
-        requires = "screenshot",
-        hide_short_help = true
-    )]
+    #[arg(long, requires = "screenshot")]
+    #[arg(hide_short_help = true)]
     pub light: bool,
     /// One view of the window, without the bars around it
     #[arg(
         long,
-        hide = true,
         requires = "screenshot",
         value_parser = PossibleValuesParser::new(views::ALL.iter().map(|entry| entry.name))
     )]
+    #[arg(hide = true)]
     pub view: Option<String>,
     /// What the window is arranged for
     #[arg(

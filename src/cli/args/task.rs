@@ -18,12 +18,8 @@ pub struct RunArgs {
     /// The frame to localise, or a photo; repeatable
     ///
     /// 3823 finds the frame 003823. A photo is a file that is no frame of the scene.
-    #[arg(
-        long,
-        help_heading = "Queries",
-        value_name = "FRAME|PHOTO",
-        required_unless_present = "all"
-    )]
+    #[arg(long, value_name = "FRAME|PHOTO", required_unless_present = "all")]
+    #[arg(help_heading = "Queries")]
     pub query: Vec<String>,
     /// Localise every frame
     #[arg(long, help_heading = "Queries", conflicts_with_all = ["query", "camera"])]
@@ -36,20 +32,12 @@ pub struct RunArgs {
     #[arg(long, help_heading = "Output", value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// Write every event as JSON, one object per line
-    #[arg(
-        long,
-        help_heading = "Output",
-        value_name = "FILE.jsonl",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "FILE.jsonl")]
+    #[arg(help_heading = "Output", hide_short_help = true)]
     pub events: Option<PathBuf>,
     /// Write the matches of fb into this folder, in the form that --matches reads
-    #[arg(
-        long,
-        help_heading = "Output",
-        value_name = "DIR",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "DIR")]
+    #[arg(help_heading = "Output", hide_short_help = true)]
     pub export_matches: Option<PathBuf>,
     /// Only score a dense grid and write its costs, as a picture or a table
     ///
@@ -57,10 +45,10 @@ pub struct RunArgs {
     /// the lowest cost at each position.
     #[arg(
         long,
-        help_heading = "Output",
         value_name = "FILE.png|FILE.csv",
         conflicts_with_all = ["all", "json", "events", "export_matches", "save", "connect", "spawn", "breakpoints"]
     )]
+    #[arg(help_heading = "Output")]
     pub surface: Option<PathBuf>,
 }
 
@@ -90,24 +78,19 @@ pub struct TaskArgs {
     /// Focal lengths and centre [px], a camera line of COLMAP, or its cameras.txt.
     #[arg(
         long,
-        help_heading = "Queries",
         value_name = "fx,fy,cx,cy",
         requires = "query",
-        conflicts_with = "query_scene",
-        hide_short_help = true
+        conflicts_with = "query_scene"
     )]
+    #[arg(help_heading = "Queries", hide_short_help = true)]
     pub camera: Option<CameraArgument>,
     #[command(flatten)]
     pub protocol: Given,
     #[command(flatten)]
     pub config: ConfigArgs,
     /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10); repeatable
-    #[arg(
-        long = "break",
-        help_heading = "Runs",
-        value_name = "EXPR",
-        hide_short_help = true
-    )]
+    #[arg(long = "break", value_name = "EXPR")]
+    #[arg(help_heading = "Runs", hide_short_help = true)]
     pub breakpoints: Vec<Breakpoint>,
 }
 
@@ -161,12 +144,11 @@ pub struct RecordingArgs {
     /// Send the recording to a running Rerun viewer [default URL: the local viewer]
     #[arg(
         long,
-        help_heading = "Output",
         value_name = "URL",
         num_args = 0..=1,
-        default_missing_value = "",
-        hide_short_help = true
+        default_missing_value = ""
     )]
+    #[arg(help_heading = "Output", hide_short_help = true)]
     pub connect: Option<String>,
     /// Start a Rerun viewer and send the recording to it
     #[arg(long, help_heading = "Output", hide_short_help = true)]
