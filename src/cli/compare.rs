@@ -37,17 +37,18 @@ pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> 
         terminal.say(|| format!("Report: {}", path.display()));
     }
     if let Some(path) = &args.save {
-        let targets = Targets {
-            save: Some(path.clone()),
-            ..Targets::default()
-        };
         let name = |run: &Path| {
             let name = run.file_name().unwrap_or_default();
             name.to_string_lossy().into_owned()
         };
         let results = [read_rows(&args.before)?, read_rows(&args.after)?];
         let names = [name(&args.before), name(&args.after)];
-        record_comparison(&targets, names, &results, &shown(&comparison, None))?;
+        record_comparison(
+            &Targets::file(path),
+            names,
+            &results,
+            &shown(&comparison, None),
+        )?;
         terminal.say(|| format!("Recording: {0} (open it with `rerun {0}`)", path.display()));
     }
     if comparison.is_regression() {

@@ -47,13 +47,9 @@ fn examine_scene(
         written.map_err(io).map_err(CliError::io(path))?;
     }
     if let Some(path) = &args.save {
-        let targets = Targets {
-            save: Some(path.clone()),
-            ..Targets::default()
-        };
         let frames = found.compared.iter().map(|&frame| scene.reference(frame));
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
-        record_checkup(&targets, scene.name(), &frames)?;
+        record_checkup(&Targets::file(path), scene.name(), &frames)?;
     }
     if !terminal.is_quiet() {
         let text = report(scene.as_ref(), &found, terminal.width());

@@ -2,15 +2,15 @@
 //! `failures/QUERY-METHOD.rrd`, and events where they are asked for.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use posescope::image::Degradation;
 use posescope::localize::{LocalizeError, LocalizeObserver, QueryResult};
 use posescope::params::Params;
 use posescope::run::{
-    FAILURES, FailedQuery, FolderError, RunError, RunFile, RunFolder, RunItem, RunObserver,
-    ScenePair, read_results, recording_name,
+    FAILURES, FailedQuery, FolderError, Protocol, RunError, RunFile, RunFolder, RunItem,
+    RunObserver, ScenePair, read_results, recording_name,
 };
 use posescope::sink::SceneNames;
 use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
@@ -30,8 +30,7 @@ pub struct FailureRecordings<'a> {
     left: usize,
     missed: usize,
     params: &'a Params,
-    degraded: Degradation,
-    seed: u64,
+    protocol: &'a Protocol,
     several_pairs: bool,
     bar: indicatif::ProgressBar,
     observer: CliObserver,
@@ -42,7 +41,7 @@ impl<'a> FailureRecordings<'a> {
     pub fn new(
         kept: usize,
         folder: &RunFolder,
-        run: &RunFile,
+        run: &'a RunFile,
         params: &'a Params,
         bar: indicatif::ProgressBar,
         interrupt: Interrupt,
@@ -58,8 +57,7 @@ impl<'a> FailureRecordings<'a> {
             left: kept.saturating_sub(failures.len()),
             missed: failures.len().saturating_sub(kept),
             params,
-            degraded: run.protocol.degrade,
-            seed: run.protocol.seed,
+            protocol: &run.protocol,
             several_pairs: run.pairs.len() > 1,
             bar,
             observer,
@@ -73,25 +71,16 @@ impl<'a> FailureRecordings<'a> {
     }
 
     fn record(&self, query: &FailedQuery<'_>, path: &Path) -> Result<(), RecordError> {
-        let targets = Targets {
-            save: Some(path.to_owned()),
-            ..Targets::default()
-        };
-        let frames = query.localizer.references().frames();
-        let references = query.localizer.references().name();
-        let queries = query.localizer.queries().name();
+        let (references, queries) = (query.localizer.references(), query.localizer.queries());
+        let frames = query.request.references.frames.iter();
         let identity = Identity {
-            scene: references.to_owned(),
-            query_scene: (queries != references).then(|| queries.to_owned()),
             queries: vec![query.item.query.to_owned()],
-            references: (query.request.references.frames.iter())
-                .map(|&frame| frames[frame].clone())
+            references: frames
+                .map(|&frame| references.frames()[frame].clone())
                 .collect(),
-            configuration: self.params.to_toml(),
-            degraded: self.degraded,
-            seed: self.seed,
+            ..Identity::of(references, queries, self.params, self.protocol)
         };
-        let mut recorder = Recorder::open(&targets, &identity, &[query.method])?;
+        let mut recorder = Recorder::open(&Targets::file(path), &identity, &[query.method])?;
         // A panic was told as the query's result; here it only ends the recording.
         let localized = catch_unwind(AssertUnwindSafe(|| {
             query.localizer.localize(
@@ -176,7 +165,12 @@ impl RunObserver for FailureRecordings<'_> {
             self.several_pairs,
         );
         let path = self.folder.join(format!("{name}.rrd"));
-        remove_if_there(&path)?;
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(FolderError::io(&path)(error).into());
+            }
+            _ => {}
+        }
         if self.left == 0 {
             self.missed += 1;
             return Ok(());
@@ -196,15 +190,6 @@ impl RunObserver for FailureRecordings<'_> {
         }
         self.bar.set_message(item.query.to_owned());
         self.bar.inc(1);
-    }
-}
-
-fn remove_if_there(path: &Path) -> Result<(), FolderError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(FolderError::io(path)(error))
-        }
-        _ => Ok(()),
     }
 }
 

@@ -30,9 +30,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         let there = Index::open(&path, params.retrieval.checks);
         match there.and_then(|index| index.check_request(&request)) {
             Ok(()) => {
-                say(terminal, || {
-                    format!("{}: up to date; --force builds it again", path.display())
-                });
+                terminal.say(|| format!("{}: up to date; --force builds it again", path.display()));
                 return Ok(());
             }
             Err(IndexError::NotFound { .. }) => {}
@@ -41,7 +39,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
                 error @ (IndexError::Stale { .. }
                 | IndexError::Damaged { .. }
                 | IndexError::Version { .. }),
-            ) => say(terminal, || format!("{error}; building it again")),
+            ) => terminal.say(|| format!("{error}; building it again")),
             Err(error) => return Err(CliError::Usage(format!("{error}; --force replaces it"))),
         }
     }
@@ -60,7 +58,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
             CliError::Usage(format!("{}: {error}; see --set index.words", scene.name()))
         }
     })?;
-    say(terminal, || {
+    terminal.say(|| {
         format!(
             "{} frames{}, {} features, {} words, {:.1} MB: {}",
             summary.frames,
@@ -95,10 +93,4 @@ fn left_out(scene: &dyn Scene, named: &[String]) -> Result<BTreeSet<usize>, CliE
         }
     }
     Ok(frames)
-}
-
-fn say(terminal: &Terminal, message: impl FnOnce() -> String) {
-    if !terminal.is_quiet() {
-        eprintln!("{}", message());
-    }
 }

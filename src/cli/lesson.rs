@@ -113,9 +113,7 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
         return Err(CliError::Interrupted(words.to_owned()));
     }
     outcome?;
-    if !terminal.is_quiet() {
-        eprintln!("Recording: {0} (open it with `rerun {0}`)", path.display());
-    }
+    terminal.say(|| format!("Recording: {0} (open it with `rerun {0}`)", path.display()));
     Ok(())
 }
 
@@ -127,25 +125,12 @@ fn estimates(setting: &OpenSetting) -> u64 {
 
 fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Recorder, CliError> {
     let first = &settings[0];
-    let scene = first.scenes.references.name();
-    let queries = first.scenes.queries.name();
+    let (scenes, protocol) = (&first.scenes, &first.task.protocol);
+    let (references, queries) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let identity = Identity {
-        scene: scene.to_owned(),
-        query_scene: (queries != scene).then(|| queries.to_owned()),
         queries: vec![format!("lesson {}", lesson.name)],
-        references: first
-            .task
-            .protocol
-            .named_references()
-            .map(str::to_owned)
-            .collect(),
-        configuration: first.task.params.to_toml(),
-        degraded: first.task.protocol.degrade,
-        seed: first.task.protocol.seed,
-    };
-    let targets = Targets {
-        save: Some(path.to_owned()),
-        ..Targets::default()
+        references: protocol.named_references().map(str::to_owned).collect(),
+        ..Identity::of(references, queries, &first.task.params, protocol)
     };
     let asked = settings
         .iter()
@@ -154,5 +139,5 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
     let methods: Vec<Method> = estimator::methods()
         .filter(|method| asked.clone().any(|asked| asked == method))
         .collect();
-    Ok(Recorder::open(&targets, &identity, &methods)?.with_pages())
+    Ok(Recorder::open(&Targets::file(path), &identity, &methods)?.with_pages())
 }

@@ -130,8 +130,8 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     // Whatever went wrong, what was computed is shown and the recording is closed.
     let shown = plan.show(&results, terminal);
     let reached = observer.stop.as_ref().and_then(StopAtBreakpoint::reached);
-    if let (Some(breakpoint), false) = (reached, terminal.is_quiet()) {
-        eprintln!("Stopped at {breakpoint}");
+    if let Some(breakpoint) = reached {
+        terminal.say(|| format!("Stopped at {breakpoint}"));
     }
     let is_interrupted = interrupt.is_raised();
     // Only the files are left to close: the next Ctrl-C ends the process.
@@ -154,13 +154,11 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     told?;
     if let (Some(export), Some(folder)) = (observer.export, &args.export_matches) {
         let written = export.close()?;
-        if !terminal.is_quiet() {
-            eprintln!("Matches: {} ({written} pairs)", folder.display());
-        }
+        terminal.say(|| format!("Matches: {} ({written} pairs)", folder.display()));
     }
     shown?;
-    if let (Some(path), false) = (&args.recording.save, terminal.is_quiet()) {
-        eprintln!("Recording: {0} (open it with `rerun {0}`)", path.display());
+    if let Some(path) = &args.recording.save {
+        terminal.say(|| format!("Recording: {0} (open it with `rerun {0}`)", path.display()));
     }
     Ok(())
 }
@@ -276,13 +274,9 @@ impl Plan<'_> {
         let references = tasks.iter().flat_map(|task| task.references.frames.iter());
         let (from, of) = (self.localizer.references(), self.localizer.queries());
         let identity = Identity {
-            scene: from.name().to_owned(),
-            query_scene: (of.name() != from.name()).then(|| of.name().to_owned()),
             queries: names(of, &mut tasks.iter().map(|task| task.query)),
             references: names(from, &mut references.copied()),
-            configuration: self.task.params.to_toml(),
-            degraded: self.task.protocol.degrade,
-            seed: self.task.protocol.seed,
+            ..Identity::of(from, of, &self.task.params, &self.task.protocol)
         };
         Ok(Some(Recorder::open(
             &targets,

@@ -35,8 +35,6 @@ pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<()
     }
     let saved = picture.save(out);
     saved.map_err(|error| CliError::Picture(format!("{}: {error}", out.display())))?;
-    if !terminal.is_quiet() {
-        eprintln!("Picture: {}", out.display());
-    }
+    terminal.say(|| format!("Picture: {}", out.display()));
     Ok(())
 }

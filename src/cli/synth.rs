@@ -36,17 +36,11 @@ pub fn synth(args: &SynthArgs, terminal: &Terminal) -> Result<(), CliError> {
     });
     bar.finish_and_clear();
     outcome?;
-    if !terminal.is_quiet() {
-        let places: Vec<String> = streets
-            .iter()
-            .map(|(name, _)| (layout.place)(name))
-            .collect();
-        eprintln!(
-            "{frames} frames in {}: {}",
-            args.folder.display(),
-            places.join(", ")
-        );
-    }
+    terminal.say(|| {
+        let places = streets.iter().map(|(name, _)| (layout.place)(name));
+        let places = places.collect::<Vec<_>>().join(", ");
+        format!("{frames} frames in {}: {places}", args.folder.display())
+    });
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! Where a recording goes, and what it is known by.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rerun::external::re_uri::RedapUri;
 use rerun::sink::{GrpcSink, LogSink};
@@ -11,6 +11,9 @@ use super::error::RecordError;
 use super::file::RecordingFile;
 use super::viewer::Viewer;
 use crate::image::Degradation;
+use crate::params::Params;
+use crate::run::Protocol;
+use crate::scene::Scene;
 
 /// Where a recording goes. All of them can be combined; none is a recording that nobody keeps.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +24,16 @@ pub struct Targets {
     pub connect: Option<String>,
     /// Whether to start a viewer.
     pub spawn: bool,
+}
+
+impl Targets {
+    /// A file alone.
+    pub fn file(path: &Path) -> Self {
+        Self {
+            save: Some(path.to_owned()),
+            ..Self::default()
+        }
+    }
 }
 
 /// What the stable id of a recording follows from.
@@ -43,6 +56,24 @@ pub struct Identity {
 }
 
 impl Identity {
+    /// That of a run between two scenes, some of whose frames the caller names.
+    pub fn of(
+        references: &dyn Scene,
+        queries: &dyn Scene,
+        params: &Params,
+        protocol: &Protocol,
+    ) -> Self {
+        let (scene, query_scene) = (references.name(), queries.name());
+        Self {
+            scene: scene.to_owned(),
+            query_scene: (query_scene != scene).then(|| query_scene.to_owned()),
+            configuration: params.to_toml(),
+            degraded: protocol.degrade,
+            seed: protocol.seed,
+            ..Self::default()
+        }
+    }
+
     /// A query's name, with its scene where there are two: frames of both may be called alike.
     pub fn query_label(&self, name: &str) -> String {
         match &self.query_scene {
