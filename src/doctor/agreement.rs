@@ -6,7 +6,7 @@
 //! - *Carried values*: grey values that points take from their own photo should be found where the pose of
 //!   another frame puts the points. It sees what is wrong with poses, scale and depth.
 
-use image::GrayImage;
+use image::{GrayImage, ImageBuffer, Luma, Primitive};
 use nalgebra::{Point2, Point3};
 
 use crate::camera::Intrinsics;
@@ -16,87 +16,74 @@ const FEWEST_POINTS: usize = 150;
 
 /// The strength of image edges, fading with the distance from them, so that an edge which is missed by a
 /// few pixels still attracts.
-pub(super) struct EdgeMap {
-    width: usize,
-    height: usize,
-    strength: Vec<f32>,
-}
+pub(super) type EdgeMap = ImageBuffer<Luma<f32>, Vec<f32>>;
 
-impl EdgeMap {
-    /// Looks for edges in a photo.
-    pub(super) fn of(photo: &GrayImage) -> Self {
-        /// What is left of an edge one pixel away.
-        const FADING: f32 = 0.80;
-        /// Share of an edge's own pixel, so that the ridge stays sharp.
-        const SHARP: f32 = 1.0 / 3.0;
-        /// Differences beyond this are edges like any other [grey values].
-        const STRONGEST: f32 = 60.0;
-        let (width, height) = (photo.width() as usize, photo.height() as usize);
-        let values = photo.as_raw();
-        let at = |x: usize, y: usize| f32::from(values[y * width + x]);
-        let mut edges = vec![0.0_f32; width * height];
-        for y in 1..height.saturating_sub(1) {
-            for x in 1..width.saturating_sub(1) {
-                let horizontal = at(x + 1, y - 1) + 2.0 * at(x + 1, y) + at(x + 1, y + 1)
-                    - at(x - 1, y - 1)
-                    - 2.0 * at(x - 1, y)
-                    - at(x - 1, y + 1);
-                let vertical = at(x - 1, y + 1) + 2.0 * at(x, y + 1) + at(x + 1, y + 1)
-                    - at(x - 1, y - 1)
-                    - 2.0 * at(x, y - 1)
-                    - at(x + 1, y - 1);
-                edges[y * width + x] = (horizontal.hypot(vertical) / 4.0).min(STRONGEST);
-            }
+/// Looks for edges in a photo.
+pub(super) fn edge_map(photo: &GrayImage) -> EdgeMap {
+    /// What is left of an edge one pixel away.
+    const FADING: f32 = 0.80;
+    /// Share of an edge's own pixel, so that the ridge stays sharp.
+    const SHARP: f32 = 1.0 / 3.0;
+    /// Differences beyond this are edges like any other [grey values].
+    const STRONGEST: f32 = 60.0;
+    /// The neighbours that a pass over the rows has seen before a pixel.
+    const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    let values = photo.as_raw();
+    let at = |x: usize, y: usize| f32::from(values[y * width + x]);
+    let mut edges = vec![0.0_f32; width * height];
+    for y in 1..height.saturating_sub(1) {
+        for x in 1..width.saturating_sub(1) {
+            let horizontal = at(x + 1, y - 1) + 2.0 * at(x + 1, y) + at(x + 1, y + 1)
+                - at(x - 1, y - 1)
+                - 2.0 * at(x - 1, y)
+                - at(x - 1, y + 1);
+            let vertical = at(x - 1, y + 1) + 2.0 * at(x, y + 1) + at(x + 1, y + 1)
+                - at(x - 1, y - 1)
+                - 2.0 * at(x, y - 1)
+                - at(x + 1, y - 1);
+            edges[y * width + x] = (horizontal.hypot(vertical) / 4.0).min(STRONGEST);
         }
-        let mut faded = edges.clone();
-        let spread = |faded: &mut Vec<f32>, x: usize, y: usize, dx: isize, dy: isize| {
-            let (nx, ny) = (x.checked_add_signed(dx), y.checked_add_signed(dy));
-            if let (Some(nx), Some(ny)) = (nx, ny)
+    }
+    let mut faded = edges.clone();
+    let there = (0..width * height).map(|index| (index, 1));
+    let back = there.clone().rev().map(|(index, _)| (index, -1));
+    for (index, side) in there.chain(back) {
+        let (x, y) = (index % width, index / width);
+        for (dx, dy) in BEFORE {
+            let beside = (
+                x.checked_add_signed(side * dx),
+                y.checked_add_signed(side * dy),
+            );
+            if let (Some(nx), Some(ny)) = beside
                 && nx < width
                 && ny < height
             {
-                let from = FADING * faded[ny * width + nx];
-                let here = &mut faded[y * width + x];
-                *here = here.max(from);
+                faded[index] = faded[index].max(FADING * faded[ny * width + nx]);
             }
-        };
-        for y in 0..height {
-            for x in 0..width {
-                for (dx, dy) in [(-1, 0), (-1, -1), (0, -1), (1, -1)] {
-                    spread(&mut faded, x, y, dx, dy);
-                }
-            }
-        }
-        for y in (0..height).rev() {
-            for x in (0..width).rev() {
-                for (dx, dy) in [(1, 0), (1, 1), (0, 1), (-1, 1)] {
-                    spread(&mut faded, x, y, dx, dy);
-                }
-            }
-        }
-        let strength = edges.iter().zip(&faded);
-        Self {
-            width,
-            height,
-            strength: strength
-                .map(|(edge, faded)| SHARP * edge + (1.0 - SHARP) * faded)
-                .collect(),
         }
     }
+    let strength = edges.iter().zip(&faded);
+    let strength = strength.map(|(edge, faded)| SHARP * edge + (1.0 - SHARP) * faded);
+    EdgeMap::from_raw(photo.width(), photo.height(), strength.collect()).unwrap_or_default()
+}
 
-    fn at(&self, pixel: &Point2<f64>) -> Option<f32> {
-        let (x, y) = (pixel.x, pixel.y);
-        let is_inside =
-            x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64;
-        is_inside.then(|| {
-            let (left, top) = (x as usize, y as usize);
-            let (right, down) = ((x - left as f64) as f32, (y - top as f64) as f32);
-            let value = |x: usize, y: usize| self.strength[y * self.width + x];
-            let upper = value(left, top) * (1.0 - right) + value(left + 1, top) * right;
-            let lower = value(left, top + 1) * (1.0 - right) + value(left + 1, top + 1) * right;
-            upper * (1.0 - down) + lower * down
-        })
-    }
+/// The value of an image between the centres of four pixels, by bilinear interpolation.
+fn value<T: Primitive + Into<f64>>(
+    image: &ImageBuffer<Luma<T>, Vec<T>>,
+    pixel: &Point2<f64>,
+) -> Option<f64> {
+    let (x, y) = (pixel.x, pixel.y);
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let is_inside = x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64;
+    is_inside.then(|| {
+        let (left, top) = (x as usize, y as usize);
+        let (right, down) = (x - left as f64, y - top as f64);
+        let at = |x: usize, y: usize| -> f64 { image.as_raw()[y * width + x].into() };
+        let upper = at(left, top) * (1.0 - right) + at(left + 1, top) * right;
+        let lower = at(left, top + 1) * (1.0 - right) + at(left + 1, top + 1) * right;
+        upper * (1.0 - down) + lower * down
+    })
 }
 
 /// A point as a camera sees it.
@@ -110,19 +97,19 @@ pub(super) struct Seen {
 /// The logarithm of how much stronger image edges are at depth edges than at other points; `None` where
 /// too little is in view.
 pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
-    let inside: Vec<(Seen, f32)> = seen
+    let inside: Vec<(Seen, f64)> = seen
         .iter()
-        .filter_map(|seen| Some((*seen, map.at(&seen.pixel)?)))
+        .filter_map(|seen| Some((*seen, value(map, &seen.pixel)?)))
         .collect();
     if inside.len() < FEWEST_POINTS {
         return None;
     }
-    let weights = depth_edges(map.width, map.height, &inside);
+    let weights = depth_edges(map.width() as usize, map.height() as usize, &inside);
     let (mut weight_sum, mut at_edges, mut at_all) = (0.0, 0.0, 0.0);
     for ((_, strength), weight) in inside.iter().zip(&weights) {
         weight_sum += weight;
-        at_edges += weight * f64::from(*strength);
-        at_all += f64::from(*strength);
+        at_edges += weight * strength;
+        at_all += strength;
     }
     let mean = at_all / inside.len() as f64;
     if weight_sum < FEWEST_POINTS as f64 / 10.0 || mean <= 0.0 {
@@ -132,7 +119,7 @@ pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
 }
 
 /// How far each point stands out before what is beside it, 0 … 1.
-fn depth_edges(width: usize, height: usize, inside: &[(Seen, f32)]) -> Vec<f64> {
+fn depth_edges(width: usize, height: usize, inside: &[(Seen, f64)]) -> Vec<f64> {
     /// Cells are such that a scan of 64 beams has a point in most of them.
     const CELLS_ACROSS: usize = 250;
     const NEIGHBOURS: [(isize, isize); 6] = [(-1, 0), (1, 0), (-2, 0), (2, 0), (0, -1), (0, -2)];
@@ -201,20 +188,6 @@ pub(super) fn carried_agreement(
     correlation
         .is_finite()
         .then(|| correlation.clamp(-0.999, 0.999).atanh())
-}
-
-fn value(photo: &GrayImage, pixel: &Point2<f64>) -> Option<f64> {
-    let (x, y) = (pixel.x, pixel.y);
-    let (width, height) = (photo.width() as usize, photo.height() as usize);
-    let is_inside = x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64;
-    is_inside.then(|| {
-        let (left, top) = (x as usize, y as usize);
-        let (right, down) = (x - left as f64, y - top as f64);
-        let at = |x: usize, y: usize| f64::from(photo.as_raw()[y * width + x]);
-        let upper = at(left, top) * (1.0 - right) + at(left + 1, top) * right;
-        let lower = at(left, top + 1) * (1.0 - right) + at(left + 1, top + 1) * right;
-        upper * (1.0 - down) + lower * down
-    })
 }
 
 /// Where a camera sees a point, through a lens that bends by `k1` more than the camera says.

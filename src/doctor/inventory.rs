@@ -47,15 +47,12 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     let references: Vec<usize> = (0..frames.len())
         .filter(|&f| poses[f].is_some() && scene.has_cloud(f))
         .collect();
+    let count = |has: &dyn Fn(usize) -> bool| (0..frames.len()).filter(|&frame| has(frame)).count();
     let mut inventory = Inventory {
         frames: frames.len(),
         with_pose: poses.iter().flatten().count(),
-        with_cloud: (0..frames.len())
-            .filter(|&frame| scene.has_cloud(frame))
-            .count(),
-        with_time: (0..frames.len())
-            .filter(|&frame| scene.time_s(frame).is_some())
-            .count(),
+        with_cloud: count(&|frame| scene.has_cloud(frame)),
+        with_time: count(&|frame| scene.time_s(frame).is_some()),
         cameras: cameras(scene),
         ..Inventory::default()
     };
@@ -76,11 +73,7 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     for at in spread(references.len(), CLOUDS) {
         cloud(scene, references[at], &mut inventory, &mut remarks);
     }
-    for &frame in [references.first(), references.last()]
-        .iter()
-        .copied()
-        .flatten()
-    {
+    for &frame in references.first().into_iter().chain(references.last()) {
         if let Err(error) = scene.photo(frame) {
             remarks.push(Remark::Broken(error.to_string()));
         }
@@ -163,15 +156,12 @@ fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &m
         }
     };
     let camera = scene.intrinsics(frame);
+    let is_seen = |pixel: Option<_>| pixel.is_some_and(|pixel| camera.contains(&pixel));
     let mut depths: Vec<f64> = cloud
         .points
         .iter()
         .map(|point| point.cast())
-        .filter(|point| {
-            camera
-                .project(point)
-                .is_some_and(|pixel| camera.contains(&pixel))
-        })
+        .filter(|point| is_seen(camera.project(point)))
         .map(|point| point.z)
         .collect();
     depths.sort_by(f64::total_cmp);

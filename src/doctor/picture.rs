@@ -1,6 +1,7 @@
 //! A cloud on its photo.
 
-use image::imageops;
+use image::{Rgb, imageops};
+use nalgebra::Point2;
 
 use super::agreement::Seen;
 use crate::image::{GrayImage, RgbImage};
@@ -18,18 +19,19 @@ pub(super) fn cloud_on(photo: &GrayImage, seen: &[Seen]) -> RgbImage {
     far_first.sort_by(|a, b| b.depth.total_cmp(&a.depth));
     for seen in far_first {
         let share = ((seen.depth / near).ln() / (far / near).ln().max(1e-6)).clamp(0.0, 1.0);
-        let color = image::Rgb(palette::turbo(1.0 - share));
-        let (x, y) = (seen.pixel.x.round() as i64, seen.pixel.y.round() as i64);
-        for (x, y) in
-            (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| (x, y)))
-        {
-            let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else {
-                continue;
-            };
-            if let Some(pixel) = canvas.get_pixel_mut_checked(x, y) {
-                *pixel = color;
-            }
-        }
+        let place = seen.pixel.map(|part| part.round() as i64);
+        dot(&mut canvas, place, radius, palette::turbo(1.0 - share));
     }
     canvas
+}
+
+/// A square around a pixel, as far as it is in the picture.
+pub(super) fn dot(canvas: &mut RgbImage, at: Point2<i64>, radius: i64, color: palette::Rgb) {
+    for (x, y) in (-radius..=radius).flat_map(|y| (-radius..=radius).map(move |x| (x, y))) {
+        if let (Ok(x), Ok(y)) = (u32::try_from(at.x + x), u32::try_from(at.y + y))
+            && let Some(pixel) = canvas.get_pixel_mut_checked(x, y)
+        {
+            *pixel = Rgb(color);
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use image::{Rgb, imageops};
 use nalgebra::{Point2, Vector3};
 
+use super::picture::dot;
 use crate::geometry::Pose;
 use crate::image::RgbImage;
 use crate::palette;
@@ -52,29 +53,19 @@ pub(super) fn below(picture: Option<RgbImage>, poses: &[Pose]) -> Option<RgbImag
         let at = (place - least) * scale;
         Point2::new(MARGIN_PX + at.x, f64::from(top + height) - MARGIN_PX - at.y)
     };
-    let mut dot = |at: Point2<f64>, radius: i32, color: palette::Rgb| {
-        for (x, y) in (-radius..=radius).flat_map(|y| (-radius..=radius).map(move |x| (x, y))) {
-            let (x, y) = (at.x as i32 + x, at.y as i32 + y);
-            if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
-                && let Some(pixel) = canvas.get_pixel_mut_checked(x, y)
-            {
-                *pixel = Rgb(color);
-            }
-        }
+    let mut mark = |at: Point2<f64>, radius, color| {
+        dot(&mut canvas, at.map(|part| part as i64), radius, color);
     };
     for pair in places.windows(2) {
         let (from, to) = (pixel(&pair[0]), pixel(&pair[1]));
         let steps = (to - from).norm().ceil().max(1.0) as usize;
         for step in 0..=steps {
-            dot(
-                from + (to - from) * (step as f64 / steps as f64),
-                1,
-                palette::REFERENCE,
-            );
+            let share = step as f64 / steps as f64;
+            mark(from + (to - from) * share, 1, palette::REFERENCE);
         }
     }
-    dot(pixel(&first), 4, palette::TRUTH);
-    dot(pixel(&places[places.len() - 1]), 4, palette::ESTIMATE);
+    mark(pixel(&first), 4, palette::TRUTH);
+    mark(pixel(&places[places.len() - 1]), 4, palette::ESTIMATE);
     Some(canvas)
 }
 

@@ -6,7 +6,7 @@ use std::collections::btree_map::Entry;
 use image::GrayImage;
 use nalgebra::Point3;
 
-use super::agreement::{EdgeMap, Seen, carried_agreement, edge_agreement, project};
+use super::agreement::{EdgeMap, Seen, carried_agreement, edge_agreement, edge_map, project};
 use super::reading::{Change, Mistake, Reading, readings};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -66,19 +66,16 @@ pub struct Agreement {
     pub carried: Option<f64>,
 }
 
-/// The scores of one reading, frame by frame.
-struct Scores(Vec<Agreement>);
+fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let numbers: Vec<f64> = numbers.collect();
+    (!numbers.is_empty()).then(|| numbers.iter().sum::<f64>() / numbers.len() as f64)
+}
 
-impl Scores {
-    fn mean(&self) -> Agreement {
-        let mean = |part: fn(&Agreement) -> Option<f64>| {
-            let known: Vec<f64> = self.0.iter().filter_map(part).collect();
-            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
-        };
-        Agreement {
-            edges: mean(|score| score.edges),
-            carried: mean(|score| score.carried),
-        }
+/// The mean of the scores of one reading over the frames.
+fn mean_of(scores: &[Agreement]) -> Agreement {
+    Agreement {
+        edges: mean(scores.iter().filter_map(|score| score.edges)),
+        carried: mean(scores.iter().filter_map(|score| score.carried)),
     }
 }
 
@@ -105,29 +102,25 @@ impl Sample {
             clouds: BTreeMap::new(),
             anchors,
         };
-        for &anchor in &sample.anchors.clone() {
+        for &anchor in &sample.anchors {
             for frame in std::iter::once(anchor).chain(partners(anchor, count)) {
                 if let Entry::Vacant(place) = sample.sights.entry(frame) {
                     let photo = scene.photo(frame)?;
-                    let sight = Sight {
-                        edges: EdgeMap::of(&photo.gray),
+                    place.insert(Sight {
+                        edges: edge_map(&photo.gray),
                         gray: photo.gray,
                         camera: scene.intrinsics(frame),
-                    };
-                    place.insert(sight);
+                    });
                 }
             }
-            for frame in [Some(anchor), anchor.checked_sub(1), Some(anchor + 1)] {
-                let Some(frame) = frame.filter(|&frame| frame < count && scene.has_cloud(frame))
-                else {
-                    continue;
-                };
-                if let Entry::Vacant(place) = sample.clouds.entry(frame) {
+            for frame in anchor.saturating_sub(1)..(anchor + 2).min(count) {
+                if let Entry::Vacant(place) = sample.clouds.entry(frame)
+                    && scene.has_cloud(frame)
+                {
                     let cloud = scene.cloud(frame)?;
                     let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
                     let points = cloud.points.iter().step_by(step);
-                    let points = points.map(|point| point.cast()).collect();
-                    place.insert(points);
+                    place.insert(points.map(|point| point.cast()).collect());
                 }
             }
         }
@@ -153,21 +146,15 @@ impl Sample {
         Some((&sight.gray, seen.collect()))
     }
 
-    fn scores(&self, change: Option<&Change>) -> Scores {
-        Scores(
-            self.anchors
-                .iter()
-                .map(|&anchor| self.score(anchor, change))
-                .collect(),
-        )
+    /// The scores of a reading, frame by frame.
+    fn scores(&self, change: &Change) -> Vec<Agreement> {
+        let anchors = self.anchors.iter();
+        anchors.map(|&anchor| self.score(anchor, change)).collect()
     }
 
-    fn score(&self, anchor: usize, change: Option<&Change>) -> Agreement {
-        let stated = Change::Pose(|pose| *pose);
-        let change = change.unwrap_or(&stated);
-        let cloud = change
-            .cloud_of(anchor)
-            .and_then(|frame| self.clouds.get(&frame));
+    fn score(&self, anchor: usize, change: &Change) -> Agreement {
+        let cloud = change.cloud_of(anchor);
+        let cloud = cloud.and_then(|frame| self.clouds.get(&frame));
         let (Some(sight), Some(cloud)) = (self.sights.get(&anchor), cloud) else {
             return Agreement::default();
         };
@@ -186,56 +173,51 @@ impl Sample {
         let seen: Vec<Option<Seen>> = seen.into_iter().step_by(CARRIED).collect();
         // Where hardly anything is in view, what agrees does so by chance.
         let least = in_view / CARRIED / 20;
-        let carried: Vec<f64> = partners(anchor, self.poses.len())
-            .filter_map(|partner| {
-                let other = self.sights.get(&partner)?;
-                let here = change.pose(anchor, &self.poses)?;
-                let partner_from_anchor = change.pose(partner, &self.poses)?.inverse() * here;
-                let (camera, k1) = change.camera(&other.camera);
-                let there: Vec<Option<Seen>> = carried_points
-                    .iter()
-                    .map(|point| project(&camera, k1, &(partner_from_anchor * **point)))
-                    .collect();
-                let agreement =
-                    carried_agreement((&sight.gray, &seen), (&other.gray, &there), least);
-                // Points that are not in view of the next frame agree with nothing.
-                Some(agreement.unwrap_or(0.0))
-            })
-            .collect();
+        let carried = partners(anchor, self.poses.len()).filter_map(|partner| {
+            let other = self.sights.get(&partner)?;
+            let here = change.pose(anchor, &self.poses)?;
+            let partner_from_anchor = change.pose(partner, &self.poses)?.inverse() * here;
+            let (camera, k1) = change.camera(&other.camera);
+            let there: Vec<Option<Seen>> = carried_points
+                .iter()
+                .map(|point| project(&camera, k1, &(partner_from_anchor * **point)))
+                .collect();
+            let agreement = carried_agreement((&sight.gray, &seen), (&other.gray, &there), least);
+            // Points that are not in view of the next frame agree with nothing.
+            Some(agreement.unwrap_or(0.0))
+        });
         Agreement {
             edges: edge_agreement(&sight.edges, &in_front),
-            carried: (!carried.is_empty())
-                .then(|| carried.iter().sum::<f64>() / carried.len() as f64),
+            carried: mean(carried),
         }
     }
 
     /// The reading that fits better than what the scene says, if there is one.
     pub(super) fn diagnose(&self) -> (Agreement, Option<Finding>) {
-        let stated = self.scores(None);
-        let mut best: Option<(f64, Reading, Scores)> = None;
+        let stated = self.scores(&Change::Pose(|pose| *pose));
+        let mut best: Option<(f64, Reading, Agreement)> = None;
         for reading in readings().into_iter().chain(self.searched()) {
-            let scores = self.scores(Some(&reading.change));
-            let gain = gain(&stated, &scores, &reading.change);
+            let scores = self.scores(&reading.change);
+            let (gain, otherwise) = (gain(&stated, &scores, &reading.change), mean_of(&scores));
             log::debug!(
-                "{:?} {}: {gain:?} {:?}",
+                "{:?} {}: {gain:?} {otherwise:?}",
                 reading.mistake,
-                reading.remedy,
-                scores.mean()
+                reading.remedy
             );
             if let Some(gain) = gain
                 && best.as_ref().is_none_or(|(known, ..)| gain > *known)
             {
-                best = Some((gain, reading, scores));
+                best = Some((gain, reading, otherwise));
             }
         }
-        let mean = stated.mean();
-        let finding = best.map(|(_, reading, scores)| Finding {
+        let stated = mean_of(&stated);
+        let finding = best.map(|(_, reading, otherwise)| Finding {
             mistake: reading.mistake,
             remedy: reading.remedy,
-            stated: mean,
-            otherwise: scores.mean(),
+            stated,
+            otherwise,
         });
-        (mean, finding)
+        (stated, finding)
     }
 
     /// The readings with a number in them, each with the number that fits best.
@@ -272,7 +254,7 @@ impl Sample {
     /// The value whose reading fits best.
     fn best_of(&self, values: &[f64], change: &dyn Fn(f64) -> Change) -> Option<f64> {
         let scored = values.iter().map(|&value| {
-            let mean = self.scores(Some(&change(value))).mean();
+            let mean = mean_of(&self.scores(&change(value)));
             (value, worth(&mean, IN_FRAME))
         });
         let best = scored.max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -336,22 +318,21 @@ const LEAST_PX: f64 = 8.0;
 const IN_FRAME: f64 = 1.0;
 
 /// What a reading gains, if that is telling.
-fn gain(stated: &Scores, other: &Scores, change: &Change) -> Option<f64> {
+fn gain(stated: &[Agreement], other: &[Agreement], change: &Change) -> Option<f64> {
     // A mistake in poses leaves the frames alone: their edges have no say.
     let weigh_edges = match change {
         Change::Pose(_) | Change::Poses(_) => 0.0,
         _ => IN_FRAME,
     };
     let gains: Vec<f64> = stated
-        .0
         .iter()
-        .zip(&other.0)
+        .zip(other)
         .filter(|(_, other)| other.edges.is_some() || other.carried.is_some())
         .map(|(stated, other)| worth(other, weigh_edges) - worth(stated, weigh_edges))
         .collect();
     let count = gains.len() as f64;
     // Where there are few frames, what fits two of them by chance must not pass for a mistake.
-    if gains.len() < FEWEST_FRAMES.min(stated.0.len()).max(2) || gains.len() * 2 < stated.0.len() {
+    if gains.len() < FEWEST_FRAMES.min(stated.len()).max(2) || gains.len() * 2 < stated.len() {
         return None;
     }
     let has_number = matches!(
