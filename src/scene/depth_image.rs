@@ -16,27 +16,15 @@ use crate::geometry::Pose;
 /// add nothing, as a view is splatted with discs of several pixels.
 const MOST_POINTS: u32 = 20_000;
 
-/// The camera that took the depth images.
-pub(super) enum DepthCamera {
-    /// The depth images are registered with the photos: pixel by pixel, seen by the same camera.
-    Registered,
-    /// A camera beside that of the photos.
-    Beside {
-        /// The depth camera.
-        intrinsics: Intrinsics,
-        /// The photo's camera from the depth camera.
-        camera_from_depth: Pose,
-    },
-}
-
 /// The depth images of a scene: 16-bit grey PNG.
 pub(super) struct DepthImages {
     /// The image of each frame, if it has one.
     pub images: Vec<Option<PathBuf>>,
     /// What names the images, for frames without one.
     pub listed_in: PathBuf,
-    /// The camera that took them.
-    pub camera: DepthCamera,
+    /// The camera that took them, and that of the photos from it. Without one they are registered with the
+    /// photos: pixel by pixel, seen by the same camera.
+    pub beside: Option<(Intrinsics, Pose)>,
     /// What a value of 1 means \[m\].
     pub unit_m: f64,
 }
@@ -53,13 +41,8 @@ impl Clouds for DepthImages {
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
         let path = self.place(index, frame);
         let depth = read_depth(path)?;
-        let (intrinsics, camera_from_depth) = match &self.camera {
-            DepthCamera::Registered => (&frame.intrinsics, Pose::identity()),
-            DepthCamera::Beside {
-                intrinsics,
-                camera_from_depth,
-            } => (intrinsics, *camera_from_depth),
-        };
+        let registered = (frame.intrinsics, Pose::identity());
+        let (intrinsics, camera_from_depth) = self.beside.unwrap_or(registered);
         let size = (intrinsics.width, intrinsics.height);
         photo_file::expect_size(path, depth.dimensions(), size)?;
         let step = step(size);

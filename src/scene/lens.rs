@@ -94,11 +94,6 @@ impl Lens {
         Ok(with_zoom(full))
     }
 
-    /// The camera of the undistorted photos.
-    pub fn pinhole(&self) -> Intrinsics {
-        self.pinhole
-    }
-
     /// Where a pixel of the undistorted photo is in the photo as it was taken.
     fn source_pixel(&self, pixel: Point2<f64>) -> Point2<f64> {
         let direction = self.pinhole.unproject(&pixel, 1.0);
@@ -113,21 +108,14 @@ impl Lens {
     /// Whether every pixel of the undistorted photo is in the photo as it was taken: those along the
     /// border decide.
     fn has_no_blank(&self) -> bool {
-        let (right, bottom) = (
-            f64::from(self.source.width) - 1.0,
-            f64::from(self.source.height) - 1.0,
-        );
+        let Intrinsics { width, height, .. } = self.source;
+        let (right, bottom) = (f64::from(width) - 1.0, f64::from(height) - 1.0);
         let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
-        let radius = corners
-            .map(|(x, y)| {
-                self.pinhole
-                    .unproject(&Point2::new(x, y), 1.0)
-                    .xy()
-                    .coords
-                    .norm()
-            })
-            .into_iter()
-            .fold(0.0, f64::max);
+        let slant = |(x, y)| {
+            let ray = self.pinhole.unproject(&Point2::new(x, y), 1.0);
+            ray.xy().coords.norm()
+        };
+        let radius = corners.map(slant).into_iter().fold(0.0, f64::max);
         let steps = |last: f64| (0..=256).map(move |i| last * f64::from(i) / 256.0);
         let horizontal = steps(right).flat_map(|x| [(x, 0.0), (x, bottom)]);
         let vertical = steps(bottom).flat_map(|y| [(0.0, y), (right, y)]);
@@ -205,7 +193,7 @@ pub(super) fn developed_camera(
         return Ok((taken, None));
     }
     let lens = Lens::new(taken, distortion)?;
-    Ok((lens.pinhole(), Some(Arc::new(lens))))
+    Ok((lens.pinhole, Some(Arc::new(lens))))
 }
 
 #[cfg(test)]
@@ -251,7 +239,7 @@ mod tests {
         ] {
             let lens = Lens::new(CAMERA, coefficients).expect("can be undistorted");
             let photo = lens.developed(Photo::from_gray(taken(&lens, value)));
-            let pinhole = lens.pinhole();
+            let pinhole = lens.pinhole;
             for (x, y, gray) in photo.gray.enumerate_pixels() {
                 let at = pinhole.unproject(&Point2::new(f64::from(x), f64::from(y)), 1.0);
                 let expected = value(at.xy());
@@ -267,15 +255,15 @@ mod tests {
     #[test]
     fn a_pincushion_is_magnified_until_nothing_is_blank_and_a_barrel_is_not() {
         let barrel = Lens::new(CAMERA, distortion(-0.1, 0.0, 0.0, 0.0)).expect("sound");
-        assert_eq!(barrel.pinhole(), CAMERA);
+        assert_eq!(barrel.pinhole, CAMERA);
         let cushion = Lens::new(CAMERA, distortion(0.1, 0.0, 0.0, 0.0)).expect("sound");
-        assert!(cushion.pinhole().fx > 1.02 * CAMERA.fx);
+        assert!(cushion.pinhole.fx > 1.02 * CAMERA.fx);
         let corner = cushion.source_pixel(Point2::new(319.0, 239.0));
         assert!(CAMERA.contains(&corner), "{corner}");
-        let ratio = cushion.pinhole().fy / cushion.pinhole().fx;
+        let ratio = cushion.pinhole.fy / cushion.pinhole.fx;
         assert!((ratio - CAMERA.fy / CAMERA.fx).abs() < 1e-12);
         // A point of the world is seen in the middle of what was magnified about the centre.
-        let ahead = cushion.pinhole().project(&Point3::new(0.0, 0.0, 5.0));
+        let ahead = cushion.pinhole.project(&Point3::new(0.0, 0.0, 5.0));
         assert_eq!(ahead, Some(Point2::new(CAMERA.cx, CAMERA.cy)));
     }
 

@@ -3,6 +3,7 @@
 mod camera;
 mod exif;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -53,24 +54,21 @@ impl LoosePhotos {
     /// A file that is no photo, a camera that is not that of its size, or none that anything tells of;
     /// and two files of the same name.
     pub fn open(&self) -> Result<Arc<dyn Scene>, SceneError> {
-        let names: Vec<String> = self.paths.iter().map(|path| Self::name(path)).collect();
-        let twice = (1..names.len()).find(|&at| names[..at].contains(&names[at]));
-        if let Some(twice) = twice {
-            return Err(SceneError::expected(
-                &self.paths[twice],
-                format!(
-                    "a name of its own expected, another photo is called {} too",
-                    names[twice]
-                ),
-            ));
+        let mut names = BTreeSet::new();
+        if let Some(twice) = self
+            .paths
+            .iter()
+            .find(|path| !names.insert(Self::name(path)))
+        {
+            let name = Self::name(twice);
+            let expected =
+                format!("a name of its own expected, another photo is called {name} too");
+            return Err(SceneError::expected(twice, expected));
         }
         let frames = self.paths.iter().map(|path| self.frame(path));
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
-        Ok(Arc::new(FileScene::new(
-            Self::NAME.to_owned(),
-            frames,
-            NoClouds,
-        )))
+        let name = Self::NAME.to_owned();
+        Ok(Arc::new(FileScene::new(name, frames, NoClouds)))
     }
 
     fn frame(&self, path: &Path) -> Result<Frame, SceneError> {
@@ -107,8 +105,9 @@ impl LoosePhotos {
                 path.display()
             );
         }
-        let (taken, distortion) = camera.of_photo(path, stored)?;
-        let (intrinsics, develop) = developed_camera(taken, distortion).map_err(error)?;
+        let camera = camera.of_photo(path, stored)?;
+        let (intrinsics, develop) =
+            developed_camera(camera.intrinsics, camera.distortion).map_err(error)?;
         Ok(Frame {
             develop,
             ..Frame::new(path.to_owned(), intrinsics)

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Matrix4, Translation3, UnitQuaternion};
 
 use super::argument::split_word;
-use super::depth_image::{DepthCamera, DepthImages};
+use super::depth_image::DepthImages;
 use super::file_scene::{FileScene, Frame};
 use super::folder::{entries, folder_name};
 use super::lens::pinhole;
@@ -79,9 +79,7 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     let mut frames = Vec::with_capacity(photos.len());
     let mut depths = Vec::with_capacity(photos.len());
     for (name, photo) in photos {
-        let number = file_name(&photo)
-            .and_then(file_parts)
-            .map_or("", |parts| parts.0);
+        let number = photo_number(&photo).unwrap_or_default();
         let beside = |kind: &str| photo.with_file_name(format!("frame-{number}.{kind}"));
         depths.push(Some(beside("depth.png")).filter(|path| path.is_file()));
         frames.push(Frame {
@@ -103,7 +101,7 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     let clouds = DepthImages {
         images: depths,
         listed_in: folder.to_owned(),
-        camera: cameras.depth,
+        beside: cameras.depth,
         unit_m: UNIT_M,
     };
     Ok(Box::new(FileScene::new(name, frames, clouds)))
@@ -181,25 +179,17 @@ fn file_name(path: &Path) -> Option<&str> {
     path.file_name()?.to_str()
 }
 
-/// The number of a frame and which of its files this is: `frame-000025.color.png` is `000025`, `color`.
-fn file_parts(name: &str) -> Option<(&str, &str, &str)> {
-    let (number, rest) = name.strip_prefix("frame-")?.split_once('.')?;
-    let (kind, extension) = rest.rsplit_once('.')?;
+/// The number of a frame by its photo: `frame-000025.color.png` is that of `000025`.
+fn photo_number(path: &Path) -> Option<&str> {
+    const KINDS: [&str; 3] = ["color.png", "color.jpg", "color.jpeg"];
+    let (number, kind) = file_name(path)?.strip_prefix("frame-")?.split_once('.')?;
     let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-    is_number.then_some((number, kind, extension))
-}
-
-fn is_photo(name: &str) -> bool {
-    file_parts(name).is_some_and(|(_, kind, extension)| {
-        kind == "color" && ["png", "jpg", "jpeg"].contains(&extension)
-    })
+    (is_number && KINDS.contains(&kind)).then_some(number)
 }
 
 fn is_sequence(folder: &Path) -> bool {
     let entries = entries(folder).unwrap_or_default();
-    entries
-        .iter()
-        .any(|path| file_name(path).is_some_and(is_photo))
+    entries.iter().any(|path| photo_number(path).is_some())
 }
 
 /// The frames of a sequence in the order of their numbers. Of a photo in two formats the last by name is
@@ -207,10 +197,9 @@ fn is_sequence(folder: &Path) -> bool {
 fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<NamedPhoto>, SceneError> {
     let mut by_number = BTreeMap::new();
     for photo in entries(folder)? {
-        let name = file_name(&photo).filter(|name| is_photo(name));
-        if let Some((number, _, _)) = name.and_then(file_parts) {
-            let frame = (format!("{prefix}{number}"), photo.clone());
-            by_number.insert((number.len(), number.to_owned()), frame);
+        if let Some(number) = photo_number(&photo) {
+            let key = (number.len(), number.to_owned());
+            by_number.insert(key, (format!("{prefix}{number}"), photo));
         }
     }
     Ok(by_number.into_values().collect())
@@ -239,7 +228,7 @@ struct Cameras {
     photo: Intrinsics,
     /// The photos' camera from the one that the poses speak of.
     camera_from_posed: Pose,
-    depth: DepthCamera,
+    depth: Option<(Intrinsics, Pose)>,
 }
 
 impl Cameras {
@@ -255,7 +244,7 @@ impl Cameras {
             return Ok(Self {
                 photo: read_intrinsics(&path, (width, height))?,
                 camera_from_posed: Pose::identity(),
-                depth: DepthCamera::Registered,
+                depth: None,
             });
         }
         if (width, height) != (COLOR.width, COLOR.height) {
@@ -279,10 +268,7 @@ impl Cameras {
         Ok(Self {
             photo: COLOR,
             camera_from_posed: camera_from_depth,
-            depth: DepthCamera::Beside {
-                intrinsics: DEPTH,
-                camera_from_depth,
-            },
+            depth: Some((DEPTH, camera_from_depth)),
         })
     }
 }

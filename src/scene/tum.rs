@@ -7,7 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::depth_image::{DepthCamera, DepthImages};
+use super::depth_image::DepthImages;
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, warn_without_poses, within};
 use super::lens::pinhole;
@@ -82,7 +82,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let clouds = DepthImages {
         images,
         listed_in: folder.join("depth.txt"),
-        camera: DepthCamera::Registered,
+        beside: None,
         unit_m: UNIT_M,
     };
     Ok(Box::new(FileScene::new(name, frames, clouds)))
@@ -94,9 +94,7 @@ fn image_list(folder: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>, SceneErr
     let mut images = file
         .lines()
         .map(|line| {
-            let (time, name) = line
-                .text
-                .split_once(char::is_whitespace)
+            let (time, name) = (line.text.split_once(char::is_whitespace))
                 .ok_or_else(|| line.error("a line `time file` expected, one word found"))?;
             let path = within(folder, name.trim()).map_err(|why| line.error(why))?;
             Ok((line.number(time)?, path))

@@ -4,7 +4,7 @@ use super::super::lens::{Distortion, pinhole};
 use crate::camera::Intrinsics;
 
 /// A camera of a model: as the photos were taken, pixel centres at integers.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct ModelCamera {
     pub intrinsics: Intrinsics,
     pub distortion: Distortion,

@@ -27,7 +27,7 @@ impl CameraArgument {
         &self,
         photo: &Path,
         (width, height): (u32, u32),
-    ) -> Result<(Intrinsics, Distortion), SceneError> {
+    ) -> Result<ModelCamera, SceneError> {
         let error = |expected: String| SceneError::expected(photo, expected);
         match self {
             Self::Pinhole(camera @ [_, _, cx, cy]) => {
@@ -39,8 +39,10 @@ impl CameraArgument {
                          fx,fy,cx,cy for photos of this size expected"
                     )));
                 }
-                let taken = pinhole(*camera, (width, height)).map_err(error)?;
-                Ok((taken, Distortion::default()))
+                Ok(ModelCamera {
+                    intrinsics: pinhole(*camera, (width, height)).map_err(error)?,
+                    distortion: Distortion::default(),
+                })
             }
             Self::Line(line) => {
                 let camera = line_camera(line).map_err(error)?;
@@ -49,11 +51,12 @@ impl CameraArgument {
                     height: h,
                     ..
                 } = camera.intrinsics;
-                of_size(&camera, (width, height)).ok_or_else(|| {
-                    error(format!(
+                if (w, h) != (width, height) {
+                    return Err(error(format!(
                         "{w}x{h} pixels expected, as --camera says, {width}x{height} found"
-                    ))
-                })
+                    )));
+                }
+                Ok(camera)
             }
             Self::File(path) => {
                 let file = TextFile::read(path)?;
@@ -61,12 +64,13 @@ impl CameraArgument {
                     .lines()
                     .map(|line| camera_of_line(line).map(|(_, camera)| camera))
                     .collect::<Result<Vec<_>, _>>()?;
-                let fitting: Vec<_> = cameras
-                    .iter()
-                    .filter_map(|camera| of_size(camera, (width, height)))
-                    .collect();
-                match fitting.as_slice() {
-                    [camera, rest @ ..] if rest.iter().all(|other| other == camera) => Ok(*camera),
+                let size = |camera: &ModelCamera| {
+                    let Intrinsics { width, height, .. } = camera.intrinsics;
+                    (width, height)
+                };
+                let fitting = cameras.iter().filter(|one| size(one) == (width, height));
+                match fitting.collect::<Vec<_>>().as_slice() {
+                    [camera, rest @ ..] if rest.iter().all(|other| other == camera) => Ok(**camera),
                     [] => Err(file.error(format!(
                         "a camera of {width}x{height} pixels expected, as {} has, none of {} found",
                         photo.display(),
@@ -83,23 +87,14 @@ impl CameraArgument {
     }
 }
 
-fn of_size(camera: &ModelCamera, size: (u32, u32)) -> Option<(Intrinsics, Distortion)> {
-    let taken = camera.intrinsics;
-    ((taken.width, taken.height) == size).then_some((taken, camera.distortion))
-}
-
 fn line_camera(line: &str) -> Result<ModelCamera, String> {
     let text = TextFile::from_text("--camera", line);
     let mut lines = text.lines();
     let camera = lines.next().map(camera_of_line);
     match (camera, lines.next()) {
-        (Some(camera), None) => {
-            let camera = camera.map_err(|error| match error {
-                SceneError::Line { expected, .. } => expected,
-                error => error.to_string(),
-            })?;
-            Ok(camera.1)
-        }
+        (Some(Ok((_, camera))), None) => Ok(camera),
+        (Some(Err(SceneError::Line { expected, .. })), None) => Err(expected),
+        (Some(Err(error)), None) => Err(error.to_string()),
         _ => Err("one camera line of COLMAP expected".to_owned()),
     }
 }
@@ -161,9 +156,11 @@ mod tests {
             assert_eq!(camera.to_string().parse().as_ref(), Ok(camera));
         }
         // COLMAP's pixels have their centres at halves.
-        let (taken, distortion) = radial
-            .of_photo(Path::new("a.png"), (640, 480))
-            .expect("its size");
+        let camera = radial.of_photo(Path::new("a.png"), (640, 480));
+        let ModelCamera {
+            intrinsics: taken,
+            distortion,
+        } = camera.expect("its size");
         assert_eq!((taken.fx, taken.cx, taken.cy), (500.0, 319.5, 239.5));
         assert_eq!(distortion.k1, 0.01);
         for (wrong, word) in [

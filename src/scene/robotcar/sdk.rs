@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use image::{Rgb, RgbImage};
+use image::RgbImage;
+use image::imageops::interpolate_bilinear;
 use nalgebra::{Matrix3x4, Rotation3, Translation3, UnitQuaternion};
 
 use super::super::SceneError;
@@ -113,26 +114,11 @@ impl CameraModel {
     /// The photo as a pinhole would have taken it; black where the lens saw nothing.
     pub(super) fn undistorted(&self, raw: &RgbImage) -> RgbImage {
         let (width, height) = raw.dimensions();
-        let values = raw.as_raw();
         let mut straight = RgbImage::new(width, height);
-        for (pixel, &[x, y]) in straight.pixels_mut().zip(self.table.iter()) {
-            let is_inside =
-                x >= 0.0 && y >= 0.0 && x <= (width - 1) as f32 && y <= (height - 1) as f32;
-            if !is_inside {
-                continue;
+        for (pixel, &[x, y]) in straight.pixels_mut().zip(&self.table) {
+            if let Some(seen) = interpolate_bilinear(raw, x, y) {
+                *pixel = seen;
             }
-            let (left, top) = (x as u32, y as u32);
-            let (right, down) = (x - left as f32, y - top as f32);
-            let (next, below) = ((left + 1).min(width - 1), (top + 1).min(height - 1));
-            let at = |x: u32, y: u32, channel: usize| {
-                f32::from(values[3 * (y as usize * width as usize + x as usize) + channel])
-            };
-            *pixel = Rgb(std::array::from_fn(|channel| {
-                let upper = at(left, top, channel) * (1.0 - right) + at(next, top, channel) * right;
-                let lower =
-                    at(left, below, channel) * (1.0 - right) + at(next, below, channel) * right;
-                (upper * (1.0 - down) + lower * down).round() as u8
-            }));
         }
         straight
     }
