@@ -42,9 +42,8 @@ fn examine_scene(
     let scene = scene::open(argument, args.format.as_deref())?;
     let found = examine(scene.as_ref())?;
     if let (Some(path), Some(picture)) = (&args.picture, &found.picture) {
-        let io = |error: image::ImageError| std::io::Error::other(error.to_string());
         let written = picture.save_with_format(path, image::ImageFormat::Png);
-        written.map_err(io).map_err(CliError::io(path))?;
+        written.map_err(CliError::image(path))?;
     }
     if let Some(path) = &args.save {
         let frames = found.compared.iter().map(|&frame| scene.reference(frame));
@@ -76,21 +75,16 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
     let there = &found.inventory;
     let mut line = |what: &str, words: &str| {
         const LABEL: &str = "           ";
-        let lines = wrapped(
-            &format!("{LABEL}{words}"),
-            width.unwrap_or(usize::MAX),
-            LABEL,
-        );
+        let words = format!("{LABEL}{words}");
+        let lines = wrapped(&words, width.unwrap_or(usize::MAX), LABEL);
         text += &format!("{what:<11}{}", &lines[LABEL.len()..]);
     };
     line("scene", scene.name());
-    line(
-        "frames",
-        &format!(
-            "{}, {} with a pose, {} with a cloud, {} with a time",
-            there.frames, there.with_pose, there.with_cloud, there.with_time
-        ),
+    let words = format!(
+        "{}, {} with a pose, {} with a cloud, {} with a time",
+        there.frames, there.with_pose, there.with_cloud, there.with_time
     );
+    line("frames", &words);
     for camera in there.cameras.iter().take(3) {
         line("camera", camera);
     }
@@ -98,13 +92,11 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
         line("", &format!("and {} more", there.cameras.len() - 3));
     }
     if let Some([least, median, greatest]) = there.steps_m {
-        line(
-            "way",
-            &format!(
-                "{:.1} m, steps of {least:.2} to {greatest:.2} m, median {median:.2} m",
-                there.way_m
-            ),
+        let words = format!(
+            "{:.1} m, steps of {least:.2} to {greatest:.2} m, median {median:.2} m",
+            there.way_m
         );
+        line("way", &words);
     }
     if let Some([images, length_km, spacing_m]) = paper_scene(scene.name()) {
         let words = format!("{images} images, {length_km} km, {spacing_m} m from image to image");

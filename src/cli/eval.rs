@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use posescope::fusion::Fusion;
 use posescope::localize::{QueryResult, Ranking, Selection};
 use posescope::measure::{
-    Change, Gate, KnownFailures, Report, RunComparison, read_rows, write_report,
+    Change, Gate, GateResult, KnownFailures, Report, RunComparison, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -51,21 +51,14 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
         eprintln!("No query failed in {}", before.display());
         return Ok(());
     }
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| default_folder(args, &asked));
+    let out = args.out.clone();
+    let folder = out.unwrap_or_else(|| default_folder(args, &asked));
     if let Some(sweep) = &args.sweep {
         return sweep::sweep(args, sweep, &folder, terminal);
     }
     let run = execute(args, None, &folder, terminal)?;
-    finish(
-        &args.judging,
-        args.rerun_failed.as_deref(),
-        &folder,
-        &run,
-        terminal,
-    )
+    let again = args.rerun_failed.as_deref();
+    finish(&args.judging, again, &folder, &run, terminal)
 }
 
 /// What is asked, and of which scenes.
@@ -101,15 +94,14 @@ fn execute(
     folder: &Path,
     terminal: &Terminal,
 ) -> Result<RunFile, CliError> {
-    let asked = match &args.rerun_failed {
-        Some(before) => again::asked(args, before)?,
-        None => asked(args, swept)?,
-    };
     let Asked {
         run,
         scenes,
         params,
-    } = asked;
+    } = match &args.rerun_failed {
+        Some(before) => again::asked(args, before)?,
+        None => asked(args, swept)?,
+    };
     let scenes = scenes.as_asked(&run.protocol)?;
     let indices = indices(&run, &scenes, &params)?;
     if let Some(path) = args.events.as_ref().filter(|path| path.starts_with(folder)) {
@@ -185,7 +177,9 @@ fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliErr
         ));
     }
     let has_several = protocol.selection().count() > 1;
-    if has_several && !args.protocol.has("fusions") && protocol.preset.is_none_or(is_large) {
+    // The large experiment fuses as a run without a preset does.
+    let has_own_fusions = protocol.preset.is_some_and(|one| one != Experiment::Large);
+    if has_several && !args.protocol.has("fusions") && !has_own_fusions {
         protocol.fusions = Fusion::all().filter(|f| f.name == "r-wavg").collect();
     }
     if let Some((sweep, value)) = swept {
@@ -212,11 +206,6 @@ fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliErr
         scenes,
         params,
     })
-}
-
-/// One experiment chooses its references by looks, and fuses them as a run without a preset does.
-fn is_large(preset: Experiment) -> bool {
-    preset == Experiment::Large
 }
 
 /// The parameters as `run.toml` has them.
@@ -266,12 +255,9 @@ fn indices(
 fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     let mut pairs = Vec::new();
     for (index, references) in scenes.references.iter().enumerate() {
-        let references = references.as_ref();
-        if scenes.queries.is_empty() {
-            pairs.push(draw.pair(index, references, references)?);
-        }
-        for queries in &scenes.queries {
-            pairs.push(draw.pair(index, references, queries.as_ref())?);
+        let itself = scenes.queries.is_empty().then_some(references);
+        for queries in itself.into_iter().chain(&scenes.queries) {
+            pairs.push(draw.pair(index, references.as_ref(), queries.as_ref())?);
         }
     }
     Ok(pairs)
@@ -303,16 +289,13 @@ impl Judged {
         let report = write_report(folder, run, &args.gate, &known)?;
         let before = args.baseline.as_deref().or(again);
         write_html(folder, before, PICTURES, None)?;
-        let failures = report
-            .gate_results
-            .iter()
-            .filter(|gate_result| !gate_result.passed)
-            .map(|gate_result| format!("gate `{}` failed: {}", gate_result.gate, gate_result.found))
-            .collect();
+        let failed = report.gate_results.iter().filter(|one| !one.passed);
         Ok(Self {
+            failures: failed
+                .map(|one| format!("gate `{}` failed: {}", one.gate, one.found))
+                .collect(),
             report,
             known,
-            failures,
         })
     }
 }
@@ -342,20 +325,19 @@ fn finish(
         }
         let changes = comparison.differences.iter();
         let broken = changes.filter(|one| one.change == Change::Broken);
-        let news = broken.filter(|one| !known.has(&one.after));
-        let news = news.count();
+        let news = broken.filter(|one| !known.has(&one.after)).count();
         if news > 0 {
             failures.push(format!("{news} queries broken since {}", before.display()));
         }
         compared = Some(comparison);
     }
-    step_summary::append(&step_summary::of_run(
-        run,
-        folder,
-        &report,
-        compared.as_ref(),
-        &failures,
-    ));
+    let summary = step_summary::of_run(run, folder, &report, compared.as_ref(), &failures);
+    step_summary::append(&summary);
+    good_unless(&failures)
+}
+
+/// The error of a run that is not good enough for these reasons.
+fn good_unless(failures: &[String]) -> Result<(), CliError> {
     if failures.is_empty() {
         return Ok(());
     }
@@ -368,16 +350,15 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
     for figures in report.tables.iter().skip(skipped) {
         output::print(&table::figures(figures, width))?;
     }
-    for gate_result in &report.gate_results {
-        let verdict = if gate_result.passed {
-            "passed"
-        } else {
-            "FAILED"
-        };
-        output::print(&format!(
-            "{verdict}: {}: {}",
-            gate_result.gate, gate_result.found
-        ))?;
+    for GateResult {
+        gate,
+        found,
+        passed,
+        ..
+    } in &report.gate_results
+    {
+        let verdict = if *passed { "passed" } else { "FAILED" };
+        output::print(&format!("{verdict}: {gate}: {found}"))?;
     }
     for line in report.known.lines() {
         output::print(&line)?;
@@ -393,9 +374,6 @@ fn against(before: &Path, folder: &Path, only_again: bool) -> Result<RunComparis
         let again: BTreeSet<_> = rows.iter().map(key).collect();
         rows_before.retain(|row| again.contains(&key(row)));
     }
-    Ok(RunComparison::of(
-        &rows_before,
-        &rows,
-        &RunComparison::TOLERANCE,
-    ))
+    let tolerance = &RunComparison::TOLERANCE;
+    Ok(RunComparison::of(&rows_before, &rows, tolerance))
 }

@@ -1,9 +1,10 @@
 //! Errors of the command line and their exit codes.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use image::ImageError;
 use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::ChoiceError;
@@ -93,6 +94,16 @@ impl CliError {
         |source| Self::Io { path, source }
     }
 
+    /// The error of a picture that cannot be written.
+    pub fn image(path: &Path) -> impl FnOnce(ImageError) -> Self {
+        move |error| {
+            Self::io(path)(match error {
+                ImageError::IoError(error) => error,
+                other => io::Error::other(other),
+            })
+        }
+    }
+
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::ReaderGone | Self::Stopped(_) | Self::Choice(ChoiceError::Cancelled(_)) => DONE,
@@ -110,27 +121,13 @@ impl CliError {
             )
             | Self::Lesson(LessonError::Unknown { .. })
             | Self::Scene(SceneError::UnknownFormat { .. }) => USAGE,
-            Self::Scene(_)
-            | Self::Config { .. }
-            | Self::Io { .. }
-            | Self::NoReference(_)
-            | Self::Index(_)
-            | Self::Choice(_)
-            | Self::Known(_)
-            | Self::Draw(_)
-            | Self::Folder(_)
-            | Self::Unhealthy(_)
-            | Self::Job(_)
-            | Self::Lesson(_)
-            | Self::LessonSetting(_)
-            | Self::Record(_) => BAD_DATA,
-            #[cfg(feature = "app")]
-            Self::Picture(_) => BAD_DATA,
             #[cfg(feature = "gpu")]
             Self::Gpu(_) => NO_GPU,
             #[cfg(not(feature = "gpu"))]
             Self::NoGpu => NO_GPU,
             Self::Interrupted(_) => INTERRUPTED,
+            // What is left cannot be read or written.
+            _ => BAD_DATA,
         })
     }
 }

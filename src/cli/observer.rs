@@ -66,9 +66,7 @@ impl CliObserver {
             method: None,
         }
     }
-}
 
-impl CliObserver {
     /// Records the pages of a lesson that are about the end of the run.
     pub fn turn_last_pages(&mut self) {
         if let (Some(pages), Some(recorder)) = (self.pages.take(), &mut self.recorder) {
@@ -111,11 +109,10 @@ impl Sink for CliObserver {
         if let (Some(export), Some(problem)) = (&mut self.export, self.problems.get(self.problem)) {
             export.accept(record, problem);
         }
-        if let (Some(events), Some(problem), Some(method)) = (
-            &mut self.events,
-            self.problems.get(self.problem),
-            self.method,
-        ) {
+        let problem = self.problems.get(self.problem);
+        if let (Some(events), Some(problem), Some(method)) =
+            (&mut self.events, problem, self.method)
+        {
             events.accept(record, problem, method);
         }
         if let Some(stop) = &mut self.stop {

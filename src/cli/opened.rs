@@ -27,8 +27,8 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
         // What is called as a frame is that frame.
         let named = task.query_scene().unwrap_or(scene);
         let opened = posescope::scene::open(named, task.protocol.format.as_deref())?;
-        let loose = queries.iter().filter(|query| opened.find(query).is_err());
-        let loose = loose.count();
+        let is_loose = |query: &&String| opened.find(query).is_err();
+        let loose = queries.iter().filter(is_loose).count();
         if loose > 0 && loose < queries.len() {
             return Err(CliError::Usage(
                 "some queries are frames and others are photos; localise them in separate runs"
@@ -57,14 +57,7 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
             task.protocol.select(Selection::Matched(1));
         }
     }
-    let opened = |argument: &str| {
-        if argument == scene {
-            first.clone()
-        } else {
-            None
-        }
-    };
-    let scenes = task.open(&opened)?;
+    let scenes = task.open(&|argument| first.clone().filter(|_| argument == scene))?;
     let queries = match &task.photos {
         Some(photos) => (0..photos.paths.len()).collect(),
         None => queries

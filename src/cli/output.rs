@@ -38,23 +38,21 @@ impl JsonLines {
 
     /// Writes one object that is text already.
     pub fn write_line(&mut self, line: &str) -> Result<(), CliError> {
-        writeln!(self.writer, "{line}")
-            .and_then(|()| self.writer.flush())
-            .map_err(|error| match error.kind() {
-                io::ErrorKind::BrokenPipe => CliError::ReaderGone,
-                _ => CliError::io(&self.path)(error),
-            })
+        print_to(&mut self.writer, &line, &self.path)
     }
 }
 
 /// Prints a table or a list on stdout.
 pub fn print(text: &dyn Display) -> Result<(), CliError> {
-    let mut stdout = io::stdout().lock();
-    writeln!(stdout, "{text}")
-        .and_then(|()| stdout.flush())
+    print_to(&mut io::stdout().lock(), text, Path::new("stdout"))
+}
+
+fn print_to(writer: &mut dyn Write, text: &dyn Display, path: &Path) -> Result<(), CliError> {
+    writeln!(writer, "{text}")
+        .and_then(|()| writer.flush())
         .map_err(|error| match error.kind() {
             io::ErrorKind::BrokenPipe => CliError::ReaderGone,
-            _ => CliError::io("stdout")(error),
+            _ => CliError::io(path)(error),
         })
 }
 

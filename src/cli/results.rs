@@ -103,10 +103,11 @@ fn row_table<'a>(
 ) -> Result<Table, CliError> {
     let is_text = form == Form::Text;
     let columns: Vec<&Field> = match args.columns.as_slice() {
-        [] if is_text => {
-            let found: Result<Vec<&Field>, _> = COLUMNS.into_iter().map(Field::find).collect();
-            found.map_err(|error| CliError::Usage(error.to_string()))?
-        }
+        [] if is_text => COLUMNS
+            .into_iter()
+            .map(Field::find)
+            .collect::<Result<_, _>>()
+            .map_err(|error| CliError::Usage(error.to_string()))?,
         [] => Field::ALL.iter().chain(Field::POSE).collect(),
         named => named.to_vec(),
     };
@@ -116,8 +117,9 @@ fn row_table<'a>(
 
 /// Writes a figure of the run as SVG.
 fn draw(args: &ResultsArgs, plot: Plot, terminal: &Terminal) -> Result<(), CliError> {
-    let svg = plot.svg(&RunResults::read(&args.run)?);
-    let svg = svg.ok_or_else(|| CliError::Usage("the run has nothing to draw in it".to_owned()))?;
+    let svg = plot
+        .svg(&RunResults::read(&args.run)?)
+        .ok_or_else(|| CliError::Usage("the run has nothing to draw in it".to_owned()))?;
     write(&svg, args.out.as_deref())?;
     if let Some(path) = &args.out {
         terminal.say(|| format!("Plot: {}", path.display()));

@@ -13,7 +13,7 @@ use posescope::grid::{
 use posescope::method::Method;
 use posescope::picture;
 use posescope::problem::Problem;
-use posescope::render::{Score, Scorer};
+use posescope::render::Scorer;
 
 use super::args::RunArgs;
 use super::failure::CliError;
@@ -69,15 +69,13 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     writer(&surface, out)?;
     if !terminal.is_quiet() {
         let truth = queried.pose(query);
-        let said = described(&surface, &problem, truth.as_ref());
-        output::print(&said)?;
-        let hypotheses = surface.hypotheses();
-        let per_second = hypotheses as f64 / seconds;
-        eprintln!(
-            "{hypotheses} hypotheses in {seconds:.1} s, {per_second:.0} per second; {}",
-            out.display()
-        );
+        output::print(&described(&surface, &problem, truth.as_ref()))?;
     }
+    terminal.say(|| {
+        let (hypotheses, out) = (surface.hypotheses(), out.display());
+        let per_second = hypotheses as f64 / seconds;
+        format!("{hypotheses} hypotheses in {seconds:.1} s, {per_second:.0} per second; {out}")
+    });
     Ok(())
 }
 
@@ -149,23 +147,17 @@ fn writer(out: &Path) -> Result<Writer, CliError> {
 
 /// The pose of least cost, in words.
 fn described(surface: &DenseSurface, problem: &Problem, truth: Option<&Pose>) -> String {
-    let Some((
-        offset,
-        Score {
-            cost: Some(cost), ..
-        },
-    )) = surface.minimum()
-    else {
+    let least = surface
+        .minimum()
+        .and_then(|(at, score)| Some((at, score.cost?)));
+    let Some((offset, cost)) = least else {
         return "no hypothesis has a cost".to_owned();
     };
-    let Offset {
-        right_m,
-        forward_m,
-        yaw_rad,
-    } = offset;
     let mut text = format!(
-        "least cost {cost:.6} at {right_m:.2} m right, {forward_m:.2} m forward, {:.1}° to the left",
-        yaw_rad.to_degrees()
+        "least cost {cost:.6} at {:.2} m right, {:.2} m forward, {:.1}° to the left",
+        offset.right_m,
+        offset.forward_m,
+        offset.yaw_rad.to_degrees()
     );
     if let Some(truth) = truth {
         let pose = problem.world_from_query(&offset.reference_from_camera());
@@ -203,8 +195,5 @@ fn write_png(surface: &DenseSurface, out: &Path) -> Result<(), CliError> {
     let cells = picture::surface(surface.cheapest());
     let (width, height) = (cells.width() * CELL_PX, cells.height() * CELL_PX);
     let picture = imageops::resize(&cells, width, height, FilterType::Nearest);
-    picture.save(out).map_err(|error| match error {
-        image::ImageError::IoError(error) => CliError::io(out)(error),
-        other => CliError::io(out)(std::io::Error::other(other)),
-    })
+    picture.save(out).map_err(CliError::image(out))
 }

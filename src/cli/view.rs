@@ -52,15 +52,15 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
 /// What the window is opened on, and the results that are known already.
 pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), CliError> {
     let folder = Path::new(&args.scene);
-    let (mut setup, results) = match folder.join("run.toml").is_file() {
-        true => of_a_run(args, folder)?,
-        false if args.before.is_some() => {
-            return Err(CliError::Usage(format!(
-                "--before compares two runs, and {} is not the folder of a run",
-                args.scene
-            )));
-        }
-        false => (of_a_scene(args)?, KnownResults::default()),
+    let (mut setup, results) = if folder.join("run.toml").is_file() {
+        of_a_run(args, folder)?
+    } else if args.before.is_some() {
+        return Err(CliError::Usage(format!(
+            "--before compares two runs, and {} is not the folder of a run",
+            args.scene
+        )));
+    } else {
+        (of_a_scene(args)?, KnownResults::default())
     };
     setup.mode = mode;
     Ok((setup, results))
@@ -84,31 +84,30 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
     let named: Vec<String> = args.query.iter().cloned().collect();
     let OpenedTask {
         task,
-        scenes: TaskScenes {
-            references,
-            queries,
-        },
+        scenes,
         queries: named,
     } = opened::open(&args.task, &args.scene, &named)?;
-    let query = named.first().copied();
-    let named: Vec<usize> = task
-        .protocol
-        .named_references()
-        .map(|name| references.find(name))
-        .collect::<Result<_, _>>()?;
-    let mut setup = Setup {
-        offered: (0..queries.frames().len()).collect(),
-        references,
-        queries,
+    let offered = (0..scenes.queries.frames().len()).collect();
+    let references = task.protocol.named_references();
+    let references = references.map(|name| scenes.references.find(name));
+    let chosen = references.collect::<Result<Vec<_>, _>>()?;
+    let mut setup = setup_of(task, scenes, offered, chosen);
+    begin_at(args, named.first().copied(), &mut setup)?;
+    Ok(setup)
+}
+
+fn setup_of(task: Task, scenes: TaskScenes, offered: Vec<usize>, chosen: Vec<usize>) -> Setup {
+    Setup {
+        offered,
+        references: scenes.references,
+        queries: scenes.queries,
         query: 0,
-        chosen: named.into(),
+        chosen: chosen.into(),
         index: Arc::new(IndexFile::of(&task)),
         task,
         mode: RunMode::Paused,
         folder: defaults::FOLDER.into(),
-    };
-    begin_at(args, query, &mut setup)?;
-    Ok(setup)
+    }
 }
 
 /// The query that was named, the demonstration's, or the first that has a reference.
@@ -127,10 +126,9 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
         }
         Some(query) => query,
         None => {
-            let mut offered = setup.offered.iter().copied();
-            offered
-                .find(|&query| has_reference(setup, query))
-                .unwrap_or(0)
+            let offered = setup.offered.iter().copied();
+            let mut usable = offered.filter(|&query| has_reference(setup, query));
+            usable.next().unwrap_or(0)
         }
     };
     if has_reference(setup, setup.query) {
@@ -217,16 +215,11 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     };
     let of_run = results.get(&query).and_then(|results| results.first());
     let named: Vec<&str> = protocol.named_references().collect();
-    let reference_names = match named.as_slice() {
-        [] => of_run.map_or_else(Vec::new, |result| {
-            result.references.iter().map(String::as_str).collect()
-        }),
-        named => named.to_vec(),
-    };
-    let reference_frames = reference_names
-        .into_iter()
-        .map(|name| references.find(name))
-        .collect::<Result<Vec<_>, _>>()?;
+    let of_run = of_run.iter().flat_map(|result| &result.references);
+    let of_run = of_run.map(String::as_str).filter(|_| named.is_empty());
+    let chosen = named.iter().copied().chain(of_run);
+    let chosen = chosen.map(|name| references.find(name));
+    let chosen = chosen.collect::<Result<Vec<_>, _>>()?;
     protocol.query_scene = other.into_iter().collect();
     protocol.limit = None;
     protocol.preset = None;
@@ -238,16 +231,13 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         breakpoints: args.task.breakpoints.clone(),
         ..Task::of(scene_argument)
     };
-    let setup = Setup {
-        offered: results.keys().copied().collect(),
+    let scenes = TaskScenes {
         references,
         queries,
+    };
+    let setup = Setup {
         query,
-        chosen: reference_frames.into(),
-        index: Arc::new(IndexFile::of(&task)),
-        task,
-        mode: RunMode::Paused,
-        folder: defaults::FOLDER.into(),
+        ..setup_of(task, scenes, results.keys().copied().collect(), chosen)
     };
     let known = KnownResults {
         now: results,

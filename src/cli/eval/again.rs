@@ -23,20 +23,13 @@ pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
     let protocol = args.protocol.over(run.protocol.clone())?;
     let format = protocol.format.as_deref();
     let scenes = Scenes::open(&run.scenes, &protocol.query_scene, format)?;
-    let pairs: Vec<ScenePair> = run
-        .pairs
-        .iter()
-        .map(|pair| {
-            let is_wanted = |query: &str| {
-                let is_failed = failed.contains(&key(&pair.scene, &pair.query_scene, query));
-                let is_named =
-                    args.query.is_empty() || args.query.iter().any(|name| is_called(query, name));
-                is_failed && is_named
-            };
-            pair.only(is_wanted)
-        })
-        .filter(|pair| !pair.queries.is_empty())
-        .collect();
+    let is_named =
+        |query: &str| args.query.is_empty() || args.query.iter().any(|name| is_called(query, name));
+    let pairs = run.pairs.iter().map(|pair| {
+        let is_failed = |query: &str| failed.contains(&key(&pair.scene, &pair.query_scene, query));
+        pair.only(|query: &str| is_failed(query) && is_named(query))
+    });
+    let pairs: Vec<ScenePair> = pairs.filter(|pair| !pair.queries.is_empty()).collect();
     Ok(Asked {
         run: RunFile {
             version: env!("CARGO_PKG_VERSION").to_owned(),

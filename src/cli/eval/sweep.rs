@@ -5,7 +5,7 @@ use std::path::Path;
 use posescope::measure::{SweptRun, write_sweep};
 use posescope::run::Sweep;
 
-use super::{Judged, execute, step_summary};
+use super::{Judged, execute, good_unless, step_summary};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 use crate::cli::terminal::Terminal;
@@ -24,19 +24,12 @@ pub fn sweep(
         let name = format!("{}={value}", sweep.key());
         let path = folder.join(&name);
         let run = execute(args, Some((sweep, value)), &path, terminal)?;
-        let Judged {
-            report,
-            failures: of_run,
-            ..
-        } = Judged::of(&args.judging, None, &path, &run)?;
-        failures.extend(
-            of_run
-                .into_iter()
-                .map(|failure| format!("{name}: {failure}")),
-        );
+        let judged = Judged::of(&args.judging, None, &path, &run)?;
+        let of_run = judged.failures.iter();
+        failures.extend(of_run.map(|failure| format!("{name}: {failure}")));
         runs.push(SweptRun {
             value: value.clone(),
-            measures: report.measures,
+            measures: judged.report.measures,
         });
     }
     let table = write_sweep(folder, sweep, &runs)?;
@@ -45,9 +38,5 @@ pub fn sweep(
         output::print(&figures(&table, terminal.width()))?;
         eprintln!("Runs and curves: {}", folder.display());
     }
-    if failures.is_empty() {
-        Ok(())
-    } else {
-        Err(CliError::NotGoodEnough(failures.join("; ")))
-    }
+    good_unless(&failures)
 }
