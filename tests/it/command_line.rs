@@ -71,7 +71,7 @@ fn results_come_in_query_then_method_order_with_the_promised_keys() {
 #[test]
 fn usage_errors_have_exit_code_2_and_name_the_next_step() {
     let sequence = SmallSequence::write();
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 9] = [
         (
             &["--query", "5", "--set", "fb.ratoi=0.7"],
             "did you mean `fb.ratio`",
@@ -86,6 +86,12 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
             "random:K, nearest:K",
         ),
         (&["--query", "5", "--radius=-1"], "a positive number"),
+        (&["--query", "5", "--right", "1,5"], "--right"),
+        (
+            &["--query", "5", "--min-confidence", "1.5"],
+            "--min-confidence",
+        ),
+        (&["--query", "5", "--explain", "many"], "--explain"),
         (&[], "--query"),
     ];
     for (arguments, words) in cases {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use posescope::diagnosis::{Family, RULES};
 use pulldown_cmark::{Event, Parser, Tag, TagEnd};
 
 fn documents() -> Vec<PathBuf> {
@@ -87,4 +88,56 @@ fn the_book_has_every_page() {
         let is_listed = name == "SUMMARY.md" || summary.contains(&format!("({name})"));
         assert!(is_listed, "{name} is not in the book");
     }
+}
+
+/// The table of verdicts as docs/diagnosis.md has it.
+fn table_of_verdicts() -> String {
+    let mut table = "\n| code | it means | applies to | needs the truth | what to do |\n\
+                     |---|---|---|---|---|\n"
+        .to_owned();
+    for rule in RULES {
+        let families: Vec<&str> = rule
+            .applies_to
+            .iter()
+            .map(|family| family.words())
+            .collect();
+        let applies_to = match families.len() {
+            0 => "–".to_owned(),
+            all if all == Family::ALL.len() => "all".to_owned(),
+            _ => families.join(", "),
+        };
+        let conclusive = if rule.is_conclusive {
+            ", conclusive"
+        } else {
+            ""
+        };
+        let truth = if rule.needs_truth { "yes" } else { "no" };
+        table += &format!(
+            "| **{}** | {}{conclusive} | {applies_to} | {truth} | {} |\n",
+            rule.code, rule.title, rule.advice
+        );
+    }
+    table
+}
+
+#[test]
+fn verdicts_in_the_docs_are_those_of_the_rules() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/diagnosis.md");
+    let page = std::fs::read_to_string(&path).expect("the page");
+    let begin = page.find("<!-- verdicts").expect("where the table begins");
+    let begin = begin + page[begin..].find("-->").expect("its end") + "-->\n".len();
+    let end = page
+        .find("<!-- /verdicts -->")
+        .expect("where the table ends");
+    let table = table_of_verdicts() + "\n";
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        let page = format!("{}{table}{}", &page[..begin], &page[end..]);
+        std::fs::write(&path, page).expect("writable");
+        return;
+    }
+    assert_eq!(
+        &page[begin..end],
+        table,
+        "UPDATE_DOCS=1 cargo test verdicts_in_the_docs writes the table"
+    );
 }

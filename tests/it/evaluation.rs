@@ -21,6 +21,7 @@ use posescope::scene::{self, Scene, SceneError};
 
 use crate::binary::{CACHE, posescope};
 use crate::small_sequence::SmallSequence;
+use crate::walls_scene::{TwoCameras, Walls};
 
 const FRAMES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
@@ -531,6 +532,24 @@ fn a_share_of_the_frames_is_held_out_of_the_references_and_a_number_is_not() {
     assert_eq!(share.drawn, share.queries);
     assert_eq!(number.queries, share.queries);
     assert!(number.drawn.is_empty());
+}
+
+#[test]
+fn a_run_describes_the_camera_of_each_query_where_they_have_several() {
+    let draw = Draw {
+        limit: None,
+        only: &[],
+        seed: 0,
+    };
+    let one = Walls::new();
+    let pair = draw.pair(0, &one, &one).expect("queries");
+    assert!(pair.cameras.is_empty());
+    let two = TwoCameras(Walls::new());
+    let pair = draw.pair(0, &two, &two).expect("queries");
+    let widths: Vec<u32> = pair.cameras.iter().map(|camera| camera.width).collect();
+    assert_eq!(widths, [240, 120, 240, 240, 240]);
+    assert_eq!(pair.camera, pair.cameras[0]);
+    assert_ne!(two.fingerprint(), TwoCameras(Walls::new()).0.fingerprint());
 }
 
 /// A scene whose photo of one frame makes the program panic.

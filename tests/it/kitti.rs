@@ -4,6 +4,7 @@ use nalgebra::Point3;
 use posescope::scene::{self, Scene};
 
 use crate::damage::Damage::{Bytes, Cut, Gone, Image, Swap, Text};
+use crate::real_pair::authors_pair;
 use crate::small_sequence::{self, SmallSequence};
 use crate::{damage, data};
 
@@ -141,7 +142,7 @@ fn what_is_wrong_with_a_sequence_is_named() {
 
 #[test]
 fn the_real_pair_is_ten_metres_apart_and_its_cloud_lies_in_the_image() {
-    let Some(folder) = data::authors_pair() else {
+    let Some(folder) = authors_pair() else {
         return;
     };
     let scene = open(&folder);

@@ -11,7 +11,8 @@ use posescope::scene::MatchFolder;
 use tempfile::TempDir;
 
 use crate::binary::posescope;
-use crate::{damage, data};
+use crate::damage;
+use crate::real_pair::authors_pair;
 
 fn results(scene: &str, arguments: &[&str]) -> Vec<QueryResult> {
     let mut command = posescope();
@@ -79,7 +80,7 @@ fn our_own_matches_read_back_give_our_own_pose_bit_for_bit() {
 
 #[test]
 fn our_own_matches_of_real_photos_read_back_give_our_own_pose_bit_for_bit() {
-    let Some(sequence) = data::authors_pair() else {
+    let Some(sequence) = authors_pair() else {
         return;
     };
     let scene = sequence.to_str().expect("a plain path");

@@ -7,7 +7,7 @@ use std::process::Command;
 use assert_cmd::cargo::cargo_bin;
 
 use crate::binary::CACHE;
-use crate::data::authors_pair;
+use crate::real_pair::authors_pair;
 
 /// One that has nothing beyond SSE4.2, and one with AVX2 and FMA but no AVX-512.
 const PROCESSORS: [&str; 2] = ["Nehalem", "Haswell"];

@@ -16,9 +16,14 @@ use posescope::trace::Trace;
 
 use crate::data;
 
+/// The sequence with the authors' pair, 003814 and 003823.
+pub fn authors_pair() -> Option<std::path::PathBuf> {
+    data::sample("kitti/sequences/00")
+}
+
 /// The problem and the official pose of the query.
 fn pair(query: &str, reference: &str) -> Option<(Problem, Pose)> {
-    let folder = data::authors_pair()?;
+    let folder = authors_pair()?;
     let scene = scene::open(folder.to_str()?, None).unwrap_or_else(|error| panic!("{error}"));
     let frame = |name| scene.find(name).expect("is there");
     let problem = Problem {

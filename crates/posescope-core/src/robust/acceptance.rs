@@ -77,7 +77,7 @@ pub struct Acceptance {
 /// `NFA = 4 C(n, 3) · P[B(n − 3, p) ≥ k − 3]`, which also bounds the probability that there is
 /// one. A pose is accepted at `NFA ≤ 0.01`. With 3 px on a KITTI image that takes 5 inliers of
 /// 8, 6 of 30, 7 of 128 and 10 of 1,000. The refinement after the sample gains an inlier or so
-/// that the count of tests leaves out; the bound is slack enough, see `tests/robust_pose.rs`.
+/// that the count of tests leaves out; the bound is slack enough, see `tests/it/robust_pose.rs`.
 ///
 /// The test assumes that false matches are independent of each other. Matches that share a pixel
 /// or a point are not and should come in once. Gathered pixels are allowed for by passing

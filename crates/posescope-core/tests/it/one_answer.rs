@@ -2,24 +2,24 @@
 
 use std::sync::Arc;
 
-use posescope::camera::Intrinsics;
-use posescope::cloud::Cloud;
-use posescope::diagnosis::Evidence;
-use posescope::estimator::Failure;
-use posescope::event::{Event, KindSet};
-use posescope::features::FeatureState;
-use posescope::fusion::Fusion;
-use posescope::geometry::Pose;
-use posescope::image::Photo;
-use posescope::localize::{
+use posescope_core::camera::Intrinsics;
+use posescope_core::cloud::Cloud;
+use posescope_core::diagnosis::Evidence;
+use posescope_core::estimator::Failure;
+use posescope_core::event::{Event, KindSet};
+use posescope_core::features::FeatureState;
+use posescope_core::fusion::Fusion;
+use posescope_core::geometry::Pose;
+use posescope_core::image::Photo;
+use posescope_core::localize::{
     LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request, is_one_drive,
     localize, localize_traced,
 };
-use posescope::method::Method;
-use posescope::params::Params;
-use posescope::problem::Problem;
-use posescope::scene::{Scene, SceneError};
-use posescope::trace::{Cancelled, Record, Sink, Trace};
+use posescope_core::method::Method;
+use posescope_core::params::Params;
+use posescope_core::problem::Problem;
+use posescope_core::scene::{Scene, SceneError};
+use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 
 use crate::two_walls::solvable;
 use crate::walls_scene::Walls;
@@ -167,7 +167,7 @@ fn points_in_view_are_fewer_than_all_where_some_are_not() {
         }
     }
     let problem = solvable();
-    let mut reference = posescope::problem::ReferenceTuple::clone(&problem.reference);
+    let mut reference = posescope_core::problem::ReferenceTuple::clone(&problem.reference);
     let behind = reference.cloud.points.clone();
     let behind = behind.iter().map(|point| -*point);
     reference.cloud.points.extend(behind);

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use image::{GrayImage, Luma};
-use posescope::camera::Intrinsics;
-use posescope::cloud::Cloud;
-use posescope::geometry::Pose;
-use posescope::image::Photo;
-use posescope::memo::Memo;
-use posescope::problem::{Problem, Query, ReferenceTuple};
+use posescope_core::camera::Intrinsics;
+use posescope_core::cloud::Cloud;
+use posescope_core::geometry::Pose;
+use posescope_core::image::Photo;
+use posescope_core::memo::Memo;
+use posescope_core::problem::{Problem, Query, ReferenceTuple};
 
 pub const CAMERA: Intrinsics = Intrinsics {
     fx: 180.0,

@@ -4,21 +4,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use posescope::diagnosis::Code;
-use posescope::diagnosis::{Diagnosis, Evidence, Family, RULES, Subject, Tolerance, diagnose};
-use posescope::event::KindSet;
-use posescope::geometry::Pose;
-use posescope::localize::{
+use posescope_core::diagnosis::Code;
+use posescope_core::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope_core::event::KindSet;
+use posescope_core::geometry::Pose;
+use posescope_core::localize::{
     LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request, StageTimes,
     localize_traced,
 };
-use posescope::memo::Memo;
-use posescope::method::Method;
-use posescope::params::Params;
-use posescope::problem::{Problem, Query};
-use posescope::trace::{Cancelled, Record, Sink, Trace};
+use posescope_core::memo::Memo;
+use posescope_core::method::Method;
+use posescope_core::params::Params;
+use posescope_core::problem::{Problem, Query};
+use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 
-use crate::binary::posescope;
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;
 
@@ -588,73 +587,4 @@ fn a_method_may_ask_for_more_certainty_than_nobody_does() {
         always.confidence, never.confidence,
         "how certain it is, it says all the same"
     );
-}
-
-/// The table of verdicts as docs/diagnosis.md has it.
-fn table_of_verdicts() -> String {
-    let mut table = "\n| code | it means | applies to | needs the truth | what to do |\n\
-                     |---|---|---|---|---|\n"
-        .to_owned();
-    for rule in RULES {
-        let families: Vec<&str> = rule
-            .applies_to
-            .iter()
-            .map(|family| family.words())
-            .collect();
-        let applies_to = match families.len() {
-            0 => "–".to_owned(),
-            all if all == Family::ALL.len() => "all".to_owned(),
-            _ => families.join(", "),
-        };
-        let conclusive = if rule.is_conclusive {
-            ", conclusive"
-        } else {
-            ""
-        };
-        let truth = if rule.needs_truth { "yes" } else { "no" };
-        table += &format!(
-            "| **{}** | {}{conclusive} | {applies_to} | {truth} | {} |\n",
-            rule.code, rule.title, rule.advice
-        );
-    }
-    table
-}
-
-#[test]
-fn verdicts_in_the_docs_are_those_of_the_rules() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/diagnosis.md");
-    let page = std::fs::read_to_string(&path).expect("the page");
-    let begin = page.find("<!-- verdicts").expect("where the table begins");
-    let begin = begin + page[begin..].find("-->").expect("its end") + "-->\n".len();
-    let end = page
-        .find("<!-- /verdicts -->")
-        .expect("where the table ends");
-    let table = table_of_verdicts() + "\n";
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        let page = format!("{}{table}{}", &page[..begin], &page[end..]);
-        std::fs::write(&path, page).expect("writable");
-        return;
-    }
-    assert_eq!(
-        &page[begin..end],
-        table,
-        "UPDATE_DOCS=1 cargo test verdicts_in_the_docs writes the table"
-    );
-}
-
-#[test]
-fn what_is_no_tolerance_is_refused() {
-    for (option, value) in [
-        ("--right", "1,5"),
-        ("--min-confidence", "1.5"),
-        ("--explain", "many"),
-    ] {
-        let output = posescope()
-            .args(["run", "street", "--query", "0", option, value])
-            .output()
-            .expect("it runs");
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(message.contains(option), "{message}");
-    }
 }

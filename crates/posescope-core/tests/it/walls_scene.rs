@@ -1,10 +1,10 @@
 //! The small world as a scene: five frames, the camera moving ahead, one of them spoiled.
 
-use posescope::camera::Intrinsics;
-use posescope::cloud::Cloud;
-use posescope::geometry::Pose;
-use posescope::image::Photo;
-use posescope::scene::{Scene, SceneError};
+use posescope_core::camera::Intrinsics;
+use posescope_core::cloud::Cloud;
+use posescope_core::geometry::Pose;
+use posescope_core::image::Photo;
+use posescope_core::scene::{Scene, SceneError};
 
 use crate::two_walls::{CAMERA, cloud_of_the_walls, photo};
 
@@ -67,5 +67,49 @@ impl Scene for Walls {
             point.z -= AHEAD_M[frame] as f32;
         }
         Ok(cloud)
+    }
+}
+
+/// Frame 1 is seen by a camera of half the size.
+pub struct TwoCameras(pub Walls);
+
+impl Scene for TwoCameras {
+    posescope_core::inner_scene!(0: frames, pose, time_s, has_cloud, cloud);
+
+    fn name(&self) -> &str {
+        "two cameras"
+    }
+
+    fn intrinsics(&self, frame: usize) -> Intrinsics {
+        let camera = self.0.intrinsics(frame);
+        match frame {
+            1 => Intrinsics {
+                fx: camera.fx / 2.0,
+                fy: camera.fy / 2.0,
+                cx: (camera.cx - 0.5) / 2.0,
+                cy: (camera.cy - 0.5) / 2.0,
+                width: camera.width / 2,
+                height: camera.height / 2,
+            },
+            _ => camera,
+        }
+    }
+
+    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
+        let photo = self.0.photo(frame)?;
+        let Intrinsics { width, height, .. } = self.intrinsics(frame);
+        if photo.dimensions() == (width, height) {
+            return Ok(photo);
+        }
+        let mean = |x: u32, y: u32| {
+            let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
+            let values = four.map(|(right, down)| {
+                u32::from(photo.gray.get_pixel(2 * x + right, 2 * y + down).0[0])
+            });
+            image::Luma([(values.iter().sum::<u32>() / 4) as u8])
+        };
+        Ok(Photo::from_gray(image::GrayImage::from_fn(
+            width, height, mean,
+        )))
     }
 }

@@ -1,9 +1,9 @@
 //! The ways of a library's user: one call for one query, a cost of one's own.
 
-use posescope::event::{Stage, StageEnded, ViewRendered};
-use posescope::image::{FloatImage, GrayImage, gaussian_smoothed};
-use posescope::memo::Key;
-use posescope::{
+use posescope_core::event::{Stage, StageEnded, ViewRendered};
+use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
+use posescope_core::memo::Key;
+use posescope_core::{
     Cost, Direct, Failure, History, IntensityPair, Method, Params, Problem, Trace, estimator,
     localize, localize_by, localize_traced,
 };

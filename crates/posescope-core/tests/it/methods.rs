@@ -1,19 +1,19 @@
 //! The methods beside the paper's: what they say of their decisions, and what they keep.
 
 use image::{GrayImage, Luma};
-use posescope::diagnosis::Code;
-use posescope::estimator::{self, Failure, Outcome};
-use posescope::event::{
+use posescope_core::diagnosis::Code;
+use posescope_core::estimator::{self, Failure, Outcome};
+use posescope_core::event::{
     CandidatesJudged, DescentStepped, Moment, PhaseSearched, StartsRefined, ViewRendered,
 };
-use posescope::geometry::{Pose, PoseError};
-use posescope::history::History;
-use posescope::judge::{Channels, Judge, JudgeParams, Refined};
-use posescope::method::Method;
-use posescope::params::Params;
-use posescope::problem::Problem;
-use posescope::render::RenderParams;
-use posescope::trace::Trace;
+use posescope_core::geometry::{Pose, PoseError};
+use posescope_core::history::History;
+use posescope_core::judge::{Channels, Judge, JudgeParams, Refined};
+use posescope_core::method::Method;
+use posescope_core::params::Params;
+use posescope_core::problem::Problem;
+use posescope_core::render::RenderParams;
+use posescope_core::trace::Trace;
 
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 

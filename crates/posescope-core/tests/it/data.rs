@@ -11,8 +11,3 @@ pub fn sample(folder: &str) -> Option<PathBuf> {
     }
     found
 }
-
-/// The sequence with the authors' pair, 003814 and 003823.
-pub fn authors_pair() -> Option<PathBuf> {
-    sample("kitti/sequences/00")
-}

@@ -1,20 +1,20 @@
 //! Long statistics of the minimal solver, the robust estimator and the acceptance rule.
 //!
 //! Every random scene comes from a seed that is part of the test. The figures are printed
-//! (`cargo test --test robust_pose -- --nocapture`); the requirements are asserted.
+//! (`cargo test -p posescope-core --test it robust_pose -- --nocapture`); the requirements are asserted.
 
 use std::convert::Infallible;
 use std::ops::Range;
 use std::time::Instant;
 
 use nalgebra::{Point2, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
-use posescope::camera::Intrinsics;
-use posescope::geometry::{Pose, PoseError};
-use posescope::robust::{
+use posescope_core::camera::Intrinsics;
+use posescope_core::geometry::{Pose, PoseError};
+use posescope_core::robust::{
     Acceptance, AcceptanceRule, Consensus, MlesacError, MlesacParams, effective_area_px,
     inliers_beyond_chance, mlesac,
 };
-use posescope::solver::{Correspondence, p3p};
+use posescope_core::solver::{Correspondence, p3p};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -3,7 +3,7 @@
 
 use image::{GrayImage, Luma};
 use nalgebra::{Point2, Rotation2, Similarity2, Vector2};
-use posescope::features::{Features, SurfParams, nearest_neighbours, surf};
+use posescope_core::features::{Features, SurfParams, nearest_neighbours, surf};
 
 use crate::data;
 

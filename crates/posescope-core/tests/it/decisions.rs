@@ -1,15 +1,17 @@
 //! Single decisions of the estimators, on two walls: each parameter changes what it says it does.
 
-use posescope::cloud::Cloud;
-use posescope::diagnosis::Code;
-use posescope::diagnosis::{Evidence, Subject, Tolerance};
-use posescope::estimator::{self, Failure, Outcome};
-use posescope::geometry::Pose;
-use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request, evaluate};
-use posescope::method::Method;
-use posescope::params::Params;
-use posescope::problem::Problem;
-use posescope::trace::Trace;
+use posescope_core::cloud::Cloud;
+use posescope_core::diagnosis::Code;
+use posescope_core::diagnosis::{Evidence, Subject, Tolerance};
+use posescope_core::estimator::{self, Failure, Outcome};
+use posescope_core::geometry::Pose;
+use posescope_core::localize::{
+    LocalizeError, Localizer, NoObserver, QueryResult, Request, evaluate,
+};
+use posescope_core::method::Method;
+use posescope_core::params::Params;
+use posescope_core::problem::Problem;
+use posescope_core::trace::Trace;
 
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;

@@ -4,23 +4,22 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 
-use posescope::camera::Intrinsics;
-use posescope::cloud::Cloud;
-use posescope::event::{Event, StageEnded};
-use posescope::geometry::Pose;
-use posescope::image::Photo;
-use posescope::localize::{
+use posescope_core::camera::Intrinsics;
+use posescope_core::cloud::Cloud;
+use posescope_core::event::{Event, StageEnded};
+use posescope_core::geometry::Pose;
+use posescope_core::image::Photo;
+use posescope_core::localize::{
     Chooser, LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, References,
     Request, Selection, StageTimes,
 };
-use posescope::method::Method;
-use posescope::params::Params;
-use posescope::problem::{Query, ReferenceTuple};
-use posescope::run::Draw;
-use posescope::scene::{CachedScene, FrameStore, Scene, SceneError};
-use posescope::trace::{Cancelled, Record, Sink};
+use posescope_core::method::Method;
+use posescope_core::params::Params;
+use posescope_core::problem::{Query, ReferenceTuple};
+use posescope_core::scene::{CachedScene, FrameStore, Scene, SceneError};
+use posescope_core::trace::{Cancelled, Record, Sink};
 
-use crate::walls_scene::Walls;
+use crate::walls_scene::{TwoCameras, Walls};
 
 /// The walls, with a count of what was read of which frame.
 struct Counting {
@@ -50,7 +49,7 @@ impl Counting {
 }
 
 impl Scene for Counting {
-    posescope::inner_scene!(walls: frames, intrinsics, pose, time_s, has_cloud);
+    posescope_core::inner_scene!(walls: frames, intrinsics, pose, time_s, has_cloud);
 
     fn name(&self) -> &str {
         self.name
@@ -266,7 +265,7 @@ fn scenes_of_one_name_are_not_taken_for_each_other() {
 struct RendezvousScene(Walls, Barrier);
 
 impl Scene for RendezvousScene {
-    posescope::inner_scene!(0: frames, intrinsics, pose, time_s, has_cloud, cloud);
+    posescope_core::inner_scene!(0: frames, intrinsics, pose, time_s, has_cloud, cloud);
 
     fn name(&self) -> &str {
         "meeting"
@@ -302,7 +301,7 @@ fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
 struct UnusualScene(Walls);
 
 impl Scene for UnusualScene {
-    posescope::inner_scene!(0: frames, has_cloud, photo, cloud);
+    posescope_core::inner_scene!(0: frames, has_cloud, photo, cloud);
 
     fn name(&self) -> &str {
         "peculiar"
@@ -397,50 +396,6 @@ fn a_scene_at_hand_says_all_that_the_scene_says() {
     assert_eq!(cloud(&cached), cloud(&scene));
 }
 
-/// Frame 1 is seen by a camera of half the size.
-struct TwoCameras(Walls);
-
-impl Scene for TwoCameras {
-    posescope::inner_scene!(0: frames, pose, time_s, has_cloud, cloud);
-
-    fn name(&self) -> &str {
-        "two cameras"
-    }
-
-    fn intrinsics(&self, frame: usize) -> Intrinsics {
-        let camera = self.0.intrinsics(frame);
-        match frame {
-            1 => Intrinsics {
-                fx: camera.fx / 2.0,
-                fy: camera.fy / 2.0,
-                cx: (camera.cx - 0.5) / 2.0,
-                cy: (camera.cy - 0.5) / 2.0,
-                width: camera.width / 2,
-                height: camera.height / 2,
-            },
-            _ => camera,
-        }
-    }
-
-    fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let photo = self.0.photo(frame)?;
-        let Intrinsics { width, height, .. } = self.intrinsics(frame);
-        if photo.dimensions() == (width, height) {
-            return Ok(photo);
-        }
-        let mean = |x: u32, y: u32| {
-            let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
-            let values = four.map(|(right, down)| {
-                u32::from(photo.gray.get_pixel(2 * x + right, 2 * y + down).0[0])
-            });
-            image::Luma([(values.iter().sum::<u32>() / 4) as u8])
-        };
-        Ok(Photo::from_gray(image::GrayImage::from_fn(
-            width, height, mean,
-        )))
-    }
-}
-
 #[test]
 fn a_query_may_have_another_camera_than_its_reference() {
     let scene = TwoCameras(Walls::new());
@@ -451,22 +406,4 @@ fn a_query_may_have_another_camera_than_its_reference() {
         let error = result.error.expect("a pose");
         assert!(error.translation_m < 0.6, "{}: {error:?}", result.method);
     }
-}
-
-#[test]
-fn a_run_describes_the_camera_of_each_query_where_they_have_several() {
-    let draw = Draw {
-        limit: None,
-        only: &[],
-        seed: 0,
-    };
-    let one = Walls::new();
-    let pair = draw.pair(0, &one, &one).expect("queries");
-    assert!(pair.cameras.is_empty());
-    let two = TwoCameras(Walls::new());
-    let pair = draw.pair(0, &two, &two).expect("queries");
-    let widths: Vec<u32> = pair.cameras.iter().map(|camera| camera.width).collect();
-    assert_eq!(widths, [240, 120, 240, 240, 240]);
-    assert_eq!(pair.camera, pair.cameras[0]);
-    assert_ne!(two.fingerprint(), TwoCameras(Walls::new()).0.fingerprint());
 }

@@ -6,26 +6,26 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
-use posescope::cloud::Cloud;
-use posescope::cost::{
+use posescope_core::cloud::Cloud;
+use posescope_core::cost::{
     self, Cost, Entropies, Evaluator, Explanation, IntensityPair, JointHistogram,
 };
-use posescope::diagnosis::Code;
-use posescope::estimator::{self, Outcome, Parts};
-use posescope::event::{
+use posescope_core::diagnosis::Code;
+use posescope_core::estimator::{self, Outcome, Parts};
+use posescope_core::event::{
     DepthsLifted, Event, FeaturesClassified, FeaturesDetected, HypothesisTried, Kind, KindSet,
     MatchesDecided, PhaseSearched, PoseScored, Stage, StageEnded, StageStarted, StartsRefined,
 };
-use posescope::features::FeatureState;
-use posescope::geometry::Pose;
-use posescope::history::History;
-use posescope::image::{FloatImage, gaussian_smoothed};
-use posescope::memo::{Key, Memo};
-use posescope::method::Method;
-use posescope::params::Params;
-use posescope::problem::Problem;
-use posescope::render::{Scorer, color_cloud};
-use posescope::trace::{Cancelled, Record, Sink, Trace};
+use posescope_core::features::FeatureState;
+use posescope_core::geometry::Pose;
+use posescope_core::history::History;
+use posescope_core::image::{FloatImage, gaussian_smoothed};
+use posescope_core::memo::{Key, Memo};
+use posescope_core::method::Method;
+use posescope_core::params::Params;
+use posescope_core::problem::Problem;
+use posescope_core::render::{Scorer, color_cloud};
+use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 use proptest::prelude::*;
 
 use crate::two_walls::{CAMERA, cloud_of_the_walls, photo, problem, solvable};
@@ -439,7 +439,7 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
     let (mut problem, mut params) = (remembering(), Params::default());
     // No photo shows the other: no sample is ever good enough, and all trials are drawn.
     let other = problem_of_strangers();
-    problem.query = Arc::new(posescope::problem::Query {
+    problem.query = Arc::new(posescope_core::problem::Query {
         memo: Memo::of(64),
         ..(*other.query).clone()
     });

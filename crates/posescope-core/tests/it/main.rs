@@ -1,0 +1,14 @@
+//! Integration tests of the estimators: one binary, so that they are linked once.
+
+mod conformance;
+mod data;
+mod decisions;
+mod diagnosis;
+mod memory;
+mod methods;
+mod one_answer;
+mod own_cost;
+mod robust_pose;
+mod surf_warp;
+mod two_walls;
+mod walls_scene;
