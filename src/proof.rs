@@ -15,7 +15,7 @@ use image::RgbImage;
 
 use crate::diagnosis::{MapOverlay, Proof};
 use crate::estimator::{self, Entry};
-use crate::event::DebugEvent;
+use crate::event::{DebugEvent, Kind, KindSet};
 use crate::geometry::Pose;
 use crate::localize::{PoseReport, QueryResult};
 use crate::method::Method;
@@ -25,6 +25,18 @@ use crate::problem::Problem;
 use crate::trace::Record;
 
 pub use layout::Place;
+
+/// The kinds of event that proofs are made from.
+pub const KINDS: KindSet = KindSet::of(&[
+    Kind::FeaturesDetected,
+    Kind::MatchesDecided,
+    Kind::DepthsLifted,
+    Kind::MatchesGuided,
+    Kind::FeaturesClassified,
+    Kind::PhaseSearched,
+    Kind::ReferencesFused,
+    Kind::ReferencesRanked,
+]);
 
 /// Panels that prove one sentence: a large one, perhaps one below it, and small ones beside it.
 #[derive(Clone, Debug)]

@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use image::DynamicImage;
 use image::codecs::jpeg::JpegEncoder;
 
+use crate::event::KindSet;
 use crate::geometry::Pose;
 use crate::history::History;
 use crate::image::Photo;
@@ -12,7 +13,7 @@ use crate::localize::{LocalizeObserver, QueryResult};
 use crate::params::Params;
 use crate::picture;
 use crate::problem::Problem;
-use crate::proof::{ProofCase, ProofPicture};
+use crate::proof::{self, ProofCase, ProofPicture};
 use crate::trace::{Cancelled, Record, Sink};
 
 /// Width of a thumbnail \[px\].
@@ -49,6 +50,10 @@ pub(super) struct Witness {
 }
 
 impl Sink for Witness {
+    fn wanted(&self) -> KindSet {
+        proof::KINDS
+    }
+
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
         self.history.accept(record)
     }

@@ -312,7 +312,7 @@ fn every_promised_entity_is_on_its_timelines() {
 }
 
 #[test]
-fn a_recording_of_something_wrong_opens_on_it_with_the_result_beside_the_truth() {
+fn a_recording_of_something_wrong_opens_on_the_picture_that_proves_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut params = Params::default();
     let right = recorded(&folder, "right.rrd", &[Method::PM, Method::MI], &params);
@@ -321,21 +321,11 @@ fn a_recording_of_something_wrong_opens_on_it_with_the_result_beside_the_truth()
         params.assign(assignment).expect("a parameter");
     }
     let wrong = recorded(&folder, "wrong.rrd", &[Method::PM, Method::MI], &params);
-    let beside = ["at_result", "at_truth"].map(|place| entities::direct(Method::MI, place));
-    let has = |path: &Path, entity: &str| {
-        let paths = timelines(&chunks(path));
-        paths.keys().any(|known| known.starts_with(entity))
-    };
-    for entity in &beside {
-        assert!(has(&wrong, &format!("{entity}/synthetic")), "{entity}");
-        assert!(
-            has(&wrong, &format!("{entity}/joint_histogram")),
-            "{entity}"
-        );
-        assert!(!has(&right, entity), "{entity}");
-    }
-    assert!(layout(&wrong).contains("MI: result beside truth"));
-    assert!(!layout(&right).contains("result beside truth"));
+    let proof = entities::proof(Method::MI);
+    assert!(timelines(&chunks(&wrong)).contains_key(&proof));
+    assert!(!timelines(&chunks(&right)).contains_key(&proof));
+    assert!(layout(&wrong).contains("Why MI is wrong"));
+    assert!(!layout(&right).contains("Why MI is wrong"));
 }
 
 #[test]

@@ -38,8 +38,8 @@ pub(super) struct LayoutInput<'a> {
 pub(super) struct Focus {
     /// The estimators whose results are wrong or missing, of a hybrid the one that it took.
     pub(super) wrong: Vec<Method>,
-    /// Of those, the ones that are shown at their result and at the truth.
-    pub(super) beside_truth: Vec<Method>,
+    /// The methods whose results are proven wrong by a picture.
+    pub(super) proven: Vec<Method>,
     /// What is to be seen in the world at once, in the frame of the first reference camera \[m\].
     pub(super) places: Vec<[f64; 3]>,
 }
@@ -125,7 +125,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     };
     let direct = direct.into_iter();
     let direct: Vec<_> = direct
-        .map(|method| direct_row(method, focus, viewpoints))
+        .map(|method| search_row(method, viewpoints))
         .collect();
     // Three rows would leave too little height for the photos.
     if rows.is_empty() {
@@ -133,11 +133,17 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     } else if !direct.is_empty() {
         rows.push((share, BlueprintNode::Tabs(direct)));
     }
-    let mut right = BlueprintNode::Column(rows);
+    // The proofs come first: they are what a recording of a failure opens on.
+    let proofs = focus.proven.iter().map(|&method| {
+        let name = format!("Why {} is wrong", method.label());
+        view("2D", name, entities::proof(method))
+    });
+    let mut tabs: Vec<BlueprintNode> = proofs.collect();
+    tabs.push(row("Methods", equal([BlueprintNode::Column(rows)])));
     if ranked > 0 {
-        let methods = row("Methods", equal([right]));
-        right = BlueprintNode::Tabs(vec![methods, ranks(ranked)]);
+        tabs.push(ranks(ranked));
     }
+    let right = BlueprintNode::Tabs(tabs);
     row("posescope", vec![(2.0, left), (3.0, right)])
 }
 
@@ -187,35 +193,6 @@ fn feature_row() -> BlueprintNode {
     row("FB", vec![(3.0, photos), (2.0, numbers)])
 }
 
-fn direct_row(method: Method, focus: &Focus, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
-    let search = search_row(method, viewpoints);
-    if !focus.beside_truth.contains(&method) {
-        return search;
-    }
-    let name = method.label();
-    // What the search compares lies beside what it should have found.
-    let at = |place: &str, what: &str| {
-        let pictures = if has_histogram(method) {
-            ["synthetic", "joint_histogram"]
-        } else {
-            ["synthetic", "residual"]
-        };
-        BlueprintNode::Column(equal(pictures.map(|part| {
-            let title = format!("{name} at the {what}: {}", part.replace('_', " "));
-            let origin = entities::direct(method, &format!("{place}/{part}"));
-            view("2D", title, origin)
-        })))
-    };
-    let beside = row(
-        &format!("{name}: result beside truth"),
-        equal([
-            at(entities::AT_RESULT, "result"),
-            at(entities::AT_TRUTH, "truth"),
-        ]),
-    );
-    row(&name, equal([BlueprintNode::Tabs(vec![beside, search])]))
-}
-
 /// The search of a direct method, step by step.
 fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     let name = method.label();
@@ -243,7 +220,7 @@ fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
         plot(format!("{name} cost (timeline eval)"), of("cost")),
     ]);
     let views = BlueprintNode::Column(equal([views, comparison]));
-    row(&format!("{name}: search"), vec![(3.0, views), (2.0, maps)])
+    row(&name, vec![(3.0, views), (2.0, maps)])
 }
 
 fn view(class: &'static str, name: impl Into<String>, origin: impl Into<String>) -> BlueprintNode {

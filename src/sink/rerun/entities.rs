@@ -24,7 +24,7 @@ pub const WORLD: &str = "world";
 /// The roots of all that belongs to one query, whichever methods were asked.
 pub fn of_a_query() -> impl Iterator<Item = &'static str> {
     let methods = estimator::methods().map(|method| method.name());
-    [WORLD, "query", "search", "fusion", "retrieval"]
+    [WORLD, PROOF, "query", "search", "fusion", "retrieval"]
         .into_iter()
         .chain(methods)
 }
@@ -48,6 +48,8 @@ pub const FUSION_TABLE: &str = "fusion/table";
 pub const RETRIEVAL_TABLE: &str = "retrieval/table";
 /// Where the ranked frames are.
 pub const RETRIEVAL_PLACES: &str = "world/retrieval";
+/// Pictures that prove what is wrong.
+pub const PROOF: &str = "proof";
 /// The results of the query, as Markdown.
 pub const REPORT: &str = "report";
 /// The decisions, in words.
@@ -128,16 +130,15 @@ pub fn yaw_curve(method: Method) -> String {
     format!("search/{}/yaw", method.name())
 }
 
-/// What a direct method shows at its result, below its name: see [`direct`].
-pub const AT_RESULT: &str = "at_result";
-/// The same at the truth.
-pub const AT_TRUTH: &str = "at_truth";
-
 /// Something that a direct method shows: `synthetic`, `residual`, `weights`, `joint_histogram`,
-/// `entropy`, `cost`, `coverage`, `best`; below [`AT_RESULT`] and [`AT_TRUTH`] the pictures of both,
-/// where the result is wrong.
+/// `entropy`, `cost`, `coverage`, `best`.
 pub fn direct(method: Method, part: &str) -> String {
     format!("{}/{part}", method.name())
+}
+
+/// The picture that proves what is wrong with a method's result.
+pub fn proof(method: Method) -> String {
+    format!("{PROOF}/{}", method.name())
 }
 
 /// The stage that a method is in.

@@ -3,15 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use image::DynamicImage;
 use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
 use super::blueprint::Focus;
 use super::direct::DirectContext;
+use super::encode::jpeg;
 use super::event_context::EventContext;
 use super::feature::FeatureContext;
 use super::fusion::FusionTables;
 use super::scene::{self, Origin, PlacedCamera};
-use super::story::{self, BesideTruth};
+use super::story;
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
 use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
@@ -22,8 +24,12 @@ use crate::narration;
 use crate::palette;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
+use crate::proof::{self, ProofCase, ProofPicture};
 use crate::render::{ColoredCloud, color_cloud};
 use crate::trace::Record;
+
+/// Width of a proof \[px\].
+const PROOF_WIDTH: u32 = 1280;
 
 /// A recording into which runs are put, one query after the other.
 ///
@@ -57,8 +63,10 @@ struct CurrentQuery {
     /// The estimators whose stages are open, the outermost first.
     estimators: Vec<ActiveEstimator>,
     fusion: FusionTables,
-    /// Estimators that were shown at their result and at the truth.
-    beside_truth: Vec<Method>,
+    /// What proofs are made from, by reference and estimator.
+    records: BTreeMap<(usize, Method), Vec<Record>>,
+    /// Methods whose results are proven by a picture.
+    proven: Vec<Method>,
     /// Ranked frames that have a picture.
     ranked: usize,
 }
@@ -148,7 +156,7 @@ impl Recording {
             problems,
             truth,
             results,
-            beside_truth,
+            proven,
             ..
         } = &self.query;
         // A lesson tells its story itself, from the beginning.
@@ -156,7 +164,7 @@ impl Recording {
             return;
         }
         if let Some(first) = problems.first() {
-            self.send_layout(story::focus(first, truth.as_ref(), results, beside_truth));
+            self.send_layout(story::focus(first, truth.as_ref(), results, proven));
         }
     }
 
@@ -175,22 +183,28 @@ impl Recording {
         blueprint::send(&mut self.stream, &input);
     }
 
-    /// A wrong result of a search beside the truth, once for every estimator and reference.
-    fn show_beside_truth(&mut self, result: &QueryResult) {
-        let (Some(problem), Some(truth)) = (self.query.problem(), self.query.truth) else {
+    /// The picture that proves what is wrong with a result, once for every method.
+    fn prove(&mut self, result: &QueryResult) {
+        let query = &self.query;
+        let (Some(problem), Some(estimator)) = (query.problem(), proof::responsible(result)) else {
             return;
         };
-        let Some(method) = story::responsible(result) else {
+        if !story::is_wrong(result) || query.proven.contains(&result.method) {
             return;
-        };
-        let shown = BesideTruth {
+        }
+        let records = query.records.get(&(query.reference, estimator));
+        let case = ProofCase {
             problem,
-            truth: &truth,
+            records: records.map_or(&[], Vec::as_slice),
+            result,
+            truth: query.truth.as_ref(),
             params: &self.params,
         };
-        if !self.query.beside_truth.contains(&method) && shown.log(method, result, &mut self.stream)
-        {
-            self.query.beside_truth.push(method);
+        if let Some(picture) = ProofPicture::of(&case) {
+            let path = entities::proof(result.method);
+            let raster = DynamicImage::ImageRgb8(picture.raster(PROOF_WIDTH));
+            self.stream.log_image(&path, jpeg(&raster));
+            self.query.proven.push(result.method);
         }
     }
 
@@ -436,7 +450,7 @@ impl Recording {
         self.stream.advance();
         self.result_in_words(result);
         self.estimate(result);
-        self.show_beside_truth(result);
+        self.prove(result);
         self.query.results.push(result.clone());
         self.report();
         self.stream.flush_blocking();
@@ -461,6 +475,13 @@ impl Recording {
             return;
         }
         self.stream.set_lockstep(Some(record.index));
+        if let Some(&method) = record.methods.last()
+            && proof::KINDS.contains(record.event.kind())
+        {
+            let key = (self.query.reference, method);
+            let records = self.query.records.entry(key).or_default();
+            records.push(record.clone());
+        }
         match (&record.event, record.methods.last()) {
             (Event::StageStarted(started), _) => self.stage_started(started.stage),
             (Event::StageEnded(ended), _) => self.stage_ended(ended.stage, ended.succeeded),
