@@ -7,7 +7,7 @@ const GAP: f32 = 8.0;
 /// Height of a title \[px\].
 const TITLE: f32 = 18.0;
 /// What the large panel and the strip below it take of the width, where something is beside them.
-const LARGE_SHARE: f32 = 0.58;
+const LARGE_SHARE: f32 = 0.52;
 
 /// A rectangle: left, top, width and height \[px\].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -143,7 +143,7 @@ fn map(
                 outline_right_cell(&mut panel, surface, &place(truth));
             }
         }
-        MapOverlay::Reach => {
+        MapOverlay::Reach | MapOverlay::Rim => {
             let radius_m = case.problem.uncertainty_radius_m;
             let around = (0..=72).map(|step| {
                 let angle = f64::from(step) * std::f64::consts::TAU / 72.0;
@@ -154,18 +154,8 @@ fn map(
                 };
                 cell_place(lattice, &offset)
             });
-            panel.line([0xFF; 3], 1.5, around);
-        }
-        MapOverlay::Rim => {
-            let (right, bottom) = (lattice.columns as f32 - 0.1, lattice.rows as f32 - 0.1);
-            let corners = [
-                [0.1, 0.1],
-                [right, 0.1],
-                [right, bottom],
-                [0.1, bottom],
-                [0.1, 0.1],
-            ];
-            panel.line(palette::ESTIMATE, 3.0, corners);
+            panel.line(palette::ESTIMATE, 2.5, around);
+            panel.title += &format!(", searched within {radius_m} m");
         }
         MapOverlay::Preference | MapOverlay::Coverage | MapOverlay::Flat => {}
     }
@@ -211,8 +201,8 @@ fn cost_scale(surface: &ScoredLattice) -> Option<ColorScale> {
     let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
     let (least, most) = (costs().reduce(f64::min)?, costs().reduce(f64::max)?);
     Some(ColorScale {
-        dark: format!("{most:.3}"),
-        bright: format!("{least:.3} (lowest cost)"),
+        dark: number(most),
+        bright: format!("{} (lowest cost)", number(least)),
     })
 }
 
@@ -252,14 +242,14 @@ fn cell_place(lattice: &Lattice, offset: &Offset) -> [f32; 2] {
 impl Seen {
     fn words(&self) -> String {
         match self.comparison.score.cost {
-            Some(cost) => format!("{}: cost {cost:.3}", self.label),
+            Some(cost) => format!("{}: cost {}", self.label, number(cost)),
             None => format!("{}: no cost", self.label),
         }
     }
 
     fn label(&self) -> String {
         match self.comparison.score.cost {
-            Some(cost) => format!("{} {cost:.3}", self.label),
+            Some(cost) => format!("{} {}", self.label, number(cost)),
             None => format!("{}: no cost", self.label),
         }
     }
@@ -267,8 +257,8 @@ impl Seen {
 
 fn view_panel(query: &GrayImage, seen: &Seen) -> Panel {
     let view = &seen.comparison.view;
-    let share = 100.0 * view.pixels.len() as f64 / f64::from(view.width * view.height).max(1.0);
-    let title = format!("Map seen from the {}, covers {share:.0} %", seen.words());
+    let covered = view.pixels.len();
+    let title = format!("Map seen from the {}, covers {covered} px", seen.words());
     Panel::new(title, over(query, view))
 }
 
@@ -353,7 +343,7 @@ fn curve(
             1.0,
             [[x(0.0), y(cost)], [x(steps as f64), y(cost)]],
         );
-        panel.mark(Thing::Words, [6.0, y(cost)], format!("{cost:.3}"));
+        panel.mark(Thing::Words, [6.0, y(cost)], number(cost));
     }
     let mut piece: Vec<[f32; 2]> = Vec::new();
     for (step, cost) in costs.iter().enumerate() {
@@ -376,6 +366,15 @@ fn curve(
         }
     }
     Some(panel)
+}
+
+/// A cost with three digits that count.
+fn number(cost: f64) -> String {
+    match cost.abs() {
+        100.0.. => format!("{cost:.0}"),
+        10.0.. => format!("{cost:.1}"),
+        _ => format!("{cost:.3}"),
+    }
 }
 
 /// The pose at a share of the way; below 0 and above 1 it goes on in the same direction.

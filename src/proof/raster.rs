@@ -7,7 +7,7 @@ use image::{Rgb, RgbImage};
 use skrifa::instance::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider as _};
 use vello_cpu::color::AlphaColor;
-use vello_cpu::kurbo::{Affine, BezPath, Circle, Rect, Shape as _, Stroke};
+use vello_cpu::kurbo::{BezPath, Circle, Rect, Shape as _, Stroke};
 use vello_cpu::peniko::{Blob, FontData};
 use vello_cpu::{Glyph, Level, Pixmap, RenderContext, RenderSettings, Resources};
 
@@ -19,6 +19,8 @@ const GROUND: Color = [0x22, 0x24, 0x28];
 const WORDS: Color = [0xE8; 3];
 /// Size of titles and labels \[px\].
 const FONT_PX: f32 = 13.0;
+/// Height of a line of the sentence \[px\].
+const LINE: f32 = 19.0;
 /// Half the size of a mark \[px\].
 const MARK: f64 = 7.0;
 
@@ -28,12 +30,17 @@ static FONT: LazyLock<FontData> = LazyLock::new(|| {
 });
 
 impl ProofPicture {
-    /// The picture in this width \[px\].
-    pub fn raster(&self, width: u32) -> RgbImage {
+    /// The sentence and below it the panels, in this width \[px\].
+    pub fn raster(&self, width: u32, sentence: &str) -> RgbImage {
         let width = width.clamp(200, 4096);
-        let height = (self.height_for(width as f32) as u32).clamp(1, 8192);
+        let lines = wrapped(sentence, width as f32 - 8.0);
+        let head = LINE * lines.len() as f32;
+        let height = ((head + self.height_for(width as f32)) as u32).clamp(1, 8192);
         let mut canvas = RgbImage::from_pixel(width, height, Rgb(GROUND));
-        let places = self.places(width as f32, height as f32);
+        let mut places = self.places(width as f32, height as f32 - head);
+        for place in &mut places {
+            place.top += head;
+        }
         for (panel, place) in self.panels().zip(&places) {
             paste(&mut canvas, panel, place);
         }
@@ -47,6 +54,9 @@ impl ProofPicture {
             resources: Resources::new(),
             width: width as f32,
         };
+        for (row, line) in lines.iter().enumerate() {
+            painter.words(line, [4.0, LINE * row as f32 + 14.0], WORDS);
+        }
         for (panel, place) in self.panels().zip(&places) {
             painter.panel(panel, place);
         }
@@ -243,7 +253,6 @@ fn path(lines: &[&[(f64, f64)]]) -> BezPath {
             }
         }
     }
-    path.apply_affine(Affine::IDENTITY);
     path
 }
 
@@ -307,6 +316,21 @@ fn width_of(words: &str) -> f32 {
     // One letter more, whose place is the end of the words.
     let glyphs = glyphs(&format!("{words}."), [0.0, 0.0]);
     glyphs.last().map_or(0.0, |last| last.x)
+}
+
+/// Words in lines that fit a width; none for no words.
+fn wrapped(words: &str, width: f32) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in words.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if width_of(&format!("{line} {word}")) <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// As much of the words as fits.

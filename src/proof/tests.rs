@@ -106,7 +106,7 @@ fn every_verdict_has_a_picture_without_overlap() {
             if let Some(folder) = std::env::var_os("POSESCOPE_PAINT") {
                 let path = std::path::Path::new(&folder).join(format!("{method}-{code}.png"));
                 picture
-                    .raster(960)
+                    .raster(960, "")
                     .save(path)
                     .expect("a folder to write to");
             }
@@ -120,5 +120,5 @@ fn a_proof_is_painted_the_same_twice() {
     let (kept, result) = localized(Method::MI);
     let first = pictures(&kept, &result);
     let again = pictures(&kept, &result);
-    assert_eq!(first[0].1.raster(640), again[0].1.raster(640));
+    assert_eq!(first[0].1.raster(640, "why"), again[0].1.raster(640, "why"));
 }

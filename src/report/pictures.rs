@@ -90,7 +90,7 @@ impl Witness {
             params,
         })?;
         let titles: Vec<&str> = picture.panels().map(|panel| panel.title.as_str()).collect();
-        let raster = DynamicImage::ImageRgb8(picture.raster(PROOF_WIDTH));
+        let raster = DynamicImage::ImageRgb8(picture.raster(PROOF_WIDTH, ""));
         Some(DrawnProof {
             picture: jpeg(&raster, PROOF_WIDTH, 75)?,
             words: titles.join("; "),

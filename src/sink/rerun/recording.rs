@@ -202,7 +202,7 @@ impl Recording {
         };
         if let Some(picture) = ProofPicture::of(&case) {
             let path = entities::proof(result.method);
-            let raster = DynamicImage::ImageRgb8(picture.raster(PROOF_WIDTH));
+            let raster = DynamicImage::ImageRgb8(picture.raster(PROOF_WIDTH, &result.headline()));
             self.stream.log_image(&path, jpeg(&raster));
             self.query.proven.push(result.method);
         }
