@@ -90,9 +90,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     assert!(page.contains(&link));
     assert!(page.contains("Too few keypoints"));
     // A direct method's failure has its costs.
-    assert!(
-        page.contains("of positions around the reference") || page.contains("positions around")
-    );
+    assert!(page.contains("Cost of each position around the reference"));
     for part in [
         "<caption>",
         "scope=\"col\"",
@@ -185,7 +183,7 @@ fn what_comes_from_elsewhere_is_no_markup() {
     command.arg("results").arg(&out).args(["--as", "html"]);
     command.assert().code(0);
     let page = text(&out.join("report.html"));
-    assert!(!page.contains("<script>alert") && !page.contains("<img"));
+    assert!(!page.contains("<script>alert") && !page.contains("<img src=x"));
     assert!(page.contains("&lt;script&gt;alert('&amp;')&lt;/script&gt;"));
     assert_eq!(page.matches("<script>").count(), 1);
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
