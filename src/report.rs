@@ -19,10 +19,8 @@ use crate::measure::{
     Change, GateResult, Measures, Plot, RunComparison, RunResults, read_gate_results, read_rows,
     tables,
 };
-use crate::method::Method;
 use crate::params::Params;
 use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
-use crate::scene::SceneError;
 use crate::table::Table;
 use pictures::{DrawnProof, Witness, thumbnail};
 
@@ -113,7 +111,9 @@ impl RunReport {
             None => None,
         };
         let mut thumbnails = BTreeMap::new();
-        match open(&run) {
+        let asked = &run.protocol;
+        let scenes = Scenes::open(&run.scenes, &asked.query_scene, asked.format.as_deref());
+        match scenes.and_then(|scenes| scenes.as_asked(asked)) {
             Ok(scenes) => {
                 thumbnails = self::thumbnails(&run, &scenes, &results);
                 let queries = results.iter().map(|one| one.query + 1).max();
@@ -123,10 +123,8 @@ impl RunReport {
                     ));
                 }
                 draw_failures(&run, &scenes, &params, &mut results, pictures);
-                let failures = results
-                    .iter()
-                    .filter(|one| one.result.grade.is_failure())
-                    .count();
+                let failures = results.iter().filter(|one| one.result.grade.is_failure());
+                let failures = failures.count();
                 if failures > pictures {
                     notes.push(format!("{pictures} of {failures} failures have pictures"));
                 }
@@ -199,16 +197,6 @@ fn held_against(
     })
 }
 
-fn open(run: &RunFile) -> Result<Scenes, SceneError> {
-    let protocol = &run.protocol;
-    let scenes = Scenes::open(
-        &run.scenes,
-        &protocol.query_scene,
-        protocol.format.as_deref(),
-    )?;
-    scenes.as_asked(protocol)
-}
-
 /// The photo of each query, as the methods saw it; one that cannot be read is missing.
 fn thumbnails(
     run: &RunFile,
@@ -268,7 +256,6 @@ fn drawn_failure(
     result: &QueryResult,
     params: &Params,
 ) -> Option<DrawnProof> {
-    let method: Method = result.method;
     let query = localizer.queries().find(&result.query).ok()?;
     let reference = result.references.first()?;
     let reference = localizer.references().find(reference).ok()?;
@@ -284,9 +271,14 @@ fn drawn_failure(
     };
     let mut witness = Witness::default();
     localizer
-        .localize(0, query, &[request], &[method], &mut witness, |_, _| {
-            Ok::<(), LocalizeError>(())
-        })
+        .localize(
+            0,
+            query,
+            &[request],
+            &[result.method],
+            &mut witness,
+            |_, _| Ok::<(), LocalizeError>(()),
+        )
         .ok()?;
     let truth = localizer.queries().pose(query);
     witness.proof(truth.as_ref(), result, params)

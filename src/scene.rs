@@ -60,33 +60,26 @@ pub const ALL: &[Entry] = &[
 /// # Errors
 /// [`SceneError`] names the file, the place in it and what was expected.
 pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, SceneError> {
-    let names = || {
-        ALL.iter()
-            .map(|entry| entry.name)
-            .collect::<Vec<_>>()
-            .join(", ")
+    let known = || {
+        let names: Vec<&str> = ALL.iter().map(|entry| entry.name).collect();
+        names.join(", ")
     };
     let entry = match format {
-        Some(name) => ALL.iter().find(|entry| entry.name == name).ok_or_else(|| {
-            SceneError::UnknownFormat {
+        Some(name) => {
+            (ALL.iter().find(|entry| entry.name == name)).ok_or_else(|| SceneError::UnknownFormat {
                 format: name.to_owned(),
-                known: names(),
-            }
-        })?,
-        None => {
-            let found = ALL.iter().find(|entry| (entry.recognizes)(argument));
-            let argument = argument.to_owned();
-            found.ok_or_else(|| {
-                if std::path::Path::new(&argument).exists() {
-                    SceneError::NotRecognized {
-                        argument,
-                        known: names(),
-                    }
-                } else {
-                    SceneError::NotFound { argument }
-                }
-            })?
+                known: known(),
+            })
         }
+        None => (ALL.iter().find(|entry| (entry.recognizes)(argument))).ok_or_else(|| {
+            let argument = argument.to_owned();
+            if std::path::Path::new(&argument).exists() {
+                let known = known();
+                SceneError::NotRecognized { argument, known }
+            } else {
+                SceneError::NotFound { argument }
+            }
+        }),
     };
-    (entry.open)(argument)
+    (entry?.open)(argument)
 }

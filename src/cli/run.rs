@@ -72,10 +72,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         tasks => tasks?,
     };
     drop(progress);
-    let mut json = match &args.json {
-        Some(path) => Some(JsonLines::create(path)?),
-        None => None,
-    };
+    let mut json = args.json.as_deref().map(JsonLines::create).transpose()?;
     let mut results = Vec::new();
     let methods = &task.protocol.methods;
     let estimates = tasks.iter().map(|task| task.references.frames.len());
@@ -278,10 +275,7 @@ impl Plan<'_> {
             references: names(from, &mut references.copied()),
             ..Identity::of(from, of, &self.task.params, &self.task.protocol)
         };
-        Ok(Some(Recorder::open(
-            &targets,
-            &identity,
-            &self.task.protocol.methods,
-        )?))
+        let methods = &self.task.protocol.methods;
+        Ok(Some(Recorder::open(&targets, &identity, methods)?))
     }
 }

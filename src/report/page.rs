@@ -203,28 +203,33 @@ const COLUMNS: [(&str, &str); 12] = [
 ];
 
 fn results(report: &RunReport) -> Markup {
-    let (several, compared) = (
-        report
-            .measures
-            .iter()
-            .any(|one| one.group != report.measures[0].group),
-        report.baseline.is_some(),
-    );
+    let mut groups = report.measures.iter().map(|one| &one.group);
+    let first = groups.next();
+    let has_several_groups = groups.any(|group| Some(group) != first);
     let is_shown = |name: &str| match name {
-        "where" => several,
-        "change" => compared,
+        "where" => has_several_groups,
+        "change" => report.baseline.is_some(),
         "photo" => !report.thumbnails.is_empty(),
         _ => true,
     };
     let columns: Vec<_> = COLUMNS.iter().filter(|(name, _)| is_shown(name)).collect();
+    let is_any = |is: &dyn Fn(&ReportedResult) -> bool| report.results.iter().any(is);
+    let methods = &report.run.protocol.methods;
+    let methods = methods.iter().map(|method| (method, method.to_string()));
+    let grades = Grade::ALL.into_iter();
+    let grades = grades.filter(|grade| is_any(&|one| one.result.grade == *grade));
+    let grades = grades.map(|grade| (grade, grade.to_string()));
+    let codes = Code::all().into_iter();
+    let codes = codes.filter(|code| is_any(&|one| primary(one) == Some(*code)));
+    let codes = codes.map(|code| (code, format!("{code} {}", code.title())));
     html! {
         section aria-labelledby="queries" {
             h2 id="queries" { "All results" }
             form.filters id="filters" hidden {
                 label { "Words" input type="search" name="words" autocomplete="off"; }
-                (choice("method", "Method", methods(report)))
-                (choice("grade", "Grade", grades(report)))
-                (choice("code", "Verdict", codes(report)))
+                (choice("method", "Method", methods))
+                (choice("grade", "Grade", grades))
+                (choice("code", "Verdict", codes))
                 button type="reset" { "No filter" }
             }
             p id="count" role="status" { (report.results.len()) " results" }
@@ -252,42 +257,20 @@ fn results(report: &RunReport) -> Markup {
     }
 }
 
-fn choice(name: &str, label: &str, values: Vec<(String, String)>) -> Markup {
+fn choice(
+    name: &str,
+    label: &str,
+    values: impl Iterator<Item = (impl ToString, String)>,
+) -> Markup {
     html! {
         label {
             (label)
             select name=(name) {
                 option value="" { "all" }
-                @for (value, words) in values { option value=(value) { (words) } }
+                @for (value, words) in values { option value=(value.to_string()) { (words) } }
             }
         }
     }
-}
-
-fn methods(report: &RunReport) -> Vec<(String, String)> {
-    let methods = report.run.protocol.methods.iter();
-    methods
-        .map(|method| (method.to_string(), method.to_string()))
-        .collect()
-}
-
-fn grades(report: &RunReport) -> Vec<(String, String)> {
-    let has = |grade: &Grade| report.results.iter().any(|one| one.result.grade == *grade);
-    let grades = Grade::ALL.into_iter().filter(has);
-    grades
-        .map(|grade| (grade.to_string(), grade.to_string()))
-        .collect()
-}
-
-fn codes(report: &RunReport) -> Vec<(String, String)> {
-    let found = |code: &Code| {
-        let mut results = report.results.iter();
-        results.any(|one| primary(one) == Some(*code))
-    };
-    let codes = Code::all().into_iter().filter(found);
-    codes
-        .map(|code| (code.to_string(), format!("{code} {}", code.title())))
-        .collect()
 }
 
 fn primary(one: &ReportedResult) -> Option<Code> {

@@ -53,10 +53,8 @@ pub fn located(
             Some(tie) => tie.of(row.place),
         };
         if positions.insert(frame, position).is_some() {
-            let name = &queries.frames()[frame];
-            return Err(row
-                .line
-                .error(format!("frame {name} has a position already")));
+            let expected = format!("frame {} has a position already", queries.frames()[frame]);
+            return Err(row.line.error(expected));
         }
     }
     if positions.is_empty() {
@@ -154,15 +152,13 @@ impl Tie {
 
     /// Fits the similarity that takes places to the poses of the frames that have both.
     fn fit(file: &TextFile, rows: &[Row<'_>], scenes: &[&dyn Scene]) -> Result<Self, SceneError> {
-        let names: Vec<_> = scenes
-            .iter()
-            .map(|scene| (FrameNames::new(*scene), scene))
-            .collect();
+        let names = scenes.iter().map(|scene| (FrameNames::new(*scene), scene));
+        let names: Vec<_> = names.collect();
         let pose = |row: &Row<'_>| {
-            let mut poses = names
-                .iter()
-                .filter_map(|(names, scene)| scene.pose(names.find(row.name)?));
-            poses.next().map(|pose| pose.translation.vector)
+            let of_scene = |(names, scene): &(FrameNames<'_>, &&dyn Scene)| {
+                Some(scene.pose(names.find(row.name)?)?.translation.vector)
+            };
+            names.iter().find_map(of_scene)
         };
         let ties: Vec<([f64; 3], Vector3<f64>)> = rows
             .iter()
@@ -228,12 +224,8 @@ fn similarity(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Similarity3<f64>
         return None;
     }
     let rotation = UnitQuaternion::from_matrix(&rotation);
-    let shift = to - rotation * from * scale;
-    Some(Similarity3::from_parts(
-        Translation3::from(shift),
-        rotation,
-        scale,
-    ))
+    let shift = Translation3::from(to - rotation * from * scale);
+    Some(Similarity3::from_parts(shift, rotation, scale))
 }
 
 impl Scene for Located {

@@ -62,20 +62,13 @@ impl Retriever {
     /// by the scene's name and the folder that the argument names. `None` where there is no such
     /// directory or it is turned off.
     pub fn default_path(scene: &dyn Scene, argument: &str) -> Option<PathBuf> {
-        let mut name: String = scene
-            .name()
-            .chars()
-            .map(|c| if c.is_alphanumeric() { c } else { '-' })
-            .collect();
+        let mut name = scene.name().replace(|c: char| !c.is_alphanumeric(), "-");
         if let Ok(folder) = Path::new(argument).canonicalize() {
             let hash = xxh3_64(folder.as_os_str().as_encoded_bytes());
             name.push_str(&format!("-{hash:016x}"));
         }
-        Some(
-            user_cache_folder("index")?
-                .join(name)
-                .with_extension(EXTENSION),
-        )
+        let folder = user_cache_folder("index")?;
+        Some(folder.join(name).with_extension(EXTENSION))
     }
 
     /// What the index of a scene is to hold.
@@ -100,11 +93,8 @@ impl Retriever {
         if !without.is_empty() {
             let names = without.iter().map(|&frame| scene.frames()[frame].as_str());
             let names = names.collect::<Vec<_>>().join("\n");
-            let hash = xxh3_64(names.as_bytes());
-            recipe.insert(
-                "without".to_owned(),
-                format!("{} {hash:016x}", without.len()),
-            );
+            let content = format!("{} {:016x}", without.len(), xxh3_64(names.as_bytes()));
+            recipe.insert("without".to_owned(), content);
         }
         BuildRequest {
             scene: scene.name().to_owned(),
@@ -188,25 +178,17 @@ impl Retriever {
         let features = features.value.strongest(indexed);
         self.index.query(&features, &self.params, allowed)
     }
-
-    /// The index.
-    pub fn index(&self) -> &Index {
-        &self.index
-    }
 }
 
 /// The parameters of the features, and some of retrieval.
 fn recipe(params: &Params, retrieval: &[&str]) -> BTreeMap<String, String> {
-    params
-        .list()
-        .into_iter()
-        .filter(|row| match row.key.split_once('.') {
-            Some(("surf", _)) => true,
-            Some(("retrieval", name)) => retrieval.contains(&name),
-            _ => false,
-        })
-        .map(|row| (row.key, row.value.to_string()))
-        .collect()
+    let is_part = |key: &str| match key.split_once('.') {
+        Some(("surf", _)) => true,
+        Some(("retrieval", name)) => retrieval.contains(&name),
+        _ => false,
+    };
+    let rows = params.list().into_iter().filter(|row| is_part(&row.key));
+    rows.map(|row| (row.key, row.value.to_string())).collect()
 }
 
 impl Ranking for Retriever {

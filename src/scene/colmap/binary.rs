@@ -24,7 +24,7 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     Ok(Model {
         cameras,
         images,
-        points: points.into_positions(),
+        points: points.positions,
     })
 }
 
@@ -36,9 +36,7 @@ fn cameras(path: &Path) -> Result<BTreeMap<u32, ModelCamera>, SceneError> {
         let number = file.u32()?;
         let size = (file.u64()?, file.u64()?);
         let (model, count) = model_of_number(number).map_err(|why| file.error(why))?;
-        let parameters = (0..count)
-            .map(|_| file.f64())
-            .collect::<Result<Vec<_>, _>>()?;
+        let parameters: Vec<f64> = (0..count).map(|_| file.f64()).collect::<Result<_, _>>()?;
         let camera = ModelCamera::new(model, size, &parameters).map_err(|why| file.error(why))?;
         cameras.insert(id, camera);
     }
@@ -82,10 +80,7 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
             if id == NO_POINT {
                 continue;
             }
-            let point = points
-                .find(id)
-                .ok_or_else(|| file.error(format!("points of points3D expected, {id} found")))?;
-            observed.push(point);
+            observed.push(points.find(id).map_err(|why| file.error(why))?);
         }
         images.push(ModelImage {
             name,
@@ -190,19 +185,16 @@ impl BinaryFile {
         let limited = &mut (&mut self.reader).take(LONGEST_NAME);
         let read = limited.read_until(0, &mut bytes);
         let is_ended = read.is_ok() && bytes.pop() == Some(0);
-        match String::from_utf8(bytes) {
-            Ok(name)
-                if is_ended
-                    && self.left > name.len() as u64
-                    && !name.contains(char::is_control) =>
-            {
-                self.left -= name.len() as u64 + 1;
-                Ok(name)
-            }
-            _ => Err(self.error(format!(
+        let name = String::from_utf8(bytes).ok().filter(|name| {
+            is_ended && self.left > name.len() as u64 && !name.contains(char::is_control)
+        });
+        let name = name.ok_or_else(|| {
+            self.error(format!(
                 "the name of an image expected, at most {LONGEST_NAME} bytes without control \
                  characters, and a zero"
-            ))),
-        }
+            ))
+        })?;
+        self.left -= name.len() as u64 + 1;
+        Ok(name)
     }
 }

@@ -26,7 +26,8 @@ pub(in super::super) struct ModelImage {
 /// The points by their ids.
 #[derive(Default)]
 pub(super) struct Points {
-    positions: Vec<[f64; 3]>,
+    /// In the order in which they are added.
+    pub positions: Vec<[f64; 3]>,
     by_id: HashMap<u64, u32>,
 }
 
@@ -39,12 +40,8 @@ impl Points {
     }
 
     /// The position of a point in the list.
-    pub fn find(&self, id: u64) -> Option<u32> {
-        self.by_id.get(&id).copied()
-    }
-
-    /// The points as a list.
-    pub fn into_positions(self) -> Vec<[f64; 3]> {
-        self.positions
+    pub fn find(&self, id: u64) -> Result<u32, String> {
+        let found = self.by_id.get(&id).copied();
+        found.ok_or_else(|| format!("points of points3D expected, {id} found"))
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::super::SceneError;
-use super::super::lines::{Line, TextFile};
+use super::super::lines::{Line, TextFile, excerpt};
 use super::camera::ModelCamera;
 use super::model::{Model, ModelImage, Points};
 
@@ -19,7 +19,7 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     Ok(Model {
         cameras,
         images,
-        points: points.into_positions(),
+        points: points.positions,
     })
 }
 
@@ -45,19 +45,12 @@ fn points(path: &Path) -> Result<Points, SceneError> {
         return Ok(points);
     }
     for line in TextFile::read(path)?.lines() {
-        let mut words = line.words();
-        let mut next = || {
-            words
-                .next()
-                .ok_or_else(|| line.error("a line `id x y z …` expected, it is cut off"))
+        let words: Vec<&str> = line.words().take(4).collect();
+        let [id, x, y, z] = words[..] else {
+            return Err(line.error("a line `id x y z …` expected, it is cut off"));
         };
-        let id = whole(&line, next()?)?;
-        let position = [
-            line.number(next()?)?,
-            line.number(next()?)?,
-            line.number(next()?)?,
-        ];
-        points.add(id, position);
+        let position = [line.number(x)?, line.number(y)?, line.number(z)?];
+        points.add(whole(&line, id)?, position);
     }
     Ok(points)
 }
@@ -129,19 +122,13 @@ fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
     let ids = words.chunks_exact(3).map(|feature| feature[2]);
     ids.filter(|id| *id != "-1")
         .map(|id| {
-            let id = whole(&line, id)?;
-            points
-                .find(id)
-                .ok_or_else(|| line.error(format!("points of points3D expected, {id} found")))
+            let point = points.find(whole(&line, id)?);
+            point.map_err(|why| line.error(why))
         })
         .collect()
 }
 
 fn whole<T: std::str::FromStr>(line: &Line<'_>, word: &str) -> Result<T, SceneError> {
-    word.parse().map_err(|_| {
-        line.error(format!(
-            "a whole number expected, `{}` found",
-            super::super::lines::excerpt(word)
-        ))
-    })
+    let error = |_| format!("a whole number expected, `{}` found", excerpt(word));
+    word.parse().map_err(error).map_err(|why| line.error(why))
 }

@@ -63,37 +63,27 @@ impl Array {
         let count = shape
             .iter()
             .try_fold(1_u64, |all, &side| all.checked_mul(side));
-        macro_rules! numbers {
-            ($type:ty) => {{
-                const BYTES: usize = size_of::<$type>();
-                if count.is_none_or(|count| count != (data.len() / BYTES) as u64) {
-                    return Err(format!(
-                        "an array of {shape:?} expected, the file is cut off or longer"
-                    ));
-                }
-                let read = |bytes: &[u8]| {
-                    let bytes = bytes.try_into().unwrap_or([0; BYTES]);
-                    <$type>::from_le_bytes(bytes) as f64
-                };
-                data.chunks_exact(BYTES).map(read).collect()
-            }};
-        }
-        let numbers: Vec<f64> = match kind {
-            "<f4" => numbers!(f32),
-            "<f8" => numbers!(f64),
-            "<i8" => numbers!(i64),
-            "<i4" => numbers!(i32),
-            "<i2" => numbers!(i16),
-            "<u8" => numbers!(u64),
-            "<u4" => numbers!(u32),
-            "<u2" => numbers!(u16),
+        let numbers = match kind {
+            "<f4" => numbers(data, |bytes| f32::from_le_bytes(bytes).into()),
+            "<f8" => numbers(data, f64::from_le_bytes),
+            "<i8" => numbers(data, |bytes| i64::from_le_bytes(bytes) as f64),
+            "<i4" => numbers(data, |bytes| i32::from_le_bytes(bytes).into()),
+            "<i2" => numbers(data, |bytes| i16::from_le_bytes(bytes).into()),
+            "<u8" => numbers(data, |bytes| u64::from_le_bytes(bytes) as f64),
+            "<u4" => numbers(data, |bytes| u32::from_le_bytes(bytes).into()),
+            "<u2" => numbers(data, |bytes| u16::from_le_bytes(bytes).into()),
             _ => {
+                let kind = excerpt(kind);
                 return Err(format!(
-                    "numbers <f4, <f8, <i2 … <i8 or <u2 … <u8 expected, `{}` found",
-                    excerpt(kind)
+                    "numbers <f4, <f8, <i2 … <i8 or <u2 … <u8 expected, `{kind}` found"
                 ));
             }
         };
+        if count != Some(numbers.len() as u64) {
+            return Err(format!(
+                "an array of {shape:?} expected, the file is cut off or longer"
+            ));
+        }
         Ok(Self { shape, numbers })
     }
 
@@ -117,6 +107,11 @@ impl Array {
         };
         partners.ok_or_else(|| "whole numbers expected, one for each keypoint".to_owned())
     }
+}
+
+fn numbers<const N: usize>(data: &[u8], read: fn([u8; N]) -> f64) -> Vec<f64> {
+    let (numbers, _) = data.as_chunks();
+    numbers.iter().map(|bytes| read(*bytes)).collect()
 }
 
 /// What stands before the numbers.
