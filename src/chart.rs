@@ -14,15 +14,11 @@ const LEGEND: (f64, f64) = (18.0, 92.0);
 /// Marks between two axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
-    /// What it shows.
     pub title: String,
-    /// To the right.
     pub x: Axis,
-    /// Upwards.
     pub y: Axis,
     /// From the lowest to the uppermost.
     pub marks: Vec<Mark>,
-    /// What colours mean.
     pub legend: Vec<(String, Rgb)>,
 }
 
@@ -39,9 +35,7 @@ pub(crate) struct Axis {
 /// A shape in the units of the axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Mark {
-    /// What is drawn.
     pub shape: Shape,
-    /// In which colour.
     pub color: Rgb,
     /// What a pointer on it reads.
     pub title: String,
@@ -49,15 +43,19 @@ pub(crate) struct Mark {
     pub link: Option<String>,
 }
 
-/// What is drawn.
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
-    /// A line through points.
     Line(Vec<(f64, f64)>),
     /// A dot; hollow where there is nothing to measure.
-    Dot { at: (f64, f64), filled: bool },
+    Dot {
+        at: (f64, f64),
+        filled: bool,
+    },
     /// A rectangle between two corners.
-    Bar { from: (f64, f64), to: (f64, f64) },
+    Bar {
+        from: (f64, f64),
+        to: (f64, f64),
+    },
     /// Words, moved by so many pixels.
     Words {
         at: (f64, f64),
@@ -67,7 +65,6 @@ pub(crate) enum Shape {
 }
 
 impl Mark {
-    /// A mark without a title.
     pub(crate) fn new(shape: Shape, color: Rgb) -> Self {
         Self {
             shape,
@@ -139,7 +136,6 @@ impl Axis {
         }
     }
 
-    /// With another length \[px\].
     pub(crate) fn long(mut self, length_px: f64) -> Self {
         self.length_px = Some(length_px);
         self

@@ -14,7 +14,6 @@ use super::output;
 use super::table::figures;
 use super::terminal::Terminal;
 
-/// Runs the command.
 pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> {
     for run in [&args.before, &args.after] {
         read_run(run)?;

@@ -30,7 +30,6 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
     view_where_there_is_a_display(terminal)
 }
 
-/// Opens the window on the same query.
 #[cfg(feature = "app")]
 fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
     use posescope::session::RunMode;
@@ -44,7 +43,6 @@ fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
     }
 }
 
-/// Without a window there is the recording.
 #[cfg(not(feature = "app"))]
 fn view_where_there_is_a_display(_terminal: &Terminal) -> Result<(), CliError> {
     Ok(())

@@ -32,7 +32,6 @@ use super::output;
 use super::table;
 use super::terminal::Terminal;
 
-/// Runs the command.
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let Some(EvalCommand::Merge(args)) = &args.command {
         let run = merge(&args.parts, &args.out)?;
@@ -208,7 +207,6 @@ fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliErr
     })
 }
 
-/// The parameters as `run.toml` has them.
 fn written(params: &Params) -> toml::Table {
     let table = params.to_toml().parse();
     table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}"))

@@ -29,7 +29,6 @@ impl Interrupt {
         Self { raised, attention }
     }
 
-    /// Whether it was pressed.
     pub fn is_raised(&self) -> bool {
         self.raised.load(Ordering::Relaxed)
     }

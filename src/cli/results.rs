@@ -28,7 +28,6 @@ const COLUMNS: [&str; 8] = [
     "probability",
 ];
 
-/// Runs the command.
 pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> {
     let run = read_run(&args.run)?;
     if let Some(plot) = args.plot {
@@ -163,7 +162,6 @@ fn poses(
     Ok(())
 }
 
-/// Writes a text to a file or to stdout.
 fn write(text: &str, out: Option<&Path>) -> Result<(), CliError> {
     match out {
         Some(path) => Ok(std::fs::write(path, text).map_err(FolderError::io(path))?),

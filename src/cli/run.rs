@@ -39,7 +39,6 @@ struct PlannedQuery {
     references: References,
 }
 
-/// Runs the command.
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let OpenedTask {
         task,

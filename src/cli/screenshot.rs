@@ -10,7 +10,6 @@ use super::failure::CliError;
 use super::terminal::Terminal;
 use super::view;
 
-/// Saves the picture.
 pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let (setup, results) = view::setup(args, RunMode::Running)?;
     let options = &args.screenshot;

@@ -24,7 +24,6 @@ use super::terminal::Terminal;
 /// Side of the square that shows a position \[px\].
 const CELL_PX: u32 = 3;
 
-/// Writes the surface of the query.
 pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let writer = writer(out)?;
     let OpenedTask {
@@ -190,7 +189,6 @@ fn write_csv(surface: &DenseSurface, out: &Path) -> Result<(), CliError> {
     std::fs::write(out, text).map_err(CliError::io(out))
 }
 
-/// Each position as a square.
 fn write_png(surface: &DenseSurface, out: &Path) -> Result<(), CliError> {
     let cells = picture::surface(surface.cheapest());
     let (width, height) = (cells.width() * CELL_PX, cells.height() * CELL_PX);

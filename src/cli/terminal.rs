@@ -8,7 +8,6 @@ use log::LevelFilter;
 
 use super::args::Everywhere;
 
-/// Where progress and messages go.
 pub struct Terminal {
     bars: MultiProgress,
     quiet: bool,

@@ -18,7 +18,6 @@ const SCRIPT: &str = include_str!("../../assets/report/report.js");
 /// address behind it.
 const WEB_VIEWER: &str = "https://app.rerun.io/version/0.36.3/?url=";
 
-/// The whole file.
 pub(super) fn page(report: &RunReport) -> String {
     let title = title(&report.run);
     html! {

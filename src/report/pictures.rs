@@ -16,7 +16,6 @@ use crate::problem::Problem;
 use crate::proof::{self, ProofCase, ProofPicture};
 use crate::trace::{Cancelled, Record, Sink};
 
-/// Width of a thumbnail \[px\].
 const THUMBNAIL_WIDTH: u32 = 120;
 /// Width of a proof \[px\]: its words are read at this size.
 const PROOF_WIDTH: u32 = 960;

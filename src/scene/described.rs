@@ -52,7 +52,6 @@ fn description_of(argument: &Path) -> PathBuf {
     }
 }
 
-/// What the file says.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -62,7 +61,6 @@ struct Description {
     images: Spanned<String>,
     /// The file with the poses, without which there are queries only.
     poses: Option<Spanned<String>>,
-    /// What the poses are.
     #[serde(default)]
     pose: PoseMeaning,
     camera: Spanned<CameraDescription>,
@@ -72,7 +70,6 @@ struct Description {
     clouds: Option<CloudsDescription>,
 }
 
-/// Which way poses go.
 #[derive(Clone, Copy, Default, Deserialize, PartialEq)]
 #[serde(rename_all = "snake_case")]
 enum PoseMeaning {
@@ -146,7 +143,6 @@ impl Source {
         self.error_at(value.span().start, expected)
     }
 
-    /// The file of this name.
     fn file(&self, name: &Spanned<String>) -> Result<PathBuf, SceneError> {
         let path = within(self.folder(), name.get_ref())
             .map_err(|expected| self.error(name, &expected))?;
@@ -281,7 +277,6 @@ fn per_frame(
     Ok(Place::PerFrame(clouds, camera_from_cloud))
 }
 
-/// Where the clouds are.
 enum Place {
     /// In one file for all, which is read when the first is asked for.
     Map(OnceLock<MapBlocks>),

@@ -14,13 +14,11 @@ use crate::image::Photo;
 pub(super) struct Frame {
     /// Its name in results and recordings.
     pub name: String,
-    /// The photo.
     pub photo: PathBuf,
     /// The camera of the developed photo.
     pub intrinsics: Intrinsics,
     /// What makes the photo of the image in the file, if they differ.
     pub develop: Option<Arc<dyn Develop>>,
-    /// The pose of the camera, if it is known.
     pub world_from_camera: Option<Pose>,
     /// When the photo was taken \[s\], if that is known.
     pub time_s: Option<f64>,
@@ -42,7 +40,6 @@ impl Frame {
 
 /// Makes photos of the images in their files: takes out distortion, for example.
 pub(super) trait Develop: Send + Sync {
-    /// The photo of an image.
     fn developed(&self, image: Photo) -> Photo;
 
     /// The size of the image in the file \[px\], given that of the photo.
@@ -70,7 +67,6 @@ pub(super) trait Clouds: Send + Sync {
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError>;
 }
 
-/// A scene of photo files.
 pub(super) struct FileScene<C> {
     name: String,
     names: Vec<String>,

@@ -76,7 +76,6 @@ enum Kind {
     Geographic,
 }
 
-/// A line of the table.
 struct Row<'a> {
     line: Line<'a>,
     name: &'a str,

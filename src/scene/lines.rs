@@ -7,7 +7,6 @@ use nalgebra::{Matrix3x4, Quaternion, Translation3, UnitQuaternion};
 use super::SceneError;
 use crate::geometry::{Pose, pose_from_matrix};
 
-/// A text file in memory.
 pub(super) struct TextFile {
     path: PathBuf,
     text: String,
@@ -24,7 +23,6 @@ pub(super) struct Line<'a> {
 }
 
 impl TextFile {
-    /// Reads a file as a whole.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         Ok(Self {
             path: path.to_owned(),
@@ -84,7 +82,6 @@ impl<'a> Line<'a> {
         !self.text.is_empty() && !self.text.starts_with('#')
     }
 
-    /// An error at this line.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
         SceneError::line(self.path, self.number, expected)
     }
@@ -104,7 +101,6 @@ impl<'a> Line<'a> {
         numbers(part).map_err(|expected| self.error(expected))
     }
 
-    /// A single finite number.
     pub fn number(&self, word: &str) -> Result<f64, SceneError> {
         number(word).map_err(|expected| self.error(expected))
     }
@@ -141,7 +137,6 @@ pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, Str
     ))
 }
 
-/// The words of a line between white space or commas.
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| c.is_whitespace() || c == ',')
         .filter(|word| !word.is_empty())
@@ -190,7 +185,6 @@ pub(super) fn excerpt_of(text: &str, most: usize) -> String {
     }
 }
 
-/// The text of a file.
 pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
     std::fs::read_to_string(path).map_err(SceneError::io(path))
 }

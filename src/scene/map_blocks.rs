@@ -31,7 +31,6 @@ struct Block {
 }
 
 impl MapBlocks {
-    /// Sorts the points of a map.
     pub fn new(map: MapCloud) -> Self {
         let MapCloud { origin, mut points } = map;
         let extent = (0..3).map(|axis| {

@@ -97,17 +97,14 @@ pub(super) fn by_time(file: &TextFile) -> Result<Vec<(f64, Pose)>, SceneError> {
     file.lines().map(timed).collect()
 }
 
-/// The poses of a KITTI text.
 pub(super) fn by_line(file: &TextFile) -> Result<PoseLines, SceneError> {
     let poses = file.lines().map(|line| line.matrix_pose());
     Ok(PoseLines(poses.collect::<Result<_, _>>()?))
 }
 
-/// Poses, one per line.
 pub(super) struct PoseLines(Vec<Pose>);
 
 impl PoseLines {
-    /// The number of lines.
     pub fn count(&self) -> usize {
         self.0.len()
     }

@@ -54,11 +54,9 @@ const KEPT: usize = 10;
 /// Timestamps count microseconds.
 const PER_SECOND: f64 = 1e6;
 
-/// A camera that is read.
 struct CameraKind {
     /// The folder of its photos, in that of its rig.
     folder: &'static str,
-    /// Its model.
     model: &'static str,
     pattern: Pattern,
 }

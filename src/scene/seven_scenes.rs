@@ -39,7 +39,6 @@ const SPLITS: [&str; 2] = ["train", "test"];
 
 /// What a depth value of 1 means \[m\].
 const UNIT_M: f64 = 0.001;
-/// The colour camera.
 const COLOR: Intrinsics = Intrinsics {
     fx: 525.0,
     fy: 525.0,
@@ -107,7 +106,6 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
-/// A frame's name and its photo.
 type NamedPhoto = (String, PathBuf);
 
 /// The scene's name and its frames in order. Frames of a single sequence are called by their numbers,
@@ -161,7 +159,6 @@ fn read_split(folder: &Path, split: &str) -> Result<Vec<u32>, SceneError> {
         .collect()
 }
 
-/// The folders `seq-NN` by their numbers.
 fn subfolders(folder: &Path) -> Vec<(u32, PathBuf)> {
     let entries = entries(folder).unwrap_or_default();
     let mut found: Vec<(u32, PathBuf)> = entries
@@ -223,7 +220,6 @@ fn read_pose(path: &Path) -> Result<Option<Pose>, SceneError> {
         .map_err(|error| file.error(error.to_string()))
 }
 
-/// The cameras of a scene.
 struct Cameras {
     photo: Intrinsics,
     /// The photos' camera from the one that the poses speak of.

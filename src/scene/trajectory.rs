@@ -14,7 +14,6 @@ const MOST_CANDIDATES: usize = 64;
 /// gives a pose every 10 ms, a tracked camera every 33 ms.
 const INTERPOLATED_S: f64 = 0.1;
 
-/// Poses in the order of their times.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trajectory {
     samples: Vec<(f64, Pose)>,
@@ -62,7 +61,6 @@ impl Trajectory {
         (nearest.0 <= self.same_moment).then_some(*nearest.1)
     }
 
-    /// The poses with their times.
     pub fn samples(&self) -> &[(f64, Pose)] {
         &self.samples
     }

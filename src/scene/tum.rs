@@ -37,7 +37,6 @@ const UNIT_M: f64 = 1.0 / 5000.0;
 const KINECT: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
 const KINECT_SIZE: (u32, u32) = (640, 480);
 
-/// Opens the folder of a sequence.
 fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let photos = image_list(folder, "rgb.txt")?;
     let depths = image_list(folder, "depth.txt")?;

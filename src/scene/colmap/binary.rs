@@ -16,7 +16,6 @@ const LONGEST_NAME: u64 = 4096;
 /// The id of a feature that was matched to no point.
 const NO_POINT: u64 = u64::MAX;
 
-/// Reads the model in a folder.
 pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     let cameras = cameras(&folder.join("cameras.bin"))?;
     let points = points(&folder.join("points3D.bin"))?;

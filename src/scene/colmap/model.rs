@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, HashMap};
 use super::camera::ModelCamera;
 use crate::geometry::Pose;
 
-/// A sparse model.
 pub(super) struct Model {
     pub cameras: BTreeMap<u32, ModelCamera>,
     pub images: Vec<ModelImage>,
@@ -13,7 +12,6 @@ pub(super) struct Model {
     pub points: Vec<[f64; 3]>,
 }
 
-/// An image of a model.
 pub(in super::super) struct ModelImage {
     /// The file, below the folder of the photos.
     pub name: String,
@@ -23,7 +21,6 @@ pub(in super::super) struct ModelImage {
     pub observed: Vec<u32>,
 }
 
-/// The points by their ids.
 #[derive(Default)]
 pub(super) struct Points {
     /// In the order in which they are added.

@@ -8,7 +8,6 @@ use super::super::lines::{Line, TextFile, excerpt};
 use super::camera::ModelCamera;
 use super::model::{Model, ModelImage, Points};
 
-/// Reads the model in a folder.
 pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     let cameras = TextFile::read(&folder.join("cameras.txt"))?
         .lines()

@@ -18,7 +18,6 @@ pub(super) struct FramePoses {
     pub time_s: Option<f64>,
 }
 
-/// The poses of the photos.
 pub(super) fn read(path: &Path, photos: &[PathBuf]) -> Result<Vec<FramePoses>, SceneError> {
     let file = TextFile::read(path)?;
     match PoseText::read(&file, None)? {

@@ -10,18 +10,14 @@ use super::super::lines::TextFile;
 use crate::camera::Intrinsics;
 use crate::geometry::{Pose, pose_from_matrix};
 
-/// The file of the cameras.
 pub(super) const CAMERAS: &str = "calib_cam_to_cam.txt";
 const VELODYNE: &str = "calib_velo_to_cam.txt";
 const IMU: &str = "calib_imu_to_velo.txt";
 
 /// Where the sensors of a drive are, and one of its rectified cameras.
 pub(super) struct Calibration {
-    /// The camera of its rectified images.
     pub intrinsics: Intrinsics,
-    /// The camera from the rectified camera 0.
     pub camera_from_camera0: Pose,
-    /// The rectified camera 0 from the scanner.
     pub camera0_from_velodyne: Pose,
     /// The scanner from the IMU, whose axes are forward, left, up as well.
     pub velodyne_from_imu: Pose,
@@ -48,7 +44,6 @@ impl Calibration {
         })
     }
 
-    /// The rectified camera 0 from the IMU.
     pub fn camera0_from_imu(&self) -> Pose {
         self.camera0_from_velodyne * self.velodyne_from_imu
     }

@@ -14,7 +14,6 @@ const FILM_DIAGONAL_MM: f64 = 43.266_615;
 pub(super) struct Exif(Option<exif::Exif>);
 
 impl Exif {
-    /// Reads the tags of a photo.
     pub fn read(path: &Path) -> Self {
         let file = File::open(path).ok();
         let read = |file| exif::Reader::new().read_from_container(&mut BufReader::new(file));

@@ -134,7 +134,6 @@ fn frame_name(image: &str) -> String {
     }
 }
 
-/// What a file has.
 #[derive(Default)]
 struct Found {
     keypoints: Vec<String>,

@@ -14,7 +14,6 @@ use crate::scene::lines::excerpt;
 /// Bytes of an array at most: as many keypoints as there may be, of two numbers of eight bytes.
 const MOST_BYTES: u64 = 16 * MOST_KEYPOINTS as u64 + 4096;
 
-/// Reads a file of matches.
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let error = |expected: String| SceneError::expected(path, expected.replace('\n', " "));
     let file = File::open(path).map_err(SceneError::io(path))?;
@@ -47,7 +46,6 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     })
 }
 
-/// The numbers of an array, row by row.
 struct Array {
     shape: Vec<u64>,
     numbers: Vec<f64>,

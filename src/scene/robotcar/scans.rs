@@ -23,7 +23,6 @@ const LONGEST_SCAN: u64 = 1 << 26;
 /// The laser scanners, and whether one scans in a plane (x, y, reflectance) or in space (x, y, z).
 const SCANNERS: [(&str, bool); 3] = [("lms_front", true), ("lms_rear", true), ("ldmrs", false)];
 
-/// A scan that is there.
 pub(super) struct ScanFile {
     /// When it was taken \[µs\].
     time: u64,
@@ -55,7 +54,6 @@ pub(super) fn scan_files(traversal: &Path, sdk: &Sdk) -> Result<Vec<ScanFile>, S
 
 /// The scans of a traversal, of which those around a frame make its cloud.
 pub(super) struct Scans {
-    /// By time.
     pub files: Vec<ScanFile>,
     /// How the vehicle moved.
     pub motion: Trajectory,

@@ -12,7 +12,6 @@ use super::super::lines::TextFile;
 use crate::camera::Intrinsics;
 use crate::geometry::{Pose, pose_from_matrix};
 
-/// The SDK's folder.
 #[derive(Clone, Debug)]
 pub(super) struct Sdk {
     folder: PathBuf,
