@@ -1,62 +1,38 @@
 //! The binary as its user drives it.
 
-use serde_json::Value;
+use serde_json::{Value, json};
+use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{cells, has, objects, posescope, refused, run_in};
 use crate::small_sequence::SmallSequence;
 
-fn json_lines(bytes: &[u8]) -> Vec<Value> {
-    String::from_utf8_lossy(bytes)
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("one object per line"))
-        .collect()
+/// The results that a run on the small sequence prints.
+#[track_caller]
+fn results(sequence: &SmallSequence, words: &str) -> Vec<Value> {
+    let said = sequence.run(&format!("run sequences/42 {words} --json - -q"));
+    assert!(said.err.is_empty(), "-q is quiet: {}", said.err);
+    objects(&said.ok().out)
 }
 
 #[test]
 fn results_come_in_query_then_method_order_with_the_promised_keys() {
     let sequence = SmallSequence::write();
-    let output = posescope()
-        .arg("run")
-        .arg(sequence.folder())
-        .args(["--query", "5", "--query", "7", "--reference", "4"])
-        .args(["--method", "mi,fb", "--json", "-", "-q"])
-        .output()
-        .expect("the binary starts");
-    assert!(output.status.success());
-    assert!(output.stderr.is_empty(), "-q is quiet");
-    let results = json_lines(&output.stdout);
-    let order: Vec<_> = results
-        .iter()
-        .map(|r| (r["query"].as_str(), r["method"].as_str()))
-        .collect();
+    let results = results(
+        &sequence,
+        "--query 5 --query 7 --reference 4 --method mi,fb",
+    );
+    let order = results.iter().map(|r| json!([r["query"], r["method"]]));
     let expected = [
-        ("000005", "fb"),
-        ("000005", "mi"),
-        ("000007", "fb"),
-        ("000007", "mi"),
+        ["000005", "fb"],
+        ["000005", "mi"],
+        ["000007", "fb"],
+        ["000007", "mi"],
     ];
-    assert_eq!(order, expected.map(|(q, m)| (Some(q), Some(m))));
-
-    let keys: Vec<_> = results[0].as_object().expect("an object").keys().collect();
-    let promised = [
-        "schema",
-        "scene",
-        "query",
-        "references",
-        "method",
-        "fusion",
-        "seed",
-        "status",
-        "reason",
-        "pose",
-        "error",
-        "initial_error",
-        "counts",
-        "cost",
-        "diagnosis",
-    ];
-    for key in promised {
-        assert!(keys.iter().any(|k| *k == key), "{key} is missing");
+    assert_eq!(order.collect::<Vec<_>>(), expected.map(|pair| json!(pair)));
+    let promised = "schema scene query references method fusion seed status reason pose error \
+                    initial_error counts cost diagnosis";
+    for key in promised.split_whitespace() {
+        assert!(results[0].get(key).is_some(), "{key} is missing");
     }
     assert_eq!(results[0]["schema"], "posescope.result/1");
     assert_eq!(results[0]["scene"], "kitti/42");
@@ -71,224 +47,139 @@ fn results_come_in_query_then_method_order_with_the_promised_keys() {
 #[test]
 fn usage_errors_have_exit_code_2_and_name_the_next_step() {
     let sequence = SmallSequence::write();
-    let cases: [(&[&str], &str); 9] = [
-        (
-            &["--query", "5", "--set", "fb.ratoi=0.7"],
-            "did you mean `fb.ratio`",
-        ),
-        (&["--query", "5", "--set", "fb.ratio=7"], "0.1 … 1"),
-        (
-            &["--query", "5", "--method", "xx"],
-            "fb, pm, mi, hy, fb2, mi6, nid or robust",
-        ),
-        (
-            &["--query", "5", "--reference", "best:1"],
-            "random:K, nearest:K",
-        ),
-        (&["--query", "5", "--radius=-1"], "a positive number"),
-        (&["--query", "5", "--right", "1,5"], "--right"),
-        (
-            &["--query", "5", "--min-confidence", "1.5"],
-            "--min-confidence",
-        ),
-        (&["--query", "5", "--explain", "many"], "--explain"),
-        (&[], "--query"),
-    ];
-    for (arguments, words) in cases {
-        let output = posescope()
-            .arg("run")
-            .arg(sequence.folder())
-            .args(arguments)
-            .output()
-            .expect("the binary starts");
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(
-            message.contains(words),
-            "`{words}` is missing in: {message}"
-        );
+    let table = "
+        --query 5 --set fb.ratoi=0.7 | did you mean `fb.ratio`
+        --query 5 --set fb.ratio=7 | 0.1 … 1
+        --query 5 --method xx | fb, pm, mi, hy, fb2, mi6, nid or robust
+        --query 5 --reference best:1 | random:K, nearest:K
+        --query 5 --radius=-1 | a positive number
+        --query 5 --radius=1,2 | takes one value here
+        --query 5 --failure-radius=3 | --failure-radius is an option of
+        --query 5 --right 1,5 | --right
+        --query 5 --min-confidence 1.5 | --min-confidence
+        --query 5 --explain many | --explain
+        --query 70 --degrade gama=0.4 | fog, blur, exposure, gamma, noise, invert expected
+        --query 70 --degrade gamma=0.01 | `gamma` takes 0.05 … 10, not `0.01`
+        --query 70 --degrade noise=8,noise=9 | `noise` is given twice
+        --query 70 --degrade '' | something such as gamma=0.4,noise=8,invert expected
+        --query 5 --estimates mi=poses.txt | mi is a method of ours
+        --query 5 --estimates poses.txt | NAME=FILE expected
+        --query 5 --estimates 'A B=poses.txt' | cannot name a method
+        --method mi | --query
+    ";
+    for row in table.lines().map(str::trim).filter(|row| !row.is_empty()) {
+        let [words, expected] = cells(row);
+        sequence
+            .run(&format!("run sequences/42 {words}"))
+            .fails_with(2, expected);
     }
 }
 
 #[test]
 fn a_scene_is_opened_and_a_mistyped_command_gets_its_suggestion() {
-    let said = |words: &[&str]| {
-        let output = posescope().args(words).output().expect("it starts");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        (output.status.code(), said)
-    };
-    let (code, text) = said(&["evla", "street"]);
-    assert_eq!(code, Some(2), "{text}");
-    assert!(text.contains("did you mean `eval`?"), "{text}");
-    let (code, text) = said(&["nonsense"]);
-    assert_eq!(code, Some(2), "{text}");
-    assert!(text.contains("no command, file or folder"), "{text}");
     let sequence = SmallSequence::write();
-    let folder = sequence.folder();
-    let folder = folder.to_str().expect("a plain path");
-    let (code, text) = said(&[folder, "--query", "5", "--limit", "3"]);
-    assert_eq!(code, Some(2), "{text}");
-    assert!(
-        text.contains("--limit is an option of `posescope eval`"),
-        "{text}"
-    );
-    for (option, words) in [
-        ("--radius=1,2", "takes one value here"),
-        ("--failure-radius=3", "--failure-radius is an option of"),
+    for (line, words) in [
+        ("evla street", "did you mean `eval`?"),
+        ("nonsense", "no command, file or folder"),
+        (
+            "sequences/42 --query 5 --limit 3",
+            "--limit is an option of `posescope eval`",
+        ),
     ] {
-        let (code, text) = said(&["run", folder, "--query", "5", option]);
-        assert_eq!(code, Some(2), "{text}");
-        assert!(text.contains(words), "{text}");
+        sequence.run(line).fails_with(2, words);
     }
 }
 
 #[test]
 fn a_reference_is_chosen_within_the_radius_and_never_the_query_itself() {
     let sequence = SmallSequence::write();
-    let references = |extra: &[&str]| {
-        let output = posescope()
-            .arg("run")
-            .arg(sequence.folder())
-            .args(["--query", "5", "--method", "mi", "--json", "-", "-q"])
-            .args(extra)
-            .output()
-            .expect("the binary starts");
-        let results = json_lines(&output.stdout);
-        let names = results
+    let line = |words: &str| format!("run sequences/42 --query 5 --method mi --json - -q {words}");
+    let references = |words: &str| -> Vec<Value> {
+        let results: Vec<Value> = objects(&sequence.run(&line(words)).ok().out);
+        results
             .iter()
-            .map(|r| r["references"][0].as_str().map(str::to_owned));
-        (
-            output.status.code(),
-            names.collect::<Option<Vec<_>>>().expect("names"),
-        )
+            .map(|result| result["references"][0].clone())
+            .collect()
     };
-    let nearest = references(&["--reference", "nearest:2"]);
+    assert_eq!(references("--reference nearest:2"), ["000004", "000007"]);
+    assert_eq!(references("--reference random:5 --radius 1.5"), ["000004"]);
     assert_eq!(
-        nearest,
-        (Some(0), vec!["000004".to_owned(), "000007".to_owned()])
+        references("--reference random:5 --radius 0.5 --prior 1.5"),
+        ["000004"]
     );
-    let within = references(&["--reference", "random:5", "--radius", "1.5"]);
-    assert_eq!(within, (Some(0), vec!["000004".to_owned()]));
-    assert_eq!(references(&["--radius", "0.5"]).0, Some(3));
-    let farther = [
-        "--reference",
-        "random:5",
-        "--radius",
-        "0.5",
-        "--prior",
-        "1.5",
-    ];
-    assert_eq!(references(&farther), within);
+    assert_eq!(sequence.run(&line("--radius 0.5")).code, Some(3));
 }
 
 #[test]
 fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
     let sequence = SmallSequence::write();
-    let said = |command: &str, extra: &[&str]| {
-        let output = posescope()
-            .arg(command)
-            .arg(sequence.folder())
-            .args(["--query", "5", "--method", "mi", "--radius", "15"])
-            .args(extra)
-            .output()
-            .expect("the binary starts");
-        assert_eq!(output.status.code(), Some(3));
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
-    for command in ["run", "view"] {
-        let message = said(command, &["--prior", "0.5"]);
-        let words = "within 0.5 m of query 000005; raise --radius or --prior, or name one";
-        assert!(message.contains(words), "{message}");
-    }
-    let out = sequence.path().join("run");
-    let output = posescope()
-        .arg("eval")
-        .arg(sequence.folder())
-        .args(["--method", "mi", "--prior", "0.5", "-q", "--out"])
-        .arg(&out)
-        .output()
-        .expect("the binary starts");
-    assert_eq!(output.status.code(), Some(0));
-    let results = std::fs::read(out.join("results.jsonl")).expect("results");
-    for result in json_lines(&results) {
-        let reason = &result["reason"]["text"];
-        assert_eq!(
-            reason,
-            "No reference frame with pose and scan within 0.5 m of the query."
-        );
+    refused(
+        sequence.path(),
+        "
+        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name one
+        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name one
+        ",
+    );
+    sequence
+        .run("eval sequences/42 --method mi --prior 0.5 -q --out run")
+        .ok();
+    for result in objects::<Value>(&sequence.text("run/results.jsonl")) {
+        let expected = "No reference frame with pose and scan within 0.5 m of the query.";
+        assert_eq!(result["reason"]["text"], expected);
     }
 }
 
 #[test]
 fn every_parameter_is_listed_and_changes_are_marked() {
-    let output = posescope()
-        .args(["params", "--set", "mi.bins=32"])
-        .output()
-        .expect("the binary starts");
-    assert!(output.status.success());
-    let table = String::from_utf8_lossy(&output.stdout);
+    let folder = TempDir::new().expect("a folder");
+    let table = run_in(folder.path(), "params --set mi.bins=32").ok().out;
     for row in posescope::params::Params::default().list() {
-        assert!(table.contains(&row.key), "{} is missing", row.key);
+        has(&table, &row.key);
     }
-    assert!(table.contains("32 (default 16)"));
+    has(&table, "32 (default 16)");
 }
 
 #[test]
 fn the_street_is_solved_and_the_bytes_do_not_depend_on_the_number_of_threads() {
-    let results = |threads: &str| {
-        let output = posescope()
-            .args(["run", "street", "--query", "70", "--reference", "62"])
-            .args(["--threads", threads, "--json", "-", "-q"])
-            .output()
-            .expect("the binary starts");
-        assert!(output.status.success());
-        output.stdout
+    let folder = TempDir::new().expect("a folder");
+    let results = |threads: u8| {
+        let line = format!("run street --query 70 --reference 62 --threads {threads} --json - -q");
+        run_in(folder.path(), &line).ok().out
     };
-    let alone = results("1");
-    for result in json_lines(&alone) {
+    let alone = results(1);
+    for result in objects::<Value>(&alone) {
         let error = result["error"]["translation_m"].as_f64();
-        let limit = if result["method"] == "fb" || result["method"] == "hy" {
-            0.2
-        } else {
-            1.5
-        };
+        let has_features = result["method"] == "fb" || result["method"] == "hy";
+        let limit = if has_features { 0.2 } else { 1.5 };
         assert!(error.is_some_and(|error| error < limit), "{result}");
     }
-    assert_eq!(results("2"), alone);
-    assert_eq!(results("8"), alone);
+    assert_eq!(results(2), alone);
+    assert_eq!(results(8), alone);
 }
 
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
-    let binary = assert_cmd::cargo::cargo_bin!("posescope");
-    let script = format!(
-        "'{}' params | true; exit ${{PIPESTATUS[0]}}",
-        binary.display()
-    );
+    let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
+    let script = format!("'{binary}' params | true; exit ${{PIPESTATUS[0]}}");
     let output = std::process::Command::new("bash")
         .args(["-c", &script])
-        .output()
-        .expect("bash is there");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && message.is_empty(), "{message}");
+        .output();
+    let output = output.expect("bash is there");
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
+    );
 }
 
 #[test]
 fn fused_references_give_one_result_with_each_reference_below_it() {
     let sequence = SmallSequence::write();
-    let output = posescope()
-        .arg("run")
-        .arg(sequence.folder())
-        .args(["--query", "5", "--reference", "4", "--reference", "7"])
-        .args(["--method", "mi", "--fusion", "avg", "--json", "-", "-q"])
-        .output()
-        .expect("the binary starts");
-    assert!(output.status.success());
-    let results = json_lines(&output.stdout);
+    let words = "--query 5 --reference 4 --reference 7 --method mi --fusion avg";
+    let results = results(&sequence, words);
     assert_eq!(results.len(), 1);
     let fused = &results[0];
     assert_eq!(fused["fusion"], "avg");
-    assert_eq!(fused["references"], serde_json::json!(["000004", "000007"]));
+    assert_eq!(fused["references"], json!(["000004", "000007"]));
     let alone = fused["per_reference"].as_array().expect("a list");
     assert_eq!(alone.len(), 2);
     let z = |result: &Value| result["pose"]["position_m"][2].as_f64().expect("a pose");
@@ -298,4 +189,90 @@ fn fused_references_give_one_result_with_each_reference_below_it() {
         assert!(one["fusion"].is_null() && one.get("per_reference").is_none());
         assert!(one["cost"]["evaluations"].as_u64().is_some_and(|n| n > 0));
     }
+}
+
+/// What is printed for a terminal of this width, or in a pipe.
+fn printed(sequence: &SmallSequence, line: &str, columns: Option<&str>) -> String {
+    let mut command = posescope();
+    command.current_dir(sequence.path()).args(line.split(' '));
+    command.envs(columns.map(|columns| ("COLUMNS", columns)));
+    crate::binary::Said::by(&mut command).ok().out
+}
+
+const TWO_QUERIES: &str = "run sequences/42 --query 5 --query 7 --reference 4 --method fb,mi";
+
+#[track_caller]
+fn expect_narrow(text: &str) {
+    for line in text.lines() {
+        assert!(line.chars().count() <= 80, "{line}\n{text}");
+    }
+}
+
+#[test]
+fn a_pipe_has_a_line_for_each_result_and_no_rules() {
+    let text = printed(&SmallSequence::write(), TWO_QUERIES, None);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].starts_with("query   reference  "), "{text}");
+    let expected = [
+        ("000005", "fb"),
+        ("000005", "mi"),
+        ("000007", "fb"),
+        ("000007", "mi"),
+    ];
+    for (line, (query, method)) in lines[1..].iter().zip(expected) {
+        let cells: Vec<&str> = line.split("  ").map(str::trim).collect();
+        assert_eq!((cells[0], cells[1]), (query, "000004"), "{text}");
+        assert!(cells.contains(&method), "{text}");
+    }
+    assert!(!text.contains(['─', '═', '│']), "{text}");
+}
+
+#[test]
+fn eighty_columns_hold_every_result_with_whole_words() {
+    let sequence = SmallSequence::write();
+    let narrow = printed(&sequence, TWO_QUERIES, Some("80"));
+    expect_narrow(&narrow);
+    assert!(
+        narrow.starts_with("query 000005, reference 000004, start 1.000 m\n"),
+        "{narrow}"
+    );
+    // Nothing of what a wide terminal shows is missing or broken, but the times.
+    let wide = printed(&sequence, TWO_QUERIES, Some("400"));
+    let rows = wide.split_once('\n').map_or("", |(_, rows)| rows);
+    let plain = |word: &str| word.trim_end_matches(',').to_owned();
+    let known: Vec<String> = narrow.split_whitespace().map(plain).collect();
+    for word in rows.split_whitespace() {
+        let is_time = word.parse::<f64>().is_ok();
+        assert!(
+            is_time || known.contains(&plain(word)),
+            "`{word}` of\n{wide}\nin\n{narrow}"
+        );
+    }
+}
+
+#[test]
+fn parameters_keep_their_names_whole_at_eighty_columns() {
+    let sequence = SmallSequence::write();
+    let narrow = printed(&sequence, "params", Some("80"));
+    expect_narrow(&narrow);
+    for line in printed(&sequence, "params", None).lines().skip(1) {
+        let name = line.split_whitespace().next().expect("a name");
+        has(&narrow, &format!("\n  {name} "));
+    }
+}
+
+#[test]
+fn an_evaluation_fits_eighty_columns_and_is_markdown_in_a_pipe() {
+    let sequence = SmallSequence::write();
+    let line = |out| format!("eval sequences/42 --method fb,mi --out {out}");
+    let narrow = printed(&sequence, &line("a"), Some("80"));
+    expect_narrow(&narrow);
+    assert!(!narrow.contains('|'), "{narrow}");
+    let label = narrow.lines().find(|line| line.contains("median (m)"));
+    assert_eq!(
+        label.map(|line| line.split_whitespace().count()),
+        Some(4),
+        "{narrow}"
+    );
+    has(&printed(&sequence, &line("b"), None), "|:--|--:|");
 }

@@ -1,8 +1,5 @@
 //! Queries whose photos are made worse: on the command line, in run folders and in the window.
 
-use std::fs;
-use std::path::Path;
-
 use egui_kittest::kittest::Queryable as _;
 use image::imageops;
 use posescope::app::{Command, Setup};
@@ -10,32 +7,14 @@ use posescope::image::Degradation;
 use posescope::scene;
 use posescope::session::RunState;
 
-use crate::binary::posescope;
+use crate::binary::has;
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
 use crate::window::{finished, run_until_idle, setup};
 
 /// The lines of `run --json -` without what says that the photo was degraded.
-fn results(scene: &Path, words: &[&str]) -> (String, usize) {
-    let output = posescope()
-        .arg("run")
-        .arg(scene)
-        .args([
-            "--query",
-            "5",
-            "--reference",
-            "4",
-            "--method",
-            "fb,mi",
-            "--radius",
-            "3",
-        ])
-        .args(words)
-        .args(["--json", "-", "-q"])
-        .output()
-        .expect("the binary starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+fn results(sequence: &SmallSequence, words: &str) -> (String, usize) {
+    let line = "run sequences/42 --query 5 --reference 4 --method fb,mi --radius 3 --json - -q";
+    let text = sequence.run(&format!("{line} {words}")).ok().out;
     let mark = "\"degraded\":\"fog=0.25,invert\",";
     (text.replace(mark, ""), text.matches(mark).count())
 }
@@ -53,86 +32,42 @@ fn worse_on_disk(text: &str) -> SmallSequence {
 #[test]
 fn a_degraded_query_is_the_photo_that_was_degraded_before_and_its_references_stay() {
     let text = "invert,fog=0.25";
-    let (there, _) = results(&worse_on_disk(text).folder(), &[]);
-    let (here, marks) = results(&SmallSequence::write().folder(), &["--degrade", text]);
-    assert_eq!(here, there);
-    assert_eq!(marks, 2);
-    let (as_taken, _) = results(&SmallSequence::write().folder(), &[]);
-    assert_ne!(here, as_taken);
+    let sequence = SmallSequence::write();
+    let (there, _) = results(&worse_on_disk(text), "");
+    let (here, marks) = results(&sequence, &format!("--degrade {text}"));
+    assert_eq!((&here, marks), (&there, 2));
+    assert_ne!(here, results(&sequence, "").0);
 }
 
 #[test]
 fn a_run_folder_says_what_was_degraded_and_goes_on_with_nothing_else() {
     let (plain, worse) = (SmallSequence::write(), worse_on_disk("invert"));
-    let eval = |sequence: &SmallSequence, name: &str, words: &[&str]| {
-        let mut command = posescope();
-        command.arg("eval").arg(sequence.folder());
-        command.args(["--method", "fb,mi", "--radius", "3", "-q"]);
-        command.args(["--reference", "nearest:1", "--query", "5"]);
-        command.arg("--out").arg(sequence.path().join(name));
-        command.args(words);
-        command
-    };
-    let read = |sequence: &SmallSequence, file: &str| {
-        fs::read_to_string(sequence.path().join(file)).expect("readable")
-    };
+    let line =
+        "eval sequences/42 --method fb,mi --radius 3 -q --reference nearest:1 --query 5 --out";
     // Without a scene of queries of their own, the references keep their photos all the same.
-    eval(&plain, "run", &["--degrade", "invert"])
-        .assert()
-        .code(0);
-    eval(&worse, "run", &[]).assert().code(0);
-    let mark = "\"degraded\":\"invert\",";
-    assert_eq!(
-        read(&plain, "run/results.jsonl").replace(mark, ""),
-        read(&worse, "run/results.jsonl")
+    plain.run(&format!("{line} run --degrade invert")).ok();
+    worse.run(&format!("{line} run")).ok();
+    let results = plain.text("run/results.jsonl");
+    let results = results.replace("\"degraded\":\"invert\",", "");
+    assert_eq!(results, worse.text("run/results.jsonl"));
+    has(&plain.text("run/run.toml"), "degrade = \"invert\"\n");
+    assert!(!worse.text("run/run.toml").contains("degrade"));
+    let said = plain.run(&format!("{line} run --degrade gamma=2 --resume"));
+    said.fails_with(
+        2,
+        "`degrade = \"invert\"` there, `degrade = \"gamma=2\"` here",
     );
-    assert!(read(&plain, "run/run.toml").contains("degrade = \"invert\"\n"));
-    assert!(!read(&worse, "run/run.toml").contains("degrade"));
-    let other = eval(&plain, "run", &["--degrade", "gamma=2", "--resume"]);
-    let other = { other }.output().expect("the binary starts");
-    let said = String::from_utf8_lossy(&other.stderr);
-    assert_eq!(other.status.code(), Some(2), "{said}");
-    let words = "`degrade = \"invert\"` there, `degrade = \"gamma=2\"` here";
-    assert!(said.contains(words), "{said}");
 
     // Noise is the same on any number of threads, and another for another seed.
-    let noise = ["--degrade", "noise=20", "--threads"];
-    for (name, more) in [
-        ("1", &["1"][..]),
-        ("3", &["3"]),
-        ("seed", &["1", "--seed", "4"]),
-    ] {
-        eval(&plain, name, &[&noise, more].concat())
-            .assert()
-            .code(0);
-    }
-    let one = read(&plain, "1/results.jsonl");
-    assert_eq!(one, read(&plain, "3/results.jsonl"));
-    assert_ne!(
-        one,
-        read(&plain, "seed/results.jsonl").replace("\"seed\":4", "\"seed\":0")
-    );
-}
-
-#[test]
-fn bad_text_is_one_line_that_says_what_was_expected() {
-    for (text, words) in [
-        (
-            "gama=0.4",
-            "fog, blur, exposure, gamma, noise, invert expected",
-        ),
-        ("gamma=0.01", "`gamma` takes 0.05 … 10, not `0.01`"),
-        ("noise=8,noise=9", "`noise` is given twice"),
-        ("", "something such as gamma=0.4,noise=8,invert expected"),
-    ] {
-        let output = posescope()
-            .args(["run", "street", "--query", "70", "--degrade", text])
-            .output()
-            .expect("the binary starts");
-        assert_eq!(output.status.code(), Some(2), "{text}");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(said.contains(words), "{said}");
-    }
+    let [one, three, seed] = ["--threads 1", "--threads 3", "--seed 4"].map(|words| {
+        let out = words.replace(' ', "");
+        plain
+            .run(&format!("{line} ./{out} --degrade noise=20 {words}"))
+            .ok();
+        plain.text(&format!("{out}/results.jsonl"))
+    });
+    assert_eq!(one, three);
+    assert_ne!(one, seed.replace("\"seed\":4", "\"seed\":0"));
 }
 
 #[test]
@@ -143,10 +78,7 @@ fn poses_clouds_and_names_of_a_degraded_scene_are_its_own() {
     assert_eq!(worse.name(), street.name());
     assert_eq!(worse.pose(frame), street.pose(frame));
     assert_ne!(worse.fingerprint(), street.fingerprint());
-    let (taken, degraded) = (
-        street.photo(frame).expect("is made"),
-        worse.photo(frame).expect("is made"),
-    );
+    let [taken, degraded] = [&street, &worse].map(|scene| scene.photo(frame).expect("is made"));
     let mut negative = taken.gray.clone();
     imageops::invert(&mut negative);
     assert_eq!(degraded.gray, negative);

@@ -4,10 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use posescope::doctor::{Mistake, examine};
+use posescope::scene::street::{Size, Street};
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{has, run_in};
+use crate::damage::open;
 use crate::data;
 use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
@@ -53,9 +55,9 @@ fn all_planted_mistakes_are_named() {
 }
 
 fn are_named(is_planted: impl Fn(Fault) -> bool) {
-    let street = scene::open("street", None).expect("is built in");
+    let street = Street::new("overcast", Size::Half).expect("is built in");
     for (fault, expected) in EXPECTED.into_iter().filter(|(fault, _)| is_planted(*fault)) {
-        let planted = Planted::new(street.as_ref(), fault, 0, 40);
+        let planted = Planted::new(&street, fault, 0, 40);
         let found = examine(&planted).expect("readable");
         let named = found.finding.as_ref().map(|finding| finding.mistake);
         println!("{fault:?}: {named:?} {:?}", found.remarks);
@@ -95,17 +97,20 @@ fn nothing_is_wrong_with_the_street_in_rain() {
 }
 
 #[test]
-fn nothing_is_wrong_with_real_scenes() {
-    for folder in [
-        "kitti/sequences/00",
-        "kitti_raw/2011_09_26/2011_09_26_drive_0013_sync",
-        "colmap/lund_door",
-    ] {
-        let Some(path) = data::sample(folder) else {
-            return;
-        };
-        let argument = path.to_str().expect("a plain path");
-        healthy(scene::open(argument, None).expect("opens").as_ref());
+fn nothing_is_wrong_with_real_photos_and_points() {
+    healthy_sample("colmap/lund_door");
+}
+
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn nothing_is_wrong_with_real_drives() {
+    healthy_sample("kitti/sequences/00");
+    healthy_sample("kitti_raw/2011_09_26/2011_09_26_drive_0013_sync");
+}
+
+fn healthy_sample(folder: &str) {
+    if let Some(path) = data::sample(folder) {
+        healthy(open(path).as_ref());
     }
 }
 
@@ -140,19 +145,13 @@ fn depth_images_that_are_not_registered_as_a_file_says_are_found_out() {
         return;
     };
     // With this file the reader takes depth and colour for one camera, of 585 px.
-    let stated = scene::open(path.to_str().expect("a plain path"), None).expect("opens");
-    let found = examine(stated.as_ref()).expect("readable");
+    let found = examine(open(&path).as_ref()).expect("readable");
     let finding = found.finding.expect("the colour camera has 525 px");
     assert_eq!(finding.mistake, Mistake::WrongCamera);
-    assert!(
-        finding.remedy.contains("of 529 px instead of 585"),
-        "{}",
-        finding.remedy
-    );
+    has(&finding.remedy, "of 529 px instead of 585");
     // Without it, the two cameras of the data set are what they are.
     let copy = without(&path, "camera-intrinsics.txt");
-    let argument = copy.path().to_str().expect("a plain path");
-    healthy(scene::open(argument, None).expect("opens").as_ref());
+    healthy(open(copy.path()).as_ref());
 }
 
 #[test]
@@ -160,47 +159,23 @@ fn a_scene_without_clouds_cannot_be_localised_against() {
     let Some(path) = data::sample("kitti/sequences/06") else {
         return;
     };
-    let output = posescope()
-        .arg("doctor")
-        .arg(path)
-        .output()
-        .expect("the binary starts");
-    assert_eq!(output.status.code(), Some(3));
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        message.contains("no frame has a cloud") && message.contains("--query-scene"),
-        "{message}"
-    );
+    let said = run_in(&path, "doctor .");
+    said.fails_with(3, "no frame has a cloud ~ --query-scene");
 }
 
 #[test]
 fn the_command_reports_and_draws() {
     let sequence = SmallSequence::write();
-    let folder = TempDir::new().expect("a folder");
-    let (picture, recording) = (folder.path().join("a.png"), folder.path().join("a.rrd"));
-    let output = posescope()
-        .arg("doctor")
-        .arg(sequence.folder())
-        .arg("--picture")
-        .arg(&picture)
-        .arg("--save")
-        .arg(&recording)
-        .output()
-        .expect("the binary starts");
-    let table = String::from_utf8_lossy(&output.stdout);
-    assert!(
-        table.contains("frames     3, 3 with a pose, 3 with a cloud"),
-        "{table}"
-    );
+    let table = sequence
+        .run("doctor sequences/42 --picture a.png --save a.rrd")
+        .out;
+    has(&table, "frames     3, 3 with a pose, 3 with a cloud");
     assert!(
         table.lines().all(|line| line.chars().count() <= 120),
         "{table}"
     );
-    assert_eq!(image::open(&picture).expect("a picture").width(), 160);
-    assert!(std::fs::metadata(&recording).expect("a recording").len() > 1000);
-    let missing = posescope()
-        .args(["doctor", "nowhere"])
-        .output()
-        .expect("starts");
-    assert_eq!(missing.status.code(), Some(3));
+    let at = |name: &str| sequence.path().join(name);
+    assert_eq!(image::open(at("a.png")).expect("a picture").width(), 160);
+    assert!(fs::metadata(at("a.rrd")).expect("a recording").len() > 1000);
+    assert_eq!(sequence.run("doctor nowhere").code, Some(3));
 }

@@ -1,12 +1,11 @@
 //! `posescope eval` and what follows it: run folders, shards, resumed runs, gates, diff, export.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command as Process, Stdio};
 use std::sync::Arc;
 
-use assert_cmd::Command;
 use posescope::diagnosis::Code;
 use posescope::image::Photo;
 use posescope::localize::{LocalizeObserver, NoObserver, QueryResult, Selection};
@@ -14,113 +13,85 @@ use posescope::measure::{Plot, RunResults, TableName};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Draw, Execution, Protocol, RUN_SCHEMA, Reference, RunFile, RunFolder, RunObserver, Scenes,
-    read_results,
+    Draw, Execution, Limit, Protocol, RUN_SCHEMA, Reference, RunFile, RunFolder, RunObserver,
+    Scenes, read_results, read_run,
 };
-use posescope::scene::{self, Scene, SceneError};
+use posescope::scene::{Scene, SceneError};
 
-use crate::binary::{CACHE, posescope};
+use crate::binary::{background_in, has, lines, objects, refused, write};
+use crate::damage::open;
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{TwoCameras, Walls};
 
-const FRAMES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+const FRAMES: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 
 /// Two methods over all frames of the sequence, with two fused references each.
-const ASKED: [&str; 8] = [
-    "--method",
-    "fb,mi",
-    "--reference",
-    "random:2",
-    "--radius",
-    "3",
-    "--seed",
-    "1",
-];
+const EVAL: &str =
+    "eval sequences/42 --method fb,mi --reference random:2 --radius 3 --seed 1 --out";
 
-fn eval(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> Command {
-    let mut command = posescope();
-    command.arg("eval").arg(sequence.folder()).args(ASKED);
-    command.arg("--out").arg(out).args(extra);
-    command
+/// Hardly a pose is within a micrometre, so that many queries fail; three are recorded.
+const STRICT: &str = "--right 0.000001m,5deg --keep-failures 3";
+
+/// Every file of a run that holds no time and is no recording, and the names of its recordings.
+fn timeless(folder: &Path) -> (BTreeMap<PathBuf, Vec<u8>>, BTreeSet<OsString>) {
+    let names = |folder: &Path| -> BTreeSet<OsString> {
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.map(|entry| entry.file_name()).collect()
+    };
+    let files = names(folder).into_iter().map(PathBuf::from);
+    let is_timeless = |name: &PathBuf| {
+        !["timings.jsonl", "failures"]
+            .map(Path::new)
+            .contains(&&**name)
+    };
+    let read = |name: PathBuf| (name.clone(), fs::read(folder.join(name)).expect("readable"));
+    (
+        files.filter(is_timeless).map(read).collect(),
+        names(&folder.join("failures")),
+    )
 }
 
-fn run(sequence: &SmallSequence, out: &Path, extra: &[&str]) {
-    eval(sequence, out, extra).assert().code(0);
-}
-
-/// Every file of a run that holds no time and is no recording.
-fn timeless(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(next) = folders.pop() {
-        for entry in fs::read_dir(&next).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_none_or(|extension| extension != "rrd") {
-                let name = path.strip_prefix(folder).expect("below").to_owned();
-                files.insert(name, fs::read(&path).expect("readable"));
-            }
-        }
-    }
-    files.remove(Path::new("timings.jsonl"));
-    files
-}
-
+#[track_caller]
 fn assert_same(left: &Path, right: &Path) {
-    let (left, right) = (timeless(left), timeless(right));
-    let names = |files: &BTreeMap<PathBuf, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
-    assert_eq!(names(&left), names(&right));
+    let ((left, recorded), (right, others)) = (timeless(left), timeless(right));
+    assert!(
+        left.keys().eq(right.keys()),
+        "{:?} {:?}",
+        left.keys(),
+        right.keys()
+    );
     for (name, bytes) in &left {
         assert!(right[name] == *bytes, "{} differs", name.display());
     }
+    assert_eq!(recorded, others);
 }
 
 #[test]
 fn a_run_folder_holds_what_is_promised() {
     let sequence = SmallSequence::of(&FRAMES);
     let out = sequence.path().join("run");
-    // Hardly a pose is within a micrometre, so that many queries fail; three are recorded.
-    let extra = ["--right", "0.000001m,5deg", "--keep-failures", "3"];
-    let output = eval(&sequence, &out, &extra)
-        .output()
-        .expect("the binary starts");
-    assert_eq!(output.status.code(), Some(0));
-    let table = String::from_utf8_lossy(&output.stdout);
-    assert!(table.contains("success (%)"), "{table}");
-    let entries = fs::read_dir(&out).expect("a folder");
-    let mut names: Vec<String> = entries
-        .map(|entry| {
-            entry
-                .expect("an entry")
-                .file_name()
-                .into_string()
-                .expect("plain")
-        })
-        .collect();
-    names.sort();
-    assert_eq!(
-        names,
-        [
-            "failures",
-            "junit.xml",
-            "report.html",
-            "results.jsonl",
-            "run.toml",
-            "summary.json",
-            "timings.jsonl",
-        ]
+    let said = sequence.run(&format!("{EVAL} run {STRICT}")).ok();
+    has(&said.out, "success (%)");
+    let (files, recordings) = timeless(&out);
+    let expected = "junit.xml report.html results.jsonl run.toml summary.json";
+    assert!(
+        files.keys().eq(expected.split(' ').map(Path::new)),
+        "{:?}",
+        files.keys()
     );
+    assert!(out.join("timings.jsonl").is_file());
     // Tables and plots follow from the results.
     let run = RunResults::read(&out).expect("a run");
     let [summary] = TableName::Summary.of(&run).try_into().expect("one table");
-    assert!(summary.to_markdown().contains("| success (%) |"));
+    has(&summary.to_markdown(), "| success (%) |");
     assert_eq!(summary.to_csv().lines().count(), 1 + 2);
-    assert!(summary.to_latex().contains("\\begin{tabular}"));
-    let recall = Plot::Recall.svg(&run).expect("the truth is known");
-    assert!(recall.contains("kitti/42"), "{recall}");
+    has(&summary.to_latex(), "\\begin{tabular}");
+    has(
+        &Plot::Recall.svg(&run).expect("the truth is known"),
+        "kitti/42",
+    );
     let results = run.results;
-    assert_eq!(results.len(), 24);
+    assert_eq!(results.len(), 2 * FRAMES.len());
     let order = |at: usize| (results[at].query.as_str(), results[at].method.name());
     let expected = [("000000", "fb"), ("000000", "mi"), ("000001", "fb")];
     assert_eq!([order(0), order(1), order(2)], expected);
@@ -130,401 +101,221 @@ fn a_run_folder_holds_what_is_promised() {
         assert_eq!(alone.len(), 2);
         assert!(alone.iter().all(|one| one.per_reference.is_none()));
     }
-    let junit = fs::read_to_string(out.join("junit.xml")).expect("text");
-    assert_eq!(junit.matches("<testcase ").count(), 24);
-    let failed: Vec<String> = results
-        .iter()
-        .filter(|result| result.grade.is_failure())
-        .map(|result| format!("{}-{}", result.query, result.method))
-        .collect();
+    let junit = sequence.text("run/junit.xml");
+    assert_eq!(junit.matches("<testcase ").count(), results.len());
+    let failed = results.iter().filter(|result| result.grade.is_failure());
+    let failed = failed.map(|result| format!("{}-{}.rrd", result.query, result.method).into());
+    let failed: Vec<OsString> = failed.collect();
     assert!(failed.len() > 3, "{failed:?}");
     assert_eq!(junit.matches("<failure ").count(), failed.len());
     // The first failures are recorded.
-    for name in &failed[..3] {
-        assert!(out.join(format!("failures/{name}.rrd")).exists(), "{name}");
-    }
-    let said = String::from_utf8_lossy(&output.stderr);
-    let count = format!("{} failures were not recorded", failed.len() - 3);
-    assert!(said.contains(&count), "{said}");
-    assert_eq!(
-        fs::read_dir(out.join("failures"))
-            .expect("a folder")
-            .count(),
-        3
+    assert!(recordings.iter().eq(&failed[..3]), "{recordings:?}");
+    has(
+        &said.err,
+        &format!("{} failures were not recorded", failed.len() - 3),
     );
 }
 
 #[test]
-fn threads_and_shards_make_no_difference() {
+fn threads_kills_and_shards_make_no_difference() {
     let sequence = SmallSequence::of(&FRAMES);
     let folder = |name: &str| sequence.path().join(name);
-    let whole = folder("whole");
-    run(&sequence, &whole, &["--threads", "1"]);
-    let other = folder("other");
-    run(&sequence, &other, &["--threads", "2"]);
-    assert_same(&whole, &other);
-    // All parts at once, each a process of its own.
-    let parts = [1, 2, 3].map(|part| {
-        let out = folder(&format!("part-{part}"));
-        let child = background(&sequence, &out, &["--shard", &format!("{part}/3")]);
-        (out, child)
-    });
-    let parts = parts.map(|(out, mut child)| {
-        assert!(child.wait().expect("it ends").success());
-        out
-    });
-    let merged = folder("merged");
-    posescope()
-        .args(["eval", "merge", "--out"])
-        .arg(&merged)
-        .args(&parts)
-        .assert()
-        .code(0);
-    assert_same(&whole, &merged);
-}
-
-fn background(sequence: &SmallSequence, out: &Path, extra: &[&str]) -> std::process::Child {
-    Process::new(assert_cmd::cargo::cargo_bin!("posescope"))
-        .env("POSESCOPE_CACHE", CACHE)
-        .arg("eval")
-        .arg(sequence.folder())
-        .args(ASKED)
-        .arg("--out")
-        .arg(out)
-        .args(extra)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the binary starts")
-}
-
-/// Whole lines in a file that may not be there yet.
-fn lines(path: &Path) -> usize {
-    let bytes = fs::read(path).unwrap_or_default();
-    bytes.iter().filter(|byte| **byte == b'\n').count()
-}
-
-#[test]
-fn a_killed_run_goes_on_to_the_same_bytes() {
-    let sequence = SmallSequence::of(&FRAMES);
-    let (whole, killed) = (
-        sequence.path().join("whole"),
-        sequence.path().join("killed"),
-    );
-    // Hardly a pose is within a micrometre, so that more fail than are recorded.
-    let extra = [
-        "--right",
-        "0.000001m,5deg",
-        "--keep-failures",
-        "5",
-        "--resume",
-        "--threads",
-        "1",
-    ];
-    run(&sequence, &whole, &extra);
-    let (results, all) = (
-        killed.join("results.jsonl"),
-        lines(&whole.join("results.jsonl")),
-    );
-    // Each is killed as soon as it has results of its own, queries away from the end.
-    for _ in 0..3 {
-        let before = lines(&results);
-        let mut child = background(&sequence, &killed, &extra);
-        while lines(&results) <= before {
+    sequence
+        .run(&format!("{EVAL} whole {STRICT} --threads 1"))
+        .ok();
+    let results = |name: &str| folder(name).join("results.jsonl");
+    let all = lines(results("whole"));
+    // Killed as soon as it has results of its own, queries away from the end.
+    let line = format!("{EVAL} killed {STRICT} --threads 2 --resume");
+    for _ in 0..2 {
+        let before = lines(results("killed"));
+        let mut child = background_in(sequence.path(), &line);
+        while lines(results("killed")) <= before {
             assert!(child.try_wait().expect("it is ours").is_none(), "it ended");
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
         child.kill().expect("it may be killed");
         assert!(!child.wait().expect("it ends").success(), "it was not hit");
-        assert!(lines(&results) < all);
+        assert!(lines(results("killed")) < all);
     }
-    run(&sequence, &killed, &extra);
-    assert_same(&whole, &killed);
-    let recorded = |run: &Path| {
-        let entries = fs::read_dir(run.join("failures")).expect("a folder");
-        let names = entries.map(|entry| entry.expect("an entry").file_name());
-        names.collect::<std::collections::BTreeSet<_>>()
-    };
-    assert_eq!(recorded(&whole).len(), 5);
-    assert_eq!(recorded(&whole), recorded(&killed));
-}
-
-/// Versions before did not write all parameters.
-#[test]
-fn a_run_whose_description_lacks_a_parameter_goes_on_and_compares() {
-    let sequence = SmallSequence::of(&FRAMES[..4]);
-    let (whole, old) = (sequence.path().join("whole"), sequence.path().join("old"));
-    run(&sequence, &whole, &[]);
-    run(&sequence, &old, &[]);
-    let file = old.join("run.toml");
-    let text = fs::read_to_string(&file).expect("text");
-    let known = |line: &&str| {
-        let unknown = ["min_trials", "em_iterations", "loss", "loss_scale"];
-        !unknown
-            .iter()
-            .any(|name| line.starts_with(&format!("{name} = ")))
-    };
-    let fewer: Vec<&str> = text.lines().filter(known).collect();
-    // FB has them, and so has the method with another feature.
-    assert_eq!(fewer.len() + 8, text.lines().count(), "{text}");
-    fs::write(&file, fewer.join("\n") + "\n").expect("writable");
-    fs::write(old.join("results.jsonl"), "").expect("writable");
-    run(&sequence, &old, &["--resume"]);
-    let results = |folder: &Path| fs::read(folder.join("results.jsonl")).expect("results");
-    assert!(results(&whole) == results(&old));
-    posescope()
-        .arg("compare")
-        .args([&whole, &old])
-        .assert()
-        .code(0);
-    expect_line(
-        &mut eval(&sequence, &old, &["--resume", "--set", "fb.min_trials=7"]),
-        2,
-        &["asked for otherwise", "min_trials = 7"],
-    );
+    sequence.run(&line).ok();
+    assert_same(&folder("whole"), &folder("killed"));
+    // All parts at once, each a process of its own.
+    sequence.run(&format!("{EVAL} plain")).ok();
+    let part = |part| format!("{EVAL} part-{part} --shard {part}/2");
+    let child = background_in(sequence.path(), &part(1));
+    sequence.run(&part(2)).ok();
+    assert!(child.wait_with_output().expect("it ends").status.success());
+    sequence.run("eval merge --out merged part-1 part-2").ok();
+    assert_same(&folder("plain"), &folder("merged"));
 }
 
 #[test]
 fn a_torn_line_is_cut_off() {
     let sequence = SmallSequence::of(&FRAMES[..4]);
-    let (whole, torn) = (sequence.path().join("whole"), sequence.path().join("torn"));
-    run(&sequence, &whole, &[]);
-    run(&sequence, &torn, &[]);
-    let results = torn.join("results.jsonl");
-    let bytes = fs::read(&results).expect("readable");
-    for length in [0, 1, bytes.len() / 3, bytes.len() - 1] {
-        fs::write(&results, &bytes[..length]).expect("writable");
-        run(&sequence, &torn, &["--resume"]);
-        assert_same(&whole, &torn);
+    sequence.run(&format!("{EVAL} run")).ok();
+    let out = sequence.path().join("run");
+    let run = read_run(&out).expect("our own");
+    let [whole, timings] =
+        ["results", "timings"].map(|of| sequence.text(&format!("run/{of}.jsonl")));
+    let ends = whole.match_indices('\n').map(|(at, _)| at + 1);
+    // A query has two results, which are written together.
+    let ends: Vec<usize> = [0].into_iter().chain(ends).step_by(2).collect();
+    for length in [0, 1, whole.len() / 3, whole.len() - 1] {
+        write(out.join("results.jsonl"), &whole[..length]);
+        write(out.join("timings.jsonl"), &timings);
+        RunFolder::resume(&out, &run).expect("our own");
+        let end = ends.iter().rev().find(|end| **end <= length);
+        assert!(sequence.text("run/results.jsonl") == whole[..*end.expect("is there")]);
     }
 }
 
-/// Runs and expects an exit code and one line with all of these words.
-fn expect_line(command: &mut Command, code: i32, words: &[&str]) {
-    let output = command.output().expect("the binary starts");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{message}");
-    let line = message.trim_end().lines().last().unwrap_or_default();
-    for word in words {
-        assert!(line.contains(word), "`{word}` is missing in: {message}");
-    }
+/// Versions before did not write all parameters.
+#[test]
+fn a_run_whose_description_lacks_a_parameter_goes_on_and_compares() {
+    let sequence = SmallSequence::of(&FRAMES[..3]);
+    sequence.run(&format!("{EVAL} whole")).ok();
+    sequence.run(&format!("{EVAL} old")).ok();
+    let text = sequence.text("old/run.toml");
+    let unknown =
+        ["min_trials", "em_iterations", "loss", "loss_scale"].map(|name| format!("{name} = "));
+    let known = |line: &&str| !unknown.iter().any(|name| line.starts_with(name));
+    let fewer: Vec<&str> = text.lines().filter(known).collect();
+    // FB has them, and so has the method with another feature.
+    assert_eq!(fewer.len() + 8, text.lines().count(), "{text}");
+    write(
+        sequence.path().join("old/run.toml"),
+        fewer.join("\n") + "\n",
+    );
+    write(sequence.path().join("old/results.jsonl"), "");
+    sequence.run(&format!("{EVAL} old --resume")).ok();
+    assert!(sequence.text("whole/results.jsonl") == sequence.text("old/results.jsonl"));
+    sequence.run("compare whole old").ok();
+    let said = sequence.run(&format!("{EVAL} old --resume --set fb.min_trials=7"));
+    said.fails(2, "asked for otherwise ~ min_trials = 7");
 }
 
 #[test]
 fn a_folder_with_something_else_in_it_is_left_alone() {
-    let sequence = SmallSequence::of(&FRAMES[..4]);
-    let out = sequence.path().join("run");
-    expect_line(
-        &mut eval(&sequence, &sequence.path().join("sequences"), &[]),
-        2,
-        &["not empty", "--out"],
+    let sequence = SmallSequence::of(&FRAMES[..3]);
+    sequence.run(&format!("{EVAL} run")).ok();
+    let table = format!(
+        "
+        2 | {EVAL} sequences | not empty ~ --out
+        2 | {EVAL} sequences --resume | not empty ~ --out
+        2 | {EVAL} run | not empty ~ --resume
+        2 | {EVAL} run --resume --failure-radius 7 | asked for otherwise ~ failure-radius = 7.0
+        "
     );
-    expect_line(
-        &mut eval(&sequence, &sequence.path().join("sequences"), &["--resume"]),
-        2,
-        &["not empty", "--out"],
-    );
-    run(&sequence, &out, &[]);
-    expect_line(
-        &mut eval(&sequence, &out, &[]),
-        2,
-        &["not empty", "--resume"],
-    );
-    expect_line(
-        &mut eval(&sequence, &out, &["--resume", "--failure-radius", "7"]),
-        2,
-        &["asked for otherwise", "failure-radius = 7.0"],
-    );
+    refused(sequence.path(), &table);
 }
 
 #[test]
 fn parts_that_do_not_make_a_whole_are_refused() {
     let sequence = SmallSequence::of(&FRAMES[..4]);
-    let part = |name: &str, shard: &str, extra: &[&str]| {
-        let out = sequence.path().join(name);
-        let mut all = vec!["--shard", shard];
-        all.extend(extra);
-        run(&sequence, &out, &all);
-        out
-    };
-    let merge = |parts: &[&PathBuf]| {
-        let mut command = posescope();
-        command
-            .args(["eval", "merge", "--out"])
-            .arg(sequence.path().join("merged"));
-        command.args(parts);
-        command
-    };
-    let (one, two) = (part("one", "1/2", &[]), part("two", "2/2", &[]));
-    expect_line(&mut merge(&[&one]), 3, &["in none of the parts"]);
-    let other = part("other", "2/2", &["--failure-radius", "7"]);
-    expect_line(&mut merge(&[&one, &other]), 2, &["asked for otherwise"]);
-    let results = two.join("results.jsonl");
-    let text = fs::read_to_string(&results).expect("text");
-    let cut = text.lines().next().expect("a line");
-    fs::write(&results, format!("{cut}\n")).expect("writable");
-    expect_line(
-        &mut merge(&[&one, &two]),
-        3,
-        &["0 of 2 queries", "--resume"],
+    for (name, words) in [
+        ("one", "--shard 1/2"),
+        ("two", "--shard 2/2"),
+        ("other", "--shard 2/2 --failure-radius 7"),
+    ] {
+        sequence.run(&format!("{EVAL} {name} {words}")).ok();
+    }
+    let text = sequence.text("two/results.jsonl");
+    let cut = text.split_inclusive('\n').next().expect("a line");
+    write(sequence.path().join("two/results.jsonl"), cut);
+    refused(
+        sequence.path(),
+        "
+        3 | eval merge --out merged one | in none of the parts
+        2 | eval merge --out merged one other | asked for otherwise
+        3 | eval merge --out merged one two | 0 of 2 queries ~ --resume
+        ",
     );
 }
 
 #[test]
 fn gates_and_regressions_decide_the_exit_code() {
     let sequence = SmallSequence::of(&FRAMES[..4]);
-    let folder = |name: &str| sequence.path().join(name);
-    let (good, bad) = (folder("good"), folder("bad"));
-    run(
-        &sequence,
-        &good,
-        &[
-            "--failure-radius",
-            "100",
-            "--gate",
-            "success@mi >= 0.5",
-            "--right",
-            "100m,180deg",
-        ],
+    let good = "--failure-radius 100 --gate 'success@mi >= 0.5' --right 100m,180deg";
+    sequence.run(&format!("{EVAL} good {good}")).ok();
+    let table = format!(
+        "
+        1 | {EVAL} gated --gate 'recall@0.000001m,5deg@mi > 0.5' | gate ~ recall ~ failed: 0.
+        2 | {EVAL} wrong --gate 'success > 1' | --help
+        1 | {EVAL} bad --right 0.000001m,5deg --baseline good | broken since
+        1 | compare good bad | queries broke
+        3 | compare good nowhere | no run here
+        "
     );
-    expect_line(
-        &mut eval(
-            &sequence,
-            &folder("gated"),
-            &["--gate", "recall@0.000001m,5deg@mi > 0.5"],
-        ),
-        1,
-        &["gate", "recall", "failed: 0."],
-    );
-    expect_line(
-        &mut eval(&sequence, &folder("wrong"), &["--gate", "success > 1"]),
-        2,
-        &["--help"],
-    );
-    let baseline = good.to_str().expect("a plain path");
-    let extra = ["--right", "0.000001m,5deg", "--baseline", baseline];
-    expect_line(&mut eval(&sequence, &bad, &extra), 1, &["broken since"]);
-    let diff = |a: &Path, b: &Path| {
-        let mut command = posescope();
-        command.arg("compare").arg(a).arg(b);
-        command
-    };
-    diff(&good, &good).assert().code(0);
-    expect_line(&mut diff(&good, &bad), 1, &["queries broke"]);
-    let recording = folder("diff.rrd");
-    diff(&bad, &good)
-        .arg("--save")
-        .arg(&recording)
-        .assert()
-        .code(0);
-    assert!(fs::metadata(&recording).is_ok_and(|file| file.len() > 1000));
-    expect_line(&mut diff(&good, &folder("nowhere")), 3, &["no run here"]);
+    refused(sequence.path(), &table);
+    sequence.run("compare good good").ok();
+    sequence.run("compare bad good --save diff.rrd").ok();
+    let recording = fs::metadata(sequence.path().join("diff.rrd"));
+    assert!(recording.is_ok_and(|file| file.len() > 1000));
 }
 
 #[test]
 fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
     let sequence = SmallSequence::of(&FRAMES[..4]);
-    let out = sequence.path().join("run");
-    run(&sequence, &out, &[]);
-    let export = |format: &str, extra: &[&str]| {
-        let mut command = posescope();
-        command
-            .arg("results")
-            .arg(&out)
-            .args(["--as", format])
-            .args(extra);
-        command
+    sequence.run(&format!("{EVAL} run")).ok();
+    sequence
+        .run(&format!("{EVAL} partly --query 2 --query 3"))
+        .ok();
+    let export = |format: &str| {
+        let line = format!("results run --where 'method = mi' --as {format}");
+        sequence.run(&line).ok().out
     };
-    let text = |format: &str| {
-        let output = export(format, &["--where", "method = mi"])
-            .output()
-            .expect("starts");
-        assert_eq!(output.status.code(), Some(0), "{format}");
-        String::from_utf8_lossy(&output.stdout).into_owned()
+    let numbers = |text: &str, line: usize| -> Vec<f64> {
+        let words = text.lines().nth(line).expect("a line per pose").split(' ');
+        words.map(|word| word.parse().expect("a number")).collect()
     };
-    let results: Vec<QueryResult> = read_results(&out)
-        .expect("results")
-        .collect::<Result<_, _>>()
-        .expect("one per line");
-    let of_mi: Vec<_> = results
-        .iter()
-        .filter(|result| result.method == Method::MI)
-        .collect();
-    let position = of_mi[1].pose.as_ref().expect("a pose").position_m;
-    let tum = text("tum");
-    let line: Vec<f64> = tum
-        .lines()
-        .nth(2)
-        .expect("a header and two poses")
-        .split(' ')
-        .map(|number| number.parse().expect("a number"))
-        .collect();
+    let results: Vec<QueryResult> = objects(&sequence.text("run/results.jsonl"));
+    let of_mi = results.iter().filter(|result| result.method == Method::MI);
+    let second = of_mi.skip(1).find_map(|result| result.pose.as_ref());
+    let position = second.expect("a pose").position_m;
+    // Behind a header.
+    let line = numbers(&export("tum"), 2);
     assert_eq!(line[..4], [0.1, position[0], position[1], position[2]]);
-    let kitti = text("kitti");
+    let kitti = export("kitti");
     assert_eq!(kitti.lines().count(), 4);
-    let line: Vec<f64> = kitti
-        .lines()
-        .nth(1)
-        .expect("a line per frame")
-        .split(' ')
-        .map(|number| number.parse().expect("a number"))
-        .collect();
+    let line = numbers(&kitti, 1);
     assert_eq!([line[3], line[7], line[11]], position);
-    // World to camera: the camera looks along the road, so that its z is minus the position's.
-    let vloc = text("vloc");
-    let line: Vec<&str> = vloc.lines().nth(1).expect("a line").split(' ').collect();
-    assert_eq!(line[0], "000001");
-    assert_eq!(text("csv").lines().count(), 5);
-    expect_line(
-        &mut export("tum", &[]),
-        2,
-        &["several results", "--where 'method = fb'"],
+    let vloc = export("vloc");
+    let line = vloc.lines().nth(1).expect("a line");
+    assert!(line.starts_with("000001 "), "{line}");
+    assert_eq!(export("csv").lines().count(), 5);
+    refused(
+        sequence.path(),
+        "
+        2 | results run --as tum | several results ~ --where 'method = fb'
+        2 | results run --where 'method = mi' --as colmap | cameras.txt ~ --out
+        2 | results partly --where 'method = mi' --as kitti | kitti ~ frame 0 is none of the queries
+        ",
     );
-    expect_line(
-        &mut export("colmap", &["--where", "method = mi"]),
-        2,
-        &["cameras.txt", "--out"],
-    );
-    let model = sequence.path().join("model");
-    let arguments = [
-        "--where",
-        "method = mi",
-        "--out",
-        model.to_str().expect("plain"),
-    ];
-    export("colmap", &arguments).assert().code(0);
-    let camera = fs::read_to_string(model.join("cameras.txt")).expect("text");
-    assert!(
-        camera.contains("1 PINHOLE 160 64 100 100 80.5 32.5"),
-        "{camera}"
-    );
+    sequence
+        .run("results run --where 'method = mi' --as colmap --out model")
+        .ok();
+    let cameras = sequence.text("model/cameras.txt");
+    has(&cameras, "1 PINHOLE 160 64 100 100 80.5 32.5");
+}
 
-    let partly = sequence.path().join("partly");
-    run(&sequence, &partly, &["--query", "2", "--query", "3"]);
-    let mut command = posescope();
-    command
-        .arg("results")
-        .arg(&partly)
-        .args(["--as", "kitti", "--where", "method = mi"]);
-    expect_line(
-        &mut command,
-        2,
-        &["kitti", "frame 0 is none of the queries"],
-    );
+/// A draw of queries, all of them where no limit is set.
+fn draw(limit: Option<Limit>) -> Draw<'static> {
+    Draw {
+        limit,
+        only: &[],
+        seed: 0,
+    }
 }
 
 #[test]
 fn a_share_of_the_frames_is_held_out_of_the_references_and_a_number_is_not() {
-    let sequence = SmallSequence::of(&FRAMES);
-    let folder = sequence.folder();
-    let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
+    let sequence = SmallSequence::of(&(0..12).collect::<Vec<_>>());
+    let scene = open(sequence.folder());
     let drawn = |limit: &str| {
-        let draw = Draw {
-            limit: Some(limit.parse().expect("a limit")),
-            only: &[],
-            seed: 0,
-        };
-        draw.pair(0, scene.as_ref(), scene.as_ref())
+        let limit = Some(limit.parse().expect("a limit"));
+        draw(limit)
+            .pair(0, scene.as_ref(), scene.as_ref())
             .expect("queries")
     };
     let (share, number) = (drawn("25%"), drawn("3"));
@@ -536,16 +327,11 @@ fn a_share_of_the_frames_is_held_out_of_the_references_and_a_number_is_not() {
 
 #[test]
 fn a_run_describes_the_camera_of_each_query_where_they_have_several() {
-    let draw = Draw {
-        limit: None,
-        only: &[],
-        seed: 0,
-    };
     let one = Walls::new();
-    let pair = draw.pair(0, &one, &one).expect("queries");
+    let pair = draw(None).pair(0, &one, &one).expect("queries");
     assert!(pair.cameras.is_empty());
     let two = TwoCameras(Walls::new());
-    let pair = draw.pair(0, &two, &two).expect("queries");
+    let pair = draw(None).pair(0, &two, &two).expect("queries");
     let widths: Vec<u32> = pair.cameras.iter().map(|camera| camera.width).collect();
     assert_eq!(widths, [240, 120, 240, 240, 240]);
     assert_eq!(pair.camera, pair.cameras[0]);
@@ -582,16 +368,10 @@ impl RunObserver for NoRunObserver {
 #[test]
 fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     let sequence = SmallSequence::of(&FRAMES[..4]);
-    let folder = sequence.folder();
-    let scene = scene::open(folder.to_str().expect("plain"), None).expect("a scene");
+    let scene = open(sequence.folder());
     let scenes = Scenes {
         references: vec![Arc::new(PanickingScene { scene, frame: 1 })],
         queries: Vec::new(),
-    };
-    let draw = Draw {
-        limit: None,
-        only: &[],
-        seed: 0,
     };
     let references = scenes.references[0].as_ref();
     let run = RunFile {
@@ -605,7 +385,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
             ..Protocol::default()
         },
         shard: None,
-        pairs: vec![draw.pair(0, references, references).expect("queries")],
+        pairs: vec![draw(None).pair(0, references, references).expect("queries")],
         inputs: BTreeMap::new(),
         params: Params::default().to_toml().parse().expect("a table"),
     };
@@ -620,21 +400,15 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     execution
         .run_remaining(&mut folder, &mut NoRunObserver(NoObserver))
         .expect("a panic is a result");
-    let results: Vec<QueryResult> = read_results(&out)
-        .expect("results")
-        .collect::<Result<_, _>>()
-        .expect("one per line");
+    let results = read_results(&out).expect("results");
+    let results: Vec<QueryResult> = results.map(|one| one.expect("a result")).collect();
     assert_eq!(results.len(), 8);
     for result in &results {
         let code = result.reason.as_ref().map(|reason| reason.code);
         if result.query == "000001" {
             let reason = result.reason.as_ref().expect("a reason");
             assert_eq!(reason.code, Code::X9);
-            assert!(
-                reason.text.contains("a trap for the photo"),
-                "{}",
-                reason.text
-            );
+            has(&reason.text, "a trap for the photo");
         } else {
             assert_ne!(code, Some(Code::X9), "{result:?}");
         }

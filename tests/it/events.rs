@@ -1,43 +1,25 @@
 //! `--events`: every event as data.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::Path;
 
 use serde_json::Value as Json;
 
-use crate::binary::posescope;
+use crate::binary::{objects, write};
 use crate::small_sequence::SmallSequence;
 
 #[test]
 fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
     let sequence = SmallSequence::write();
     let told = |name: &str, threads: &str| {
-        let path = sequence.path().join(name);
-        let output = posescope()
-            .arg("run")
-            .arg(sequence.folder())
-            .args(["--query", "5", "--reference", "4", "--reference", "7"])
-            .args(["--method", "fb,mi", "--radius", "3", "--fusion", "r-wavg"])
-            .args(["--json", "-", "-q", "--threads", threads])
-            .arg("--events")
-            .arg(&path)
-            .output()
-            .expect("the binary starts");
-        assert_eq!(output.status.code(), Some(0));
-        let results = String::from_utf8_lossy(&output.stdout).into_owned();
-        (fs::read_to_string(path).expect("text"), results)
+        let line =
+            "run sequences/42 --query 5 --reference 4 --reference 7 --method fb,mi --radius 3";
+        let more = format!("--fusion r-wavg --json - -q --threads {threads} --events {name}");
+        let results = sequence.run(&format!("{line} {more}")).ok().out;
+        (sequence.text(name), results)
     };
     let (text, results) = told("events.jsonl", "1");
     assert_eq!(told("again.jsonl", "3"), (text.clone(), results.clone()));
-    let events: Vec<Json> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("an object"))
-        .collect();
-    let results: Vec<Json> = results
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("an object"))
-        .collect();
+    let [events, results]: [Vec<Json>; 2] = [&text, &results].map(|text| objects(text));
     let of = |kind: &str, method: &str, reference: &str| -> Vec<&Json> {
         let is_it = |event: &&Json| {
             event["kind"] == kind && event["method"] == method && event["reference"] == reference
@@ -106,39 +88,29 @@ fn documented(kind: &str) -> BTreeSet<&'static str> {
 
 /// What a run over the first queries tells, in this folder, with these words more; but for what it remembers
 /// of frames that it had before.
-fn told_by_eval(sequence: &SmallSequence, out: &str, more: &[&str]) -> String {
-    let path = sequence.path().join(format!("{out}.jsonl"));
-    let output = posescope()
-        .arg("eval")
-        .arg(sequence.folder())
-        .args(["--query", "4", "--query", "5", "--method", "fb,pm", "-q"])
-        .args(["--radius", "2,3", "--keep-failures", "0"])
-        .args(more)
-        .arg("--out")
-        .arg(sequence.path().join(out))
-        .arg("--events")
-        .arg(&path)
-        .output()
-        .expect("the binary starts");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
-    let text = fs::read_to_string(path).expect("text");
+#[track_caller]
+fn told_by_eval(sequence: &SmallSequence, out: &str, more: &str) -> String {
+    let line =
+        "eval sequences/42 --query 4 --query 5 --method fb,pm -q --radius 2,3 --keep-failures 0";
+    let files = format!("--out {out} --events {out}.jsonl");
+    sequence.run(&format!("{line} {more} {files}")).ok();
+    let text = sequence.text(&format!("{out}.jsonl"));
     text.replace("\"reused\":true", "\"reused\":false")
 }
 
 #[test]
 fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
     let sequence = SmallSequence::write();
-    let whole = told_by_eval(&sequence, "whole", &[]);
-    let events: Vec<Json> = whole
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("an object"))
-        .collect();
-    for query in ["000004", "000005"] {
-        for radius in [2.0, 3.0] {
-            let of_it = |event: &&Json| event["query"] == query && event["radius_m"] == radius;
-            assert!(events.iter().any(|event| of_it(&event)), "{query} {radius}");
-        }
+    let whole = told_by_eval(&sequence, "whole", "");
+    let events: Vec<Json> = objects(&whole);
+    for (query, radius) in [
+        ("000004", 2.0),
+        ("000004", 3.0),
+        ("000005", 2.0),
+        ("000005", 3.0),
+    ] {
+        let is_it = |event: &Json| event["query"] == query && event["radius_m"] == radius;
+        assert!(events.iter().any(is_it), "{query} {radius}");
     }
     assert!(
         events
@@ -146,8 +118,8 @@ fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
             .all(|event| event["scene"] == events[0]["scene"])
     );
 
-    let first = told_by_eval(&sequence, "first", &["--shard", "1/2"]);
-    let second = told_by_eval(&sequence, "second", &["--shard", "2/2"]);
+    let first = told_by_eval(&sequence, "first", "--shard 1/2");
+    let second = told_by_eval(&sequence, "second", "--shard 2/2");
     assert!(!first.is_empty() && !second.is_empty());
     assert!(
         first.clone() + &second == whole,
@@ -155,63 +127,34 @@ fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
     );
 
     // As a run that was stopped after its first query leaves it.
-    let results = sequence.path().join("whole/results.jsonl");
-    let lines = fs::read_to_string(&results).expect("text");
-    let of_first: String = lines
+    let lines = sequence.text("whole/results.jsonl");
+    let of_first = lines
         .split_inclusive('\n')
-        .filter(|line| line.contains("\"query\":\"000004\""))
-        .collect();
+        .filter(|line| line.contains("\"query\":\"000004\""));
+    let of_first: String = of_first.collect();
     assert!(!of_first.is_empty() && of_first.len() < lines.len());
-    fs::write(&results, of_first).expect("room");
-    fs::write(sequence.path().join("whole.jsonl"), &first).expect("room");
-    let resumed = told_by_eval(&sequence, "whole", &["--resume"]);
+    write(sequence.path().join("whole/results.jsonl"), of_first);
+    write(sequence.path().join("whole.jsonl"), &first);
+    let resumed = told_by_eval(&sequence, "whole", "--resume");
     assert!(resumed == whole, "what is gone on with is not the whole");
 }
 
 #[test]
 fn a_file_that_cannot_be_written_is_told_before_anything_is_run() {
     let sequence = SmallSequence::write();
-    let output = posescope()
-        .arg("run")
-        .arg(sequence.folder())
-        .args([
-            "--query",
-            "5",
-            "--reference",
-            "4",
-            "--events",
-            "/no/such/folder/e.jsonl",
-        ])
-        .output()
-        .expect("the binary starts");
-    assert_eq!(output.status.code(), Some(3));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("/no/such/folder/e.jsonl: "));
-    assert!(output.stdout.is_empty());
-
-    let folder = sequence.path().join("run");
-    let eval = |events: &Path| {
-        posescope()
-            .arg("eval")
-            .arg(sequence.folder())
-            .args(["--query", "5", "--method", "fb", "-q", "--out"])
-            .arg(&folder)
-            .arg("--events")
-            .arg(events)
-            .output()
-            .expect("the binary starts")
-    };
-    let refused = eval(Path::new("/no/such/folder/e.jsonl"));
-    assert_eq!(refused.status.code(), Some(3));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("/no/such/folder/e.jsonl: "));
-    assert!(
-        !folder.exists(),
-        "a run folder that the same command refuses"
-    );
-
+    let line = "run sequences/42 --query 5 --reference 4 --events /no/such/folder/e.jsonl";
+    let said = sequence.run(line).fails(3, "/no/such/folder/e.jsonl: ");
+    assert_eq!(said.out, "");
     // The folder of the run holds what a run holds.
-    let refused = eval(&folder.join("events.jsonl"));
-    assert_eq!(refused.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&refused.stderr);
-    assert!(said.contains("outside of the run folder"), "{said}");
-    assert!(!folder.exists());
+    for (events, code, words) in [
+        ("/no/such/folder/e.jsonl", 3, "/no/such/folder/e.jsonl: "),
+        ("run/events.jsonl", 2, "outside of the run folder"),
+    ] {
+        let line = "eval sequences/42 --query 5 --method fb -q --out run --events";
+        sequence.run(&format!("{line} {events}")).fails(code, words);
+        assert!(
+            !sequence.path().join("run").exists(),
+            "the same command refuses it"
+        );
+    }
 }

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::path::Path;
 
 use posescope::diagnosis::Code;
 use posescope::localize::QueryResult;
@@ -11,28 +10,17 @@ use posescope::method::Method;
 use posescope::scene;
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{has, refused, run_in, write};
 use crate::damage;
 use crate::small_sequence::SmallSequence;
 
-fn results(output: &Output) -> Vec<QueryResult> {
+/// The results that a run prints.
+fn results(folder: &Path, words: &str) -> Vec<QueryResult> {
     // A program knows the names that it was given.
     for name in ["other", "tum", "kitti", "model", "vloc"] {
         Method::called(name).expect("a plain name");
     }
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{message}");
-    let lines = String::from_utf8_lossy(&output.stdout);
-    let read = |line: &str| serde_json::from_str(line).expect("a result");
-    lines.lines().map(read).collect()
-}
-
-fn run(scene: &str, arguments: &[&str]) -> Output {
-    let mut command = posescope();
-    command
-        .args(["run", scene, "--json", "-", "-q"])
-        .args(arguments);
-    command.output().expect("the binary starts")
+    run_in(folder, &format!("run {words} --json - -q")).results()
 }
 
 /// The poses of a method as visuallocalization.net takes them.
@@ -50,11 +38,8 @@ fn named_poses(results: &[QueryResult], method: Method) -> String {
 }
 
 fn codes(result: &QueryResult) -> BTreeSet<Code> {
-    result
-        .diagnosis
-        .iter()
-        .map(|verdict| verdict.code)
-        .collect()
+    let verdicts = result.diagnosis.iter();
+    verdicts.map(|verdict| verdict.code).collect()
 }
 
 #[test]
@@ -63,77 +48,44 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
     let file = folder.path().join("poses.txt");
     // Night and rain against an overcast reference: MI is wrong in many ways.
     for (queries, wanted) in [
-        (
-            "street:night",
-            ["--query", "70", "--query", "300", "--query", "450"],
-        ),
-        (
-            "street:snow",
-            ["--query", "20", "--query", "160", "--query", "610"],
-        ),
+        ("street:night", "--query 70 --query 300"),
+        ("street:snow", "--query 160 --query 610"),
     ] {
-        let asked = |extra: &[&str]| {
-            let mut arguments = vec!["--query-scene", queries, "--reference", "nearest:2"];
-            arguments.extend(["--radius", "8", "--method", "mi"]);
-            arguments.extend(wanted.iter().chain(extra));
-            results(&run("street:overcast", &arguments))
-        };
-        for ours in asked(&[]) {
+        let street = format!("street:overcast --query-scene {queries} --radius 8");
+        let asked = format!("{street} {wanted} --reference nearest:2 --method mi");
+        for ours in results(folder.path(), &asked) {
             let Some(pose) = ours.pose.clone() else {
                 continue;
             };
-            fs::write(&file, named_poses(std::slice::from_ref(&ours), Method::MI))
-                .expect("writable");
-            let given = format!("other={}", file.display());
-            let (query, reference) = (ours.query.as_str(), ours.references[0].as_str());
-            let output = run(
-                "street:overcast",
-                &[
-                    "--query-scene",
-                    queries,
-                    "--query",
-                    query,
-                    "--reference",
-                    reference,
-                    "--radius",
-                    "8",
-                    "--method",
-                    "other",
-                    "--estimates",
-                    &given,
-                ],
-            );
-            let [other] = results(&output).try_into().expect("one result");
+            write(&file, named_poses(std::slice::from_ref(&ours), Method::MI));
+            let (query, reference) = (&ours.query, &ours.references[0]);
+            let pair = format!("{street} --query {query} --reference {reference}");
+            let given = format!("{pair} --method other --estimates other=poses.txt");
+            let [other] = results(folder.path(), &given)
+                .try_into()
+                .expect("one result");
             assert_eq!(other.method.name(), "other");
             let [a, b] = [&pose, other.pose.as_ref().expect("a pose")].map(|pose| pose.position_m);
             assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9));
             let costs = ours.cost.as_ref().expect("MI has a cost");
-            let at_pose = other
-                .costs_at_pose
-                .iter()
-                .find(|at| at.method == Method::MI);
+            let mut at_pose = other.costs_at_pose.iter();
+            let at_pose = at_pose.find(|at| at.method == Method::MI);
             let at_pose = at_pose.expect("every cost is asked");
             assert!((at_pose.cost.expect("is covered") - costs.best).abs() < 1e-6);
             assert_eq!(at_pose.truth, costs.truth);
             // What MI found beside its result it alone can say: other minima (D2 for D3), the grid
             // (D4, D8), and how far it is to be believed (L1 and X1 that rests on it).
             let alone = [Code::D1, Code::D5, Code::D6, Code::D7];
-            let needed: BTreeSet<Code> = codes(&ours)
-                .into_iter()
-                .filter(|code| alone.contains(code))
-                .collect();
-            let said: BTreeSet<Code> = codes(&other)
-                .into_iter()
-                .filter(|code| alone.contains(code))
-                .collect();
-            println!(
-                "{queries} {query} {reference}: {:?} → {:?}",
-                codes(&ours),
-                codes(&other)
-            );
-            assert!(needed.is_subset(&said), "{query}: {needed:?} {said:?}");
-            let is_wrong = codes(&ours).iter().any(|code| code.is_failure());
-            assert_eq!(is_wrong, !codes(&other).is_empty(), "{query}");
+            let (needed, said) = (codes(&ours), codes(&other));
+            println!("{queries} {query} {reference}: {needed:?} → {said:?}");
+            for code in alone {
+                assert!(
+                    !needed.contains(&code) || said.contains(&code),
+                    "{query}: {code}"
+                );
+            }
+            let is_wrong = needed.iter().any(|code| code.is_failure());
+            assert_eq!(is_wrong, !said.is_empty(), "{query}");
         }
     }
 }
@@ -141,67 +93,47 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
 /// Our own MI poses of the small sequence, and the arguments that ask for them.
 fn small() -> (SmallSequence, Vec<QueryResult>) {
     let sequence = SmallSequence::write();
-    let scene = sequence.folder();
-    let output = run(
-        text(&scene),
-        &["--all", "--reference", "4", "--method", "mi"],
-    );
-    let found = results(&output);
+    let found = results(sequence.path(), ALL);
     (sequence, found)
 }
 
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
+const ALL: &str = "sequences/42 --all --reference 4 --method mi";
 
 #[test]
 fn all_four_texts_say_the_same() {
     let (sequence, found) = small();
-    let poses: Vec<_> = found
-        .iter()
-        .map(|result| {
-            result
-                .pose
-                .as_ref()
-                .expect("a pose")
-                .to_pose()
-                .expect("a pose")
-        })
-        .collect();
-    let folder = TempDir::new().expect("a folder");
-    let at = |name: &str| -> PathBuf { folder.path().join(name) };
+    let at = |name: &str| sequence.path().join(name);
     let numbers = |values: &[f64]| -> String {
         let words: Vec<String> = values.iter().map(ToString::to_string).collect();
         words.join(" ")
     };
     let (mut tum, mut kitti, mut colmap) = (String::new(), String::new(), "# images\n".to_owned());
-    for (result, pose) in found.iter().zip(&poses) {
+    for result in &found {
+        let estimate = result.pose.as_ref().expect("a pose");
+        let pose = estimate.to_pose().expect("a pose");
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
         let frame: f64 = result.query.parse().expect("a number");
-        tum += &format!(
-            "{} {}\n",
-            frame / 10.0,
-            numbers(&[t.x, t.y, t.z, q.x, q.y, q.z, q.w])
-        );
-        let rows = result.pose.as_ref().expect("a pose").world_from_camera;
-        kitti += &format!("{}\n", numbers(&rows.concat()));
+        let values = numbers(&[t.x, t.y, t.z, q.x, q.y, q.z, q.w]);
+        tum += &format!("{} {values}\n", frame / 10.0);
+        kitti += &format!("{}\n", numbers(&estimate.world_from_camera.concat()));
         let inverse = pose.inverse();
         let (t, q) = (inverse.translation.vector, inverse.rotation.coords);
         let inverse = numbers(&[q.w, q.x, q.y, q.z, t.x, t.y, t.z]);
         colmap += &format!("7 {inverse} 1 image_0/{}.png\n1.5 2.5 -1\n", result.query);
     }
-    fs::write(at("tum.txt"), tum).expect("writable");
-    fs::write(at("kitti.txt"), kitti).expect("writable");
+    write(at("tum.txt"), tum);
+    write(at("kitti.txt"), kitti);
     fs::create_dir(at("model")).expect("writable");
-    fs::write(at("model/images.txt"), colmap).expect("writable");
-    fs::write(at("vloc.txt"), named_poses(&found, Method::MI)).expect("writable");
-    let given: Vec<String> = ["tum.txt", "kitti.txt", "model", "vloc.txt"]
-        .map(|name| format!("{}={}", name.trim_end_matches(".txt"), at(name).display()))
-        .into();
-    let mut arguments = vec!["--all", "--reference", "4", "--method", "mi"];
-    arguments.extend(given.iter().flat_map(|given| ["--estimates", given]));
-    let output = run(text(&sequence.folder()), &arguments);
-    let results = results(&output);
+    write(at("model/images.txt"), colmap);
+    write(at("vloc.txt"), named_poses(&found, Method::MI));
+    let given = [
+        "tum=tum.txt",
+        "kitti=kitti.txt",
+        "model=model",
+        "vloc=vloc.txt",
+    ];
+    let given = given.map(|given| format!(" --estimates {given}")).concat();
+    let results = results(sequence.path(), &(ALL.to_owned() + &given));
     assert_eq!(results.len(), 5 * found.len());
     for of_query in results.chunks(5) {
         let order: Vec<&str> = of_query.iter().map(|result| result.method.name()).collect();
@@ -219,67 +151,42 @@ fn all_four_texts_say_the_same() {
 #[test]
 fn a_run_folder_knows_the_other_system_and_all_that_reads_it_does_too() {
     let (sequence, found) = small();
-    let file = sequence.path().join("poses.txt");
     // One query has no pose.
-    fs::write(&file, named_poses(&found[1..], Method::MI)).expect("writable");
-    let out = sequence.path().join("run");
-    let given = format!("super-glue={}", file.display());
-    let eval = |extra: &[&str]| {
-        let mut command = posescope();
-        command
-            .arg("eval")
-            .arg(sequence.folder())
-            .arg("--out")
-            .arg(&out);
-        command.args(["--method", "mi", "--radius", "3", "--estimates", &given]);
-        command.args(extra).output().expect("the binary starts")
-    };
-    let output = eval(&["--gate", "success@super-glue >= 0.9"]);
-    assert_eq!(output.status.code(), Some(1), "one of three has no pose");
-    let table = String::from_utf8_lossy(&output.stdout);
-    assert!(table.contains("super-glue"), "{table}");
-    let text = fs::read_to_string(out.join("results.jsonl")).expect("results");
-    assert!(text.contains("super-glue has no pose of 000004"), "{text}");
-    assert_eq!(eval(&["--resume"]).status.code(), Some(0));
-    let mut export = posescope();
-    export
-        .arg("results")
-        .arg(&out)
-        .args(["--as", "vloc", "--where", "method = super-glue"]);
-    let exported = export.output().expect("the binary starts");
-    let lines = String::from_utf8_lossy(&exported.stdout);
-    assert_eq!(lines.lines().count(), 2, "{lines}");
-    posescope()
-        .arg("compare")
-        .args([&out, &out])
-        .assert()
-        .code(0);
-    // A run that names a method which nobody brought is not read.
-    let run_file = fs::read_to_string(out.join("run.toml")).expect("text");
-    let without: String = run_file
-        .lines()
-        .filter(|line| !line.starts_with("estimates"))
-        .map(|line| format!("{line}\n"))
-        .collect();
-    fs::write(out.join("run.toml"), without).expect("writable");
-    let output = posescope()
-        .arg("compare")
-        .arg(&out)
-        .arg(&out)
-        .output()
-        .expect("starts");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(3), "{message}");
-    assert!(
-        message.contains("run.toml:") && message.contains("`super-glue` is no method"),
-        "{message}"
+    write(
+        sequence.path().join("poses.txt"),
+        named_poses(&found[1..], Method::MI),
     );
+    let eval =
+        "eval sequences/42 --out run --method mi --radius 3 --estimates super-glue=poses.txt";
+    let said = sequence.run(&format!("{eval} --gate 'success@super-glue >= 0.9'"));
+    assert_eq!(said.code, Some(1), "one of three has no pose");
+    has(&said.out, "super-glue");
+    has(
+        &sequence.text("run/results.jsonl"),
+        "super-glue has no pose of 000004",
+    );
+    sequence.run(&format!("{eval} --resume")).ok();
+    let said = sequence.run("results run --as vloc --where 'method = super-glue'");
+    assert_eq!(said.ok().out.lines().count(), 2);
+    sequence.run("compare run run").ok();
+    // A run that names a method which nobody brought is not read.
+    let run = sequence.text("run/run.toml");
+    let without = run
+        .split_inclusive('\n')
+        .filter(|line| !line.starts_with("estimates"));
+    write(
+        sequence.path().join("run/run.toml"),
+        without.collect::<String>(),
+    );
+    sequence
+        .run("compare run run")
+        .fails(3, "run.toml: ~ `super-glue` is no method");
 }
 
 #[test]
 fn poses_that_cannot_be_read_are_named_with_their_line() {
     let sequence = SmallSequence::write();
-    let scene = scene::open(text(&sequence.folder()), None).expect("our own");
+    let scene = damage::open(sequence.folder());
     let file = sequence.path().join("poses.txt");
     for (content, words) in [
         ("", "poses expected, none found"),
@@ -313,20 +220,20 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
             "poses.txt:3: a line `id qw",
         ),
     ] {
-        fs::write(&file, content).expect("writable");
+        write(&file, content);
         let read = scene::read_estimates(&file, scene.as_ref());
         let error = read.expect_err(content).to_string();
-        damage::expect_words(&error, &[words]);
+        damage::expect_words(&error, words);
     }
 }
 
 #[test]
 fn a_number_that_is_a_frame_and_a_time_is_told_by_its_quaternion_and_then_as_a_frame() {
     let sequence = SmallSequence::write();
-    let scene = scene::open(text(&sequence.folder()), None).expect("our own");
+    let scene = damage::open(sequence.folder());
     let file = sequence.path().join("poses.txt");
     let frames = |content: &str| -> Vec<String> {
-        fs::write(&file, content).expect("writable");
+        write(&file, content);
         let read = scene::read_estimates(&file, scene.as_ref());
         let estimates = read.unwrap_or_else(|error| panic!("{error}"));
         estimates.into_keys().collect()
@@ -339,21 +246,11 @@ fn a_number_that_is_a_frame_and_a_time_is_told_by_its_quaternion_and_then_as_a_f
 }
 
 #[test]
-fn an_unreadable_file_of_poses_is_bad_data_and_a_wrong_name_is_bad_usage() {
+fn an_unreadable_file_of_poses_is_bad_data() {
     let sequence = SmallSequence::write();
-    let file = sequence.path().join("poses.txt");
-    fs::write(&file, "1 2 3\n").expect("writable");
-    let poses = format!("other={}", file.display());
-    for (given, code, words) in [
-        (poses.as_str(), 3, "poses.txt:1: TUM"),
-        ("mi=poses.txt", 2, "mi is a method of ours"),
-        ("poses.txt", 2, "NAME=FILE expected"),
-        ("A B=poses.txt", 2, "cannot name a method"),
-    ] {
-        let asked = ["--query", "5", "--reference", "4", "--estimates", given];
-        let output = run(text(&sequence.folder()), &asked);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{message}");
-        assert!(message.contains(words), "{given}: {message}");
-    }
+    write(sequence.path().join("poses.txt"), "1 2 3\n");
+    refused(
+        sequence.path(),
+        "3 | run sequences/42 --query 5 --reference 4 --estimates other=poses.txt | poses.txt:1: TUM",
+    );
 }

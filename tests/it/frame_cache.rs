@@ -6,21 +6,15 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{Said, command_in};
 
 /// Results and messages of one run on the street.
-fn run(cache: impl AsRef<OsStr>, home: &Path) -> (Vec<u8>, String) {
-    let output = posescope()
-        .args(["run", "street", "--query", "70", "--reference", "62"])
-        .args(["--method", "fb", "--json", "-", "-q"])
-        .env("POSESCOPE_CACHE", cache)
-        .env("HOME", home)
-        .env_remove("XDG_CACHE_HOME")
-        .output()
-        .expect("the binary starts");
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{message}");
-    (output.stdout, message)
+fn run(cache: impl AsRef<OsStr>, home: &Path) -> (String, String) {
+    let line = "run street --query 70 --reference 62 --method fb --json - -q";
+    let mut command = command_in(Path::new("."), line);
+    command.env("POSESCOPE_CACHE", cache).env("HOME", home);
+    let said = Said::by(command.env_remove("XDG_CACHE_HOME")).ok();
+    (said.out, said.err)
 }
 
 /// All files below a folder.

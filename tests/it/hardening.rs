@@ -1,70 +1,71 @@
-//! What breaks on the way: disks, viewers, data. One line, what was done is kept, exit code 3.
+//! Bad input and what breaks on the way (disks, viewers, data): one line, what was done is kept, exit
+//! code 3, never a panic.
 #![cfg(target_os = "linux")]
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use rerun::external::re_log_encoding::DecoderApp;
 use tempfile::TempDir;
 
-use crate::binary::CACHE;
+use crate::binary::{Said, background_in, has, lines, refused, run_in, write};
 use crate::small_sequence::SmallSequence;
 
-fn posescope() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_posescope"));
-    command.env("POSESCOPE_CACHE", CACHE).env_remove("COLUMNS");
-    command
-}
-
-fn run(sequence: &SmallSequence) -> Command {
-    let mut command = posescope();
-    command
-        .arg("run")
-        .arg(sequence.folder())
-        .args(["--all", "--reference", "4", "--method", "mi"]);
-    command
-}
-
-/// One line of error, whose words these are, and exit code 3.
-#[track_caller]
-fn expect_one_line(output: &Output, words: &[&str]) {
-    let said = String::from_utf8_lossy(&output.stderr);
-    let errors: Vec<&str> = said
-        .lines()
-        .filter(|line| line.starts_with("posescope: "))
-        .collect();
-    assert_eq!(output.status.code(), Some(3), "{said}");
-    assert_eq!(errors.len(), 1, "{said}");
-    for word in words {
-        assert!(errors[0].contains(word), "`{word}` is missing in: {said}");
-    }
-}
-
+const RUN: &str = "run sequences/42 --all --reference 4 --method mi";
 const FULL: &str = "No space left on device";
+
+#[test]
+fn what_is_missing_damaged_or_cannot_be_written_is_named() {
+    let sequence = SmallSequence::write();
+    write(sequence.scan("000007"), "");
+    write(sequence.path().join("tuned.toml"), "[fb]\nratio = 3\n");
+    refused(
+        sequence.path(),
+        "
+        3 | run sequences/77 --query 5 --reference 4 | sequences/77 ~ no such
+        3 | run . --query 5 --reference 4 | not recognised ~ kitti ~ --format
+        3 | run sequences/42 --query 99 --reference 4 | `99` ~ 000004 … 000007 ~ 3 in all
+        3 | run sequences/42 --query 5 --reference 7 --method mi | velodyne/000007.bin ~ empty
+        3 | run sequences/42 --query 5 --reference 4 --config none.toml | none.toml
+        3 | run sequences/42 --query 5 --reference 4 --config tuned.toml | tuned.toml ~ `fb.ratio` takes
+        3 | run sequences/42 --query 5 --reference 4 --json no/such/folder/out | no/such/folder/out
+        3 | run sequences/42 --query 5 --reference 4 --save no/such/folder/out | no/such/folder/out
+        ",
+    );
+}
 
 #[test]
 fn a_full_disk_ends_a_run_with_what_was_computed() {
     let sequence = SmallSequence::write();
-    let output = run(&sequence).args(["--json", "/dev/full"]).output();
-    let output = output.expect("the binary starts");
-    expect_one_line(&output, &["/dev/full", FULL]);
-    let table = String::from_utf8_lossy(&output.stdout);
-    assert!(
-        table.contains("000004"),
-        "the first result is shown: {table}"
-    );
-    let full = File::options()
-        .write(true)
-        .open("/dev/full")
-        .expect("is there");
-    let output = run(&sequence)
-        .stdout(full)
-        .output()
-        .expect("the binary starts");
-    expect_one_line(&output, &["stdout", FULL]);
+    let words = format!("/dev/full ~ {FULL}");
+    let [said, _] = ["--json", "--save"].map(|option| {
+        let said = sequence.run(&format!("{RUN} {option} /dev/full"));
+        said.fails_in_one_line(3, &words)
+    });
+    has(&said.out, "000004");
+    let full = File::options().write(true).open("/dev/full");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_posescope"));
+    command.current_dir(sequence.path()).args(RUN.split(' '));
+    command.stdout(full.expect("is there"));
+    let output = command.output().expect("the binary starts");
+    Said::of(&output).fails(3, &format!("stdout ~ {FULL}"));
+}
+
+/// A limit on the size of files stands in for a disk that fills while the recording is written.
+#[test]
+fn a_recording_that_breaks_off_costs_no_result() {
+    let sequence = SmallSequence::write();
+    let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
+    let line = "run sequences/42 --query 5 --reference 4 --save cut.rrd";
+    let script = format!("trap '' XFSZ; ulimit -f 40; exec '{binary}' {line}");
+    let mut command = assert_cmd::Command::new("bash");
+    command.current_dir(sequence.path()).args(["-c", &script]);
+    let said = Said::by(&mut command);
+    let said = said.fails_in_one_line(3, "cut.rrd ~ incomplete ~ File too large");
+    has(&said.out, "fb ~ pm ~ mi ~ hy");
 }
 
 /// A small file system in memory, if we may mount one.
@@ -100,27 +101,9 @@ impl Drop for SmallDisk {
     }
 }
 
-fn eval(scene: &Path, out: &Path) -> Command {
-    let mut command = posescope();
-    command
-        .arg("eval")
-        .arg(scene)
-        .args([
-            "--method",
-            "mi",
-            "--radius",
-            "3",
-            "--keep-failures",
-            "0",
-            "-q",
-            "--out",
-        ])
-        .arg(out);
-    command
-}
-
-fn lines(path: &Path) -> usize {
-    fs::read_to_string(path).map_or(0, |text| text.lines().count())
+fn eval(out: &Path) -> String {
+    let out = out.display();
+    format!("eval sequences/42 --method mi --radius 3 --keep-failures 0 -q --out '{out}'")
 }
 
 #[test]
@@ -131,97 +114,68 @@ fn an_evaluation_goes_on_once_a_full_or_locked_disk_is_writable_again() {
         return;
     };
     let out = folder.path().join("run");
-    let output = eval(&sequence.folder(), &out)
-        .output()
-        .expect("the binary starts");
-    expect_one_line(&output, &[".jsonl", FULL]);
+    let line = eval(&out);
     let results = out.join("results.jsonl");
+    sequence.run(&line).fails(3, &format!(".jsonl ~ {FULL}"));
     let before = lines(&results);
     assert!((1..40).contains(&before), "{before}");
+    let line = line + " --resume";
     disk.remount("ro");
-    let output = eval(&sequence.folder(), &out).arg("--resume").output();
-    expect_one_line(
-        &output.expect("the binary starts"),
-        &["Read-only file system"],
-    );
+    sequence.run(&line).fails(3, "Read-only file system");
     disk.remount("rw,size=20m");
-    let status = eval(&sequence.folder(), &out).arg("--resume").status();
-    assert!(status.expect("the binary starts").success());
+    sequence.run(&line).ok();
     let whole = fs::read(&results).expect("results");
-    let other = sequence.path().join("other");
-    assert!(
-        eval(&sequence.folder(), &other)
-            .status()
-            .expect("starts")
-            .success()
-    );
-    assert_eq!(
-        whole,
-        fs::read(other.join("results.jsonl")).expect("results")
-    );
+    sequence.run(&eval(Path::new("other"))).ok();
+    let other = fs::read(sequence.path().join("other/results.jsonl"));
+    assert!(whole == other.expect("results"));
     disk.remount("ro");
     let recording = folder.path().join("a.rrd");
-    let output = run(&sequence).arg("--save").arg(&recording).output();
-    expect_one_line(
-        &output.expect("the binary starts"),
-        &["a.rrd", "Read-only file system"],
-    );
+    let said = sequence.run(&format!("{RUN} --save '{}'", recording.display()));
+    said.fails(3, "a.rrd ~ Read-only file system");
 }
 
 #[test]
 fn data_that_vanish_end_an_evaluation_with_what_is_done() {
     let sequence = SmallSequence::of(&(0..200).collect::<Vec<_>>());
-    let folder = TempDir::new().expect("a folder");
-    let out = folder.path().join("run");
-    let child = eval(&sequence.folder(), &out)
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the binary starts");
-    let results = out.join("results.jsonl");
+    let line = eval(Path::new("run"));
+    let child = background_in(sequence.path(), &line);
+    let results = sequence.path().join("run/results.jsonl");
     let since = Instant::now();
     while lines(&results) < 3 && since.elapsed() < Duration::from_secs(60) {
         thread::sleep(Duration::from_millis(5));
     }
     let moved = sequence.path().join("moved");
     fs::rename(sequence.folder(), &moved).expect("is there");
-    let output = child.wait_with_output().expect("it ends");
-    expect_one_line(&output, &["sequences/42", "No such file"]);
+    let said = Said::of(&child.wait_with_output().expect("it ends"));
+    said.fails(3, "sequences/42 ~ No such file");
     let done = lines(&results);
     assert!((3..200).contains(&done), "{done}");
     fs::rename(&moved, sequence.folder()).expect("is there");
-    let status = eval(&sequence.folder(), &out).arg("--resume").status();
-    assert!(status.expect("the binary starts").success());
+    sequence.run(&(line + " --resume")).ok();
     assert_eq!(lines(&results), 200);
+}
+
+/// A whole recording ends with a footer, and that with its magic and a number.
+pub fn expect_whole_recording(path: &Path) {
+    let bytes = fs::read(path).expect("a recording");
+    let messages = DecoderApp::decode_lazy(std::io::BufReader::new(bytes.as_slice()));
+    let messages: Vec<_> = messages.map(|message| message.expect("whole")).collect();
+    assert!(messages.len() > 3);
+    assert_eq!(&bytes[bytes.len() - 12..bytes.len() - 4], b"RRF2FOOT");
 }
 
 #[test]
 fn a_viewer_that_goes_away_costs_nothing_but_what_it_would_have_shown() {
     let sequence = SmallSequence::write();
-    let folder = TempDir::new().expect("a folder");
-    let recording = folder.path().join("a.rrd");
     // Somebody who takes one connection and hangs up.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
-    let url = format!(
-        "rerun+http://{}/proxy",
-        listener.local_addr().expect("bound")
-    );
+    let address = listener.local_addr().expect("bound");
     let hanging_up = thread::spawn(move || drop(listener.accept()));
     let since = Instant::now();
-    let output = run(&sequence)
-        .args(["--connect", &url, "--save"])
-        .arg(&recording)
-        .output()
-        .expect("the binary starts");
-    expect_one_line(&output, &["viewer did not receive"]);
+    let line = format!("{RUN} --connect rerun+http://{address}/proxy --save a.rrd");
+    let said = run_in(sequence.path(), &line).fails(3, "viewer did not receive");
     assert!(since.elapsed() < Duration::from_secs(60));
-    let table = String::from_utf8_lossy(&output.stdout);
-    for query in ["000004", "000005", "000007"] {
-        assert!(table.contains(query), "{table}");
-    }
-    let bytes = fs::read(&recording).expect("a recording");
-    let messages = DecoderApp::decode_lazy(std::io::BufReader::new(bytes.as_slice()));
-    let messages: Vec<_> = messages.map(|message| message.expect("whole")).collect();
-    assert!(messages.len() > 3);
-    assert_eq!(&bytes[bytes.len() - 12..bytes.len() - 4], b"RRF2FOOT");
+    has(&said.out, "000004 ~ 000005 ~ 000007");
+    expect_whole_recording(&sequence.path().join("a.rrd"));
     drop(hanging_up);
 }

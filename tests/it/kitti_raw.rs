@@ -10,10 +10,11 @@ use posescope::localize::localize;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
-use posescope::scene::{self, Scene};
+use posescope::scene::Scene;
 use tempfile::TempDir;
 
-use crate::damage::Damage::{Cut, Image, Text};
+use crate::binary::arg;
+use crate::damage::open;
 use crate::small_sequence::{HEIGHT, WIDTH, scan_of_the_wall, wall};
 use crate::{damage, data};
 
@@ -80,35 +81,24 @@ pub fn write(day: &Path) -> PathBuf {
     drive
 }
 
-fn open(argument: &str) -> Box<dyn Scene> {
-    scene::open(argument, None).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
-
 #[test]
 fn poses_are_those_of_the_camera_from_its_place_at_the_first_packet() {
     let day = TempDir::new().expect("a folder");
     let drive = write(day.path());
-    let scene = open(text(&drive));
+    let scene = open(&drive);
     assert_eq!(scene.name(), "kitti-raw/2011_09_26_drive_0001_sync");
     assert_eq!(scene.frames(), ["0000000003", "0000000004", "0000000006"]);
     assert_eq!(scene.find("6").expect("is there"), 2);
     // The car drives along z of the camera.
     let pose = scene.pose(2).expect("is known");
     let error = PoseError::between(&Pose::translation(0.0, 0.0, 6.0), &pose);
-    assert!(
-        error.translation_m < 1e-6 && error.rotation_deg < 1e-9,
-        "{error}"
-    );
+    assert!(error.translation_m < 1e-6 && error.rotation_deg < 1e-9);
     let times: Vec<f64> = (0..3).filter_map(|frame| scene.time_s(frame)).collect();
     assert!((times[2] - times[0] - 0.3).abs() < 1e-6, "{times:?}");
     let midnight = 15_243.0 * 86_400.0;
     assert!((times[0] - midnight - (13.0 * 3600.0 + 10.0 * 60.0 + 51.3)).abs() < 1e-5);
 
-    let color = open(text(&drive.join("image_02")));
+    let color = open(drive.join("image_02"));
     assert_eq!(
         color.name(),
         "kitti-raw/2011_09_26_drive_0001_sync/image_02"
@@ -121,8 +111,8 @@ fn poses_are_those_of_the_camera_from_its_place_at_the_first_packet() {
 fn scans_are_corrected_unless_told_otherwise() {
     let day = TempDir::new().expect("a folder");
     let drive = write(day.path());
-    let corrected = open(text(&drive));
-    let raw = open(&format!("{}:uncorrected", text(&drive)));
+    let corrected = open(&drive);
+    let raw = open(format!("{}:uncorrected", arg(&drive)));
     assert!(raw.name().ends_with("_sync:uncorrected"), "{}", raw.name());
     let [corrected, raw] = [corrected, raw].map(|scene| scene.cloud(1).expect("is there").points);
     assert_eq!(corrected.len(), raw.len());
@@ -130,54 +120,23 @@ fn scans_are_corrected_unless_told_otherwise() {
         // 1 m in a sweep; what is to the left (negative x) was measured before, from farther back.
         let share = f64::from(-raw.x).atan2(f64::from(raw.z)) / std::f64::consts::TAU;
         let expected = Point3::new(raw.x, raw.y, raw.z - share as f32);
-        assert!(
-            (corrected - expected).norm() < 1e-4,
-            "{corrected} {expected}"
-        );
+        assert!((corrected - expected).norm() < 1e-4);
     }
 }
 
 #[test]
 fn what_is_wrong_with_a_drive_is_named() {
-    let drive = |file: &str| format!("2011_09_26_drive_0001_sync/{file}");
-    let [oxts, times, image, scan] = [
-        "oxts/data/0000000002.txt",
-        "image_00/timestamps.txt",
-        "image_00/data/0000000003.png",
-        "velodyne_points/data/0000000003.bin",
-    ]
-    .map(drive);
     damage::expect(
-        |day| text(&write(day)).to_owned(),
-        &[
-            (
-                "calib_cam_to_cam.txt",
-                Text("a: 1\n"),
-                &["calib_cam_to_cam.txt", "`P_rect_00:`"],
-            ),
-            (
-                "calib_velo_to_cam.txt",
-                Text("R: 1 0 0 0 2 0 0 0 1\nT: 0 0 0\n"),
-                &["calib_velo_to_cam.txt", "not a rotation"],
-            ),
-            (
-                "calib_imu_to_velo.txt",
-                Text("R: 1 0 0 0 1 0 0 0 1\nT: 0 0\n"),
-                &["calib_imu_to_velo.txt:2", "3 numbers expected, 2 found"],
-            ),
-            (
-                &oxts,
-                Text("1 2 3\n"),
-                &["0000000002.txt:1", "30 numbers expected, 3 found"],
-            ),
-            (
-                &times,
-                Text("yesterday\n"),
-                &["timestamps.txt:1", "`yesterday`"],
-            ),
-            (&image, Image(170, 64), &["0000000003.png", "160x64"]),
-            (&scan, Cut(3), &["0000000003.bin", "cut off"]),
-        ],
+        |day| arg(&write(day)).to_owned(),
+        r#"
+        calib_cam_to_cam.txt | text a: 1\n | calib_cam_to_cam.txt ~ `P_rect_00:`
+        calib_velo_to_cam.txt | text R: 1 0 0 0 2 0 0 0 1\nT: 0 0 0\n | calib_velo_to_cam.txt ~ not a rotation
+        calib_imu_to_velo.txt | text R: 1 0 0 0 1 0 0 0 1\nT: 0 0\n | calib_imu_to_velo.txt:2 ~ 3 numbers expected, 2 found
+        2011_09_26_drive_0001_sync/oxts/data/0000000002.txt | text 1 2 3\n | 0000000002.txt:1 ~ 30 numbers expected, 3 found
+        2011_09_26_drive_0001_sync/image_00/timestamps.txt | text yesterday\n | timestamps.txt:1 ~ `yesterday`
+        2011_09_26_drive_0001_sync/image_00/data/0000000003.png | image 170x64 | 0000000003.png ~ 160x64
+        2011_09_26_drive_0001_sync/velodyne_points/data/0000000003.bin | cut 3 | 0000000003.bin ~ cut off
+        "#,
     );
 }
 
@@ -205,7 +164,7 @@ fn the_real_drive_is_where_its_scans_say() {
     let (Some(folder), Some(derived)) = (data::sample(REAL), derived()) else {
         return;
     };
-    let scene = open(text(&folder));
+    let scene = open(&folder);
     assert_eq!(scene.frames().len(), 8);
     let pose = |number: usize| {
         let frame = scene.find(&number.to_string()).expect("is there");
@@ -260,8 +219,8 @@ fn corrected_scans_of_the_real_drive_fit_each_other_better() {
     let (Some(folder), Some(derived)) = (data::sample(REAL), derived()) else {
         return;
     };
-    let corrected = gap_beside_the_car(open(text(&folder)).as_ref(), &derived);
-    let uncorrected = format!("{}:uncorrected", text(&folder));
+    let corrected = gap_beside_the_car(open(&folder).as_ref(), &derived);
+    let uncorrected = format!("{}:uncorrected", arg(&folder));
     let uncorrected = gap_beside_the_car(open(&uncorrected).as_ref(), &derived);
     println!("median gap {corrected:.3} m corrected, {uncorrected:.3} m as scanned");
     assert!(corrected < 0.85 * uncorrected, "{corrected} {uncorrected}");
@@ -272,7 +231,7 @@ fn fb_localises_on_the_real_drive() {
     let (Some(folder), Some(derived)) = (data::sample(REAL), derived()) else {
         return;
     };
-    let scene = open(text(&folder));
+    let scene = open(&folder);
     let frame = |name| scene.find(name).expect("is there");
     let (reference, query) = (frame("4"), frame("8"));
     let problem = Problem {
@@ -288,8 +247,5 @@ fn fb_localises_on_the_real_drive() {
     let truth = scene.pose(reference).expect("is known") * derived[&8];
     let error = PoseError::between(&truth, &pose);
     println!("{error}");
-    assert!(
-        error.translation_m < 0.15 && error.rotation_deg < 0.3,
-        "{error}"
-    );
+    assert!(error.translation_m < 0.15 && error.rotation_deg < 0.3);
 }

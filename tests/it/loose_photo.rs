@@ -1,16 +1,16 @@
 //! Photos of no scene, localised in one.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use exif::experimental::Writer;
 use exif::{Field, In, Tag, Value};
 use image::{DynamicImage, GrayImage};
-use posescope::scene::{self, LoosePhotos, Scene};
+use posescope::camera::Intrinsics;
+use posescope::scene::{LoosePhotos, Scene};
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{objects, refused, run_in, write};
 use crate::damage;
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
 
@@ -22,70 +22,36 @@ fn photo(folder: &Path) -> PathBuf {
     path
 }
 
-/// Runs, and hands out the results, or what was said and the exit code.
-fn run(scene: &Path, words: &[&str]) -> Result<Vec<Json>, (String, i32)> {
-    let output = posescope()
-        .arg("run")
-        .arg(scene)
-        .args(words)
-        .args(["--json", "-", "-q"])
-        .output()
-        .expect("the binary starts");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    match output.status.code() {
-        Some(0) => Ok(String::from_utf8_lossy(&output.stdout)
-            .lines()
-            .map(|line| serde_json::from_str(line).expect("one object per line"))
-            .collect()),
-        code => Err((said, code.expect("an exit code"))),
-    }
-}
-
-/// The exit code and all of the words in one line.
-#[track_caller]
-fn refused(scene: &Path, words: &[&str], code: i32, parts: &[&str]) {
-    let (said, found) = run(scene, words).expect_err("it is refused");
-    assert_eq!(found, code, "{said}");
-    for part in parts {
-        assert!(said.contains(part), "`{part}` is missing in: {said}");
-    }
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
-
 #[test]
 fn a_photo_of_its_own_has_the_pose_of_the_frame_that_it_is_and_no_error() {
     let folder = TempDir::new().expect("a folder");
-    let street = scene::open("street:overcast", None).expect("is built in");
+    let street = damage::open("street:overcast");
     let frame = street.find("70").expect("is there");
-    let path = folder.path().join("000070.png");
     let color = street.photo(frame).expect("is made").color;
-    color.expect("in colour").save(&path).expect("writable");
-    let camera = street.intrinsics(frame);
-    let numbers = format!("{},{},{},{}", camera.fx, camera.fy, camera.cx, camera.cy);
+    let path = folder.path().join("000070.png");
+    color.expect("in colour").save(path).expect("writable");
+    let Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    } = street.intrinsics(frame);
     let line = format!(
-        "1 PINHOLE {} {} {} {} {} {}",
-        camera.width,
-        camera.height,
-        camera.fx,
-        camera.fy,
-        camera.cx + 0.5,
-        camera.cy + 0.5
+        "1 PINHOLE {width} {height} {fx} {fy} {} {}",
+        cx + 0.5,
+        cy + 0.5
     );
-    let cameras = folder.path().join("cameras.txt");
-    let other = "2 SIMPLE_PINHOLE 64 48 50 32 24";
-    fs::write(&cameras, format!("# cameras\n{other}\n{line}\n")).expect("writable");
-    let scene = Path::new("street");
-    let against = ["--reference", "62", "--method", "fb"];
-    let query = |words: &[&str]| {
-        let results = run(scene, &[words, &against[..]].concat());
-        results.expect("it runs").remove(0)
+    let cameras = format!("# cameras\n2 SIMPLE_PINHOLE 64 48 50 32 24\n{line}\n");
+    write(folder.path().join("cameras.txt"), cameras);
+    let query = |words: &str| -> Json {
+        let line = format!("run street --reference 62 --method fb --json - -q --query {words}");
+        objects(&run_in(folder.path(), &line).ok().out).remove(0)
     };
-    let frame = query(&["--query", "70"]);
-    for camera in [numbers.as_str(), &line, text(&cameras)] {
-        let loose = query(&["--query", text(&path), "--camera", camera]);
+    let frame = query("70");
+    for camera in [&format!("{fx},{fy},{cx},{cy}"), &line, "cameras.txt"] {
+        let loose = query(&format!("000070.png --camera '{camera}'"));
         // Random choices are seeded by the name.
         assert_eq!(loose["query_scene"], "photo");
         assert_eq!(loose["pose"], frame["pose"], "{camera}");
@@ -97,53 +63,46 @@ fn a_photo_of_its_own_has_the_pose_of_the_frame_that_it_is_and_no_error() {
 #[test]
 fn without_a_position_the_reference_that_looks_most_alike_is_taken() {
     let sequence = SmallSequence::write();
-    let path = photo(sequence.path());
-    let words = ["--query", text(&path), "--camera", CAMERA, "--method", "mi"];
-    let results = run(&sequence.folder(), &words).expect("it runs");
+    photo(sequence.path());
+    let line = "run sequences/42 --query IMG_1.png --method mi --json - -q";
+    let results: Vec<Json> = objects(&sequence.run(&format!("{line} --camera {CAMERA}")).ok().out);
     assert_eq!(results.len(), 1);
     assert_eq!(results[0]["references"].as_array().map(Vec::len), Some(1));
     assert!(!results[0]["pose"].is_null());
-    let random = [&words[..], &["--reference", "random:1"]].concat();
-    refused(
-        &sequence.folder(),
-        &random,
-        2,
-        &["IMG_1", "--gps", "retrieve:K"],
+    let table = format!(
+        "
+        2 | {line} --camera {CAMERA} --reference random:1 | IMG_1 ~ --gps ~ retrieve:K
+        3 | {line} --reference 4 | EXIF
+        2 | {line} --reference 4 --query 5 | some queries are frames
+        "
     );
+    refused(sequence.path(), &table);
+    let said = sequence.run(&format!("{line} --camera 100,100"));
+    said.fails_with(2, "4 numbers expected, 2 found");
 }
 
 #[test]
 fn what_is_no_photo_or_no_camera_of_it_is_told() {
     let folder = TempDir::new().expect("a folder");
     let path = photo(folder.path());
-    let (broken, gone) = (
-        folder.path().join("broken.png"),
-        folder.path().join("gone.png"),
-    );
-    fs::write(&broken, "no image").expect("writable");
+    let [broken, gone] = ["broken.png", "gone.png"].map(|name| folder.path().join(name));
+    write(&broken, "no image");
+    let pinhole = "1 SIMPLE_PINHOLE 320 128 100 160 64";
     for (paths, camera, words) in [
-        (
-            vec![&path],
-            None,
-            &["IMG_1.png", "EXIF", "--camera fx,fy,cx,cy"][..],
-        ),
+        (vec![&path], None, "IMG_1.png ~ EXIF ~ --camera fx,fy,cx,cy"),
         (
             vec![&path],
             Some("900,900,640,480"),
-            &["IMG_1.png", "160x64", "640,480"],
+            "IMG_1.png ~ 160x64 ~ 640,480",
         ),
-        (
-            vec![&path],
-            Some("1 SIMPLE_PINHOLE 320 128 100 160 64"),
-            &["IMG_1.png", "320x128", "160x64"],
-        ),
+        (vec![&path], Some(pinhole), "IMG_1.png ~ 320x128 ~ 160x64"),
         (
             vec![&path, &path],
             Some(CAMERA),
-            &["IMG_1.png", "a name of its own"],
+            "IMG_1.png ~ a name of its own",
         ),
-        (vec![&gone], Some(CAMERA), &["gone.png"]),
-        (vec![&broken], Some(CAMERA), &["broken.png"]),
+        (vec![&gone], Some(CAMERA), "gone.png"),
+        (vec![&broken], Some(CAMERA), "broken.png"),
     ] {
         let photos = LoosePhotos {
             paths: paths.into_iter().cloned().collect(),
@@ -151,21 +110,6 @@ fn what_is_no_photo_or_no_camera_of_it_is_told() {
         };
         let error = photos.open().err().expect("it is refused").to_string();
         damage::expect_words(&error, words);
-    }
-}
-
-#[test]
-fn photos_without_a_camera_and_words_that_are_none_have_their_exit_codes() {
-    let sequence = SmallSequence::write();
-    let path = photo(sequence.path());
-    let (scene, query) = (sequence.folder(), text(&path));
-    let against = ["--reference", "4", "--method", "mi", "--query", query];
-    for (words, code, part) in [
-        (&[][..], 3, "EXIF"),
-        (&["--camera", "100,100"], 2, "4 numbers expected, 2 found"),
-        (&["--query", "5"], 2, "some queries are frames"),
-    ] {
-        refused(&scene, &[&against[..], words].concat(), code, &[part]);
     }
 }
 
@@ -190,7 +134,7 @@ pub fn jpeg(path: &Path, image: &GrayImage, fields: &[Field]) {
     bytes.extend(b"Exif\0\0");
     bytes.extend(&tiff);
     bytes.extend(&plain[2..]);
-    fs::write(path, bytes).expect("writable");
+    write(path, bytes);
 }
 
 fn field(tag: Tag, value: Value) -> Field {
@@ -234,10 +178,7 @@ fn exif_tells_the_focal_length_and_which_side_is_up() {
     let film = field(Tag::FocalLengthIn35mmFilm, Value::Short(vec![28]));
     jpeg(&path, &image, std::slice::from_ref(&film));
     let camera = opened(&path).intrinsics(0);
-    assert!(
-        (camera.fx - 28.0 * diagonal / 43.2666).abs() < 0.01,
-        "{camera:?}"
-    );
+    assert!((camera.fx - 28.0 * diagonal / 43.2666).abs() < 0.01);
     assert_eq!((camera.cx, camera.cy), (79.5, 31.5));
     // 5 mm on a sensor of 32 px/mm, of a photo that was twice as large.
     let sensor = [

@@ -1,6 +1,5 @@
 //! Integration tests: one binary, because each would link the whole of Rerun again.
 
-mod bad_input;
 mod binary;
 mod card;
 mod ci;
@@ -54,7 +53,6 @@ mod space;
 mod stored;
 mod sweep;
 mod synth;
-mod terminal;
 #[path = "../../crates/posescope-core/tests/it/two_walls.rs"]
 mod two_walls;
 mod verdicts;

@@ -10,40 +10,29 @@ use posescope::method::Method;
 use posescope::scene::MatchFolder;
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{has, run_in, write};
 use crate::damage;
 use crate::real_pair::authors_pair;
 
-fn results(scene: &str, arguments: &[&str]) -> Vec<QueryResult> {
-    let mut command = posescope();
-    command
-        .args(["run", scene, "--json", "-", "-q"])
-        .args(arguments);
-    let output = command.output().expect("the binary starts");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{message}");
-    let lines = String::from_utf8_lossy(&output.stdout);
-    let read = |line: &str| serde_json::from_str(line).expect("a result");
-    lines.lines().map(read).collect()
-}
-
-fn of_fb(results: &[QueryResult]) -> Vec<&QueryResult> {
-    results
-        .iter()
-        .filter(|result| result.method == Method::FB)
-        .collect()
+/// The results that a run prints.
+#[track_caller]
+fn results(folder: &Path, words: &str) -> Vec<QueryResult> {
+    run_in(folder, &format!("run {words} --json - -q")).results()
 }
 
 /// FB's poses with the matches that FB exported.
-fn read_back(scene: &str, asked: &[&str]) {
+fn read_back(asked: &str) {
     let folder = TempDir::new().expect("a folder");
-    let matches = folder.path().join("matches");
-    let matches = matches.to_str().expect("a plain path");
-    let ours = results(scene, &[asked, &["--export-matches", matches]].concat());
-    let again = results(scene, &[asked, &["--matches", matches]].concat());
+    let [ours, again] = ["--export-matches", "--matches"].map(|option| {
+        results(
+            folder.path(),
+            &format!("{asked} --method fb,mi {option} matches"),
+        )
+    });
     assert_eq!(ours.len(), again.len());
     let mut localized = 0;
-    for (ours, again) in of_fb(&ours).into_iter().zip(of_fb(&again)) {
+    let is_of_fb = |(ours, _): &(&QueryResult, &QueryResult)| ours.method == Method::FB;
+    for (ours, again) in ours.iter().zip(&again).filter(is_of_fb) {
         // Bit for bit, as it is written.
         assert_eq!(ours.pose, again.pose, "{}", ours.query);
         let inliers = |result: &QueryResult| result.counts.map(|counts| counts.inliers);
@@ -65,63 +54,28 @@ fn read_back(scene: &str, asked: &[&str]) {
 
 #[test]
 fn our_own_matches_read_back_give_our_own_pose_bit_for_bit() {
-    let asked = [
-        "--query",
-        "70",
-        "--query",
-        "300",
-        "--reference",
-        "nearest:2",
-        "--method",
-        "fb,mi",
-    ];
-    read_back("street", &asked);
+    read_back("street --query 70 --query 300 --reference nearest:2");
 }
 
 #[test]
 fn our_own_matches_of_real_photos_read_back_give_our_own_pose_bit_for_bit() {
-    let Some(sequence) = authors_pair() else {
-        return;
-    };
-    let scene = sequence.to_str().expect("a plain path");
-    read_back(
-        scene,
-        &[
-            "--query",
-            "3823",
-            "--reference",
-            "3814",
-            "--method",
-            "fb,mi",
-        ],
-    );
+    if let Some(sequence) = authors_pair() {
+        read_back(&format!(
+            "'{}' --query 3823 --reference 3814",
+            sequence.display()
+        ));
+    }
 }
 
 #[test]
 fn a_pair_without_matches_is_a_result_that_says_so() {
     let folder = TempDir::new().expect("a folder");
-    fs::write(folder.path().join("000001_000002_matches.txt"), "1 2 3 4\n").expect("writable");
-    let matches = folder.path().to_str().expect("a plain path");
-    let found = results(
-        "street",
-        &[
-            "--query",
-            "70",
-            "--reference",
-            "62",
-            "--method",
-            "fb,hy",
-            "--matches",
-            matches,
-        ],
-    );
+    write(folder.path().join("000001_000002_matches.txt"), "1 2 3 4\n");
+    let words = "street --query 70 --reference 62 --method fb,hy --matches .";
+    let found = results(folder.path(), words);
     let reason = found[0].reason.as_ref().expect("no matches, no pose");
     assert_eq!(reason.code.name(), "E1");
-    assert!(
-        reason.text.contains("matches of 000070 with 000062"),
-        "{}",
-        reason.text
-    );
+    has(&reason.text, "matches of 000070 with 000062");
     // The hybrid goes on to its second method.
     assert!(found[1].cost.is_some());
 }
@@ -142,23 +96,24 @@ fn npy(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
 
 /// As SuperGlue's demonstration writes it: three keypoints, two, and one match.
 fn npz(path: &Path) {
-    let floats =
-        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
-    let whole =
-        |values: &[i64]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let floats = |values: &[f32]| {
+        values
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect::<Vec<_>>()
+    };
+    let whole = [-1_i64, 1, -1].map(i64::to_le_bytes).concat();
+    let keypoints = floats(&[1.0, 2.0, 3.5, 4.0, 5.0, 6.0]);
     let mut archive = zip::ZipWriter::new(fs::File::create(path).expect("writable"));
     let options = zip::write::SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Deflated);
     for (name, content) in [
-        (
-            "keypoints0.npy",
-            npy("<f4", "(3, 2)", &floats(&[1.0, 2.0, 3.5, 4.0, 5.0, 6.0])),
-        ),
+        ("keypoints0.npy", npy("<f4", "(3, 2)", &keypoints)),
         (
             "keypoints1.npy",
             npy("<f4", "(2, 2)", &floats(&[7.0, 8.0, 9.0, 10.25])),
         ),
-        ("matches.npy", npy("<i8", "(3,)", &whole(&[-1, 1, -1]))),
+        ("matches.npy", npy("<i8", "(3,)", &whole)),
         (
             "match_confidence.npy",
             npy("<f4", "(3,)", &floats(&[0.0, 0.5, 0.0])),
@@ -170,28 +125,15 @@ fn npz(path: &Path) {
     archive.finish().expect("writable");
 }
 
-/// As hloc writes them, with names in folders and positions of 16 bits.
+/// As hloc writes them, with names in folders; the writer has no positions of 16 bits.
 fn hloc(folder: &Path) {
-    let half = |values: &[f32]| -> Vec<u16> {
-        values
-            .iter()
-            .map(|value| half::f16::from_f32(*value).to_bits())
-            .collect()
-    };
     let mut features = hdf5_pure::FileBuilder::new();
-    for (name, values, count) in [
-        ("query", vec![1.0, 2.0, 3.5, 4.0, 5.0, 6.0], 3),
-        ("mapping", vec![7.0, 8.0, 9.0, 10.25], 2),
+    for (name, image, values, count) in [
+        ("query", "000070.png", vec![1.0, 2.0, 3.5, 4.0, 5.0, 6.0], 3),
+        ("mapping", "000062.png", vec![7.0, 8.0, 9.0, 10.25], 2),
     ] {
         let mut outer = features.create_group(name);
-        let image = if name == "query" {
-            "000070.png"
-        } else {
-            "000062.png"
-        };
         let mut group = outer.create_group(image);
-        // Halves have no type of their own in the writer; singles are read as well.
-        let _ = half(&values);
         group
             .create_dataset("keypoints")
             .with_f32_data(&values)
@@ -213,7 +155,7 @@ fn hloc(folder: &Path) {
 }
 
 fn text(path: &Path) {
-    fs::write(path, "# a comment\n3.5 4 9 10.25 0.5\n").expect("writable");
+    write(path, "# a comment\n3.5 4 9 10.25 0.5\n");
 }
 
 /// What writes the same matches of a pair into a folder.
@@ -248,21 +190,11 @@ fn all_forms_say_the_same_in_both_directions() {
             let b = found.reference.keypoints[decision.reference];
             ([a.x, a.y], [b.x, b.y], found.count())
         };
-        assert_eq!(
-            pairs("000070", "000062"),
-            ([3.5, 4.0], [9.0, 10.25], 1),
-            "{form}"
-        );
-        assert_eq!(
-            pairs("000062", "000070"),
-            ([9.0, 10.25], [3.5, 4.0], 1),
-            "{form}"
-        );
-        assert!(
-            source
-                .matches("000070", "000063")
-                .is_ok_and(|found| found.is_none())
-        );
+        let (a, b) = ([3.5, 4.0], [9.0, 10.25]);
+        assert_eq!(pairs("000070", "000062"), (a, b, 1), "{form}");
+        assert_eq!(pairs("000062", "000070"), (b, a, 1), "{form}");
+        let other = source.matches("000070", "000063");
+        assert!(other.is_ok_and(|found| found.is_none()));
     }
 }
 
@@ -270,9 +202,7 @@ fn all_forms_say_the_same_in_both_directions() {
 fn a_folder_without_matches_is_refused() {
     let folder = TempDir::new().expect("a folder");
     let error = MatchFolder::open(folder.path()).err().expect("is empty");
-    damage::expect_words(&error.to_string(), &["hloc's features and matches"]);
-    let mut command = posescope();
-    command.args(["run", "street", "--query", "70", "--method", "mi"]);
-    command.arg("--export-matches").arg(folder.path());
-    command.assert().code(2);
+    damage::expect_words(&error.to_string(), "hloc's features and matches");
+    let line = "run street --query 70 --method mi --export-matches .";
+    assert_eq!(run_in(folder.path(), line).code, Some(2));
 }

@@ -1,140 +1,111 @@
 //! `posescope results` as a process.
 
-use std::path::{Path, PathBuf};
+use serde_json::Value;
 
-use crate::binary::{posescope, said};
+use crate::binary::{Said, has, objects, refused};
 use crate::small_sequence::SmallSequence;
 
-/// A run over the frames of a small sequence.
-fn run() -> (SmallSequence, PathBuf) {
+/// A sequence with a `run` over its frames.
+fn finished() -> SmallSequence {
     let sequence = SmallSequence::write();
-    let folder = sequence.path().join("run");
-    posescope()
-        .arg("eval")
-        .arg(sequence.folder())
-        .args(["--method", "fb,mi", "--radius", "3", "--out"])
-        .arg(&folder)
-        .assert()
-        .code(0);
-    (sequence, folder)
+    sequence
+        .run("eval sequences/42 --method fb,mi --radius 3 --out run")
+        .ok();
+    sequence
 }
 
-/// The exit code, what is printed, and what is said on stderr.
-fn results_of(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
-    said(posescope().arg("results").arg(folder).args(more))
+#[track_caller]
+fn results(sequence: &SmallSequence, words: &str) -> Said {
+    sequence.run(&format!("results run {words}")).ok()
+}
+
+/// The numbers in the first column of a table.
+fn numbers(table: &str) -> Vec<f64> {
+    let rows = table.lines().skip(1);
+    rows.filter_map(|line| line.split_whitespace().next()?.parse().ok())
+        .collect()
 }
 
 #[test]
 fn results_are_chosen_sorted_and_counted() {
-    let (_sequence, folder) = run();
-    let lines = std::fs::read_to_string(folder.join("results.jsonl")).expect("results");
-    let results: Vec<serde_json::Value> = lines
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("a result"))
-        .collect();
-    let of_mi = results.iter().filter(|result| result["method"] == "mi");
-    let mut wanted: Vec<f64> = of_mi
-        .filter_map(|result| result["error"]["translation_m"].as_f64())
-        .collect();
-    wanted.sort_by(f64::total_cmp);
+    let sequence = finished();
+    let lines = sequence.text("run/results.jsonl");
+    let all: Vec<Value> = objects(&lines);
+    let of_mi = all.iter().filter(|result| result["method"] == "mi");
+    let errors = of_mi.filter_map(|result| result["error"]["translation_m"].as_f64());
+    let mut wanted: Vec<f64> = errors.collect();
+    wanted.sort_by(|a, b| b.total_cmp(a));
     // An error that some poses stay below and some do not.
-    let limit = wanted[wanted.len() - 1];
+    let limit = wanted[0];
     wanted.retain(|error| *error < limit);
     assert!(!wanted.is_empty());
 
-    let condition = &format!("method = MI and error < {limit}");
-    let asked = [
-        "--where",
-        condition,
-        "--sort",
-        "-error",
-        "--columns",
-        "error,query",
-    ];
-    let (code, table, said) = results_of(&folder, &asked);
-    assert_eq!(code, Some(0), "{said}");
-    let words = format!("{} of {} results", wanted.len(), results.len());
-    assert_eq!(said.trim(), words);
-    let shown: Vec<f64> = table
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let first = line.split_whitespace().next().expect("an error");
-            first.parse().expect("a number")
-        })
-        .collect();
-    let mut sorted = wanted.clone();
-    sorted.sort_by(|a, b| b.total_cmp(a));
-    assert_eq!(shown.len(), sorted.len());
-    for (shown, wanted) in shown.iter().zip(&sorted) {
+    let condition = format!("--where 'method = MI and error < {limit}'");
+    let said = results(
+        &sequence,
+        &format!("{condition} --sort -error --columns error,query"),
+    );
+    assert_eq!(
+        said.err.trim(),
+        format!("{} of {} results", wanted.len(), all.len())
+    );
+    let shown = numbers(&said.out);
+    assert_eq!(shown.len(), wanted.len());
+    for (shown, wanted) in shown.iter().zip(&wanted) {
         assert!((shown - wanted).abs() <= 5e-4, "{shown} {wanted}");
     }
 
     // Of one order the other is the reverse, and what has no error comes last in both.
-    let order = |order: &str| -> Vec<f64> {
-        let (code, table, said) =
-            results_of(&folder, &["--sort", order, "--columns", "error,method"]);
-        assert_eq!(code, Some(0), "{said}");
-        let rows = table.lines().skip(1);
-        rows.filter_map(|line| line.split_whitespace().next()?.parse().ok())
-            .collect()
-    };
-    let (up, mut down) = (order("error"), order("-error"));
+    let [up, mut down] = ["error", "-error"].map(|order| {
+        numbers(&results(&sequence, &format!("--sort {order} --columns error,method")).out)
+    });
     assert!(up.is_sorted() && up[0] < up[up.len() - 1], "{up:?}");
     down.reverse();
     assert_eq!(down, up);
 
     // As JSON the lines are those of the run.
-    let asked = ["--where", "error >= 0", "--as", "json", "--rows", "1"];
-    let (code, json, said) = results_of(&folder, &asked);
-    assert_eq!(code, Some(0), "{said}");
-    assert_eq!(json.lines().count(), 1);
-    assert!(lines.contains(json.trim()));
-    let measured = results.iter().filter(|result| !result["error"].is_null());
-    let words = format!("1 of {} that meet it", measured.count());
-    assert!(said.contains(&words), "{said}");
+    let said = results(&sequence, "--where 'error >= 0' --as json --rows 1");
+    assert_eq!(said.out.lines().count(), 1);
+    has(&lines, said.out.trim());
+    let measured = all
+        .iter()
+        .filter(|result| !result["error"].is_null())
+        .count();
+    has(&said.err, &format!("1 of {measured} that meet it"));
 }
 
 #[test]
 fn what_cannot_be_asked_is_said_with_what_can() {
-    let (_sequence, folder) = run();
-    for (more, words) in [
-        (["--where", "eror > 1"], "rotation"),
-        (["--where", "error > far"], "a number expected"),
-        (["--sort", "size"], "coverage"),
-        (["--columns", "query,size"], "coverage"),
+    let sequence = finished();
+    for (words, expected) in [
+        ("--where 'eror > 1'", "rotation"),
+        ("--where 'error > far'", "a number expected"),
+        ("--sort size", "coverage"),
+        ("--columns query,size", "coverage"),
     ] {
-        let (code, table, said) = results_of(&folder, &more);
-        assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains(words) && table.is_empty(), "{said}");
+        let said = sequence.run(&format!("results run {words}"));
+        assert_eq!((said.code, &*said.out), (Some(2), ""), "{}", said.err);
+        has(&said.err, expected);
     }
-    let (code, _, said) = results_of(&folder.join("nothing"), &[]);
-    assert_eq!(code, Some(3), "{said}");
-    assert_eq!(said.lines().count(), 1, "{said}");
+    refused(sequence.path(), "3 | results nothing | nothing");
 }
 
 #[test]
 fn tables_and_figures_come_in_the_form_that_is_asked_for() {
-    let (sequence, folder) = run();
-    let text = |more: &[&str]| {
-        let (code, text, said) = results_of(&folder, more);
-        assert_eq!(code, Some(0), "{more:?}: {said}");
-        text
-    };
-    let csv = text(&["--as", "csv", "--where", "method = fb"]);
-    assert!(csv.starts_with("scene,") || csv.contains("query,"), "{csv}");
-    let queries = text(&["--where", "method = fb"]).lines().count();
-    assert_eq!(csv.lines().count(), queries);
-    let markdown = text(&["--as", "markdown", "--columns", "query,method"]);
+    let sequence = finished();
+    let text = |words: &str| results(&sequence, words).out;
+    let csv = text("--as csv --where 'method = fb'");
+    has(csv.lines().next().expect("a head"), "query,");
+    assert_eq!(
+        csv.lines().count(),
+        text("--where 'method = fb'").lines().count()
+    );
+    let markdown = text("--as markdown --columns query,method");
     assert!(markdown.starts_with("| query | method |"), "{markdown}");
-    let summary = text(&["--table", "summary", "--as", "markdown"]);
-    assert!(summary.contains("| success (%) |"), "{summary}");
-    assert!(text(&["--table", "summary", "--as", "latex"]).contains("\\begin{tabular}"));
-    assert!(text(&["--table", "paper:1"]).contains("kitti/00"));
-
-    let plot = sequence.path().join("recall.svg");
-    let out = plot.to_str().expect("a plain path");
-    text(&["--plot", "recall", "--out", out]);
-    let svg = std::fs::read_to_string(&plot).expect("written");
+    has(&text("--table summary --as markdown"), "| success (%) |");
+    has(&text("--table summary --as latex"), "\\begin{tabular}");
+    has(&text("--table paper:1"), "kitti/00");
+    text("--plot recall --out recall.svg");
+    let svg = sequence.text("recall.svg");
     assert!(svg.starts_with("<svg") && svg.contains("kitti/42"), "{svg}");
 }

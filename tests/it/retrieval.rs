@@ -1,10 +1,8 @@
 //! `posescope index` and `--reference retrieve:K`, as their user drives them.
 
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use assert_cmd::Command;
 use posescope::event::{Event, ReferencesRanked, Stage};
 use posescope::geometry::Pose;
 use posescope::localize::{
@@ -16,77 +14,34 @@ use posescope::problem::Problem;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use posescope::sink::rerun::entities;
 use posescope::trace::{Cancelled, Record, Sink};
-use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{Said, has, objects, posescope, refused, run_in, text, write};
 use crate::recording::{chunks, timelines};
 use crate::walls_scene::{UNREADABLE, Walls};
 
-/// Every hundredth frame of the street.
-fn index(file: &Path) -> Command {
-    index_of(file, "300")
-}
+/// Every two-hundredth frame of the street.
+const INDEX: &str = "index street --every 200 --set index.words=300 --out an.index";
 
-fn index_of(file: &Path, words: &str) -> Command {
-    let mut command = posescope();
-    command
-        .args(["index", "street", "--every", "100"])
-        .args(["--set", &format!("index.words={words}"), "--out"])
-        .arg(file);
-    command
-}
-
-fn run(file: &Path) -> Command {
-    let mut command = posescope();
-    command
-        .args(["run", "street", "--query", "203", "--method", "fb", "-q"])
-        .args(["--reference", "retrieve:2", "--radius", "150"])
-        .args(["--json", "-", "--index"])
-        .arg(file);
-    command
-}
-
-/// Exit code and what is said on stderr.
-fn said(command: &mut Command) -> (Option<i32>, String) {
-    let output = command.output().expect("the binary starts");
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    (output.status.code(), message)
-}
-
-fn file() -> (TempDir, PathBuf) {
-    let folder = TempDir::new().expect("a temporary folder");
-    let file = folder.path().join("street.posescope-index");
-    (folder, file)
-}
+const RUN: &str = "run street --query 203 --method fb -q --reference retrieve:2 --radius 250 --json - \
+                   --index an.index";
 
 #[test]
 fn an_index_is_built_once_and_finds_the_reference() {
-    let (_folder, file) = file();
-    let (code, message) = said(&mut index(&file));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(message.contains("9 frames"), "{message}");
-    let first = fs::read(&file).expect("just written");
-    let (code, message) = said(&mut index(&file));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(message.contains("up to date; --force"), "{message}");
-    let (code, message) = said(index(&file).args(["--force", "--threads", "1"]));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(first == fs::read(&file).expect("is there"), "other bytes");
+    let folder = TempDir::new().expect("a folder");
+    let run = |line: &str| run_in(folder.path(), line).ok();
+    let index = || fs::read(folder.path().join("an.index")).expect("just written");
+    has(&run(INDEX).err, "5 frames");
+    let first = index();
+    has(&run(INDEX).err, "up to date; --force");
+    run(&format!("{INDEX} --force --threads 1"));
+    assert!(first == index(), "other bytes");
 
-    let recording = file.with_extension("rrd");
-    let output = run(&file).arg("--save").arg(&recording).output();
-    let output = output.expect("the binary starts");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{message}");
-    let results: Vec<Value> = String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("one object per line"))
-        .collect();
-    // Within 150 m there are others; what looks alike is 3 m away.
-    assert_eq!(results[0]["references"], serde_json::json!(["000200"]));
-    assert_eq!(results[0]["status"], "ok");
-    let shown = timelines(&chunks(&recording));
+    let results = run(&format!("{RUN} --save a.rrd")).results();
+    // Within 250 m there are others; what looks alike is 3 m away.
+    assert_eq!(results[0].references, ["000200"]);
+    assert!(results[0].pose.is_some());
+    let shown = timelines(&chunks(&folder.path().join("a.rrd")));
     for entity in [
         entities::RETRIEVAL_TABLE.to_owned(),
         entities::RETRIEVAL_PLACES.to_owned(),
@@ -95,138 +50,85 @@ fn an_index_is_built_once_and_finds_the_reference() {
     ] {
         assert!(shown.contains_key(&entity), "{entity} is missing");
     }
-}
 
-#[test]
-fn frames_that_are_left_out_of_an_index_are_not_found_and_make_it_another() {
-    let (folder, file) = file();
-    let (code, message) = said(index(&file).args(["--without", "200"]));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(message.contains("8 frames without 1"), "{message}");
-    let output = run(&file).output().expect("the binary starts");
-    let results = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(results.contains("\"references\":") && !results.contains("\"000200\""));
-    // With that frame it is another index, which is built anew.
-    let (code, message) = said(&mut index(&file));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(message.contains("9 frames,"), "{message}");
-    let (code, message) = said(index(&file).args(["--without", "no such frame"]));
-    assert_eq!(code, Some(3), "{message}");
+    // Frames that are left out are not found and make it another index.
+    has(
+        &run(&format!("{INDEX} --without 200")).err,
+        "4 frames without 1",
+    );
+    let found = run(RUN).results();
+    assert!(!found[0].references.contains(&"000200".to_owned()));
+    has(&run(INDEX).err, "5 frames,");
+    refused(
+        folder.path(),
+        &format!("3 | {INDEX} --without 'no such frame' | no such frame"),
+    );
+
+    // An experiment asks the index that is named for each scene.
+    let eval =
+        "eval street --query 203 --method fb -q --reference retrieve:2 --prior 250 --out run";
+    let table = format!(
+        "
+        2 | {eval} --index an.index --index an.index | 2 times for 1 scenes
+        3 | {eval} --index elsewhere | `posescope index street --out elsewhere`
+        "
+    );
+    refused(folder.path(), &table);
+    run(&format!("{eval} --index an.index"));
+    let results: Vec<QueryResult> = objects(&text(folder.path().join("run/results.jsonl")));
+    assert_eq!(results[0].references[0], "000200");
+    assert_eq!(results[0].fusion.map(|fusion| fusion.name), Some("r-wavg"));
 
     // The queries of a run, which its folder names.
-    let runs = folder.path().join("run");
-    let eval = posescope()
-        .args(["eval", "street", "--query", "200", "--method", "fb", "-q"])
-        .args(["--reference", "nearest:1", "--out"])
-        .arg(&runs)
-        .output();
-    assert!(eval.expect("the binary starts").status.success());
-    let (code, message) = said(index(&file).arg("--without").arg(&runs));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(message.contains("8 frames without 1"), "{message}");
-}
-
-#[test]
-fn an_experiment_asks_the_index_that_is_named_for_each_scene() {
-    let (folder, file) = file();
-    assert!(index(&file).output().expect("starts").status.success());
-    let runs = folder.path().join("run");
-    let eval = |files: &[&Path]| {
-        let mut command = posescope();
-        command
-            .args(["eval", "street", "--query", "203", "--method", "fb", "-q"])
-            .args(["--reference", "retrieve:2", "--prior", "150"])
-            .arg("--out")
-            .arg(&runs);
-        for file in files {
-            command.arg("--index").arg(file);
-        }
-        command
-    };
-    let (code, message) = said(&mut eval(&[&file, &file]));
-    assert_eq!(code, Some(2), "{message}");
-    assert!(message.contains("2 times for 1 scenes"), "{message}");
-    let elsewhere = folder.path().join("elsewhere");
-    let (code, message) = said(&mut eval(&[&elsewhere]));
-    assert_eq!(code, Some(3), "{message}");
-    let command = format!("`posescope index street --out {}`", elsewhere.display());
-    assert!(message.contains(&command), "{message}");
-
-    let (code, message) = said(&mut eval(&[&file]));
-    assert_eq!(code, Some(0), "{message}");
-    let results = fs::read_to_string(runs.join("results.jsonl")).expect("was written");
-    let result: Value = serde_json::from_str(results.trim()).expect("one result");
-    assert_eq!(result["references"][0], "000200");
-    assert_eq!(result["fusion"], "r-wavg");
+    run("eval street --query 200 --method fb -q --reference nearest:1 --out of-200");
+    has(
+        &run(&format!("{INDEX} --without of-200")).err,
+        "4 frames without 1",
+    );
 }
 
 #[test]
 fn an_index_that_cannot_be_used_is_named_with_the_command_that_builds_it() {
-    let (_folder, file) = file();
-    let command = format!("`posescope index street --out {}`", file.display());
-    let (code, message) = said(&mut run(&file));
-    assert_eq!(code, Some(3), "{message}");
-    assert!(message.contains("there is no retrieval index"), "{message}");
-    assert!(message.contains(&command), "{message}");
-    assert_eq!(message.lines().count(), 1, "{message}");
+    let folder = TempDir::new().expect("a folder");
+    let run = |line: &str| run_in(folder.path(), line);
+    let file = folder.path().join("an.index");
+    let command = "`posescope index street --out an.index`";
+    let missing = format!("there is no retrieval index ~ {command}");
+    run(RUN).fails_in_one_line(3, &missing);
 
-    assert!(index(&file).output().expect("starts").status.success());
+    run(INDEX).ok();
     let whole = fs::read(&file).expect("just written");
-    let (code, message) = said(run(&file).args(["--set", "surf.threshold=600"]));
-    assert_eq!(code, Some(3), "{message}");
-    let words = "stale: it was made with surf.threshold = 500, not 600";
-    assert!(message.contains(words), "{message}");
+    let stale = "stale: it was made with surf.threshold = 500, not 600";
+    run(&format!("{RUN} --set surf.threshold=600")).fails_with(3, stale);
 
     let mut damaged = whole.clone();
     damaged[whole.len() / 2] ^= 1;
-    fs::write(&file, damaged).expect("writable");
-    let (code, message) = said(&mut run(&file));
-    assert_eq!(code, Some(3), "{message}");
-    assert!(message.contains("is damaged"), "{message}");
-    assert!(message.contains(&command), "{message}");
+    write(&file, damaged);
+    run(RUN).fails_with(3, &format!("is damaged ~ {command}"));
+    has(&run(INDEX).ok().err, "is damaged ~ building it again");
+    assert!(whole == fs::read(&file).expect("is there"), "other bytes");
 
-    let (code, message) = said(&mut index(&file));
-    assert_eq!(code, Some(0), "{message}");
-    assert!(message.contains("is damaged"), "{message}");
-    assert!(message.contains("building it again"), "{message}");
+    let letter = "a letter that somebody still needs";
+    write(&file, letter);
+    run(INDEX).fails_with(2, "not a retrieval index; --force");
+    assert_eq!(text(&file), letter);
+    run(&format!("{INDEX} --force")).ok();
     assert!(whole == fs::read(&file).expect("is there"), "other bytes");
 }
 
 #[test]
-fn a_file_of_another_kind_is_only_replaced_when_told_to() {
-    let (_folder, file) = file();
-    fs::write(&file, "a letter that somebody still needs").expect("writable");
-    let (code, message) = said(&mut index(&file));
-    assert_eq!(code, Some(2), "{message}");
-    assert!(
-        message.contains("not a retrieval index; --force"),
-        "{message}"
-    );
-    let kept = fs::read_to_string(&file).expect("is there");
-    assert_eq!(kept, "a letter that somebody still needs");
-    let (code, message) = said(index(&file).arg("--force"));
-    assert_eq!(code, Some(0), "{message}");
-}
-
-#[test]
 fn a_vocabulary_larger_than_its_descriptors_is_a_usage_error() {
-    let (_folder, file) = file();
-    let (code, message) = said(&mut index_of(&file, "1000000"));
-    assert_eq!(code, Some(2), "{message}");
-    assert!(message.contains("too few"), "{message}");
-    assert!(message.contains("--set index.words"), "{message}");
-    assert!(!file.exists());
+    let folder = TempDir::new().expect("a folder");
+    let line = "index street --every 400 --set index.words=1000000 --out an.index";
+    run_in(folder.path(), line).fails_with(2, "too few ~ --set index.words");
+    assert!(!folder.path().join("an.index").exists());
 }
 
 #[test]
 fn without_a_cache_directory_a_file_has_to_be_named() {
-    let (code, message) = said(
-        posescope()
-            .env("POSESCOPE_CACHE", "")
-            .args(["index", "street"]),
-    );
-    assert_eq!(code, Some(2), "{message}");
-    assert!(message.contains("--out"), "{message}");
+    let mut command = posescope();
+    command.env("POSESCOPE_CACHE", "").args(["index", "street"]);
+    Said::by(&mut command).fails_with(2, "--out");
 }
 
 /// Writes down what comes between the beginning of a query and that of its first method.

@@ -12,7 +12,8 @@ use posescope::scene::layout::{Drive, Shot};
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
-use crate::damage::Damage::{Cut, Gone, Text};
+use crate::binary::arg;
+use crate::damage::open;
 use crate::{damage, data, layouts};
 
 const CAMERA: Intrinsics = Intrinsics {
@@ -83,19 +84,11 @@ pub fn write_part(root: &Path, frames: Range<usize>) -> PathBuf {
     root.join((layout.place)("drive"))
 }
 
-fn open(argument: &str) -> Box<dyn Scene> {
-    scene::open(argument, None).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
-
 #[test]
 fn one_frame_in_ten_is_kept_while_the_car_moves() {
     let folder = TempDir::new().expect("a folder");
     let traversal = write(folder.path());
-    let kept = open(text(&traversal));
+    let kept = open(&traversal);
     assert_eq!(kept.name(), "robotcar/drive");
     let frames: Vec<f64> = (0..kept.frames().len())
         .map(|frame| 10.0 * (kept.time_s(frame).expect("is known") - 1_000.0))
@@ -111,12 +104,10 @@ fn one_frame_in_ten_is_kept_while_the_car_moves() {
         frames[0] >= 20.0 && frames[frames.len() - 1] <= 90.0,
         "{frames:?}"
     );
-    let all = open(&format!("{}:all", text(&traversal)));
+    let all = open(format!("{}:all", arg(&traversal)));
     assert_eq!(all.frames().len(), FRAMES);
-    assert_eq!(
-        open(text(&traversal.join("stereo/centre"))).frames(),
-        kept.frames()
-    );
+    let camera = open(traversal.join("stereo/centre"));
+    assert_eq!(camera.frames(), kept.frames());
 }
 
 #[test]
@@ -125,7 +116,7 @@ fn rows_without_a_good_solution_are_left_out() {
     let traversal = write(folder.path());
     let file = traversal.join("gps/ins.csv");
     let good = fs::read_to_string(&file).expect("text");
-    let all = format!("{}:all", text(&traversal));
+    let all = format!("{}:all", arg(&traversal));
     let scene = open(&all);
     // The world is north, east, down; the car drives north.
     let [a, b] = [40, 60].map(|frame| scene.pose(frame).expect("is known"));
@@ -142,7 +133,7 @@ fn rows_without_a_good_solution_are_left_out() {
 #[test]
 fn scans_around_a_frame_are_gathered_in_its_camera() {
     let folder = TempDir::new().expect("a folder");
-    let scene = open(&format!("{}:all", text(&write(folder.path()))));
+    let scene = open(format!("{}:all", arg(&write(folder.path()))));
     let cloud = scene.cloud(50).expect("is there");
     assert!(cloud.len() > 200, "{}", cloud.len());
     // The wall of every scan is the same wall.
@@ -197,7 +188,7 @@ fn the_cameras_of_the_sdk_stand_where_the_sdk_puts_them() {
     };
     let folder = TempDir::new().expect("a folder");
     let traversal = with_real_sdk(folder.path(), &sdk);
-    let camera = |folder: &str| open(&format!("{}:all", text(&traversal.join(folder))));
+    let camera = |folder: &str| open(format!("{}:all", arg(&traversal.join(folder))));
     let (front, rear) = (camera("stereo/centre"), camera("mono_rear"));
     assert_eq!(front.intrinsics(0).fx, 964.828979);
     assert_eq!(
@@ -229,49 +220,24 @@ fn the_cameras_of_the_sdk_stand_where_the_sdk_puts_them() {
 
 #[test]
 fn what_is_wrong_with_a_traversal_is_named() {
-    let lens = "sdk/models/stereo_narrow_left_distortion_lut.bin";
-    let write = |root: &Path| format!("{}:all", text(&write_part(root, 40..42)));
+    let write = |root: &Path| format!("{}:all", arg(&write_part(root, 40..42)));
     damage::expect(
         write,
-        &[
-            (lens, Cut(76_700), &["76800 bytes, 100 found"]),
-            (
-                "sdk/models/stereo_narrow_left.txt",
-                Text("1 2 3 4\n0 0 1 0\n"),
-                &["stereo_narrow_left.txt", "cut off"],
-            ),
-            ("sdk/extrinsics/ldmrs.txt", Gone, &["extrinsics/ldmrs.txt"]),
-            (
-                "drive/stereo.timestamps",
-                Text("soon 1\n"),
-                &["stereo.timestamps:1", "`timestamp chunk`"],
-            ),
-            (
-                "drive/gps/ins.csv",
-                Text("a,b\n"),
-                &["ins.csv:1", "`timestamp`"],
-            ),
-            (
-                "drive/vo/vo.csv",
-                Text("a\n1,2,3\n"),
-                &["vo.csv:2", "columns"],
-            ),
-            (
-                "drive/stereo/centre/1004000000.png",
-                Cut(200),
-                &["1004000000.png"],
-            ),
-            (
-                "drive/ldmrs/1004000000.bin",
-                Cut(5),
-                &["1004000000.bin", "24 bytes"],
-            ),
-        ],
+        r#"
+        sdk/models/stereo_narrow_left_distortion_lut.bin | cut 76700 | 76800 bytes, 100 found
+        sdk/models/stereo_narrow_left.txt | text 1 2 3 4\n0 0 1 0\n | stereo_narrow_left.txt ~ cut off
+        sdk/extrinsics/ldmrs.txt | gone | extrinsics/ldmrs.txt
+        drive/stereo.timestamps | text soon 1\n | stereo.timestamps:1 ~ `timestamp chunk`
+        drive/gps/ins.csv | text a,b\n | ins.csv:1 ~ `timestamp`
+        drive/vo/vo.csv | text a\n1,2,3\n | vo.csv:2 ~ columns
+        drive/stereo/centre/1004000000.png | cut 200 | 1004000000.png
+        drive/ldmrs/1004000000.bin | cut 5 | 1004000000.bin ~ 24 bytes
+        "#,
     );
     let root = TempDir::new().expect("a folder");
     let traversal = write_part(root.path(), 40..42);
     fs::remove_dir_all(root.path().join("sdk")).expect("was written");
-    let opened = scene::open(text(&traversal), Some("robotcar"));
+    let opened = scene::open(arg(&traversal), Some("robotcar"));
     let error = opened.err().expect("no SDK").to_string();
-    damage::expect_words(&error, &["models and extrinsics of the SDK"]);
+    damage::expect_words(&error, "models and extrinsics of the SDK");
 }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use image::{GrayImage, Luma};
 use tempfile::TempDir;
 
+use crate::binary::{Said, run_in, text};
+
 pub const WIDTH: u32 = 160;
 pub const HEIGHT: u32 = 64;
 const CALIBRATION: &str = "\
@@ -45,6 +47,23 @@ impl SmallSequence {
     }
     pub fn path(&self) -> &Path {
         self.root.path()
+    }
+
+    /// Runs the binary with the arguments of a line, where the scene is called `sequences/42`.
+    pub fn run(&self, line: &str) -> Said {
+        run_in(self.path(), line)
+    }
+
+    /// What a file says, by its path from there.
+    #[track_caller]
+    pub fn text(&self, file: &str) -> String {
+        text(self.path().join(file))
+    }
+
+    /// Nothing finds a black photo.
+    pub fn blacken(&self, name: &str) {
+        let black = GrayImage::new(WIDTH, HEIGHT);
+        black.save(self.image(name)).expect("writable");
     }
 }
 

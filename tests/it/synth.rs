@@ -14,32 +14,15 @@ use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
-use posescope::scene::{self, Scene};
 use posescope::trace::Trace;
 use tempfile::TempDir;
 
-use crate::binary::posescope;
+use crate::binary::{Said, command_in, has, run_in, text, write};
+use crate::damage::open;
 use crate::round_trips;
 
 /// Frames 0, 300 and 600 in half size.
-const FEW: [&str; 6] = [
-    "--size",
-    "half",
-    "--every",
-    "300",
-    "--condition",
-    "overcast",
-];
-
-fn synth(folder: &Path, extra: &[&str]) -> std::process::Output {
-    let output = posescope().arg("synth").arg(folder).args(extra).output();
-    output.expect("the binary starts")
-}
-
-fn open(folder: &Path) -> Box<dyn Scene> {
-    let folder = folder.join("sequences/overcast");
-    scene::open(folder.to_str().expect("a plain path"), None).unwrap_or_else(|e| panic!("{e}"))
-}
+const FEW: &str = "synth . --size half --every 300 --condition overcast";
 
 /// The pair as it is made, past any cache.
 fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
@@ -100,47 +83,24 @@ fn estimates_from_disk_are_those_from_memory() {
 }
 
 #[test]
-fn the_command_line_runs_on_what_it_wrote() {
-    let folder = TempDir::new().expect("a temporary folder");
-    let output = synth(folder.path(), &[&FEW[..], &["-q"]].concat());
-    assert!(output.status.success() && output.stderr.is_empty());
-    let disk = open(folder.path());
+fn the_command_line_runs_on_what_it_wrote_and_writes_the_same_on_any_number_of_threads() {
+    let [folder, other] = [0, 1].map(|_| TempDir::new().expect("a temporary folder"));
+    let said = run_in(folder.path(), &format!("{FEW} -q")).ok();
+    assert!(said.err.is_empty(), "{}", said.err);
+    let disk = open(folder.path().join("sequences/overcast"));
     assert_eq!(disk.frames(), ["000000", "000300", "000600"]);
     assert_eq!(disk.intrinsics(0), Size::Half.intrinsics());
-    let output = posescope()
-        .arg("run")
-        .arg(folder.path().join("sequences/overcast"))
-        .args(["--query", "300", "--reference", "600", "--radius", "1000"])
-        .args(["--method", "fb", "-q", "--json", "-"])
-        .output()
-        .expect("the binary starts");
-    assert!(output.status.success());
-    let result = String::from_utf8_lossy(&output.stdout);
-    assert!(result.contains("kitti/overcast"), "{result}");
-}
 
-#[test]
-fn the_bytes_do_not_depend_on_the_number_of_threads() {
-    let folders = ["1", "3"].map(|threads| {
-        let folder = TempDir::new().expect("a temporary folder");
-        let written = posescope()
-            .arg("synth")
-            .arg(folder.path())
-            .args(FEW)
-            .env("RAYON_NUM_THREADS", threads)
-            .output();
-        assert!(written.expect("the binary starts").status.success());
-        folder
-    });
-    let [alone, together] = folders.each_ref().map(|folder| contents(folder.path()));
+    let mut command = command_in(other.path(), FEW);
+    Said::by(command.env("RAYON_NUM_THREADS", "1")).ok();
     // Three frames, three text files.
-    assert_eq!(
-        alone.len(),
-        9,
-        "{:?}",
-        alone.iter().map(|f| &f.0).collect::<Vec<_>>()
-    );
-    assert!(alone == together);
+    let files = contents(folder.path());
+    assert_eq!(files.len(), 9);
+    assert!(files == contents(other.path()));
+
+    let line =
+        "run sequences/overcast --query 300 --reference 600 --radius 1000 --method fb -q --json -";
+    has(&run_in(folder.path(), line).ok().out, "kitti/overcast");
 }
 
 /// Every file below a folder, by its path there.
@@ -165,46 +125,23 @@ fn contents(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 #[test]
 fn a_folder_that_is_not_empty_is_refused_unless_forced() {
     let folder = TempDir::new().expect("a temporary folder");
-    let notes = folder.path().join("notes.txt");
-    fs::write(&notes, b"mine").expect("writable");
-    let refused = synth(folder.path(), &FEW);
-    let message = String::from_utf8_lossy(&refused.stderr);
-    assert_eq!(refused.status.code(), Some(2), "{message}");
-    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
-    assert!(
-        message.contains("not empty") && message.contains("--force"),
-        "{message}"
-    );
+    let run = |line: &str| run_in(folder.path(), line);
+    write(folder.path().join("notes.txt"), "mine");
+    run(FEW).fails_in_one_line(2, "not empty ~ --force");
     assert_eq!(contents(folder.path()).len(), 1);
-
-    let sparse = ["--size", "half", "--every", "400", "--force"];
-    for extra in [&[&FEW[..], &["--force"]].concat()[..], &sparse] {
-        let output = synth(folder.path(), extra);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-    }
+    run(&format!("{FEW} --force")).ok();
+    run("synth . --size half --every 400 --condition overcast --force").ok();
     // Of the first sequence no frame is left between those of the second.
-    assert_eq!(open(folder.path()).frames(), ["000000", "000400", "000800"]);
-    assert_eq!(fs::read(&notes).expect("is still there"), b"mine");
-}
-
-#[test]
-fn wrong_arguments_name_the_right_ones() {
-    let folder = TempDir::new().expect("a temporary folder");
-    let cases = [
-        (["--condition", "fog"], "overcast"),
-        (["--size", "tiny"], "half"),
-        (["--every", "0"], "--every"),
-        (["--layout", "robotcar"], "toml"),
-    ];
-    for (arguments, words) in cases {
-        let output = synth(folder.path(), &arguments);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(message.contains(words), "{message}");
+    let disk = open(folder.path().join("sequences/overcast"));
+    assert_eq!(disk.frames(), ["000000", "000400", "000800"]);
+    assert_eq!(text(folder.path().join("notes.txt")), "mine");
+    for (words, expected) in [
+        ("--condition fog", "overcast"),
+        ("--size tiny", "half"),
+        ("--every 0", "--every"),
+        ("--layout robotcar", "toml"),
+    ] {
+        run(&format!("synth other {words}")).fails_with(2, expected);
     }
 }
 
@@ -213,29 +150,17 @@ fn wrong_arguments_name_the_right_ones() {
 #[test]
 fn a_full_disk_leaves_no_half_file() {
     let folder = TempDir::new().expect("a temporary folder");
-    let script = format!(
-        "trap '' XFSZ; ulimit -f 500; exec '{}' synth '{}' {}",
-        assert_cmd::cargo::cargo_bin!("posescope").display(),
-        folder.path().display(),
-        FEW.join(" ")
-    );
-    let output = assert_cmd::Command::new("bash")
-        .args(["-c", &script])
-        .env("POSESCOPE_CACHE", "")
-        .output()
-        .expect("bash starts");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(3), "{message}");
-    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
-    assert!(message.contains(".bin: File too large"), "{message}");
-    let left: Vec<PathBuf> = contents(folder.path())
-        .into_iter()
-        .map(|file| file.0)
-        .collect();
-    let text_files = [
+    let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
+    let script = format!("trap '' XFSZ; ulimit -f 500; exec '{binary}' {FEW}");
+    let mut command = assert_cmd::Command::new("bash");
+    command.current_dir(folder.path()).args(["-c", &script]);
+    let said = Said::by(command.env("POSESCOPE_CACHE", ""));
+    said.fails_in_one_line(3, ".bin: File too large");
+    let left = contents(folder.path()).into_iter().map(|file| file.0);
+    let expected = [
         "poses/overcast.txt",
         "sequences/overcast/calib.txt",
         "sequences/overcast/times.txt",
     ];
-    assert_eq!(left, text_files.map(PathBuf::from));
+    assert!(left.eq(expected.map(PathBuf::from)));
 }

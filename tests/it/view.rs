@@ -4,89 +4,51 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::binary::{CACHE, posescope, said};
+use crate::binary::{CACHE, Said, command_in, has};
 use crate::small_sequence::SmallSequence;
+
+fn view(sequence: &SmallSequence, words: &str) -> Said {
+    let mut command = command_in(sequence.path(), &format!("view {words}"));
+    Said::by(command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY"))
+}
 
 #[test]
 fn without_a_display_it_records_instead() {
     let sequence = SmallSequence::write();
-    let output = posescope()
-        .current_dir(sequence.path())
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .arg("view")
-        .arg(sequence.folder())
-        .args(["--query", "5", "--reference", "4", "--method", "fb"])
-        .output()
-        .expect("the binary starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    assert!(said.contains("no display is set"), "{said}");
-    assert!(said.contains("instead"), "{said}");
-    let table = String::from_utf8_lossy(&output.stdout);
-    assert!(table.contains("000005"), "{table}");
+    let said = view(
+        &sequence,
+        "sequences/42 --query 5 --reference 4 --method fb",
+    )
+    .ok();
+    has(&said.err, "no display is set ~ instead");
+    has(&said.out, "000005");
     assert!(sequence.path().join("recordings/000005.rrd").is_file());
 }
 
 #[test]
 fn the_options_beside_the_folder_of_a_run_are_obeyed_or_refused() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let run = sequence.path().join("run");
-    posescope()
-        .arg("eval")
-        .arg(sequence.folder())
-        .args([
-            "--method",
-            "fb,mi",
-            "--radius",
-            "2",
-            "--keep-failures",
-            "0",
-            "--out",
-        ])
-        .arg(&run)
-        .assert()
-        .code(0);
-    let view = |options: &[&str]| {
-        let mut command = posescope();
-        command.current_dir(sequence.path());
-        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-        said(command.arg("view").arg(&run).args(options))
-    };
-    let methods = |table: &str| {
+    let line = "eval sequences/42 --method fb,mi --radius 2 --keep-failures 0 --out run";
+    sequence.run(line).ok();
+    let view = |words: &str| view(&sequence, &format!("run {words}"));
+    let methods = |words: &str| {
+        let table = view(words).ok().out;
         let is_method = |word: &&str| ["fb", "pm", "mi", "hy"].contains(word);
         let rows = table.lines().filter(|line| line.starts_with("00000"));
         let words = rows.filter_map(|line| line.split_whitespace().find(is_method));
         words.map(str::to_owned).collect::<Vec<_>>()
     };
-    let (code, table, said) = view(&[]);
-    assert_eq!(
-        (code, methods(&table)),
-        (Some(0), vec!["fb".into(), "mi".into()]),
-        "{said}"
-    );
-    let (_, table, said) = view(&["--method", "pm"]);
-    assert_eq!(methods(&table), ["pm"], "{said}");
-    let (_, table, said) = view(&[
-        "--query",
-        "0",
-        "--method",
-        "mi",
-        "--right",
-        "0.000001m,1deg",
-    ]);
-    assert!(table.contains("▲ wrong"), "{table}{said}");
-    let (_, table, said) = view(&["--query", "0", "--reference", "3", "--method", "fb"]);
-    assert!(table.contains("000003"), "{table}{said}");
-    for refused in [
-        ["--query-scene", "street"],
-        ["--camera", "1,1,1,1"],
-        ["--limit", "3"],
+    assert_eq!(methods(""), ["fb", "mi"]);
+    assert_eq!(methods("--method pm"), ["pm"]);
+    let said = view("--query 0 --method mi --right 0.000001m,1deg");
+    has(&said.out, "▲ wrong");
+    has(&view("--query 0 --reference 3 --method fb").out, "000003");
+    for (option, value) in [
+        ("--query-scene", "street"),
+        ("--camera", "1,1,1,1"),
+        ("--limit", "3"),
     ] {
-        let options = [&["--query", "0"][..], &refused[..]].concat();
-        let (code, _, said) = view(&options);
-        assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains(refused[0]), "{said}");
+        view(&format!("--query 0 {option} {value}")).fails_with(2, option);
     }
 }
 
