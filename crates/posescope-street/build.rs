@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// What the bytes of a frame follow from: this package, what it takes from the core, and the versions
-/// of the packages that it computes with.
+/// of the packages that it computes with. Outside of the workspace, the version of this package fixes that of the
+/// core, whose sources are not there.
 const SOURCES: [&str; 6] = [
     "src",
     "../posescope-core/src/recent.rs",
@@ -26,7 +27,10 @@ const LOCK: &str = "../../Cargo.lock";
 fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
     let mut files = Vec::new();
-    for source in SOURCES {
+    for source in SOURCES
+        .into_iter()
+        .filter(|source| Path::new(source).exists())
+    {
         println!("cargo::rerun-if-changed={source}");
         collect(Path::new(source), &mut files)?;
     }
@@ -37,7 +41,7 @@ fn main() -> io::Result<()> {
     for file in files {
         fs::read(file)?.hash(&mut hasher);
     }
-    if Path::new(LOCK).exists() {
+    if Path::new(SOURCES[1]).exists() && Path::new(LOCK).exists() {
         println!("cargo::rerun-if-changed={LOCK}");
         versions(&fs::read_to_string(LOCK)?).hash(&mut hasher);
     }

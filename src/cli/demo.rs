@@ -8,6 +8,14 @@ use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
 
+/// What to look at, and what to type next. The query at night is one that PM gets wrong.
+const NEXT: &str = "\
+The column `grade` says whether a pose is within 1 m and 5° of the truth (● right, ▲ wrong, × no pose).
+Next:
+  posescope run street --query-scene street:night --query 361 --reference nearest:1 --method pm   see why a pose is wrong
+  posescope lesson                                                                               learn how the methods work
+  posescope doctor PATH                                                                          check your own scene";
+
 /// Runs the demonstration and saves its recording.
 pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
     std::fs::create_dir_all(FOLDER).map_err(CliError::io(FOLDER))?;
@@ -27,6 +35,7 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
         Some(Command::Run(args)) => run::run(&args, terminal)?,
         _ => unreachable!("the words begin with `run`"),
     }
+    terminal.say(|| NEXT.to_owned());
     view_where_there_is_a_display(terminal)
 }
 

@@ -1,6 +1,5 @@
 //! The commands that README and docs show are commands.
 
-#[path = "../../tests/it/documented/commands.rs"]
 mod commands;
 
 use clap::Parser as _;
@@ -10,6 +9,10 @@ use commands::{commands, documents, own_arguments};
 
 #[test]
 fn every_command_of_the_documentation_is_understood() {
+    if !std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").exists() {
+        println!("skipped: a package has no docs");
+        return;
+    }
     let mut seen = 0;
     for page in documents() {
         for words in commands(&page) {

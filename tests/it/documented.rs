@@ -1,5 +1,6 @@
 //! Every command of posescope that README and docs show is run, with fewer queries.
 
+#[path = "../../src/cli/tests/commands.rs"]
 mod commands;
 
 use std::path::Path;
