@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use posescope::fusion::Fusion;
 use posescope::localize::{QueryResult, Ranking, Selection};
 use posescope::measure::{
-    Change, Gate, GateResult, KnownFailures, Report, RunComparison, read_rows, write_report,
+    Change, Gate, KnownFailures, Report, RunComparison, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -348,15 +348,9 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
     for figures in report.tables.iter().skip(skipped) {
         output::print(&table::figures(figures, width))?;
     }
-    for GateResult {
-        gate,
-        found,
-        passed,
-        ..
-    } in &report.gate_results
-    {
-        let verdict = if *passed { "passed" } else { "FAILED" };
-        output::print(&format!("{verdict}: {gate}: {found}"))?;
+    for one in &report.gate_results {
+        let verdict = if one.passed { "passed" } else { "FAILED" };
+        output::print(&format!("{verdict}: {}: {}", one.gate, one.found))?;
     }
     for line in report.known.lines() {
         output::print(&line)?;
