@@ -9,7 +9,10 @@ use commands::{commands, documents, own_arguments};
 
 #[test]
 fn every_command_of_the_documentation_is_understood() {
-    if !std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").exists() {
+    if !std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("docs")
+        .exists()
+    {
         println!("skipped: a package has no docs");
         return;
     }

@@ -29,6 +29,9 @@ const INLIER: usize = 4;
 /// What is drawn but does not count.
 const FAINT: Color = [0x70; 3];
 
+/// A kind of line: its colour, its width, and which matches it stands for.
+type LineKind = (Color, f32, fn(&Matched<'_>) -> bool);
+
 /// A match as FB left it.
 struct Matched<'a> {
     query: &'a Keypoint,
@@ -122,17 +125,17 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         "Query above reference; the inliers"
     };
     let mut panel = Panel::new(title, canvas.into_rgb8());
-    let kinds: [(Color, f32, &dyn Fn(&Matched<'_>) -> bool); 4] = [
-        (FAINT, 0.5, &|one| {
+    let kinds: [LineKind; 4] = [
+        (FAINT, 0.5, |one| {
             one.point.is_some() && !one.is_inlier() && one.is_true != Some(true)
         }),
-        (palette::TRUTH, 1.0, &|one| {
+        (palette::TRUTH, 1.0, |one| {
             one.is_true == Some(true) && !one.is_inlier()
         }),
-        (palette::ESTIMATE, 1.5, &|one| {
+        (palette::ESTIMATE, 1.5, |one| {
             one.is_true == Some(false) && one.is_inlier()
         }),
-        (palette::TRUTH, 2.0, &|one| {
+        (palette::TRUTH, 2.0, |one| {
             one.is_true != Some(false) && one.is_inlier()
         }),
     ];
