@@ -140,11 +140,23 @@ pub(crate) fn preference(
     let (width, height) = query.dimensions();
     let columns = width.div_ceil(TILE);
     let tile = |index: u32| ((index / width) / TILE * columns + (index % width) / TILE) as usize;
-    let mut balance = vec![0.0_f64; (columns * height.div_ceil(TILE)) as usize];
-    for (comparison, sign) in [(first, 1.0), (second, -1.0)] {
+    let tiles = (columns * height.div_ceil(TILE)) as usize;
+    let mut balance = vec![0.0_f64; tiles];
+    let mut covered = [vec![false; tiles], vec![false; tiles]];
+    for ((comparison, sign), covered) in
+        [(first, 1.0), (second, -1.0)].into_iter().zip(&mut covered)
+    {
         let evidence = evidence(comparison)?;
         for (pixel, evidence) in comparison.view.pixels.iter().zip(evidence) {
-            balance[tile(pixel.index)] += sign * evidence;
+            let tile = tile(pixel.index);
+            balance[tile] += sign * evidence;
+            covered[tile] = true;
+        }
+    }
+    // A tile that only one of them covers says nothing of how well either fits.
+    for (tile, balance) in balance.iter_mut().enumerate() {
+        if !(covered[0][tile] && covered[1][tile]) {
+            *balance = 0.0;
         }
     }
     // The colour of the strongest tile is full; a few of those that cover most would leave the others pale.

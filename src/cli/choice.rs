@@ -14,18 +14,22 @@ const MANY: usize = 100;
 pub struct ChoiceProgress<'a> {
     terminal: &'a Terminal,
     interrupt: &'a Interrupt,
-    /// The scene of the references, as the command line names it.
-    scene: &'a str,
+    /// The scene whose photos are compared one by one, for which an index would be quicker.
+    index_for: Option<&'a str>,
     bar: Option<indicatif::ProgressBar>,
     has_advised: bool,
 }
 
 impl<'a> ChoiceProgress<'a> {
-    pub fn new(terminal: &'a Terminal, interrupt: &'a Interrupt, scene: &'a str) -> Self {
+    pub fn new(
+        terminal: &'a Terminal,
+        interrupt: &'a Interrupt,
+        index_for: Option<&'a str>,
+    ) -> Self {
         Self {
             terminal,
             interrupt,
-            scene,
+            index_for,
             bar: None,
             has_advised: false,
         }
@@ -49,11 +53,12 @@ impl Sink for ChoiceProgress<'_> {
 impl LocalizeObserver for ChoiceProgress<'_> {
     fn choosing(&mut self, looked_at: usize, candidates: usize) {
         let is_many = candidates >= MANY && !self.terminal.is_quiet();
-        if is_many && !std::mem::replace(&mut self.has_advised, true) {
+        if let Some(scene) = self.index_for.filter(|_| is_many)
+            && !std::mem::replace(&mut self.has_advised, true)
+        {
             eprintln!(
-                "Each of {candidates} photos is looked at for the one with the most matches; quicker from \
-                 the second query on: `posescope index {}`, then --reference retrieve:1",
-                self.scene
+                "Comparing the query with {candidates} photos; an index is quicker: `posescope index {scene}`, then \
+                 --reference retrieve:1"
             );
         }
         let terminal = self.terminal;

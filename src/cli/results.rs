@@ -118,7 +118,9 @@ fn row_table<'a>(
 fn draw(args: &ResultsArgs, plot: Plot, terminal: &Terminal) -> Result<(), CliError> {
     let svg = plot
         .svg(&RunResults::read(&args.run)?)
-        .ok_or_else(|| CliError::Usage("the run has nothing to draw in it".to_owned()))?;
+        .ok_or_else(|| CliError::Usage("the run has too few results for this plot: verdicts and causes need the truth and failures, success needs \
+             several radii, numbers of references or scenes, basin and margin a method with a cost"
+                .to_owned()))?;
     write(&svg, args.out.as_deref())?;
     if let Some(path) = &args.out {
         terminal.say(|| format!("Plot: {}", path.display()));

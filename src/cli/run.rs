@@ -63,7 +63,9 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         wanted
     };
     let interrupt = Interrupt::listen();
-    let mut progress = ChoiceProgress::new(terminal, &interrupt, &args.scene);
+    let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
+    let index_for = (!has_index).then_some(args.scene.as_str());
+    let mut progress = ChoiceProgress::new(terminal, &interrupt, index_for);
     let tasks = match plan.queries(wanted, &mut progress) {
         Err(CliError::Choice(ChoiceError::Cancelled(_))) if interrupt.is_raised() => {
             return Err(CliError::Interrupted("no query is done".to_owned()));

@@ -14,7 +14,19 @@ pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> Strin
         let Some(verdict) = result.verdict() else {
             continue;
         };
-        let sentence = format!("{} {}: {verdict}", result.query, result.method_name());
+        // Where each of several references gives a pose, the sentence says whose it is.
+        let is_same = |other: &QueryResult| {
+            other.query == result.query && other.method_name() == result.method_name()
+        };
+        let against = match results.iter().filter(|(other, _)| is_same(other)).count() {
+            1 => String::new(),
+            _ => format!(" against {}", result.references.join(" ")),
+        };
+        let sentence = format!(
+            "{} {}{against}: {verdict}",
+            result.query,
+            result.method_name()
+        );
         text += &format!("\n{}", lines(sentence));
         for paragraph in result.paragraphs() {
             text += &lines(format!("  {paragraph}"));

@@ -19,8 +19,7 @@ use crate::run::{QueryCamera, RunFile, RunItem};
 pub enum Format {
     /// TUM RGB-D and evo: `time x y z qx qy qz qw`, camera to world.
     Tum,
-    /// KITTI odometry: twelve numbers of `[R|t]`, camera to world; line and frame number belong
-    /// together.
+    /// KITTI odometry: twelve numbers of `[R|t]`, camera to world; a line for each frame.
     Kitti,
     /// A COLMAP text model without points: world to camera.
     Colmap,
@@ -67,8 +66,7 @@ pub enum ExportError {
     Nothing,
     /// The format cannot hold a missing pose.
     #[error(
-        "kitti: line and frame number belong together, so that a missing pose cannot be told: {missing}; \
-         tum, vloc and colmap leave it out"
+        "kitti has a line for each frame and cannot leave out a pose: {missing}; write tum, vloc or colmap instead"
     )]
     Gap {
         /// What is missing.

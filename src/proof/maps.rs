@@ -127,7 +127,10 @@ fn map(
         MapOverlay::Coverage => coverage_map(surface),
         _ => {
             let mut panel = Panel::new(
-                "Cost of each position around the reference",
+                format!(
+                    "Cost of each position, a cell is {} m, ahead is up",
+                    lattice.step
+                ),
                 picture::surface(surface),
             );
             panel.scale = cost_scale(surface);
@@ -159,6 +162,12 @@ fn map(
         }
         MapOverlay::Preference | MapOverlay::Coverage | MapOverlay::Flat => {}
     }
+    let label = |seen: &Seen| match overlay {
+        MapOverlay::Coverage => {
+            format!("{} covers {} px", seen.label, seen.comparison.score.covered)
+        }
+        _ => seen.label(),
+    };
     panel.mark(
         Thing::Reference,
         cell_place(lattice, &Offset::default()),
@@ -166,11 +175,11 @@ fn map(
     );
     if let Some(result) = result {
         let at = cell_place(lattice, &place(&result.world_from_query));
-        panel.marks.push(case.result_mark(at, result.label()));
+        panel.marks.push(case.result_mark(at, label(result)));
     }
     if let Some(truth) = truth {
         let at = cell_place(lattice, &place(&truth.world_from_query));
-        panel.mark(Thing::Truth, at, truth.label());
+        panel.mark(Thing::Truth, at, label(truth));
     }
     panel
 }
@@ -221,7 +230,13 @@ fn coverage_map(surface: &ScoredLattice) -> Panel {
             palette::viridis(f64::from(covered) / f64::from(most))
         }))
     });
-    let mut panel = Panel::new("How much of the image each position covers", cells);
+    let mut panel = Panel::new(
+        format!(
+            "What each position covers, a cell is {} m, ahead is up",
+            lattice.step
+        ),
+        cells,
+    );
     panel.scale = Some(ColorScale {
         dark: "nothing".to_owned(),
         bright: format!("{most} px"),
@@ -262,9 +277,9 @@ fn view_panel(query: &GrayImage, seen: &Seen) -> Panel {
     Panel::new(title, over(query, view))
 }
 
-/// The view in its grey values over the darkened query.
+/// The view in its grey values over the darkened query, which is bluish where nothing covers it.
 fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
-    const GROUND: f64 = 0.35;
+    const GROUND: f64 = 0.5;
     let synthetic = picture::synthetic(view);
     let mut covered = vec![false; (view.width * view.height) as usize];
     for pixel in &view.pixels {
@@ -274,12 +289,10 @@ fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
         let ground = f64::from(query.get_pixel(x, y).0[0]) * GROUND;
         let painted = f64::from(synthetic.get_pixel(x, y).0[0]);
         let is_painted = painted > 0.0 || covered[(y * view.width + x) as usize];
-        // Warm and a little brighter than the query, so that thin lines of points are seen.
-        let lifted = 50.0 + painted * 205.0 / 255.0;
         let [red, green, blue] = if is_painted {
-            [lifted, 0.92 * lifted, 0.72 * lifted]
+            [painted; 3]
         } else {
-            [0.6 * ground, 0.7 * ground, ground]
+            [0.75 * ground, 0.85 * ground, ground]
         };
         Rgb([red as u8, green as u8, blue as u8])
     })
