@@ -90,7 +90,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     assert!(page.contains(&link));
     assert!(page.contains("Too few keypoints"));
     // A direct method's failure has its costs.
-    assert!(page.contains("Cost of each position around the reference"));
+    assert!(page.contains("Cost of each position"));
     for part in [
         "<caption>",
         "scope=\"col\"",
