@@ -290,4 +290,32 @@ mod tests {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
         }
     }
+
+    #[test]
+    fn a_run_is_read_as_it_was_written_and_an_unknown_key_is_refused_with_its_line() {
+        let run = RunFile {
+            schema: RUN_SCHEMA.to_owned(),
+            version: "1".to_owned(),
+            scenes: vec!["street".to_owned()],
+            shard: Some(Shard { number: 2, of: 3 }),
+            protocol: Protocol {
+                methods: vec![Method::FB, Method::MI],
+                radii_m: vec![3.0],
+                seed: 7,
+                ..Protocol::default()
+            },
+            inputs: BTreeMap::new(),
+            pairs: Vec::new(),
+            params: Params::default().to_toml().parse().expect("a table"),
+        };
+        let text = toml::to_string(&run).expect("TOML");
+        assert_eq!(RunFile::read(&text).expect("our own"), run);
+        let at = 1 + text
+            .lines()
+            .position(|line| line.starts_with("seed = "))
+            .expect("is there");
+        let error = RunFile::read(&text.replacen("seed = ", "sed = ", 1)).expect_err("unknown");
+        assert_eq!(error.line, at);
+        assert!(error.message.contains("`sed`"), "{}", error.message);
+    }
 }

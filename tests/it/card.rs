@@ -13,7 +13,8 @@ use posescope::session::{RunMode, RunState};
 
 use crate::walls_scene::GREY;
 use crate::window::{
-    finished, is_said, press, results, run_until_idle, setup, wait, window, window_with_results,
+    app, finish, finished, is_said, press, results, run_until_idle, send, setup, wait, window,
+    window_with_results,
 };
 
 /// How many answers the card calls right. The report has the error behind the word.
@@ -54,8 +55,7 @@ fn what_is_below_the_card_stays_where_it_is_while_a_person_looks_back() {
     let top = |window: &Harness<'_, App>| window.get_by_label("Run all").rect().top();
     let at_end = top(&window);
     for command in [Command::First, Command::Forward(40), Command::Last] {
-        window.state_mut().send(command.clone());
-        window.run_steps(3);
+        send(&mut window, command.clone());
         assert_eq!(top(&window), at_end, "{command:?}");
     }
 }
@@ -76,19 +76,18 @@ fn a_stray_key_of_lock_step_leaves_the_card_where_it_is() {
     let mut window = finished(setup());
     for key in [Key::Period, Key::Comma] {
         press(&mut window, Modifiers::NONE, key);
-        assert_eq!(window.state().app_state().options.lockstep, None);
+        assert_eq!(app(&window).options.lockstep, None);
         assert_eq!(right_ones(&window), 4, "{key:?}");
     }
-    window.state_mut().send(Command::StepTogether(Some(3)));
-    window.run_steps(2);
+    send(&mut window, Command::StepTogether(Some(3)));
     press(&mut window, Modifiers::NONE, Key::Period);
-    assert_eq!(window.state().app_state().options.lockstep, Some(4));
+    assert_eq!(app(&window).options.lockstep, Some(4));
 }
 
 #[test]
 fn leaving_the_radius_as_it_is_starts_nothing_again() {
     let mut window = finished(setup());
-    let radius = window.state().app_state().setup.task.radius_m();
+    let radius = app(&window).setup.task.radius_m();
     let menu = window.get_all_by_label("References").next();
     menu.expect("the menu is in the toolbar").click();
     window.run_steps(3);
@@ -96,7 +95,7 @@ fn leaving_the_radius_as_it_is_starts_nothing_again() {
     window.run_steps(2);
     window.get_by_label("Seed").focus();
     window.run_steps(2);
-    let state = window.state().app_state();
+    let state = app(&window);
     assert_eq!(state.setup.task.radius_m(), radius);
     assert!(
         matches!(state.run_state(), RunState::Finished),
@@ -109,18 +108,14 @@ fn leaving_the_radius_as_it_is_starts_nothing_again() {
 fn back_to_a_leads_to_a_from_either_run() {
     let mut window = finished(setup());
     for command in [Command::Pin, Command::Restart] {
-        window.state_mut().send(command);
-        window.run_steps(2);
+        send(&mut window, command);
     }
     window.state_mut().send(Command::ShowView("differences"));
     for _ in 0..2 {
         window.run_steps(3);
         window.get_by_label("Back to A").click();
         window.run_steps(3);
-        assert_eq!(
-            window.state().app_state().options.compare_mode,
-            CompareMode::Kept
-        );
+        assert_eq!(app(&window).options.compare_mode, CompareMode::Kept);
     }
 }
 
@@ -147,11 +142,11 @@ fn what_helped_is_tried_by_a_button_and_compared_with_the_run_before() {
     assert!(helped.helped.len() > 1 && helped.helped[0].error != best);
     window.get_by_label_contains("Try --").click();
     wait(&mut window, |app| app.app_state().kept.is_some());
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     let again = results(&window);
     assert!(again.iter().any(|result| result.error == Some(best)));
     assert!(is_said(&window, "● right"));
-    let before = &window.state().app_state().kept.as_ref().expect("kept").run;
+    let before = &app(&window).kept.as_ref().expect("kept").run;
     assert_eq!(before.params, wrong.task.params);
 }
 
@@ -207,7 +202,7 @@ fn frames_of_two_scenes_are_told_apart_and_the_query_is_in_sight() {
     window.run_steps(4);
     assert!(is_said(&window, "street:night 000450"));
     assert!(is_said(&window, "street:snow 000450"));
-    let title = window.state().app_state().setup.title();
+    let title = app(&window).setup.title();
     assert_eq!(title, "posescope: street:night 000450 ← street:snow 000450");
     // The list shows some rows only; that of the query is one of them, and so after a jump. Its rows are
     // buttons: a report that is there already says the same names.
@@ -227,15 +222,13 @@ fn a_lecture_shows_nothing_of_what_is_still_to_come() {
     press(&mut window, Modifiers::NONE, Key::F3);
     window.run_steps(3);
     assert_eq!(right_ones(&window), 4, "the cursor is at the end");
-    window.state_mut().send(Command::SelectMethod(Method::PM));
-    window.run_steps(3);
+    send(&mut window, Command::SelectMethod(Method::PM));
     assert_eq!(
         right_ones(&window),
         2,
         "FB and PM are over, MI and HY are not"
     );
-    window.state_mut().send(Command::MoveCursor(1));
-    window.run_steps(3);
+    send(&mut window, Command::MoveCursor(1));
     assert_eq!(right_ones(&window), 0);
     assert!(
         is_said(&window, "Points are found"),
@@ -290,20 +283,14 @@ fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
         folder: folder.path().to_owned(),
         ..setup()
     });
-    window
-        .state_mut()
-        .send(Command::AskWhere(SaveTarget::Recording));
-    window.run_steps(3);
+    send(&mut window, Command::AskWhere(SaveTarget::Recording));
     assert!(is_said(&window, "Save the recording"));
     press(&mut window, Modifiers::NONE, Key::Escape);
     assert!(!is_said(&window, "Save the recording"));
     let name = folder.path().join("walls-000001-000000.rrd");
     assert!(!name.exists(), "nobody said so");
 
-    window
-        .state_mut()
-        .send(Command::AskWhere(SaveTarget::Recording));
-    window.run_steps(3);
+    send(&mut window, Command::AskWhere(SaveTarget::Recording));
     // Keys belong to the field meanwhile: no view changes for them.
     press(&mut window, Modifiers::NONE, Key::Enter);
     window.run_steps(3);
@@ -338,7 +325,7 @@ fn what_is_known_from_a_run_folder_is_told_before_the_query_is_run_again() {
     assert!(is_said(&window, code.title()), "{}", code.title());
     // Once the run has come so far, the card tells of it alone.
     press(&mut window, Modifiers::NONE, Key::F9);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     window.run_steps(2);
     assert!(!is_said(&window, "known before:"));
 }

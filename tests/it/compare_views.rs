@@ -11,7 +11,7 @@ use posescope::method::Method;
 
 use crate::walls_scene::GREY;
 use crate::window::{
-    finished, is_said, press, results, run_until_idle, setup, wait, window_with_results,
+    app, finished, is_said, press, results, run_until_idle, send, setup, wait, window_with_results,
 };
 
 fn show(window: &mut Harness<'_, App>, view: &'static str) {
@@ -48,7 +48,7 @@ fn two_poses_are_compared_by_the_costs_at_them() {
     // The same two the other way round.
     window.get_by_label("Swap").click();
     window.run_steps(60);
-    let options = &window.state().app_state().options;
+    let options = &app(&window).options;
     assert_eq!(
         options.beside,
         Some([NamedPose::Truth, NamedPose::Estimate])
@@ -80,11 +80,13 @@ fn two_runs_are_one_table_of_what_became_different() {
     assert!(is_said(&window, "Both were asked the same"));
     assert!(is_said(&window, "no difference"));
 
-    window.state_mut().send(Command::SetParam {
-        key: "fb.ratio".to_owned(),
-        value: "0.6".to_owned(),
-    });
-    window.run_steps(2);
+    send(
+        &mut window,
+        Command::SetParam {
+            key: "fb.ratio".to_owned(),
+            value: "0.6".to_owned(),
+        },
+    );
     run_until_idle(&mut window);
     window.run_steps(3);
     let after = results(&window);
@@ -99,8 +101,7 @@ fn two_runs_are_one_table_of_what_became_different() {
     }
 
     let degradation = "gamma=0.5".parse().expect("a degradation");
-    window.state_mut().send(Command::Degrade(degradation));
-    window.run_steps(2);
+    send(&mut window, Command::Degrade(degradation));
     run_until_idle(&mut window);
     window.run_steps(3);
     assert!(is_said(&window, "--degrade gamma=0.5"));
@@ -126,7 +127,7 @@ fn results_are_drawn_as_the_condition_chooses_them() {
     show(&mut window, "charts");
     // What has no error is not drawn.
     let known: Vec<QueryResult> = {
-        let known = window.state().app_state().results.values().flatten();
+        let known = app(&window).results.values().flatten();
         known.cloned().collect()
     };
     let drawn = |wanted: &dyn Fn(&QueryResult) -> bool| {
@@ -182,18 +183,15 @@ fn results_are_drawn_as_the_condition_chooses_them() {
     assert!(is_said(&window, "Share of results within an error"));
 
     window.get_by_label("Scatter").click();
-    window
-        .state_mut()
-        .send(Command::FilterResults("method = mi".to_owned()));
-    window.run_steps(3);
+    send(
+        &mut window,
+        Command::FilterResults("method = mi".to_owned()),
+    );
     assert!(is_said(
         &window,
         &drawn(&|result| result.method == Method::MI)
     ));
-    window
-        .state_mut()
-        .send(Command::FilterResults("method = ".to_owned()));
-    window.run_steps(3);
+    send(&mut window, Command::FilterResults("method = ".to_owned()));
     assert!(is_said(&window, "expected"));
 }
 
@@ -201,7 +199,7 @@ fn results_are_drawn_as_the_condition_chooses_them() {
 fn a_result_is_opened_at_the_step_that_decided_it() {
     let mut window = over_a_run();
     let failed = |window: &Harness<'_, App>, code: Code| {
-        let known = &window.state().app_state().results[&GREY];
+        let known = &app(window).results[&GREY];
         known.iter().position(|result| {
             result
                 .diagnosis
@@ -210,13 +208,15 @@ fn a_result_is_opened_at_the_step_that_decided_it() {
         })
     };
     let result = failed(&window, Code::R2).expect("a grey photo has no features");
-    window.state_mut().send(Command::OpenResult {
-        query: GREY,
-        result,
-    });
-    window.run_steps(2);
+    send(
+        &mut window,
+        Command::OpenResult {
+            query: GREY,
+            result,
+        },
+    );
     run_until_idle(&mut window);
-    let state = window.state().app_state();
+    let state = app(&window);
     assert_eq!(state.setup.query, GREY);
     let Event::StageEnded(ended) = &state.run().records()[state.cursor()].event else {
         panic!("not the end of a stage");
@@ -227,7 +227,7 @@ fn a_result_is_opened_at_the_step_that_decided_it() {
     let mut window = over_a_run();
     press(&mut window, Modifiers::NONE, Key::N);
     run_until_idle(&mut window);
-    let state = window.state().app_state();
+    let state = app(&window);
     assert_eq!(state.setup.query, GREY);
     let first = &state.results[&GREY][0].diagnosis[0];
     assert_eq!(first.code, Code::R2);
@@ -323,11 +323,13 @@ fn results_are_kept_and_those_that_follow_are_held_against_them() {
     show(&mut window, "migrations");
     assert!(is_said(&window, "None of 12 verdicts changed"));
     // Nothing is right any more within a hair.
-    window.state_mut().send(Command::SetParam {
-        key: "grid.coarse_step".to_owned(),
-        value: "3".to_owned(),
-    });
-    window.run_steps(2);
+    send(
+        &mut window,
+        Command::SetParam {
+            key: "grid.coarse_step".to_owned(),
+            value: "3".to_owned(),
+        },
+    );
     run_until_idle(&mut window);
     show(&mut window, "batch");
     window.get_by_label("Forget A").click();
@@ -342,7 +344,7 @@ fn recall_says_how_many_are_right_within_the_tolerance_of_the_run() {
     show(&mut window, "charts");
     window.get_by_label("Recall").click();
     window.run_steps(3);
-    let state = window.state().app_state();
+    let state = app(&window);
     let right = state.setup.task.protocol.right;
     let of_mi: Vec<&QueryResult> = state
         .results

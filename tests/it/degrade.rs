@@ -5,11 +5,10 @@ use image::imageops;
 use posescope::app::{Command, Setup};
 use posescope::image::Degradation;
 use posescope::scene;
-use posescope::session::RunState;
 
 use crate::binary::has;
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
-use crate::window::{finished, run_until_idle, setup};
+use crate::window::{app, finish, finished, run_until_idle, send, setup};
 
 /// The lines of `run --json -` without what says that the photo was degraded.
 fn results(sequence: &SmallSequence, words: &str) -> (String, usize) {
@@ -94,15 +93,12 @@ fn query_photo(setup: &Setup) -> image::GrayImage {
 #[test]
 fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     let mut window = finished(setup());
-    let taken = query_photo(&window.state().app_state().setup);
-    window.state_mut().send(Command::ShowView("parameters"));
-    window.step();
-    window.step();
+    let taken = query_photo(&app(&window).setup);
+    send(&mut window, Command::ShowView("parameters"));
     window.get_by_label("Photo: invert").click_accesskit();
-    window.step();
-    window.step();
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
-    let state = window.state().app_state();
+    window.run_steps(2);
+    finish(&mut window);
+    let state = app(&window);
     let degraded = |state: &posescope::app::AppState| state.setup.task.protocol.degrade.to_string();
     assert_eq!(degraded(state), "invert");
     let loaded = state.run().loaded.as_deref().expect("it ran");
@@ -120,22 +116,18 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     // The strength of a step is set as assistive technology does it.
     let gamma = window.get_by_label("Photo: gamma");
     gamma.set_value_accesskit(0.5);
-    window.step();
-    window.step();
+    window.run_steps(2);
     run_until_idle(&mut window);
-    let both = degraded(window.state().app_state());
+    let both = degraded(app(&window));
     assert_eq!(both, "gamma=0.5,invert");
     window.get_by_label("As taken").click_accesskit();
-    window.step();
-    window.step();
+    window.run_steps(2);
     run_until_idle(&mut window);
-    let setup = &window.state().app_state().setup;
+    let setup = &app(&window).setup;
     assert_eq!(query_photo(setup), taken);
-    window.state_mut().send(Command::RestoreSession(path));
-    window.step();
-    window.step();
+    send(&mut window, Command::RestoreSession(path));
     run_until_idle(&mut window);
-    let state = window.state().app_state();
+    let state = app(&window);
     assert_eq!(degraded(state), "invert");
     assert_eq!(query_photo(&state.setup), negative);
 }

@@ -79,94 +79,70 @@ fn the_estimators_and_the_street_depend_on_nothing_above_them() {
 
 #[test]
 fn a_circle_is_found_whatever_way_it_goes_round() {
-    let found = |files: &[(&str, &str)]| -> Vec<Vec<String>> {
+    // By `use`, by a path in the code, and past one that passes a name on; a module with what is inside it,
+    // but not past one outside, nor between two inside. Nobody imports from the crate's root what is made
+    // there out of the rest.
+    for (files, expected) in [
+        (
+            "a: use crate::{b::B, c};
+             b: fn f() { super::c::g(); }
+             c: fn f() -> impl A + use<'a> { g(); super::d::D } #[cfg(test)] mod tests { use crate::a::A; }
+             d: ",
+            "",
+        ),
+        (
+            "crate: mod a; pub use self::c::C as Other;
+             a: use super::b::{self, B as D};
+             b: /* use crate::d::D; */ fn f() -> crate::Other { \"use crate::d::D;\" }
+             c: use super::a::A;
+             d: use crate::{a, b, c};",
+            "a b c",
+        ),
+        (
+            "a: use part::Part; use other::Other;
+             a::part: use super::A;
+             a::other: use super::A;",
+            "",
+        ),
+        (
+            "a: use part::Part;
+             a::part: use crate::b::B;
+             b: use crate::a::A;",
+            "a a::part b",
+        ),
+        (
+            "a: mod part; mod other;
+             a::part: use super::other::Other;
+             a::other: use super::part::Part;",
+            "a::other a::part",
+        ),
+        (
+            "a: mod part; fn f() { part::g() }
+             a::part: use crate::b::B;
+             b: use crate::a::A;",
+            "a a::part b",
+        ),
+        (
+            "a: mod b; mod c; use b::B;
+             a::b: use super::{A, c::C};
+             a::c: mod d; fn f() { d::g() }
+             a::c::d: use crate::a::b::B;",
+            "a::b a::c a::c::d",
+        ),
+        ("crate: use a::A; pub struct B;\na: use crate::B;", "crate a"),
+    ] {
         let module = |path: &str| -> Module {
-            let parts = path.split("::").filter(|part| !part.is_empty());
+            let parts = path.split("::").filter(|part| *part != "crate");
             parts.map(str::to_owned).collect()
         };
-        let sources: Sources = files
-            .iter()
-            .map(|&(path, source)| (module(path), source.to_owned()))
-            .collect();
-        let circles = circles(&graph(&sources));
-        let names = |circle: &Vec<Module>| circle.iter().map(|m| m.join("::")).collect();
-        circles.iter().map(names).collect()
-    };
-    let none: [Vec<String>; 0] = [];
-    assert_eq!(
-        found(&[
-            ("a", "use crate::{b::B, c};"),
-            ("b", "fn f() { super::c::g(); }"),
-            (
-                "c",
-                "fn f() -> impl A + use<'a> { g(); super::d::D } #[cfg(test)] mod tests { use crate::a::A; }"
-            ),
-            ("d", ""),
-        ]),
-        none
-    );
-    // By `use`, by a path in the code, and past one that passes a name on.
-    assert_eq!(
-        found(&[
-            ("", "mod a; pub use self::c::C as Other;"),
-            ("a", "use super::b::{self, B as D};"),
-            (
-                "b",
-                "// use crate::d::D;\nfn f() -> crate::Other { \"use crate::d::D;\" }"
-            ),
-            ("c", "use super::a::A;"),
-            ("d", "use crate::{a, b, c};"),
-        ]),
-        [["a", "b", "c"]]
-    );
-    // A module with what is inside it, but not past one outside, nor between two inside.
-    assert_eq!(
-        found(&[
-            ("a", "use part::Part; use other::Other;"),
-            ("a::part", "use super::A;"),
-            ("a::other", "use super::A;"),
-        ]),
-        none
-    );
-    assert_eq!(
-        found(&[
-            ("a", "use part::Part;"),
-            ("a::part", "use crate::b::B;"),
-            ("b", "use crate::a::A;"),
-        ]),
-        [["a", "a::part", "b"]]
-    );
-    assert_eq!(
-        found(&[
-            ("a", ""),
-            ("a::part", "use super::other::Other;"),
-            ("a::other", "use super::part::Part;"),
-        ]),
-        [["a::other", "a::part"]]
-    );
-    assert_eq!(
-        found(&[
-            ("a", "mod part; fn f() { part::g() }"),
-            ("a::part", "use crate::b::B;"),
-            ("b", "use crate::a::A;"),
-        ]),
-        [["a", "a::part", "b"]]
-    );
-    // Nor past one outside that the module is not at home with.
-    assert_eq!(
-        found(&[
-            ("a", "mod b; mod c; use b::B;"),
-            ("a::b", "use super::{A, c::C};"),
-            ("a::c", "mod d; fn f() { d::g() }"),
-            ("a::c::d", "use crate::a::b::B;"),
-        ]),
-        [["a::b", "a::c", "a::c::d"]]
-    );
-    // Nobody imports from the crate's root what is made there out of the rest.
-    assert_eq!(
-        found(&[("", "use a::A; pub struct B;"), ("a", "use crate::B;")]),
-        [["", "a"]]
-    );
+        let file = |line: &str| {
+            let (path, source) = line.trim_start().split_once(": ").expect("a source");
+            (module(path), source.to_owned())
+        };
+        let circles = circles(&graph(&files.lines().map(file).collect()));
+        let expected: Vec<Module> = expected.split_whitespace().map(module).collect();
+        assert_eq!(circles.concat(), expected, "{files}");
+    }
 }
 
 /// Adds the files of a folder, but for those that hold nothing but tests.

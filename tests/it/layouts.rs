@@ -2,7 +2,6 @@
 
 mod kitti_raw;
 mod robotcar;
-mod seven_scenes;
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +13,7 @@ pub use robotcar::LAYOUT as ROBOTCAR;
 
 /// Every layout in which the street can be written.
 pub fn all() -> impl Iterator<Item = &'static Layout> {
-    let more: &'static [Layout] = &[kitti_raw::LAYOUT, robotcar::LAYOUT, seven_scenes::LAYOUT];
+    let more: &'static [Layout] = &[kitti_raw::LAYOUT, robotcar::LAYOUT];
     LAYOUTS.iter().chain(more)
 }
 

@@ -12,9 +12,9 @@ use posescope::session::RunState;
 use posescope::sink::rerun::entities;
 use rerun::TextDocument;
 
-use crate::binary::posescope;
+use crate::binary::{has, refused, run_in, write};
 use crate::recording::chunks;
-use crate::window::{is_said, press, run_until_idle};
+use crate::window::{app, is_said, press, run_until_idle, send};
 
 /// A lesson on the small world, whose frames cost nothing.
 const SMALL: &str = r#"+++
@@ -87,25 +87,22 @@ fn a_question_is_answered_before_anything_of_the_answer_is_shown() {
     let mut window = small(walls());
     assert!(is_said(&window, "The beginning") && is_said(&window, "These words are read first"));
     let moment: Moment = "after fb.match".parse().expect("a moment");
-    let at = |window: &Harness<'_, App>| window.state().app_state().cursor();
-    let found = moment.find(window.state().app_state().run());
+    let at = |window: &Harness<'_, App>| app(window).cursor();
+    let found = moment.find(app(&window).run());
     assert_eq!(Some(at(&window)), found);
     assert!(
         !is_said(&window, "● right"),
         "nothing is told before its time"
     );
     assert!(!is_said(&window, "It was said in the beginning"));
-    assert!(!window.state().app_state().options.shows_truth);
+    assert!(!app(&window).options.shows_truth);
 
     press(&mut window, Modifiers::NONE, Key::Num1);
     window.run_steps(2);
     assert!(is_said(&window, "the one  ▲ wrong") && is_said(&window, "the other  ● right"));
     assert!(is_said(&window, "It was said in the beginning"));
     let moment: Moment = "after fb".parse().expect("a moment");
-    assert_eq!(
-        Some(at(&window)),
-        moment.find(window.state().app_state().run())
-    );
+    assert_eq!(Some(at(&window)), moment.find(app(&window).run()));
     assert_eq!(
         window.query_all_by_label("● right").count(),
         1,
@@ -142,18 +139,15 @@ fn a_place_is_guessed_on_the_empty_map_and_measured_afterwards() {
 
     press(&mut window, Modifiers::NONE, Key::PageDown);
     window.run_steps(2);
-    let options = &window.state().app_state().options;
+    let options = &app(&window).options;
     assert_eq!(options.lockstep, Some(3));
     press(&mut window, Modifiers::NONE, Key::Period);
-    assert_eq!(window.state().app_state().options.lockstep, Some(4));
+    assert_eq!(app(&window).options.lockstep, Some(4));
     assert!(
         !is_said(&window, "● right"),
         "no method is done at its fourth step"
     );
-    window
-        .state_mut()
-        .send(Command::StepTogether(Some(usize::MAX - 1)));
-    window.run_steps(2);
+    send(&mut window, Command::StepTogether(Some(usize::MAX - 1)));
     assert_eq!(
         window.query_all_by_label_contains("● right").count(),
         2,
@@ -185,7 +179,7 @@ fn go_through(lesson: &Lesson) -> Vec<(String, Vec<QueryResult>)> {
         );
         window.run_steps(3);
         assert!(is_said(&window, &page.title), "{}", page.title);
-        let state = window.state().app_state();
+        let state = app(&window);
         let shown = state.run().results().cloned().collect();
         if results
             .last()
@@ -221,7 +215,7 @@ fn go_through(lesson: &Lesson) -> Vec<(String, Vec<QueryResult>)> {
 }
 
 fn check_moment(window: &Harness<'_, App>, moment: &Moment, title: &str) {
-    let state = window.state().app_state();
+    let state = app(window);
     let place = match moment {
         Moment::End => state.run().len() - 1,
         moment => moment
@@ -288,38 +282,18 @@ fn claims_hold(is_meant: impl Fn(&Lesson) -> bool) {
 
 #[test]
 fn lessons_are_listed_and_recorded() {
-    let output = posescope()
-        .arg("lesson")
-        .output()
-        .expect("the binary starts");
-    assert_eq!(output.status.code(), Some(0));
-    let listed = String::from_utf8_lossy(&output.stdout).into_owned();
-    let lessons = Lesson::all().expect("our own");
-    for lesson in &lessons {
-        assert!(
-            listed.contains(&lesson.name) && listed.contains(&lesson.title),
-            "{listed}"
-        );
+    let folder = tempfile::tempdir().expect("a folder");
+    let listed = run_in(folder.path(), "lesson").ok().out;
+    for lesson in Lesson::all().expect("our own") {
+        has(&listed, &format!("{} ~ {}", lesson.name, lesson.title));
     }
-    for (name, code, words) in [("nonsense", 2, "four-points"), ("broken.md", 3, "line 3")] {
-        let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(
-            folder.path().join("broken.md"),
-            "+++\ntitle = \"a\"\nabot = \"b\"\n+++\n",
-        )
-        .expect("writable");
-        let output = posescope()
-            .current_dir(folder.path())
-            .args(["lesson", name])
-            .output()
-            .expect("the binary starts");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(code), "{said}");
-        assert!(
-            said.contains(words) && said.trim().lines().count() == 1,
-            "{said}"
-        );
-    }
+    let broken = "+++\ntitle = \"a\"\nabot = \"b\"\n+++\n";
+    write(folder.path().join("broken.md"), broken);
+    let table = "
+        2 | lesson nonsense | four-points
+        3 | lesson broken.md | line 3
+    ";
+    refused(folder.path(), table);
 }
 
 /// The pages of a recording with their places on the timeline of decisions.
@@ -358,12 +332,12 @@ fn turn_their_pages(is_meant: impl Fn(&Lesson) -> bool) {
     let folder = tempfile::tempdir().expect("a folder");
     let lessons = Lesson::all().expect("our own").into_iter();
     for lesson in lessons.filter(is_meant) {
-        let path = folder.path().join(format!("{}.rrd", lesson.name));
-        posescope()
-            .args(["lesson", &lesson.name, "--save"])
-            .arg(&path)
-            .assert()
-            .code(0);
+        run_in(
+            folder.path(),
+            &format!("lesson {} --save a.rrd", lesson.name),
+        )
+        .ok();
+        let path = folder.path().join("a.rrd");
         let recorded = recorded_pages(&path);
         let all = lesson.pages.len();
         let wanted: Vec<String> = (lesson.pages.iter().enumerate())

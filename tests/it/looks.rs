@@ -12,7 +12,7 @@ use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
 
 use crate::painted::{PaintedWindow, painted};
-use crate::window::{run_until_idle, setup, wait};
+use crate::window::{app, run_until_idle, send, setup, wait};
 
 /// The views whose point is pixels.
 const PICTURES: [&str; 4] = ["images", "synthetic", "space", "surface"];
@@ -47,8 +47,7 @@ fn at_every_moment(
     see(window, "light", &[]);
     window.state_mut().send(Command::SetReferences(vec![0, 2]));
     let all = posescope::fusion::Fusion::all().collect();
-    window.state_mut().send(Command::SetFusions(all));
-    window.run_steps(2);
+    send(window, Command::SetFusions(all));
     wait(window, |app| {
         *app.app_state().run_state() == RunState::Finished
     });
@@ -162,8 +161,7 @@ fn every_view_bears_a_run_that_never_began() {
     let mut window = crate::window::window(broken);
     run_until_idle(&mut window);
     for entry in views::ALL {
-        window.state_mut().send(Command::Maximize(Some(entry.name)));
-        window.run_steps(3);
+        send(&mut window, Command::Maximize(Some(entry.name)));
     }
-    assert!(window.state().app_state().run().is_empty());
+    assert!(app(&window).run().is_empty());
 }

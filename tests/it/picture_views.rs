@@ -13,36 +13,34 @@ use posescope::event::{
 use posescope::features::FeatureState;
 use posescope::features::Features;
 use posescope::method::Method;
-use posescope::session::{RunMode, RunState};
+use posescope::session::RunMode;
 
 use crate::two_walls::CAMERA;
-use crate::window::{run_until_idle, setup, window};
+use crate::window::{app, finish, run_until_idle, send, setup, window};
 
 /// The small world after its run, at the end of a method, with a view in front.
 fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     order(&mut window, Command::SelectMethod(method));
     order(&mut window, Command::Maximize(Some(view)));
     window
 }
 
 fn order(window: &mut Harness<'_, App>, command: Command) {
-    window.state_mut().send(command);
-    window.step();
-    window.step();
+    send(window, command);
 }
 
 fn latest<E: DebugEvent + Clone + 'static>(window: &Harness<'_, App>) -> E {
-    let state = window.state().app_state();
+    let state = app(window);
     let event: Option<&E> = state.run().latest(state.cursor());
     event.expect("it was told").clone()
 }
 
 fn query_features(window: &Harness<'_, App>) -> Arc<Features> {
-    let state = window.state().app_state();
+    let state = app(window);
     let mut events = state.run().all_until::<FeaturesDetected>(state.cursor());
     let event = events.find(|(_, event)| event.side == Side::Query);
     Arc::clone(&event.expect("detected").1.features)
@@ -110,19 +108,17 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
     window
         .get_by_label(&format!("inlier: {inliers}, shown"))
         .click();
-    window.step();
-    window.step();
+    window.run_steps(2);
     window.get_by_label(&format!("inlier: {inliers}, hidden"));
     click(&mut window, place);
-    let selected = window.state().app_state().options.selected_feature;
+    let selected = app(&window).options.selected_feature;
     let is_inlier = |i: usize| matches!(states[i], FeatureState::Inlier { .. });
     assert!(!selected.is_some_and(is_inlier), "it is hidden");
 
     let outliers = count("outlier");
     let label = format!("outlier: {outliers}, shown");
     window.get_by_label(&label).click_secondary();
-    window.step();
-    window.step();
+    window.run_steps(2);
     window.get_by_label(&label);
     window.get_by_label(&format!("no_depth: {}, hidden", count("no_depth")));
 }
@@ -132,10 +128,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     let mut window = finished(Method::FB, "images");
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
-    assert_eq!(
-        window.state().app_state().options.selected_feature,
-        Some(feature)
-    );
+    assert_eq!(app(&window).options.selected_feature, Some(feature));
     window.get_by_label(&format!("query feature {feature}: inlier"));
 
     let decisions = latest::<MatchesDecided>(&window).decisions;
@@ -158,9 +151,8 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     window.get_by_label("reference patch");
 
     window.get_by_label("Close feature").click();
-    window.step();
-    window.step();
-    assert_eq!(window.state().app_state().options.selected_feature, None);
+    window.run_steps(2);
+    assert_eq!(app(&window).options.selected_feature, None);
 }
 
 #[test]
@@ -191,7 +183,7 @@ fn only_differences_leaves_the_features_that_ended_in_another_state() {
     let before = latest::<FeaturesClassified>(&window).states;
     let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
     order(&mut window, Command::SetParam { key, value });
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     order(&mut window, Command::SelectMethod(Method::FB));
     let after = latest::<FeaturesClassified>(&window).states;
     let pairs = before.iter().zip(after.iter());
@@ -224,8 +216,7 @@ fn linked_photos_zoom_together_and_a_double_click_shows_them_whole() {
     }
     assert!(!whole(&window));
     window.get_by_label("Whole photos").click();
-    window.step();
-    window.step();
+    window.run_steps(2);
     assert!(whole(&window));
 }
 
@@ -250,7 +241,7 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
             assessed.shuffled.expect("a cost")
         ));
         window.get_by_label(&format!("best {:.4}", assessed.best));
-        let results = window.state().app_state().run().results();
+        let results = app(&window).run().results();
         let mut costs = results.filter(|result| result.method == method);
         let cost = costs
             .find_map(|result| result.cost.clone())
@@ -262,29 +253,17 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
 #[test]
 fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
     let mut window = finished(Method::MI, "synthetic");
-    let truth = window
-        .state()
-        .app_state()
-        .run()
-        .loaded
-        .as_ref()
-        .expect("loaded")
-        .truth;
+    let truth = app(&window).run().loaded.as_ref().expect("loaded").truth;
     order(&mut window, Command::TakeCamera(truth));
     let begun = std::time::Instant::now();
-    while window.state().app_state().probe().is_none() {
+    while app(&window).probe().is_none() {
         assert!(begun.elapsed().as_secs() < 60, "it hangs");
         std::thread::sleep(std::time::Duration::from_millis(5));
         window.step();
     }
     window.step();
     window.get_by_label("MI, camera in hand");
-    let probe = window
-        .state()
-        .app_state()
-        .probe()
-        .expect("an answer")
-        .clone();
+    let probe = app(&window).probe().expect("an answer").clone();
     for (_, comparison) in &probe.comparisons {
         let cost = comparison.score.cost.expect("a cost");
         window.get_by_label(&format!("present {cost:.4}"));
@@ -306,12 +285,10 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
     ];
     for (method, own) in [("MI", "shares"), ("PM", "weights")] {
         window.get_by_label(&format!("{method} pictures")).click();
-        window.step();
-        window.step();
+        window.run_steps(2);
         for name in common.into_iter().chain([own]) {
             window.get_by_label(&format!("Show {name}")).click();
-            window.step();
-            window.step();
+            window.run_steps(2);
             window.get_by_label(&format!("{method} picture: {name}"));
         }
     }
@@ -331,15 +308,13 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 fn both_views_draw_at_every_moment_of_a_run() {
     let mut window = finished(Method::FB, "images");
     order(&mut window, Command::SelectFeature(Some(0)));
-    let len = window.state().app_state().run().len();
+    let len = app(&window).run().len();
     // Every moment of FB's story, and some of the long searches.
     let mut cursor = 0;
     while cursor < len {
         for view in ["images", "synthetic"] {
             window.state_mut().send(Command::Maximize(Some(view)));
-            window.state_mut().send(Command::MoveCursor(cursor));
-            window.step();
-            window.step();
+            send(&mut window, Command::MoveCursor(cursor));
         }
         cursor += if cursor < 12 { 1 } else { 1 + len / 97 };
     }

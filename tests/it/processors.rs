@@ -6,7 +6,7 @@ use std::process::Command;
 
 use assert_cmd::cargo::cargo_bin;
 
-use crate::binary::CACHE;
+use crate::binary::{CACHE, Said};
 use crate::real_pair::authors_pair;
 
 /// One that has nothing beyond SSE4.2, and one with AVX2 and FMA but no AVX-512.
@@ -28,7 +28,7 @@ fn emulator() -> Option<PathBuf> {
 }
 
 /// The results of an evaluation, on an emulated processor or on this one.
-fn results(asked: &[&str], processor: Option<(&Path, &str)>, folder: &Path) -> Vec<u8> {
+fn results(asked: &str, processor: Option<(&Path, &str)>, folder: &Path) -> Vec<u8> {
     let binary = cargo_bin("posescope");
     let mut command = match processor {
         Some((emulator, processor)) => {
@@ -38,19 +38,15 @@ fn results(asked: &[&str], processor: Option<(&Path, &str)>, folder: &Path) -> V
         }
         None => Command::new(binary),
     };
-    command
-        .env("POSESCOPE_CACHE", CACHE)
-        .arg("eval")
-        .args(asked);
-    command.args(["--compute", "cpu", "--keep-failures", "0", "-q"]);
-    let out = folder.join(processor.map_or("here", |(_, name)| name));
-    let output = command.arg("--out").arg(&out).output().expect("it starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    fs::read(out.join("results.jsonl")).expect("results")
+    let out = processor.map_or("here", |(_, name)| name);
+    let line = format!("eval {asked} --compute cpu --keep-failures 0 -q --out {out}");
+    command.env("POSESCOPE_CACHE", CACHE).current_dir(folder);
+    command.args(shlex::split(&line).expect("words"));
+    Said::of(&command.output().expect("it starts")).ok();
+    fs::read(folder.join(out).join("results.jsonl")).expect("results")
 }
 
-fn assert_same_everywhere(asked: &[&str], processors: &[&str]) {
+fn assert_same_everywhere(asked: &str, processors: &[&str]) {
     let Some(emulator) = emulator() else {
         return;
     };
@@ -67,43 +63,17 @@ fn assert_same_everywhere(asked: &[&str], processors: &[&str]) {
 #[test]
 #[ignore = "emulates processors; .ci/nightly runs it"]
 fn a_night_photo_of_the_street_has_the_same_results_on_any_processor() {
-    assert_same_everywhere(
-        &[
-            "street:night",
-            "--query-scene",
-            "street:overcast",
-            "--query",
-            "70",
-            "--reference",
-            "nearest:1",
-            "--radius",
-            "5",
-            "--method",
-            "fb,pm,mi,hy,nid",
-        ],
-        &PROCESSORS,
-    );
+    let asked = "street:night --query-scene street:overcast --query 70 --reference nearest:1 \
+                 --radius 5 --method fb,pm,mi,hy,nid";
+    assert_same_everywhere(asked, &PROCESSORS);
 }
 
 #[test]
 #[ignore = "emulates processors; .ci/nightly runs it"]
 fn the_real_pair_has_the_same_results_on_any_processor() {
-    let Some(sequence) = authors_pair() else {
-        return;
-    };
-    let sequence = sequence.display().to_string();
-    assert_same_everywhere(
-        &[
-            &sequence,
-            "--query",
-            "3823",
-            "--reference",
-            "nearest:1",
-            "--radius",
-            "10.5",
-            "--method",
-            "fb,pm,mi",
-        ],
-        &PROCESSORS[..1],
-    );
+    if let Some(sequence) = authors_pair() {
+        let asked = "--query 3823 --reference nearest:1 --radius 10.5 --method fb,pm,mi";
+        let asked = format!("'{}' {asked}", sequence.display());
+        assert_same_everywhere(&asked, &PROCESSORS[..1]);
+    }
 }

@@ -23,7 +23,7 @@ use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use rerun::log::{Chunk, LogMsg};
 
-use crate::binary::posescope;
+use crate::binary::{has, posescope};
 use crate::small_sequence::SmallSequence;
 use crate::two_walls::solvable;
 
@@ -488,10 +488,7 @@ fn a_full_disk_is_reported_with_the_name_of_the_file() {
         panic!("there is no room for even the header");
     };
     let line = error.to_string();
-    assert!(
-        line.contains("/dev/full: No space left on device"),
-        "{line}"
-    );
+    has(&line, "/dev/full: No space left on device");
 }
 
 #[test]

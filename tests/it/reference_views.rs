@@ -19,19 +19,18 @@ use posescope::session::{IndexFile, Part, RunMode, RunState};
 use posescope::sink::rerun::entities;
 use posescope::trace::{Cancelled, Record, Sink};
 
+use crate::binary::has;
 use crate::recording::{chunks, timelines};
 use crate::walls_scene::Walls;
-use crate::window::{finished, is_said, results, run_until_idle, setup};
+use crate::window::{app, finish, finished, is_said, results, run_until_idle, send, setup};
 
 fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
-    window.state_mut().send(Command::Maximize(Some(view)));
-    window.run_steps(3);
+    send(window, Command::Maximize(Some(view)));
 }
 
 fn pick(window: &mut Harness<'_, App>, selection: Selection) -> RunState {
     let pick = ReferencePick::By(selection);
-    window.state_mut().send(Command::PickReferences(pick));
-    window.run_steps(2);
+    send(window, Command::PickReferences(pick));
     run_until_idle(window)
 }
 
@@ -57,7 +56,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
         .get_by_role_and_label(egui::Role::CheckBox, "000002")
         .click();
     window.run_steps(2);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     assert!(
         results(&window)
@@ -65,19 +64,19 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
             .all(|result| result.fusion.is_none())
     );
 
-    let stages = window.state().app_state().run().stages();
+    let stages = app(&window).run().stages();
     let inner = stages.iter().filter(|bar| bar.stage.name() == "detect");
     assert!(inner.count() >= 2);
     window.get_by_label("wavg").click();
     window.run_steps(2);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     let fused: Vec<_> = results(&window)
         .into_iter()
         .filter(|result| result.fusion.is_some_and(|f| f.name == "wavg"))
         .collect();
     assert_eq!(fused.len(), Method::PAPER.len());
     // Only the fusion is new.
-    let run = window.state().app_state().run();
+    let run = app(&window).run();
     for bar in run.stages() {
         let name = bar.stage.name();
         assert!(name != "detect" && name != "color" || bar.reused, "{name}");
@@ -85,27 +84,21 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     let folder = tempfile::tempdir().expect("a folder");
     let recording = folder.path().join("fused.rrd");
     let save = Command::SaveRecording(recording.clone());
-    window.state_mut().send(save);
-    window.run_steps(2);
+    send(&mut window, save);
     let recorded = timelines(&chunks(&recording));
     assert!(recorded.contains_key(&entities::fusion_weights(Method::FB)));
     assert!(!recorded.contains_key(entities::RETRIEVAL_TABLE));
 
-    let command = window.state().app_state().setup.command_line();
-    assert!(
-        command.contains("--reference 000000 --reference 000002"),
-        "{command}"
-    );
-    assert!(command.contains("--fusion wavg"), "{command}");
+    let command = app(&window).setup.command_line();
+    has(&command, "--reference 000000 --reference 000002");
+    has(&command, "--fusion wavg");
 
     maximize(&mut window, "fusion");
-    window.state_mut().send(Command::Last);
-    window.run_steps(3);
+    send(&mut window, Command::Last);
     assert!(is_said(&window, "HY, 2 references"));
     let error = fused[3].error.expect("the truth is known");
     assert!(is_said(&window, &format!("{:.3} m", error.translation_m)));
-    window.state_mut().send(Command::SelectMethod(Method::FB));
-    window.run_steps(3);
+    send(&mut window, Command::SelectMethod(Method::FB));
     assert!(is_said(&window, "FB, 2 references"));
 
     // Without a second reference there is nothing to fuse, but a fusion of one is its pose.
@@ -130,7 +123,7 @@ fn references_may_be_as_far_away_as_the_prior_allows() {
     assert_eq!(narrow.candidates(1), [2, 0]);
     let mut window = finished(narrow);
     assert_eq!(pick(&mut window, Selection::Nearest(2)), RunState::Finished);
-    assert_eq!(window.state().app_state().setup.chosen.frames, [2, 0]);
+    assert_eq!(app(&window).setup.chosen.frames, [2, 0]);
     maximize(&mut window, "references");
     assert!(is_said(&window, "2 of 2 frames within 3 m"));
 }
@@ -139,12 +132,12 @@ fn references_may_be_as_far_away_as_the_prior_allows() {
 fn references_are_ranked_by_their_matches() {
     let mut window = finished(setup());
     assert_eq!(pick(&mut window, Selection::Matched(1)), RunState::Finished);
-    let setup = &window.state().app_state().setup;
+    let setup = &app(&window).setup;
     let ranking = setup.chosen.ranking.as_ref().expect("they were ranked");
     assert_eq!(setup.chosen.frames, [ranking.frames[0].ranked.frame]);
     let scores: Vec<f32> = ranking.frames.iter().map(|f| f.ranked.score).collect();
     assert!(scores.len() == 2 && scores[0] >= scores[1], "{scores:?}");
-    let run = window.state().app_state().run();
+    let run = app(&window).run();
     assert_eq!(run.spans()[0].part, Part::Retrieval);
     maximize(&mut window, "retrieval");
     assert!(is_said(
@@ -154,10 +147,9 @@ fn references_are_ranked_by_their_matches() {
     // What a setting changes does not change the references.
     let key = "fb.ratio".to_owned();
     let value = "0.7".to_owned();
-    window.state_mut().send(Command::SetParam { key, value });
-    window.run_steps(2);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
-    let again = &window.state().app_state().run().spans()[0];
+    send(&mut window, Command::SetParam { key, value });
+    finish(&mut window);
+    let again = &app(&window).run().spans()[0];
     assert_eq!(again.part, Part::Retrieval);
 }
 
@@ -192,7 +184,7 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
         pick(&mut window, Selection::Retrieved(2)),
         RunState::Finished
     );
-    let chosen = &window.state().app_state().setup.chosen;
+    let chosen = &app(&window).setup.chosen;
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     maximize(&mut window, "retrieval");
@@ -200,13 +192,12 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
         &window,
         "2 of 2 frames are references, ranked by visual words"
     ));
-    let ranking = window.state().app_state().setup.chosen.ranking.clone();
+    let ranking = app(&window).setup.chosen.ranking.clone();
     let first = &ranking.expect("an index ranks").frames[0];
     let found = first.ranked.verification().expect("the walls are the same");
     let recording = folder.path().join("ranked.rrd");
     let save = Command::SaveRecording(recording.clone());
-    window.state_mut().send(save);
-    window.run_steps(2);
+    send(&mut window, save);
     assert!(timelines(&chunks(&recording)).contains_key(entities::RETRIEVAL_TABLE));
     let name = format!("{} matches with {}", found.matches.len(), first.name);
     assert!(is_said(&window, &name), "{name}");
@@ -294,7 +285,7 @@ fn the_bar_says_how_many_frames_were_looked_at() {
     slow.task.protocol.select(Selection::Matched(1));
     let mut window = crate::window::window(slow);
     let mut is_told = false;
-    while *window.state().app_state().run_state() == RunState::Loading {
+    while *app(&window).run_state() == RunState::Loading {
         window.step();
         is_told |= is_said(&window, "Choosing references: 2 of 2 frames");
     }

@@ -1,29 +1,20 @@
 //! `report.html`: what `eval` leaves in a run folder and `posescope results --as html` makes of one.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command as Process;
 
-use crate::binary::posescope;
+use crate::binary::{Said, command_in, has, text, write};
 use crate::small_sequence::SmallSequence;
 
-/// Two methods over four frames, one of which is black, with a gate.
-fn run(sequence: &SmallSequence, name: &str, extra: &[&str]) -> PathBuf {
-    let out = sequence.path().join(name);
-    let black = image::GrayImage::new(160, 64);
-    black.save(sequence.image("000002")).expect("writable");
-    let mut command = posescope();
-    command.arg("eval").arg(sequence.folder());
-    command.args(["--method", "fb,mi", "--radius", "3", "-q"]);
-    command.args(["--reference", "nearest:1", "--gate", "success@mi >= 0"]);
-    command.arg("--out").arg(&out).args(extra);
-    command.env_remove("GITHUB_STEP_SUMMARY");
-    command.assert().code(0);
-    out
-}
-
-fn text(path: &Path) -> String {
-    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+/// Two methods over four frames, one of which is black, with a gate: the report.
+#[track_caller]
+fn run(sequence: &SmallSequence, out: &str, words: &str) -> String {
+    sequence.blacken("000002");
+    let asked = "--method fb,mi --radius 3 -q --reference nearest:1 --gate 'success@mi >= 0'";
+    let line = format!("eval sequences/42 {asked} --out {out} {words}");
+    Said::by(command_in(sequence.path(), &line).env_remove("GITHUB_STEP_SUMMARY")).ok();
+    sequence.text(&format!("{out}/report.html"))
 }
 
 /// Whatever an attribute or a style names.
@@ -36,7 +27,7 @@ fn named<'a>(page: &'a str, before: &str, end: char) -> Vec<&'a str> {
 
 /// Where recordings can be looked at without a viewer of one's own: the version that writes them.
 fn web_viewer() -> String {
-    let manifest = text(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
+    let manifest = text(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
     let manifest: toml::Table = manifest.parse().expect("a manifest");
     let version = manifest["dependencies"]["rerun"]["version"].as_str();
     let version = version.and_then(|version| version.strip_prefix('='));
@@ -70,144 +61,95 @@ fn assert_self_contained(page: &str) {
 #[test]
 fn eval_leaves_a_report_that_needs_nothing_else() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let out = run(&sequence, "run", &["--threads", "1"]);
-    let page = text(&out.join("report.html"));
+    let page = run(
+        &sequence,
+        "run",
+        "--threads 1 --explain 1 --min-confidence 0.25",
+    );
     assert_self_contained(&page);
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
     // Thumbnails are kept once for each query, whatever the number of its results.
-    assert_eq!(
-        page.matches("{background-image:url(data:image/jpeg;base64,")
-            .count(),
-        4
+    let thumbnail = "{background-image:url(data:image/jpeg;base64,";
+    assert_eq!(page.matches(thumbnail).count(), 4);
+    // The black photo is a failure of fb with the line that opens its recording, and a direct method's
+    // failure has its costs.
+    let viewer = web_viewer();
+    has(
+        &page,
+        &format!("<a hidden{viewer} data-recording=\"failures/000002-fb.rrd\">"),
     );
-    assert!(page.contains("kitti/42") && page.contains("success@mi &gt;= 0"));
-    // The black photo is a failure of fb with the line that opens its recording.
-    assert!(page.contains("<code>rerun failures/000002-fb.rrd</code>"));
-    let link = format!(
-        "<a hidden{} data-recording=\"failures/000002-fb.rrd\">",
-        web_viewer()
-    );
-    assert!(page.contains(&link));
-    assert!(page.contains("Too few keypoints"));
-    // A direct method's failure has its costs.
-    assert!(page.contains("Cost of each position"));
-    for part in [
-        "<caption>",
-        "scope=\"col\"",
-        "lang=\"en\"",
-        "aria-label=\"All results\"",
+    for words in [
+        "kitti/42 ~ success@mi &gt;= 0 ~ Too few keypoints ~ Cost of each position",
+        "<code>rerun failures/000002-fb.rrd</code>",
+        "<caption> ~ scope=\"col\" ~ lang=\"en\" ~ aria-label=\"All results\"",
+        "<dt>explain</dt><dd>1</dd> ~ <dt>min-confidence</dt><dd>0.25</dd>",
+        "within 1m,5deg of the truth; wrong otherwise ~ success, as the paper counts it",
     ] {
-        assert!(page.contains(part), "{part}");
+        has(&page, words);
     }
 
     // From the folder alone, on any number of threads: the same bytes.
-    let again = sequence.path().join("again.html");
-    let mut command = posescope();
-    command
-        .arg("results")
-        .arg(&out)
-        .args(["--as", "html", "--out"]);
-    command.arg(&again).args(["--threads", "3"]);
-    command.assert().code(0);
-    assert_eq!(text(&again), page);
+    sequence
+        .run("results run --as html --out again.html --threads 3")
+        .ok();
+    assert!(sequence.text("again.html") == page);
 
     // Without the scene there are no photos, which is said; everything else stays.
     fs::rename(sequence.folder(), sequence.path().join("away")).expect("movable");
-    let mut command = posescope();
-    command.arg("results").arg(&out).args(["--as", "html"]);
-    command.assert().code(0);
-    let page = text(&out.join("report.html"));
+    sequence.run("results run --as html").ok();
+    let page = sequence.text("run/report.html");
     assert_self_contained(&page);
-    assert!(page.contains("There are no photos: "));
+    has(&page, "There are no photos: ");
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
-    let mut command = posescope();
-    let nowhere = sequence.path().join("nowhere");
-    command.arg("results").arg(nowhere).args(["--as", "html"]);
-    command.assert().code(3);
-}
+    sequence
+        .run("results nowhere --as html")
+        .fails(3, "nowhere");
 
-#[test]
-fn the_report_says_all_that_was_asked() {
-    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let out = run(
-        &sequence,
-        "run",
-        &["--limit", "3", "--explain", "1", "--min-confidence", "0.25"],
-    );
-    let page = text(&out.join("report.html"));
-    for words in [
-        "<dt>limit</dt><dd>3</dd>",
-        "<dt>explain</dt><dd>1</dd>",
-        "<dt>min-confidence</dt><dd>0.25</dd>",
-        "within 1m,5deg of the truth; wrong otherwise",
-        "success, as the paper counts it",
-    ] {
-        assert!(page.contains(words), "{words}");
-    }
-}
-
-#[test]
-fn two_runs_are_held_against_each_other() {
-    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let before = run(&sequence, "before", &["--right", "0.5m,5deg"]);
-    let after = run(&sequence, "after", &[]);
-    let compared = sequence.path().join("compared.html");
-    posescope()
-        .arg("compare")
-        .args([&before, &after])
-        .arg("--html")
-        .arg(&compared)
-        .assert()
-        .code(0);
-    let page = text(&compared);
-    assert_self_contained(&page);
-    assert!(page.contains("Changes since <code>"));
-    assert!(
-        page.contains(">fixed</td>"),
-        "a wider tolerance fixes what was wrong"
-    );
-}
-
-#[test]
-fn what_comes_from_elsewhere_is_no_markup() {
-    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let out = run(&sequence, "run", &[]);
-    let evil = "</td><script>alert('&')</script>";
+    // What comes from elsewhere is no markup.
     for file in ["run.toml", "results.jsonl"] {
-        let path = out.join(file);
-        let spoilt = text(&path).replace("000002", evil);
+        let path = sequence.path().join("run").join(file);
+        let spoilt = text(&path).replace("000002", "</td><script>alert('&')</script>");
         let spoilt = spoilt.replace("Too few keypoints", "<img src=x onerror=alert(1)>");
-        fs::write(path, spoilt).expect("writable");
+        write(path, spoilt);
     }
-    let mut command = posescope();
-    command.arg("results").arg(&out).args(["--as", "html"]);
-    command.assert().code(0);
-    let page = text(&out.join("report.html"));
+    sequence.run("results run --as html").ok();
+    let page = sequence.text("run/report.html");
     assert!(!page.contains("<script>alert") && !page.contains("<img src=x"));
-    assert!(page.contains("&lt;script&gt;alert('&amp;')&lt;/script&gt;"));
+    has(&page, "&lt;script&gt;alert('&amp;')&lt;/script&gt;");
     assert_eq!(page.matches("<script>").count(), 1);
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
 }
 
 #[test]
+fn two_runs_are_held_against_each_other() {
+    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
+    let before = run(&sequence, "before", "--right 0.5m,5deg --limit 3");
+    has(&before, "<dt>limit</dt><dd>3</dd>");
+    run(&sequence, "after", "--limit 3");
+    sequence
+        .run("compare before after --html compared.html")
+        .ok();
+    let page = sequence.text("compared.html");
+    assert_self_contained(&page);
+    // A wider tolerance fixes what was wrong.
+    has(&page, "Changes since <code> ~ >fixed</td>");
+}
+
+#[test]
 fn a_browser_sorts_and_filters_it_without_a_complaint() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let out = run(&sequence, "run", &[]);
+    run(&sequence, "run", "");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/ci/check-report.sh");
-    let checked = Process::new("bash")
+    let mut shell = Process::new("bash");
+    shell
         .arg(script)
-        .arg(out.join("report.html"))
-        .output();
-    let checked = match checked {
-        Ok(checked) => checked,
-        Err(_) => return println!("skipped: no shell"),
+        .arg(sequence.path().join("run/report.html"));
+    let Ok(output) = shell.output() else {
+        return println!("skipped: no shell");
     };
-    let said = String::from_utf8_lossy(&checked.stdout);
-    println!("{said}");
-    if checked.status.code() == Some(77) {
-        return;
+    let said = Said::of(&output);
+    println!("{}", said.out);
+    if said.code != Some(77) {
+        has(&said.ok().out, "\"results\":8");
     }
-    let wrong = String::from_utf8_lossy(&checked.stderr);
-    assert_eq!(checked.status.code(), Some(0), "{said}{wrong}");
-    assert!(said.contains("\"results\":8"), "{said}");
 }

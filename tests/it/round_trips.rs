@@ -178,14 +178,13 @@ fn expect_cloud(layout: &Layout, street: &Street, disk: &dyn Scene) {
                 );
             }
         }
-        "tum" | "7scenes" => {
-            let unit_m = if layout.name == "tum" { 0.0002 } else { 0.001 };
+        "tum" => {
             assert!(cloud.len() > 3000, "{}", cloud.len());
             for read in cloud.iter().step_by(7) {
                 let pixel = camera.project(&read.cast()).expect("is ahead");
                 let pixel = pixel.map(f64::round);
                 let depth = street.traversal().depth(WRITTEN[1], pixel).expect("no sky");
-                assert!((f64::from(read.z) - depth).abs() < 0.51 * unit_m + 1e-5);
+                assert!((f64::from(read.z) - depth).abs() < 0.51 * 0.0002 + 1e-5);
             }
         }
         other => panic!("what the cloud of the layout {other} is like is wanted here"),

@@ -9,9 +9,10 @@ use posescope::event::{
 };
 use posescope::grid::{DenseSurface, GridParams, Offset, Phase, least_covered};
 use posescope::method::Method;
-use posescope::session::{RunMode, RunState, Span};
+use posescope::session::{RunMode, Span};
 
-use crate::window::{run_until_idle, setup, wait, window};
+use crate::binary::has;
+use crate::window::{app, finish, run_until_idle, send, setup, wait, window};
 
 /// The small world after all of its run.
 fn finished() -> Harness<'static, App> {
@@ -20,12 +21,12 @@ fn finished() -> Harness<'static, App> {
     let mut window = window(setup);
     // It shares its place with the view of the space.
     window.state_mut().send(Command::ShowView("ransac"));
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     window
 }
 
 fn span(window: &Harness<'_, App>, method: Method) -> Span {
-    let spans = window.state().app_state().run().spans();
+    let spans = app(window).run().spans();
     let span = spans.iter().find(|span| span.part.method() == Some(method));
     span.expect("the method ran").clone()
 }
@@ -33,7 +34,7 @@ fn span(window: &Harness<'_, App>, method: Method) -> Span {
 /// The events of a type that a method told, with their positions.
 fn told<E: DebugEvent + Clone>(window: &Harness<'_, App>, method: Method) -> Vec<(usize, E)> {
     let records = span(window, method).records;
-    let all = window.state().app_state().run().records();
+    let all = app(window).run().records();
     records
         .filter_map(|at| Some((at, E::from_event(&all[at].event)?.clone())))
         .collect()
@@ -125,7 +126,7 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
                 .iter()
                 .find(|(_, event)| !event.phase.is_yaw() && readout.starts_with(&words(event)))
                 .unwrap_or_else(|| panic!("`{readout}` was not recorded"));
-            let state = window.state().app_state();
+            let state = app(&window);
             let problem = &state.run().loaded.as_ref().expect("loaded").problems[0];
             let pose = problem.world_from_query(&event.offset.reference_from_camera());
             let hovered = state.hovered.expect("the pointer is over a cell");
@@ -143,14 +144,13 @@ fn leaving_a_map_is_said_once() {
     let mut window = finished();
     move_to_end(&mut window, Method::MI);
     hover(&mut window, "Cost map", 0.5, 0.5).expect("a cell");
-    let hovered = window.state().app_state().hovered;
+    let hovered = app(&window).hovered;
     assert!(hovered.is_some());
     window.hover_at(egui::pos2(5.0, 5.0));
     window.run_steps(3);
-    assert_eq!(window.state().app_state().hovered, None);
-    window.state_mut().send(Command::Hover(hovered));
-    window.run_steps(3);
-    assert_eq!(window.state().app_state().hovered, hovered);
+    assert_eq!(app(&window).hovered, None);
+    send(&mut window, Command::Hover(hovered));
+    assert_eq!(app(&window).hovered, hovered);
 }
 
 #[test]
@@ -158,7 +158,7 @@ fn a_click_takes_the_camera_to_the_cell() {
     let mut window = finished();
     move_to_end(&mut window, Method::PM);
     hover(&mut window, "Cost map", 0.25, 0.5).expect("a cell");
-    let hovered = window.state().app_state().hovered;
+    let hovered = app(&window).hovered;
     let rect = window.get_by_label_contains("Cost map").rect();
     let at = rect.min + rect.size() * egui::vec2(0.25, 0.5);
     window.drag_at(at);
@@ -166,14 +166,13 @@ fn a_click_takes_the_camera_to_the_cell() {
     window.drop_at(at);
     window.run_steps(2);
     assert!(hovered.is_some());
-    assert_eq!(window.state().app_state().camera, hovered);
+    assert_eq!(app(&window).camera, hovered);
 }
 
 #[test]
 fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded() {
     let mut window = finished();
-    window.state_mut().send(Command::Maximize(Some("surface")));
-    window.run_steps(3);
+    send(&mut window, Command::Maximize(Some("surface")));
     let scored = told::<PoseScored>(&window, Method::MI);
     for &(at, ref event) in scored
         .iter()
@@ -211,8 +210,7 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
 #[test]
 fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
     let mut window = finished();
-    window.state_mut().send(Command::Maximize(Some("surface")));
-    window.run_steps(2);
+    send(&mut window, Command::Maximize(Some("surface")));
     move_to_end(&mut window, Method::MI);
     let surfaces = told::<PhaseSearched>(&window, Method::MI);
     let surface = &surfaces[0].1.surface;
@@ -246,15 +244,8 @@ fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
 
     window.get_by_label("Run with this floor").click();
     window.run_steps(2);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
-    let floor = window
-        .state()
-        .app_state()
-        .setup
-        .task
-        .params
-        .grid
-        .coverage_floor;
+    finish(&mut window);
+    let floor = app(&window).setup.task.params.grid.coverage_floor;
     assert!((floor - moving).abs() < 1e-9, "{floor}");
     let surfaces = told::<PhaseSearched>(&window, Method::MI);
     assert_eq!(surfaces[0].1.surface.minimum(), Some(cell));
@@ -349,7 +340,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
         .get_by_label_contains("log likelihood by trial")
         .click();
     window.run_steps(3);
-    let cursor = window.state().app_state().cursor();
+    let cursor = app(&window).cursor();
     let place = trials.iter().position(|(at, _)| *at == cursor);
     let place = place.expect("the cursor is at a trial");
     let middle = trials.len() / 2;
@@ -386,7 +377,7 @@ fn every_moment_of_a_run_can_be_drawn() {
     // From the first frame on, when nothing is read yet.
     let mut window = finished();
     window.state_mut().send(Command::ShowView("ransac"));
-    let records = window.state().app_state().run().len();
+    let records = app(&window).run().len();
     for cursor in (0..records).step_by(9).chain([records - 1]) {
         move_to(&mut window, cursor);
         // Each says what is missing, or names what it draws.
@@ -419,15 +410,14 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
         setup.task.params.assign(assignment).expect("a parameter");
     }
     let mut window = window(setup);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     move_to_end(&mut window, Method::MI);
-    window.state_mut().send(Command::Maximize(Some("surface")));
-    window.run_steps(3);
+    send(&mut window, Command::Maximize(Some("surface")));
     wait(&mut window, |app| {
         app.app_state().cost_along(Method::MI).is_some() && !app.app_state().is_tracing_line()
     });
     window.run_steps(2);
-    let state = window.state().app_state();
+    let state = app(&window);
     let along = state.cost_along(Method::MI).expect("traced");
     let result = span(&window, Method::MI).result.expect("a result");
     let reported = result.cost.as_ref().expect("a cost");
@@ -467,19 +457,16 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
         .rect();
     window.hover_at(plot.center());
     window.run_steps(3);
-    let hovered = window.state().app_state().hovered.expect("a pose");
+    let hovered = app(&window).hovered.expect("a pose");
     let way = hovered.translation.vector - along_from(&window);
-    let length = window
-        .state()
-        .app_state()
+    let length = app(&window)
         .cost_along(Method::MI)
         .expect("traced")
         .line
         .length_m();
     assert!(way.norm() < 1.3 * length, "{way} of {length}");
     // A truth that is hidden has no line.
-    window.state_mut().send(Command::ShowTruth);
-    window.run_steps(3);
+    send(&mut window, Command::ShowTruth);
     assert!(texts(&window, "Cost from the result").is_empty());
     assert!(!texts(&window, "The truth is hidden (G shows it)").is_empty());
 }
@@ -510,14 +497,14 @@ fn filled_densely() -> Harness<'static, App> {
 
 /// What is known of the dense map of MI.
 fn dense(window: &Harness<'_, App>) -> DenseSurface {
-    let map = window.state().app_state().dense_map(Method::MI);
+    let map = app(window).dense_map(Method::MI);
     map.expect("asked for").surface().expect("small").clone()
 }
 
 #[test]
 fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_there() {
     let mut window = filled_densely();
-    let state = window.state().app_state();
+    let state = app(&window);
     let problem = state.run().loaded.as_ref().expect("loaded").problems[0].clone();
     let params = state.setup.task.params.clone();
     let filled = dense(&window);
@@ -563,15 +550,12 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
         words.contains(&format!("{:.4}", best.cost.expect("covered"))),
         "{words}"
     );
-    assert!(
-        words.contains("from the truth; the search ended"),
-        "{words}"
-    );
+    has(&words, "from the truth; the search ended");
 
     // A click on its mark in the legend takes the camera there, heading and all.
     click(&window, "least of all ");
     window.run_steps(2);
-    let camera = window.state().app_state().camera.expect("taken");
+    let camera = app(&window).camera.expect("taken");
     let found = Offset::of(&problem.reference_from_query(&camera));
     let off = [
         found.right_m - least.right_m,
@@ -583,7 +567,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     let mut headings = Vec::new();
     for (right, down) in [(0.3, 0.5), (0.4, 0.3), (0.6, 0.6), (0.7, 0.4), (0.5, 0.5)] {
         let readout = hover(&mut window, "Cost map", right, down).expect("a cell");
-        let hovered = window.state().app_state().hovered.expect("a pose");
+        let hovered = app(&window).hovered.expect("a pose");
         let there = Offset::of(&problem.reference_from_query(&hovered));
         let near = |(offset, _): &(Offset, _)| {
             (offset.right_m - there.right_m).hypot(offset.forward_m - there.forward_m) < 1e-6
@@ -614,7 +598,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     assert!(text(&window, "Cost map").contains("position, coarse"));
     window.key_press(egui::Key::F);
     window.run_steps(3);
-    assert!(!window.state().app_state().is_filling_dense_map());
+    assert!(!app(&window).is_filling_dense_map());
     assert!(text(&window, "Cost map").contains(&format!("{all} of {all}")));
 }
 
@@ -632,7 +616,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     wait(&mut window, has_begun);
     window.state_mut().send(Command::Maximize(Some("report")));
     window.run_steps(4);
-    assert!(!window.state().app_state().is_filling_dense_map());
+    assert!(!app(&window).is_filling_dense_map());
     std::thread::sleep(std::time::Duration::from_millis(50));
     window.run_steps(2);
     let stood = dense(&window);
@@ -648,7 +632,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     wait(&mut window, is_done);
     let whole = dense(&window);
     // What was scored twice or not at all would show in one that is filled in one go.
-    let state = window.state().app_state();
+    let state = app(&window);
     let params = &state.setup.task.params;
     let problem = &state.run().loaded.as_ref().expect("loaded").problems[0];
     let grid = GridParams {
@@ -681,7 +665,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
 }
 
 fn along_from(window: &Harness<'_, App>) -> nalgebra::Vector3<f64> {
-    let along = window.state().app_state().cost_along(Method::MI);
+    let along = app(window).cost_along(Method::MI);
     along.expect("traced").line.from.translation.vector
 }
 
@@ -708,8 +692,7 @@ fn the_truth_is_seen_whatever_else_is_there() {
     };
     run_until_idle(&mut window);
     window.state_mut().send(Command::SelectMethod(Method::MI));
-    window.state_mut().send(Command::Maximize(Some("surface")));
-    window.run_steps(3);
+    send(&mut window, Command::Maximize(Some("surface")));
     // The colour of the truth, which recordings have too.
     let [r, g, b] = posescope::palette::TRUTH;
     let truth = egui::Color32::from_rgb(r, g, b);
@@ -723,10 +706,10 @@ fn the_truth_is_seen_whatever_else_is_there() {
     let alone = pixels_of(&map(&mut window), truth);
     assert!(alone > 20, "{alone}");
     // The camera goes to the truth, where its own mark lies on that place too.
-    window
-        .state_mut()
-        .send(Command::JumpCamera(posescope::app::NamedPose::Truth));
-    window.run_steps(3);
+    send(
+        &mut window,
+        Command::JumpCamera(posescope::app::NamedPose::Truth),
+    );
     wait(&mut window, |app| !app.app_state().is_probing());
     window.run_steps(3);
     let beneath = pixels_of(&map(&mut window), truth);

@@ -10,15 +10,14 @@ use posescope::grid::Phase;
 use posescope::session::RunMode;
 
 use crate::painted::{PaintedWindow, painted};
-use crate::window::{run_until_idle, setup, window};
+use crate::window::{app, run_until_idle, send, setup, window};
 
 fn finished() -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
     run_until_idle(&mut window);
-    window.state_mut().send(Command::Maximize(Some("space")));
-    window.run_steps(3);
+    send(&mut window, Command::Maximize(Some("space")));
     window
 }
 
@@ -34,8 +33,7 @@ fn label(window: &Harness<'_, App>, part: &str) -> String {
 
 fn click(window: &mut Harness<'_, App>, name: &str) {
     window.get_by_label(name).click();
-    window.step();
-    window.step();
+    window.run_steps(2);
 }
 
 fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: egui::Modifiers) {
@@ -56,22 +54,17 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
     }
     window.event(button(from + by, false));
     window.event(egui::Event::ModifiersChanged(egui::Modifiers::NONE));
-    window.step();
-    window.step();
+    window.run_steps(2);
 }
 
 fn in_hand(window: &Harness<'_, App>) -> Pose {
-    window
-        .state()
-        .app_state()
-        .camera
-        .expect("a camera is in hand")
+    app(window).camera.expect("a camera is in hand")
 }
 
 #[test]
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let mut window = finished();
-    let run = window.state().app_state().run().clone();
+    let run = app(&window).run().clone();
     let ends: Vec<usize> = run
         .spans()
         .iter()
@@ -81,21 +74,15 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let moments =
         (0..run.len()).filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
     for cursor in moments {
-        window.state_mut().send(Command::MoveCursor(cursor));
-        window.step();
-        window.step();
+        send(&mut window, Command::MoveCursor(cursor));
         assert!(headline(&window).contains("points"));
     }
-    window.state_mut().send(Command::First);
-    window.step();
-    window.step();
+    send(&mut window, Command::First);
     assert!(
         window.query_by_label_contains("FB: ").is_none(),
         "FB has no pose yet"
     );
-    window.state_mut().send(Command::MoveCursor(ends[0]));
-    window.step();
-    window.step();
+    send(&mut window, Command::MoveCursor(ends[0]));
     assert!(window.query_by_label_contains("FB: ").is_some());
 }
 
@@ -104,9 +91,7 @@ fn the_truth_hides_with_its_errors() {
     let mut window = finished();
     assert!(label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_some());
-    window.state_mut().send(Command::ShowTruth);
-    window.step();
-    window.step();
+    send(&mut window, Command::ShowTruth);
     assert!(!label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_none());
 }
@@ -126,9 +111,7 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     );
     assert!(headline(&window).contains("From outside"));
     click(&mut window, "× Truth");
-    window.state_mut().send(Command::ShowTruth);
-    window.step();
-    window.step();
+    send(&mut window, Command::ShowTruth);
     assert!(headline(&window).contains("Truth has no pose at this step"));
     click(&mut window, "Reset view");
     assert!(headline(&window).contains("From outside"));
@@ -157,9 +140,7 @@ fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
     let mut window = finished();
     click(&mut window, "Top");
     let pose = start(&window);
-    window.state_mut().send(Command::TakeCamera(Some(pose)));
-    window.step();
-    window.step();
+    send(&mut window, Command::TakeCamera(Some(pose)));
     let before = in_hand(&window);
     let handle = window
         .get_by_label_contains("Camera in hand")
@@ -194,13 +175,7 @@ fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
 }
 
 fn start(window: &Harness<'_, App>) -> Pose {
-    let loaded = window
-        .state()
-        .app_state()
-        .run()
-        .loaded
-        .as_deref()
-        .expect("is read");
+    let loaded = app(window).run().loaded.as_deref().expect("is read");
     loaded.problems[0].reference.world_from_camera
 }
 
@@ -224,7 +199,7 @@ fn jumps_and_blinking_go_between_two_poses() {
     assert!(seen.len() >= 4, "{} changes", seen.len());
     assert!(seen.iter().all(|pose| [begin, truth].contains(pose)));
     click(&mut window, "Let go");
-    assert_eq!(window.state().app_state().camera, None);
+    assert_eq!(app(&window).camera, None);
 }
 
 /// The number that follows some words.
@@ -242,15 +217,13 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
     let mut window = finished();
     // The hybrid took the pose of FB and searched nothing.
     let method = posescope::method::Method::MI;
-    window.state_mut().send(Command::SelectMethod(method));
-    window.run_steps(2);
+    send(&mut window, Command::SelectMethod(method));
     click(&mut window, "Top");
     let pane = window.get_by_label_contains("3-D view of").rect();
     let mut found = 0;
     for (x, y) in [(0.5, 0.5), (0.4, 0.55), (0.55, 0.4), (0.6, 0.6)] {
         window.hover_at(pane.min + egui::vec2(x * pane.width(), y * pane.height()));
-        window.step();
-        window.step();
+        window.run_steps(2);
         let words = headline(&window);
         if !words.contains("cost ") {
             continue;
@@ -259,7 +232,7 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
         let cost = number_after(&words, "cost ");
         let right_m = number_after(&words, "at (");
         let forward_m = number_after(&words, &format!("at ({right_m:.1}, "));
-        let run = window.state().app_state().run();
+        let run = app(&window).run();
         let span = run
             .spans()
             .iter()
@@ -337,9 +310,7 @@ fn the_layers_are_drawn_and_can_be_taken_away() {
     assert!(window.query_by_label_contains("Nothing is drawn").is_none());
     let with_truth = count(window, TRUTH);
     assert!(with_truth > 50, "{with_truth} pixels of the truth");
-    window.state_mut().send(Command::ShowTruth);
-    window.step();
-    window.step();
+    send(window, Command::ShowTruth);
     // Inlier rays have the same colour, but are pale.
     let without = count(window, TRUTH);
     assert!(without < with_truth / 2, "{without} of {with_truth}");

@@ -9,23 +9,16 @@ use posescope::method::Method;
 use posescope::run::read_results;
 use posescope::scene::{self, Scene};
 
-use crate::binary::posescope;
 use crate::small_sequence::SmallSequence;
-use crate::window::{finished, is_said, run_until_idle, setup, window_with_results};
+use crate::window::{finished, is_said, run_until_idle, send, setup, window_with_results};
 
 #[test]
 fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
     let sequence = SmallSequence::write();
-    let output = posescope()
-        .arg("run")
-        .arg(sequence.folder())
-        .args(["--query", "5", "--reference", "4", "--method", "fb"])
-        .args(["--radius", "3", "--seed", "7", "--json"])
-        .arg(sequence.path().join("results.jsonl"))
-        .output()
-        .expect("the binary starts");
-    let table = String::from_utf8_lossy(&output.stdout);
-    let line = std::fs::read_to_string(sequence.path().join("results.jsonl")).expect("written");
+    let asked = "--query 5 --reference 4 --method fb --radius 3 --seed 7";
+    let line = format!("run sequences/42 {asked} --json results.jsonl");
+    let table = sequence.run(&line).out;
+    let line = sequence.text("results.jsonl");
     let result: QueryResult = serde_json::from_str(line.trim()).expect("a result");
     let error = result.error.expect("the truth is known");
 
@@ -65,8 +58,7 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
     setup.task.scene = folder;
     setup.task.protocol.methods = vec![Method::FB];
     let mut window = finished(setup);
-    window.state_mut().send(Command::Maximize(Some("report")));
-    window.run_steps(3);
+    send(&mut window, Command::Maximize(Some("report")));
     assert!(is_said(&window, &error.to_string()), "{error}");
     assert!(error.to_string().contains("max Euler"));
 }
@@ -75,25 +67,20 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
 fn the_window_counts_the_failures_that_the_run_counts() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3, 4, 5]);
     let out = sequence.path().join("run");
-    let eval = |right: &str, out: &std::path::Path| {
-        posescope()
-            .arg("eval")
-            .arg(sequence.folder())
-            .args(["--method", "mi", "--reference", "random:1", "--radius", "3"])
-            .args(["--keep-failures", "0", "--right", right, "--out"])
-            .arg(out)
-            .assert()
-            .code(0);
-        read_rows(out).expect("results")
+    let eval = |right: &str, out: &str| {
+        let asked = "--method mi --reference random:1 --radius 3 --keep-failures 0";
+        let line = format!("eval sequences/42 {asked} --right {right} --out {out}");
+        sequence.run(&line).ok();
+        read_rows(&sequence.path().join(out)).expect("results")
     };
-    let mut errors: Vec<f64> = eval("1m,5deg", &sequence.path().join("first"))
+    let mut errors: Vec<f64> = eval("1m,5deg", "first")
         .iter()
         .filter_map(|row| Some(row.error?.translation_m))
         .collect();
     errors.sort_by(f64::total_cmp);
     // Half of them are right.
     let right = format!("{}m,180deg", errors[errors.len() / 2]);
-    let rows = eval(&right, &out);
+    let rows = eval(&right, "run");
     let measures = measure(&rows, 10.0);
     let failed = measures[0].queries - measures[0].right;
     assert!(failed > 0 && failed < 6, "{failed} of 6 failed");
@@ -108,7 +95,6 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     };
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
-    window.state_mut().send(Command::Maximize(Some("queries")));
-    window.run_steps(3);
+    send(&mut window, Command::Maximize(Some("queries")));
     assert!(is_said(&window, &format!("{failed} of 6 failed")));
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, CompareMode, KnownResults, Results, Setup};
+use posescope::app::{App, AppState, Command, CompareMode, KnownResults, Results, Setup};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
@@ -16,6 +16,7 @@ use posescope::scene;
 use posescope::scene::Scene;
 use posescope::session::{RunMode, RunState, Task};
 
+use crate::binary::has;
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{GREY, UNREADABLE, Walls};
 
@@ -68,7 +69,28 @@ pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
         )
     });
     window.step();
-    window.state().app_state().run_state().clone()
+    app(window).run_state().clone()
+}
+
+/// The run comes to its end.
+#[track_caller]
+pub fn finish(window: &mut Harness<'_, App>) {
+    // A run that a key lets go on is said to wait until it is heard of.
+    wait(window, |app| {
+        *app.app_state().run_state() == RunState::Finished
+    });
+    assert_eq!(run_until_idle(window), RunState::Finished);
+}
+
+/// What the window knows.
+pub fn app<'a>(window: &'a Harness<'_, App>) -> &'a AppState {
+    window.state().app_state()
+}
+
+/// Sends a command; it is obeyed in the next frame and drawn in that or the one behind it.
+pub fn send(window: &mut Harness<'_, App>, command: Command) {
+    window.state_mut().send(command);
+    window.run_steps(3);
 }
 
 /// Draws frames until something is the case.
@@ -90,26 +112,25 @@ pub fn finished(setup: Setup) -> Harness<'static, App> {
         mode: RunMode::Running,
         ..setup
     });
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     window
 }
 
 pub fn press(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) {
     window.key_press_modifiers(modifiers, key);
-    window.step();
-    window.step();
+    window.run_steps(2);
 }
 
 /// Gives an order by a key, and waits for what comes of it.
 fn order(window: &mut Harness<'_, App>, modifiers: Modifiers, key: Key) -> Event {
-    let before = window.state().app_state().run().len();
+    let before = app(window).run().len();
     press(window, modifiers, key);
     wait(window, |app| {
         app.app_state().run().len() > before
             || matches!(app.app_state().run_state(), RunState::Finished)
     });
     run_until_idle(window);
-    let state = window.state().app_state();
+    let state = app(window);
     state.run().records()[state.cursor()].event.clone()
 }
 
@@ -127,13 +148,7 @@ fn stage(event: &Event) -> Option<(Stage, bool)> {
 }
 
 pub fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
-    window
-        .state()
-        .app_state()
-        .run()
-        .results()
-        .cloned()
-        .collect()
+    app(window).run().results().cloned().collect()
 }
 
 /// The results of the same run without a window.
@@ -169,7 +184,7 @@ fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
         run_until_idle(&mut window),
         RunState::Paused { breakpoint: None }
     );
-    assert_eq!(window.state().app_state().run().len(), 1);
+    assert_eq!(app(&window).run().len(), 1);
     window.get_by_label("Into").click();
     wait(&mut window, |app| app.app_state().run().len() == 2);
     run_until_idle(&mut window);
@@ -182,29 +197,27 @@ fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let event = order(&mut window, Modifiers::SHIFT, Key::F11);
     assert_eq!(stage(&event), Some((Stage::Match, false)));
     order(&mut window, Modifiers::NONE, Key::F9);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     assert_eq!(results(&window), headless(&Params::default()));
 }
 
 #[test]
 fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     let mut window = finished(setup());
-    let last = window.state().app_state().run().len() - 1;
+    let last = app(&window).run().len() - 1;
     for cursor in (0..=last).step_by(7).chain([last]) {
-        window.state_mut().send(Command::MoveCursor(cursor));
-        window.step();
-        window.step();
-        assert_eq!(window.state().app_state().cursor(), cursor);
+        send(&mut window, Command::MoveCursor(cursor));
+        assert_eq!(app(&window).cursor(), cursor);
     }
-    assert_eq!(window.state().app_state().run().len(), last + 1);
+    assert_eq!(app(&window).run().len(), last + 1);
     press(&mut window, Modifiers::NONE, Key::Home);
-    assert_eq!(window.state().app_state().cursor(), 0);
+    assert_eq!(app(&window).cursor(), 0);
     press(&mut window, Modifiers::SHIFT, Key::ArrowRight);
-    assert_eq!(window.state().app_state().cursor(), 10);
+    assert_eq!(app(&window).cursor(), 10);
     press(&mut window, Modifiers::NONE, Key::ArrowLeft);
-    assert_eq!(window.state().app_state().cursor(), 9);
+    assert_eq!(app(&window).cursor(), 9);
     press(&mut window, Modifiers::NONE, Key::Num3);
-    let state = window.state().app_state();
+    let state = app(&window);
     let span = state.run().span_at(state.cursor()).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
 }
@@ -213,9 +226,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
 fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     let mut window = window(setup());
     run_until_idle(&mut window);
-    window.state_mut().send(Command::ShowView("breakpoints"));
-    window.step();
-    window.step();
+    send(&mut window, Command::ShowView("breakpoints"));
     window.get_by_label("New breakpoint").focus();
     window.step();
     window
@@ -223,9 +234,8 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
         .type_text("mi.yaw_coarse");
     window.step();
     window.get_by_label("Add").click();
-    window.step();
-    window.step();
-    let breakpoints = &window.state().app_state().setup.task.breakpoints;
+    window.run_steps(2);
+    let breakpoints = &app(&window).setup.task.breakpoints;
     assert_eq!(breakpoints[0].to_string(), "mi.yaw_coarse");
     assert_eq!(breakpoints.len(), 1);
     press(&mut window, Modifiers::NONE, Key::F5);
@@ -248,25 +258,25 @@ fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
     let mut window = window(wrong);
     run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::F9);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     window.get_by_label("What would have helped?").click();
     wait(&mut window, |app| {
         app.app_state().setup.task.protocol.explain > 0
     });
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     let explanation = |window: &Harness<'_, App>| {
-        let run = window.state().app_state().run();
+        let run = app(window).run();
         let result = run.results().next().expect("a result");
         result.explanation.clone()
     };
     let helped = explanation(&window).expect("it went wrong");
     let words = helped.best().expect("something helped").args.join(" ");
     assert!(is_said(&window, &format!("Try {words}")), "{words}");
-    assert!(window.state().app_state().run().explaining.is_none());
-    let line = window.state().app_state().setup.command_line();
-    assert!(line.contains("--explain 12"), "{line}");
+    assert!(app(&window).run().explaining.is_none());
+    let line = app(&window).setup.command_line();
+    has(&line, "--explain 12");
     press(&mut window, Modifiers::NONE, Key::E);
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     assert_eq!(explanation(&window), None);
 }
 
@@ -276,12 +286,9 @@ fn the_filter_takes_the_keyboard_once_and_lets_it_go() {
     run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::Slash);
     assert!(window.get_by_label("Filter parameters").is_focused());
-    window.state_mut().send(Command::ShowView("breakpoints"));
-    window.step();
-    window.step();
+    send(&mut window, Command::ShowView("breakpoints"));
     window.get_by_label("New breakpoint").focus();
-    window.step();
-    window.step();
+    window.run_steps(2);
     assert!(window.get_by_label("New breakpoint").is_focused());
 }
 
@@ -290,25 +297,21 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
     let mut window = window(setup());
     run_until_idle(&mut window);
     let wrong = vec!["inlers < 3".to_owned()];
-    window.state_mut().send(Command::SetBreakpoints(wrong));
-    window.step();
-    window.step();
+    send(&mut window, Command::SetBreakpoints(wrong));
     assert!(is_said(&window, "`inlers` is none of"));
 }
 
 #[test]
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
-    window.state_mut().send(Command::SelectMethod(Method::MI));
-    window.step();
-    window.step();
+    send(&mut window, Command::SelectMethod(Method::MI));
     window.state_mut().send(Command::SetParam {
         key: "grid.yaw_step".to_owned(),
         value: "2".to_owned(),
     });
     window.step();
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
-    let state = window.state().app_state();
+    finish(&mut window);
+    let state = app(&window);
     let span = state.run().span_at(state.cursor()).expect("in a span");
     assert_eq!(span.part.method(), Some(Method::MI));
     assert_eq!(state.cursor() + 1, span.records.end);
@@ -337,20 +340,11 @@ fn two_settings_are_compared_and_their_differences_marked() {
     });
     window.step();
     run_until_idle(&mut window);
-    window.state_mut().send(Command::ShowView("report"));
-    window.step();
-    window.step();
+    send(&mut window, Command::ShowView("report"));
     assert!(window.query_all_by_label_contains("≠").next().is_some());
     press(&mut window, Modifiers::NONE, Key::X);
-    assert_eq!(
-        window.state().app_state().options.compare_mode,
-        CompareMode::Kept
-    );
-    window
-        .state_mut()
-        .send(Command::Compare(CompareMode::SideBySide));
-    window.step();
-    window.step();
+    assert_eq!(app(&window).options.compare_mode, CompareMode::Kept);
+    send(&mut window, Command::Compare(CompareMode::SideBySide));
     assert!(is_said(&window, "A, kept"));
     window.state_mut().send(Command::ShowView("parameters"));
     press(&mut window, Modifiers::NONE, Key::D);
@@ -363,14 +357,14 @@ fn two_settings_are_compared_and_their_differences_marked() {
 fn the_next_failure_is_found_once_all_queries_were_run() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::N);
-    assert_eq!(window.state().app_state().setup.query, 1);
+    assert_eq!(app(&window).setup.query, 1);
     window.get_by_label("Run all").click();
     wait(&mut window, |app| app.app_state().results.len() == 3);
     press(&mut window, Modifiers::NONE, Key::N);
-    assert_eq!(window.state().app_state().setup.query, GREY);
+    assert_eq!(app(&window).setup.query, GREY);
     run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::K);
-    assert_eq!(window.state().app_state().setup.query, 2);
+    assert_eq!(app(&window).setup.query, 2);
 }
 
 #[test]
@@ -397,7 +391,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         let begun = Instant::now();
         window.state_mut().send(command);
         window.step();
-        assert_eq!(window.state().app_state().queries.progress(), None);
+        assert_eq!(app(&window).queries.progress(), None);
         wait(&mut window, is_alone);
         assert!(begun.elapsed() < Duration::from_secs(20));
         let running = Instant::now();
@@ -406,7 +400,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         }
         window.state_mut().send(Command::RunAllQueries);
         window.step();
-        assert_eq!(window.state().app_state().queries.progress(), Some((0, 3)));
+        assert_eq!(app(&window).queries.progress(), Some((0, 3)));
         wait(&mut window, |app| !is_alone(app));
     };
     // The first time there is nothing to stop but the session, which waits at its first event.
@@ -437,7 +431,7 @@ fn what_goes_wrong_is_said_and_the_window_lives_on() {
     assert!(is_said(&window, "internal error"));
     window.state_mut().send(Command::SetReferences(vec![0]));
     window.step();
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
 }
 
 #[test]
@@ -463,14 +457,12 @@ fn a_session_is_saved_and_restored() {
         .send(Command::RestoreSession(path.clone()));
     window.step();
     run_until_idle(&mut window);
-    let state = window.state().app_state();
+    let state = app(&window);
     assert_eq!(state.setup.query, 1);
     assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
     assert_eq!(state.cursor(), 40);
     std::fs::write(&path, "{}").expect("writable");
-    window.state_mut().send(Command::RestoreSession(path));
-    window.step();
-    window.step();
+    send(&mut window, Command::RestoreSession(path));
     assert!(is_said(&window, "session.json"));
 }
 
@@ -490,9 +482,9 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     std::fs::write(&path, elsewhere).expect("writable");
     window.state_mut().send(Command::RestoreSession(path));
     window.step();
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
-    let loaded = window.state().app_state().run().loaded.clone();
+    let loaded = app(&window).run().loaded.clone();
     let problem = &loaded.expect("it ran").problems[0];
     assert_eq!(problem.query.photo.gray, photo.expect("readable").gray);
 }
@@ -526,15 +518,13 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
         let line = bad[..at].matches('\n').count() + 1;
         std::fs::write(&path, &bad).expect("writable");
         let restore = Command::RestoreSession(path.clone());
-        window.state_mut().send(restore);
-        window.step();
-        window.step();
+        send(&mut window, restore);
         // The schema is told without a line: it is about the whole file.
         let place = match from {
             "session/3" => "session.json: ".to_owned(),
             _ => format!("session.json:{line}: "),
         };
-        let note = window.state().app_state().notes.last().expect("it is said");
+        let note = app(&window).notes.last().expect("it is said");
         let said = &note.text;
         assert!(said.contains(&place) && said.contains(words), "{said}");
         assert!(!said.contains('\n') && note.is_error, "{said}");
@@ -579,14 +569,10 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.rrd");
     let mut window = finished(setup());
-    window
-        .state_mut()
-        .send(Command::SaveRecording(path.clone()));
-    window.step();
-    window.step();
+    send(&mut window, Command::SaveRecording(path.clone()));
     assert!(path.metadata().expect("written").len() > 10_000);
     assert_eq!(
-        window.state().app_state().setup.command_line(),
+        app(&window).setup.command_line(),
         "posescope run walls --query 000001 --radius 3 --reference 000000 --seed 7"
     );
 }
@@ -607,7 +593,7 @@ fn the_command_line_names_format_prior_and_breakpoints() {
     setup.task.protocol.select(choice);
     setup.chosen = Vec::new().into();
     let command = setup.command_line();
-    assert!(command.contains("--reference nearest:2 "), "{command}");
+    has(&command, "--reference nearest:2 ");
 }
 
 #[test]
@@ -615,9 +601,9 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::Num9);
     let truth = Walls::new().pose(1).expect("known");
-    assert_eq!(window.state().app_state().camera, Some(truth));
+    assert_eq!(app(&window).camera, Some(truth));
     wait(&mut window, |app| !app.app_state().is_probing());
-    let state = window.state().app_state();
+    let state = app(&window);
     let probe = state.probe().expect("answered");
     for (method, comparison) in &probe.comparisons {
         let results = results(&window);
@@ -628,10 +614,10 @@ fn the_camera_in_hand_has_costs_of_its_own() {
         assert_eq!(comparison.score.cost, report.truth);
     }
     press(&mut window, Modifiers::ALT, Key::ArrowUp);
-    let moved = window.state().app_state().camera.expect("in hand");
+    let moved = app(&window).camera.expect("in hand");
     assert!((moved.translation.z - truth.translation.z - 0.2).abs() < 1e-9);
     press(&mut window, Modifiers::NONE, Key::Escape);
-    assert_eq!(window.state().app_state().camera, None);
+    assert_eq!(app(&window).camera, None);
 }
 
 /// Whatever is registered is shown as the paper's methods are, in glyphs that the fonts have.
@@ -641,8 +627,7 @@ fn a_method_beyond_the_paper_has_its_place_in_every_view() {
     asked.task.protocol.methods = vec!["nid".parse().expect("is registered"), Method::FB];
     let mut window = finished(asked);
     for view in posescope::app::views::ALL {
-        window.state_mut().send(Command::Maximize(Some(view.name)));
-        window.run_steps(3);
+        send(&mut window, Command::Maximize(Some(view.name)));
     }
     assert!(is_said(&window, "NID"));
 }

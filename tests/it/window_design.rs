@@ -7,9 +7,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command, Setup, views};
 use posescope::method::Method;
-use posescope::session::{RunMode, RunState};
+use posescope::session::RunMode;
 
-use crate::window::{finished as finished_of, is_said, press};
+use crate::window::{app, finish, finished as finished_of, is_said, press};
 use crate::window::{results, run_until_idle, setup, wait};
 
 /// The smallest window that the views are made for \[points\].
@@ -25,7 +25,7 @@ fn finished(size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
         .with_size(size)
         .with_pixels_per_point(pixels_per_point)
         .build_eframe(|creation| App::new(creation, setup));
-    assert_eq!(run_until_idle(&mut window), RunState::Finished);
+    finish(&mut window);
     window.state_mut().send(Command::SelectMethod(Method::MI));
     settle(&mut window);
     window
@@ -348,7 +348,7 @@ fn empty_views_say_what_to_do() {
 #[test]
 fn the_timeline_goes_by_events_or_by_time_and_is_zoomed_by_the_wheel() {
     let mut window = finished_of(setup());
-    let last = window.state().app_state().run().len() - 1;
+    let last = app(&window).run().len() - 1;
     assert!(is_said(
         &window,
         &format!("Stages of the run, events 0 to {last}")
@@ -396,7 +396,7 @@ fn the_timeline_goes_by_events_or_by_time_and_is_zoomed_by_the_wheel() {
 
     window.get_by_label("By time").click();
     window.run_steps(3);
-    let run = window.state().app_state().run();
+    let run = app(&window).run();
     let all = run.worked_until(last).as_secs_f64();
     assert!(is_said(
         &window,

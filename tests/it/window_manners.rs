@@ -6,7 +6,7 @@ use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Command, shortcuts};
 use posescope::geometry::Pose;
 
-use crate::window::{is_said, press, run_until_idle, setup, wait, window};
+use crate::window::{app, is_said, press, run_until_idle, send, setup, wait, window};
 
 /// On most keyboards a question mark is a key with Shift and a text at once.
 #[test]
@@ -55,18 +55,17 @@ fn a_menu_closes_with_escape_and_the_camera_stays() {
     let mut window = window(setup());
     run_until_idle(&mut window);
     let pose = Pose::identity();
-    window.state_mut().send(Command::TakeCamera(Some(pose)));
-    window.run_steps(2);
+    send(&mut window, Command::TakeCamera(Some(pose)));
     window.get_by_label("Views").click();
     window.run_steps(2);
     assert!(is_said(&window, "Layout: Teach"));
     press(&mut window, Modifiers::NONE, Key::Escape);
     window.run_steps(2);
     assert!(!is_said(&window, "Layout: Teach"));
-    assert_eq!(window.state().app_state().camera, Some(pose));
+    assert_eq!(app(&window).camera, Some(pose));
     press(&mut window, Modifiers::NONE, Key::Escape);
     window.run_steps(2);
-    assert_eq!(window.state().app_state().camera, None);
+    assert_eq!(app(&window).camera, None);
 }
 
 #[test]
@@ -84,7 +83,7 @@ fn what_is_told_goes_by_itself_and_what_went_wrong_stays() {
     // A step is a quarter of a second.
     window.run_steps(60);
     assert!(!is_said(&window, "MI has not begun yet"));
-    let notes = &window.state().app_state().notes;
+    let notes = &app(&window).notes;
     assert!(notes.len() == 1 && notes[0].is_error);
 }
 
@@ -101,7 +100,7 @@ fn no_query_of_all_is_localised_against_itself() {
     wait(&mut window, |app| {
         app.app_state().queries.progress().is_none() && !app.app_state().results.is_empty()
     });
-    let results = &window.state().app_state().results;
+    let results = &app(&window).results;
     assert!(!results.contains_key(&reference), "{:?}", results.keys());
     assert!(is_said(&window, "no reference is chosen for query 000000"));
 }

@@ -8,6 +8,7 @@ mod memory;
 mod methods;
 mod one_answer;
 mod own_cost;
+mod ranking;
 mod robust_pose;
 mod surf_warp;
 mod two_walls;
