@@ -9,6 +9,7 @@ use crate::estimator::{self, Estimator};
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
+use crate::localize::QueryResult;
 use crate::palette;
 use crate::picture;
 use crate::render::{Comparison, SyntheticView};
@@ -142,8 +143,10 @@ fn map(
         |world_from_query: &Pose| Offset::of(&case.problem.reference_from_query(world_from_query));
     match overlay {
         MapOverlay::Ranks => {
-            if let Some(truth) = case.truth {
-                outline_right_cell(&mut panel, surface, &place(truth));
+            // The verdict ranks the cell nearest to the lowest cost near the truth.
+            let named = near_truth(case.result);
+            if let Some(right) = named.or_else(|| case.truth.map(place)) {
+                outline_right_cell(&mut panel, surface, &right);
             }
         }
         MapOverlay::Reach | MapOverlay::Rim => {
@@ -182,6 +185,17 @@ fn map(
         panel.mark(Thing::Truth, at, label(truth));
     }
     panel
+}
+
+/// The pose near the truth that the verdict speaks of.
+fn near_truth(result: &QueryResult) -> Option<Offset> {
+    let place = result.diagnosis.first()?.evidence.get("near_truth")?;
+    let metres = |key: &str| place.get(key)?.as_f64();
+    Some(Offset {
+        right_m: metres("right_m")?,
+        forward_m: metres("forward_m")?,
+        yaw_rad: 0.0,
+    })
 }
 
 /// The coarse cell at the truth, with its rank among all that may win.

@@ -85,6 +85,17 @@ impl Map {
         self.panel.mark(thing, at, label);
     }
 
+    /// The result and the truth.
+    fn found(&mut self, case: &ProofCase<'_>, result: Option<&Pose>, truth: Option<&Pose>) {
+        let grade = palette::grade(case.result.grade);
+        if let Some(pose) = result {
+            self.camera(Thing::Result(grade), pose, "result");
+        }
+        if let Some(pose) = truth {
+            self.camera(Thing::Truth, pose, "truth");
+        }
+    }
+
     fn circle(&mut self, radius_m: f64) {
         let points = (0..=96).map(|step| {
             let angle = f64::from(step) * std::f64::consts::TAU / 96.0;
@@ -132,16 +143,7 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
         let label = format!("{} alone, weight {:.2}", share.reference, share.weight);
         map.camera(Thing::Dot(palette::UNDECIDED), pose, &label);
     }
-    if let Some(pose) = &result {
-        map.camera(
-            Thing::Result(palette::grade(case.result.grade)),
-            pose,
-            "result",
-        );
-    }
-    if let Some(pose) = &truth {
-        map.camera(Thing::Truth, pose, "truth");
-    }
+    map.found(case, result.as_ref(), truth.as_ref());
     let photo = |photo| picture::photo(photo).into_rgb8();
     ProofPicture {
         large: map.panel,
@@ -172,16 +174,7 @@ pub(super) fn from_above(case: &ProofCase<'_>, points: &[Point3<f64>]) -> Panel 
         map.panel.mark(Thing::Dot(palette::TRUTH), at, "");
     }
     map.camera(Thing::Reference, &Pose::identity(), "reference");
-    if let Some(pose) = &result {
-        map.camera(
-            Thing::Result(palette::grade(case.result.grade)),
-            pose,
-            "result",
-        );
-    }
-    if let Some(pose) = &truth {
-        map.camera(Thing::Truth, pose, "truth");
-    }
+    map.found(case, result.as_ref(), truth.as_ref());
     map.panel
 }
 

@@ -26,25 +26,72 @@ impl LocalizeObserver for Kept {
     }
 }
 
-/// The first query of the street against its neighbour, by one method.
-fn localized(method: Method) -> (Kept, QueryResult) {
-    let street = scene::open("street", None).expect("the built-in scene");
+/// A query of a scene against a frame of another, by one method.
+fn localized(
+    scenes: [&str; 2],
+    frames: [&str; 2],
+    radius_m: f64,
+    method: Method,
+) -> (Kept, QueryResult) {
+    let [references, queries] =
+        scenes.map(|name| scene::open(name, None).expect("a built-in scene"));
+    let [reference, query] = [(&references, frames[0]), (&queries, frames[1])]
+        .map(|(scene, name)| scene.find(name).expect("a frame"));
     let params = Params::default();
-    let localizer = Localizer::new(street.as_ref(), street.as_ref(), &params, 0).explaining(0);
+    let localizer = Localizer::new(references.as_ref(), queries.as_ref(), &params, 0);
     let request = Request {
-        radius_m: 5.0,
-        references: vec![1].into(),
+        radius_m,
+        references: vec![reference].into(),
         fusions: Vec::new(),
         setting: None,
     };
     let (mut kept, mut found) = (Kept::default(), None);
     localizer
-        .localize(0, 0, &[request], &[method], &mut kept, |result, _| {
+        .explaining(0)
+        .localize(0, query, &[request], &[method], &mut kept, |result, _| {
             found = Some(result);
             Ok::<(), LocalizeError>(())
         })
         .expect("nobody stops it");
     (kept, found.expect("a result"))
+}
+
+/// Neighbours on the street.
+fn neighbours(method: Method) -> (Kept, QueryResult) {
+    localized(["street"; 2], ["000001", "000000"], 5.0, method)
+}
+
+/// The map ranks the cell that the verdict ranks, and marks truth and result where they are.
+#[test]
+fn the_map_of_a_search_that_missed_agrees_with_its_sentence() {
+    let scenes = ["street:snow", "street:night"];
+    let (kept, result) = localized(scenes, ["000450"; 2], 15.0, Method::MI);
+    let primary = &result.diagnosis[0];
+    assert_eq!(primary.code.name(), "D3");
+    let rank = primary.evidence["rank"].as_u64().expect("a rank");
+    let case = ProofCase {
+        problem: &kept.problems[0],
+        records: kept.history.records(),
+        result: &result,
+        truth: kept.truth.as_ref(),
+        params: &Params::default(),
+    };
+    let map = ProofPicture::of(&case).expect("a map").large;
+    let says = format!("the right cell is number {rank} of ");
+    assert!(map.title.contains(&says), "{}", map.title);
+    let at = |wanted: fn(Thing) -> bool| {
+        let mark = map.marks.iter().find(|mark| wanted(mark.thing));
+        mark.expect("a mark").at
+    };
+    let truth = at(|thing| thing == Thing::Truth);
+    let found = at(|thing| matches!(thing, Thing::Result(_)));
+    let apart = f64::from((truth[0] - found[0]).hypot(truth[1] - found[1]));
+    let step_m = Params::default().grid.coarse_step_m;
+    let error_m = result.error.expect("the truth is known").translation_m;
+    assert!(
+        (apart * step_m - error_m).abs() < 0.5,
+        "{apart} cells, {error_m} m"
+    );
 }
 
 /// Every kind of proof that a method's run has something to show for.
@@ -73,7 +120,7 @@ fn pictures(kept: &Kept, result: &QueryResult) -> Vec<(&'static str, ProofPictur
 #[test]
 fn every_verdict_has_a_picture_without_overlap() {
     for (method, least) in [(Method::FB, 15), (Method::MI, 13)] {
-        let (kept, result) = localized(method);
+        let (kept, result) = neighbours(method);
         let drawn = pictures(&kept, &result);
         assert!(drawn.len() >= least, "{method}: {}", drawn.len());
         for (code, picture) in drawn {
@@ -117,7 +164,7 @@ fn every_verdict_has_a_picture_without_overlap() {
 /// The same bytes each time: reports are compared by them.
 #[test]
 fn a_proof_is_painted_the_same_twice() {
-    let (kept, result) = localized(Method::MI);
+    let (kept, result) = neighbours(Method::MI);
     let first = pictures(&kept, &result);
     let again = pictures(&kept, &result);
     assert_eq!(first[0].1.raster(640, "why"), again[0].1.raster(640, "why"));

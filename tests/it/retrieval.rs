@@ -97,7 +97,7 @@ fn an_index_that_cannot_be_used_is_named_with_the_command_that_builds_it() {
     has(&run(INDEX).ok().err, "is damaged ~ building it again");
     assert!(whole == fs::read(&file).expect("is there"), "other bytes");
 
-    let letter = "a letter that somebody still needs";
+    let letter = "a letter that must not be overwritten";
     write(&file, letter);
     run(INDEX).fails_with(2, "not a retrieval index; --force");
     assert_eq!(text(&file), letter);

@@ -75,7 +75,7 @@ pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
 /// The run comes to its end.
 #[track_caller]
 pub fn finish(window: &mut Harness<'_, App>) {
-    // A run that a key lets go on is said to wait until it is heard of.
+    // After a key, the run counts as paused until its next message arrives.
     wait(window, |app| {
         *app.app_state().run_state() == RunState::Finished
     });

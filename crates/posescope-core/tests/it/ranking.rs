@@ -1,4 +1,4 @@
-//! A ranking of references is told once, whatever is asked of it.
+//! A run reports its ranking of references once, whatever the number of methods.
 
 use std::sync::Arc;
 
