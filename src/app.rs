@@ -8,22 +8,23 @@
 //! answers with commands; so looking back costs no second run, and whatever a person can do, a test
 //! can do.
 
+mod action;
 mod adapter;
 mod arrangement;
 mod camera;
-mod card;
 mod command;
 mod cost_line;
 mod deciding;
 mod dense_map;
 mod dispatch;
+mod frame;
 mod headless;
-mod keys;
-mod layout;
 mod lecture;
 mod lesson;
 mod navigation;
+mod pictures;
 mod prober;
+mod proofs;
 mod queries;
 mod run_results;
 mod save;
@@ -36,19 +37,19 @@ mod shown;
 mod state;
 mod textures;
 mod theme;
-mod timeline;
-mod transport;
+mod thumbnails;
 mod view_context;
 mod view_options;
 pub mod views;
 mod window;
+mod worker;
 
+pub use action::{ACTIONS, Action, Group};
 pub use arrangement::Arrangement;
 pub use camera::NamedPose;
 pub use command::Command;
 pub use cost_line::{CostAlong, CostLine};
 pub use dense_map::{DenseAsk, DenseMap};
-pub use keys::{Shortcut, shortcuts};
 pub use run_results::results_of_run;
 pub use save_target::SaveTarget;
 pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
@@ -57,11 +58,14 @@ pub use shot::{Moment, Shot, ShotError, shoot};
 pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note};
 pub use view_context::ViewContext;
-pub use view_options::{CompareMode, ViewOptions};
+pub use view_options::{CompareMode, Tab, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson, window_options};
 
 use eframe::egui_wgpu::RenderState;
-use layout::Layout;
+use egui::{Margin, Panel};
+use frame::Panes;
+use frame::help::ActionSearch;
+use frame::size::Sizes;
 use lesson::OpenLesson;
 
 use crate::lesson::Lesson;
@@ -69,19 +73,22 @@ use crate::lesson::Lesson;
 /// The application.
 pub struct App {
     state: AppState,
-    layout: Layout,
-    timeline: timeline::Timeline,
-    card: card::Card,
+    panes: Panes,
     commands: command::Queue,
+    /// Whether the list of keys is open.
     help: bool,
+    /// The search for an action, while it is open.
+    search: Option<ActionSearch>,
     pictures: save::Pictures,
     /// Where something is to be saved, while that is asked.
     asking: Option<save::Asking>,
-    /// The lesson that somebody goes through.
+    /// The lesson that is open.
     lesson: Option<OpenLesson>,
     /// What the window's frame says.
     title: String,
-    /// Whether a maximised view is drawn without bars around it, for a picture.
+    /// Where the canvas is \[points\].
+    canvas: egui::Rect,
+    /// Whether a view that is alone is drawn without a way back, for a picture.
     is_bare: bool,
 }
 
@@ -96,15 +103,15 @@ impl App {
         theme::install(ctx);
         Self {
             state: AppState::new(setup, ctx.clone()),
-            layout: Layout::new(render_state),
-            timeline: timeline::Timeline::default(),
-            card: card::Card::default(),
+            panes: Panes::new(render_state),
             commands: command::Queue::default(),
             help: false,
+            search: None,
             pictures: save::Pictures::default(),
             asking: None,
             lesson: None,
             title: String::new(),
+            canvas: egui::Rect::NOTHING,
             is_bare: false,
         }
     }
@@ -118,13 +125,18 @@ impl App {
     /// With a lesson at its first page, of which the setup is what is localised there.
     pub fn with_lesson(mut self, lesson: Lesson) -> Self {
         self.lesson = Some(OpenLesson::new(lesson, &self.state.setup));
-        self.commands.send(Command::Arrange(Arrangement::Teach));
+        self.commands.send(Command::Arrange(Arrangement::Lecture));
         self
     }
 
-    /// The state that the views draw from: the run, the cursor, the camera.
+    /// The state that the window is drawn from: the run, the cursor, the camera.
     pub fn app_state(&self) -> &AppState {
         &self.state
+    }
+
+    /// Where the canvas is \[points\].
+    pub fn canvas(&self) -> egui::Rect {
+        self.canvas
     }
 
     /// Does what a key or a button would do.
@@ -137,10 +149,9 @@ impl App {
     /// Takes in what other threads have done, and does what was asked for.
     fn update(&mut self, ctx: &egui::Context) {
         self.state.poll();
-        let said = self.pictures.write();
-        for said in said {
-            match said {
-                Ok(words) => self.state.note(words, false),
+        for written in self.pictures.write() {
+            match written {
+                Ok(text) => self.state.note(text, false),
                 Err(why) => self.state.note(why, true),
             }
         }
@@ -156,70 +167,157 @@ impl App {
 
     /// Draws the window.
     fn content(&mut self, ui: &mut egui::Ui) {
-        // A question has the keys to itself.
-        if self.asking.is_none() {
-            // What is open on top closes first.
-            let close = |input: &mut egui::InputState| {
-                input.consume_key(egui::Modifiers::NONE, egui::Key::Escape)
-            };
-            if self.help && ui.input_mut(close) {
-                self.help = false;
-            }
-            if let Some(lesson) = &self.lesson {
-                lesson.read_keys(ui.ctx(), &self.commands);
-            }
-            keys::read_keys(ui.ctx(), &self.commands);
+        self.read_keys(ui.ctx());
+        if self.state.options.is_alone && self.is_bare {
+            let view = self.state.options.alone;
+            egui::CentralPanel::default().show(ui, |ui| match view {
+                Some(view) => self.panes.show(ui, view, &self.state, &self.commands),
+                None => frame::canvas::ui(ui, &self.state, &self.commands, &mut self.panes, 9),
+            });
+        } else {
+            self.frame(ui);
+            self.above(ui.ctx());
         }
-        let Self {
-            state,
-            layout,
-            timeline,
-            card,
-            commands,
-            help,
-            is_bare,
-            lesson,
-            asking,
-            ..
-        } = self;
-        if *is_bare && layout.is_maximized() {
-            egui::CentralPanel::default().show(ui, |ui| layout.alone_ui(ui, state, commands));
-            state.textures.end_frame();
-            return;
-        }
-        egui::Panel::top("transport").show(ui, |ui| transport::ui(ui, state, commands));
-        if let Some(lesson) = lesson {
-            egui::Panel::left("lesson")
-                .exact_size(lesson::WIDTH)
-                .show(ui, |ui| lesson.ui(ui, state, commands));
-        }
-        // A view that has all the room has that of the card too.
-        if !layout.is_maximized() {
-            if layout.arrangement() == Arrangement::Teach {
-                egui::Panel::top("lecture").show(ui, |ui| lecture::ui(ui, state));
-            }
-            // Beside each other the methods say themselves what became of them.
-            if state.options.lockstep.is_none() {
-                egui::Panel::top("verdicts").show(ui, |ui| card.ui(ui, state, commands));
-            }
-        }
-        egui::Panel::bottom("timeline").show(ui, |ui| timeline.ui(ui, state, commands));
-        egui::CentralPanel::default()
-            .frame(egui::Frame::NONE.fill(ui.visuals().panel_fill))
-            .show(ui, |ui| layout.ui(ui, state, commands));
-        transport::notes(ui.ctx(), state, commands);
-        if asking
-            .as_mut()
-            .is_some_and(|asking| asking.ui(ui.ctx(), commands))
-        {
-            *asking = None;
-        }
-        if *help {
-            keys::help_ui(ui.ctx(), help);
-        }
-        state.textures.end_frame();
+        self.state.textures.end_frame();
         for command in self.commands.take() {
             self.dispatch(command, ui.ctx());
+        }
+    }
+
+    fn read_keys(&mut self, ctx: &egui::Context) {
+        // A question has the keys to itself.
+        if self.asking.is_some() || self.search.is_some() {
+            return;
+        }
+        let close = |input: &mut egui::InputState| {
+            input.consume_key(egui::Modifiers::NONE, egui::Key::Escape)
+        };
+        if self.help && ctx.input_mut(close) {
+            self.help = false;
+        }
+        if let Some(lesson) = &self.lesson {
+            lesson.read_keys(ctx, &self.commands);
+        }
+        let in_batch = self.state.options.layout == Arrangement::Batch;
+        let enter = |input: &mut egui::InputState| {
+            input.consume_key(egui::Modifiers::NONE, egui::Key::Enter)
+        };
+        if in_batch && !ctx.egui_wants_keyboard_input() && ctx.input_mut(enter) {
+            self.commands.send(Command::OpenSelected);
+        }
+        action::read_keys(ctx, &self.commands);
+    }
+
+    /// The parts of the window at their places.
+    fn frame(&mut self, ui: &mut egui::Ui) {
+        let Self {
+            state,
+            panes,
+            commands,
+            lesson,
+            ..
+        } = self;
+        let sizes = Sizes::of(ui.ctx().content_rect().size());
+        let fill = ui.visuals().panel_fill;
+        let plain = |margin: Margin| egui::Frame::NONE.fill(fill).inner_margin(margin);
+        let bar = |name: &'static str, height: f32| {
+            Panel::top(name)
+                .exact_size(height)
+                .resizable(false)
+                .frame(plain(Margin::symmetric(8, 0)))
+        };
+        bar("toolbar", sizes.toolbar).show(ui, |ui| frame::toolbar::ui(ui, state, commands, panes));
+        let mut canvas = egui::Rect::NOTHING;
+        let central = egui::CentralPanel::default().frame(plain(Margin::same(6)));
+        let options = &state.options;
+        if options.is_alone {
+            central.show(ui, |ui| {
+                canvas = ui.max_rect();
+                frame::canvas::alone(ui, state, commands, panes);
+            });
+            self.canvas = canvas;
+            return;
+        }
+        let below = |name: &'static str, height: f32| {
+            Panel::bottom(name)
+                .exact_size(height)
+                .resizable(false)
+                .frame(plain(Margin::symmetric(8, 4)))
+        };
+        match options.layout {
+            Arrangement::Inspect => {
+                Panel::top("verdicts")
+                    .exact_size(sizes.verdicts)
+                    .resizable(false)
+                    .frame(plain(Margin::ZERO))
+                    .show(ui, |ui| frame::verdicts::ui(ui, state, commands));
+                below("storyboard", sizes.storyboard)
+                    .show(ui, |ui| frame::storyboard::ui(ui, state, commands));
+                if options.shows_queries && sizes.has_sides {
+                    Panel::left("queries")
+                        .exact_size(sizes.queries)
+                        .resizable(false)
+                        .frame(plain(Margin::same(6)))
+                        .show(ui, |ui| panes.show(ui, views::QUERIES, state, commands));
+                }
+                if options.shows_inspector && sizes.has_sides {
+                    Panel::right("inspector")
+                        .exact_size(sizes.inspector)
+                        .resizable(false)
+                        .frame(plain(Margin::symmetric(10, 6)))
+                        .show(ui, |ui| frame::inspector::ui(ui, state, commands, panes));
+                }
+                central.show(ui, |ui| {
+                    canvas = ui.max_rect();
+                    frame::canvas::ui(ui, state, commands, panes, 4);
+                });
+            }
+            Arrangement::Lecture => {
+                below("lecture", sizes.sentence).show(ui, |ui| lecture::ui(ui, state, commands));
+                if let Some(lesson) = lesson {
+                    Panel::left("lesson")
+                        .exact_size(lesson::WIDTH)
+                        .resizable(false)
+                        .show(ui, |ui| lesson.ui(ui, state, commands));
+                }
+                central.show(ui, |ui| {
+                    canvas = ui.max_rect();
+                    if state.options.lockstep.is_some() {
+                        panes.show(ui, "lockstep", state, commands);
+                    } else {
+                        frame::canvas::ui(ui, state, commands, panes, 2);
+                    }
+                });
+            }
+            Arrangement::Batch => {
+                let width = ui.available_width() * 0.44;
+                Panel::right("selected")
+                    .exact_size(width)
+                    .resizable(false)
+                    .frame(plain(Margin::same(10)))
+                    .show(ui, |ui| {
+                        canvas = ui.max_rect();
+                        frame::batch::right(ui, state, commands, panes);
+                    });
+                central.show(ui, |ui| frame::batch::left(ui, state, commands, panes));
+            }
+        }
+        self.canvas = canvas;
+    }
+
+    /// What is open above all parts.
+    fn above(&mut self, ctx: &egui::Context) {
+        frame::notes::ui(ctx, &self.state, &self.commands);
+        let is_over = |asking: &mut save::Asking| asking.ui(ctx, &self.commands);
+        if self.asking.as_mut().is_some_and(is_over) {
+            self.asking = None;
+        }
+        let is_over = |search: &mut ActionSearch| search.ui(ctx, &self.state, &self.commands);
+        if self.search.as_mut().is_some_and(is_over) {
+            self.search = None;
+        }
+        if self.help {
+            frame::help::keys_ui(ctx, &mut self.help);
         }
     }
 }

@@ -10,6 +10,7 @@ mod junit;
 mod known;
 mod metrics;
 mod migration;
+mod overview;
 #[cfg(feature = "cli")]
 mod paper;
 #[cfg(feature = "cli")]
@@ -33,6 +34,7 @@ pub use gate::{Gate, GateResult};
 pub use known::{KnownError, KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
 pub use migration::{Migration, migrations, verdict_name};
+pub use overview::{Bar, Overview};
 #[cfg(feature = "cli")]
 pub use paper::scene as paper_scene;
 #[cfg(feature = "cli")]

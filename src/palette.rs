@@ -21,6 +21,8 @@ pub const TRUTH: Rgb = [0x1F, 0xB5, 0x8A];
 pub const NO_POSE: Rgb = [0x80; 3];
 /// What is not decided yet.
 pub const UNDECIDED: Rgb = [0xCC, 0x79, 0xA7];
+/// What is selected or can be clicked, and nothing else.
+pub const ACCENT: Rgb = [0x8F, 0x8C, 0xF0];
 /// Where a picture shows nothing.
 pub const NOTHING: Rgb = [0x18, 0x18, 0x18];
 

@@ -69,6 +69,27 @@ pub(crate) fn synthetic(view: &SyntheticView) -> GrayImage {
     Painter::new(view).synthetic()
 }
 
+/// The view in its grey values over the darkened query, which is bluish where nothing covers it.
+pub(crate) fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
+    const GROUND: f64 = 0.5;
+    let synthetic = synthetic(view);
+    let mut covered = vec![false; (view.width * view.height) as usize];
+    for pixel in &view.pixels {
+        covered[pixel.index as usize] = true;
+    }
+    RgbImage::from_fn(view.width, view.height, |x, y| {
+        let ground = f64::from(query.get_pixel(x, y).0[0]) * GROUND;
+        let painted = f64::from(synthetic.get_pixel(x, y).0[0]);
+        let is_painted = painted > 0.0 || covered[(y * view.width + x) as usize];
+        let [red, green, blue] = if is_painted {
+            [painted; 3]
+        } else {
+            [0.75 * ground, 0.85 * ground, ground]
+        };
+        Rgb([red as u8, green as u8, blue as u8])
+    })
+}
+
 /// How far grey values differ: at most one pixel in fifty differs more. A power of two, so that views that
 /// are alike have the same.
 #[cfg(feature = "app")]

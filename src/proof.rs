@@ -147,6 +147,16 @@ impl ProofPicture {
         }
     }
 
+    /// The same with a small panel, counted from 0, in the place of the large one.
+    #[must_use]
+    pub fn swapped(&self, small: usize) -> Self {
+        let mut swapped = self.clone();
+        if let Some(panel) = swapped.beside.get_mut(small) {
+            std::mem::swap(&mut swapped.large, panel);
+        }
+        swapped
+    }
+
     /// All panels: the large one, that below it, those beside it.
     pub fn panels(&self) -> impl Iterator<Item = &Panel> {
         [&self.large]

@@ -1,13 +1,16 @@
 //! What the window is arranged for.
 
+use serde::{Deserialize, Serialize};
+
 /// What the window is arranged for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Arrangement {
-    /// Everything about one query, for somebody who asks why it failed.
+    /// One query: why it failed.
     #[default]
     Inspect,
-    /// Few large views and one sentence for each stage, and nothing of what is still to come.
-    Teach,
+    /// One large picture and one sentence for each stage, and nothing of what is still to come.
+    Lecture,
     /// A run over many queries.
     Batch,
 }
@@ -16,7 +19,7 @@ impl Arrangement {
     /// All arrangements, with their titles and keys.
     pub const ALL: [(Self, &'static str, egui::Key); 3] = [
         (Self::Inspect, "Inspect", egui::Key::F2),
-        (Self::Teach, "Teach", egui::Key::F3),
+        (Self::Lecture, "Lecture", egui::Key::F3),
         (Self::Batch, "Batch", egui::Key::F4),
     ];
 }

@@ -43,23 +43,6 @@ impl NamedPose {
             Self::Last => "Back",
         }
     }
-
-    /// The name on a command line.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Start => "start",
-            Self::Coarse => "coarse",
-            Self::Fine => "fine",
-            Self::Estimate => "estimate",
-            Self::Truth => "truth",
-            Self::Last => "back",
-        }
-    }
-
-    /// The pose of such a name.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|pose| pose.word() == word)
-    }
 }
 
 /// A small move of the camera in its own frame, in steps.

@@ -9,11 +9,13 @@ use super::dense_map::DenseAsk;
 use super::save_target::SaveTarget;
 use super::selection::VerdictChange;
 use super::setup::ReferencePick;
-use super::view_options::CompareMode;
+use super::view_options::{CompareMode, Tab};
+use crate::event::Stage;
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::image::Degradation;
 use crate::method::Method;
+use crate::session::Part;
 
 /// Something to be done between two frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +44,35 @@ pub enum Command {
     Last,
     /// Move the cursor to this record.
     MoveCursor(usize),
-    /// Move the cursor to the last record that an estimator has told.
+    /// Move the cursor to the next stage of the selected part, or to the one before.
+    NextStage {
+        /// Whether the one before is meant.
+        back: bool,
+    },
+    /// Move the cursor to the last record of a method.
     SelectMethod(Method),
+    /// Show what the nth method came to, counted from 0.
+    SelectNth(usize),
+    /// Show what a part of the run came to: why it failed, or its end.
+    ShowPart(Part),
+    /// Show why the result of a part of the run is what it is.
+    ShowWhy(Part),
+    /// Show why the selected result is what it is, or its stage again.
+    Why,
+    /// Make a view large for as long as the cursor is in this stage.
+    Enlarge(Option<Stage>, &'static str),
+    /// Show the 3-D view, or what was there before.
+    Toggle3d,
+    /// Show or hide the list of queries.
+    ToggleQueries,
+    /// Show or hide the inspector.
+    ToggleInspector,
+    /// Show a tab of the inspector.
+    ShowTab(Tab),
+    /// Search for an action by its words.
+    Search,
+    /// Show the selected result in the layout that explains one query.
+    OpenSelected,
     /// Localise another query.
     SelectQuery(usize),
     /// Localise a query and go to the step that decided what became of a method's answer.
@@ -61,8 +90,6 @@ pub enum Command {
     KeepResults,
     /// Forget the results A.
     ForgetResults,
-    /// Look at two poses beside each other.
-    LookBeside([NamedPose; 2]),
     /// Work out the cost along a line between two poses.
     TraceLine(CostLine),
     /// Show or hide the map of every position with every heading.
@@ -163,8 +190,8 @@ pub enum Command {
     AskWhere(SaveTarget),
     /// Save a view, or the whole window, as a picture.
     SavePicture {
-        /// The view; the whole window without.
-        view: Option<&'static str>,
+        /// Whether only the canvas is saved.
+        of_canvas: bool,
         /// The file, a PNG.
         path: std::path::PathBuf,
     },

@@ -7,14 +7,16 @@ use super::arrangement::Arrangement;
 use super::camera::NamedPose;
 use super::command::Command;
 use super::deciding::deciding;
+use super::frame::help::ActionSearch;
+use super::frame::storyboard::stages_of;
 use super::navigation::Navigation;
+use super::pictures::RunPictures;
 use super::queries::Queries;
 use super::save::Asking;
-use super::save_target::SaveTarget;
 use super::saved::SavedSession;
 use super::setup::ReferencePick;
 use super::state::{AppState, KeptRun};
-use super::view_options::CompareMode;
+use super::view_options::{CompareMode, Tab};
 use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::Phase;
@@ -23,9 +25,6 @@ use crate::localize::References;
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 use crate::sink::rerun::Targets;
-
-/// How much larger everything is where a room of people looks.
-const LECTURE_ZOOM: f32 = 1.2;
 
 impl App {
     /// Does one thing. What cannot be done is said, not ignored.
@@ -59,7 +58,37 @@ impl App {
                 state.navigation.follow();
             }
             Command::MoveCursor(cursor) => state.move_cursor(cursor),
+            Command::NextStage { back } => state.next_stage(back),
             Command::SelectMethod(method) => state.select_method(method),
+            Command::SelectNth(nth) => {
+                let method = state.setup.task.protocol.methods.get(nth).copied();
+                if let Some(method) = method {
+                    state.select_method(method);
+                }
+            }
+            Command::ShowPart(part) => state.show_part(part, state.needs_why(part)),
+            Command::ShowWhy(part) => state.show_part(part, true),
+            Command::Why => state.options.shows_why = !state.options.shows_why,
+            Command::Enlarge(stage, view) => state.options.large = Some((stage, view)),
+            Command::Toggle3d => state.toggle("space"),
+            Command::ToggleQueries => {
+                state.options.shows_queries = !state.options.shows_queries;
+            }
+            Command::ToggleInspector => {
+                state.options.shows_inspector = !state.options.shows_inspector;
+            }
+            Command::ShowTab(tab) => {
+                state.options.tab = tab;
+                state.options.shows_inspector = true;
+            }
+            Command::Search => self.search = Some(ActionSearch::default()),
+            Command::OpenSelected => {
+                let part = state.shown_span().map(|span| span.part);
+                self.send(Command::Arrange(Arrangement::Inspect));
+                if let Some(part) = part {
+                    self.send(Command::ShowPart(part));
+                }
+            }
             Command::OpenResult { query, result } => state.open_result(query, result),
             Command::FilterResults(filter) => state.options.results_filter = filter,
             Command::FilterVerdictChange(change) => state.options.verdict_change = change,
@@ -69,7 +98,6 @@ impl App {
                 state.note(words, false);
             }
             Command::ForgetResults => state.set_results_before(None),
-            Command::LookBeside(poses) => state.options.beside = Some(poses),
             Command::TraceLine(line) => state.trace_line(line),
             Command::ShowDenseMap => {
                 state.options.shows_dense_map = !state.options.shows_dense_map;
@@ -98,6 +126,7 @@ impl App {
             Command::CloseLesson => {
                 self.lesson = None;
                 state.options.lockstep = None;
+                state.options.presented = None;
                 self.send(Command::Arrange(Arrangement::default()));
             }
             Command::RunAllQueries => state.queries.run_all(&state.setup),
@@ -146,7 +175,7 @@ impl App {
             Command::Flip => {
                 state.options.compare_mode = match state.options.compare_mode {
                     CompareMode::Kept => CompareMode::Present,
-                    CompareMode::Present | CompareMode::SideBySide => CompareMode::Kept,
+                    CompareMode::Present => CompareMode::Kept,
                 }
             }
             Command::Blink => state.options.blinking = !state.options.blinking,
@@ -156,7 +185,10 @@ impl App {
             Command::ShowTruth => state.options.shows_truth = !state.options.shows_truth,
             Command::Filter => {
                 state.options.wants_filter = true;
-                self.layout.show(super::views::PARAMETERS);
+                if state.options.layout == Arrangement::Inspect {
+                    state.options.tab = Tab::Parameters;
+                    state.options.shows_inspector = true;
+                }
             }
             Command::FilterFocused => state.options.wants_filter = false,
             Command::SelectFeature(feature) => state.options.selected_feature = feature,
@@ -173,17 +205,24 @@ impl App {
                 ctx.copy_text(state.setup.command_line());
                 state.note("The command line is on the clipboard", false);
             }
-            Command::ShowView(name) => self.layout.show(name),
-            Command::Maximize(view) => {
-                let pointer = ctx.input(|input| input.pointer.hover_pos());
-                self.layout.maximize(view, pointer);
+            Command::ShowView(name) => state.show_view(name),
+            Command::Maximize(Some(view)) => {
+                state.options.is_alone = true;
+                state.options.alone = Some(view);
+            }
+            Command::Maximize(None) => {
+                state.options.is_alone = !state.options.is_alone;
+                state.options.alone = None;
             }
             Command::Arrange(arrangement) => {
-                let is_lecture = arrangement == Arrangement::Teach;
-                state.options.hides_future = is_lecture;
-                ctx.set_zoom_factor(if is_lecture { LECTURE_ZOOM } else { 1.0 });
-                self.layout.arrange(arrangement);
+                let is_lecture = arrangement == Arrangement::Lecture;
+                let options = &mut state.options;
+                options.layout = arrangement;
+                options.hides_future = is_lecture;
+                options.is_alone = false;
+                options.presented = None;
                 if is_lecture {
+                    options.shows_why = false;
                     self.show_page();
                 }
             }
@@ -233,21 +272,9 @@ impl App {
                     done,
                 );
             }
-            Command::AskWhere(target) => {
-                // What is to be seen in a picture must be in sight by then.
-                if let SaveTarget::Picture(Some(view)) = target
-                    && self.layout.place_of(view).is_none()
-                {
-                    self.commands.send(Command::ShowView(view));
-                }
-                self.asking = Some(Asking::new(target, &state.setup));
-            }
-            Command::SavePicture { view, path } => {
-                let part = view.and_then(|view| self.layout.place_of(view));
-                if let (Some(view), None) = (view, part) {
-                    state.note(format!("The view {view} is not in sight"), true);
-                    return;
-                }
+            Command::AskWhere(target) => self.asking = Some(Asking::new(target, &state.setup)),
+            Command::SavePicture { of_canvas, path } => {
+                let part = of_canvas.then_some(self.canvas);
                 self.pictures.ask(ctx, path, part);
             }
             Command::SaveSession(path) => self.save_session(&path),
@@ -283,14 +310,16 @@ impl App {
         self.state.options.shows_truth = open.asked().is_none();
         let page = open.page();
         self.state.options.lockstep = page.lockstep;
-        self.layout.present(&page.show);
+        let named = page
+            .show
+            .iter()
+            .filter_map(|name| super::views::name_of(name));
+        let named: Vec<_> = named.collect();
+        self.state.options.presented = Some(named).filter(|named| !named.is_empty());
     }
 
     fn save_session(&mut self, path: &Path) {
-        let layout = match self.layout.to_json() {
-            Ok(layout) => layout,
-            Err(error) => return self.state.note(error.to_string(), true),
-        };
+        let layout = self.state.options.layout;
         let saved = SavedSession::new(&self.state.setup, self.state.cursor(), layout);
         match saved.write(path) {
             Ok(()) => self
@@ -303,14 +332,13 @@ impl App {
     fn restore_session(&mut self, path: &Path) {
         let restored = SavedSession::read(path).and_then(|saved| {
             let setup = saved.setup(&self.state.setup)?;
-            let layout = saved.layout.clone();
-            self.layout
-                .restore(layout)
-                .map_err(|error| error.to_string())?;
-            Ok((setup, saved.cursor))
+            Ok((setup, saved.cursor, saved.layout))
         });
         match restored {
-            Ok((setup, cursor)) => self.state.restore(setup, cursor),
+            Ok((setup, cursor, layout)) => {
+                self.state.restore(setup, cursor);
+                self.send(Command::Arrange(layout));
+            }
             Err(why) => self.state.note(why, true),
         }
     }
@@ -348,8 +376,69 @@ impl AppState {
         self.options.lockstep = Some(here.saturating_add_signed(steps).min(last));
     }
 
-    fn move_cursor(&mut self, cursor: usize) {
+    pub(super) fn move_cursor(&mut self, cursor: usize) {
+        self.options.shows_why = false;
+        // The user looks elsewhere by now.
+        self.opens_at_cause = false;
         self.navigation.move_to(cursor, self.session.run());
+    }
+
+    /// Goes to the end of the next stage of the selected part, or of the one before; after the last stage comes
+    /// why the result is what it is.
+    fn next_stage(&mut self, back: bool) {
+        let Some(span) = self.shown_span() else {
+            return;
+        };
+        let (part, cursor) = (span.part, self.shown_cursor());
+        let ends: Vec<usize> = stages_of(self, span)
+            .iter()
+            .map(|bar| bar.records.end - 1)
+            .collect();
+        let next = if back {
+            let before = ends.iter().rev().find(|end| **end < cursor).copied();
+            // From the picture of the cause to the last stage.
+            ends.last()
+                .copied()
+                .filter(|_| self.options.shows_why)
+                .or(before)
+        } else {
+            ends.into_iter().find(|end| *end > cursor)
+        };
+        match next {
+            Some(end) => self.move_cursor(end),
+            None if !back && self.options.hides_future => self.forward(1),
+            None if !back && self.needs_why(part) => self.show_part(part, true),
+            None => {}
+        }
+    }
+
+    /// Shows a view on the canvas, in the inspector or alone, wherever its place is.
+    fn show_view(&mut self, name: &'static str) {
+        let tab = match name {
+            super::views::PARAMETERS => Some(Tab::Parameters),
+            "log" => Some(Tab::Log),
+            _ => None,
+        };
+        match tab {
+            Some(tab) => {
+                self.options.tab = tab;
+                self.options.shows_inspector = true;
+            }
+            None => {
+                self.options.shows_why = false;
+                self.options.large = Some((self.shown_stage(), name));
+            }
+        }
+    }
+
+    /// Shows a view on the canvas, or what was there before.
+    fn toggle(&mut self, name: &'static str) {
+        let here = (self.shown_stage(), name);
+        if self.options.large == Some(here) {
+            self.options.large = None;
+        } else {
+            self.show_view(name);
+        }
     }
 
     fn select_method(&mut self, method: Method) {
@@ -362,7 +451,11 @@ impl AppState {
         };
         let span = run.span_of(part);
         match span.and_then(|span| span.records.end.checked_sub(1)) {
-            Some(last) => self.move_cursor(last),
+            Some(last) => {
+                let why = self.options.shows_why && self.needs_why(part);
+                self.move_cursor(last);
+                self.options.shows_why = why;
+            }
             None => {
                 let name = method.name().to_uppercase();
                 self.note(format!("{name} has not begun yet"), false);
@@ -466,6 +559,7 @@ impl AppState {
         self.kept = Some(KeptRun {
             run: self.run().clone(),
             cursor: self.cursor(),
+            pictures: RunPictures::new(&self.ctx),
         });
     }
 

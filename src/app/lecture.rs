@@ -1,8 +1,9 @@
-//! What a lecture shows above the views: the stage at the cursor in one sentence, and what it has just
-//! told.
+//! The bar of a lecture: the stage at the cursor in one sentence, and the latest decision.
 
-use egui::{RichText, Ui};
+use egui::{Align, Button, Layout, RichText, Ui};
 
+use super::command::{Command, Queue};
+use super::frame::storyboard::{part_name, stages_of};
 use super::state::AppState;
 use super::theme;
 use crate::event::Stage;
@@ -10,89 +11,155 @@ use crate::grid::Phase;
 use crate::narration;
 use crate::session::{Run, Span};
 
-/// Size of the sentences \[points\].
-const LARGE: f32 = 19.0;
+/// Size of the sentence, and of the one below it \[points\].
+const LARGE: f32 = 24.0;
+const SMALL: f32 = 17.0;
+/// Width of the count of stages, and of the buttons \[points\].
+const COUNT: f32 = 120.0;
+const BUTTONS: f32 = 130.0;
 
-pub(super) fn ui(ui: &mut Ui, state: &AppState) {
-    let (run, cursor) = (state.run(), state.cursor());
-    if state.options.lockstep.is_some() {
-        let words = "Every method goes on by one step at a time, beside the others.";
-        ui.label(RichText::new(words).size(LARGE));
-        ui.weak("The . key goes on, the , key back, with Shift by fifty steps");
-        return;
-    }
-    let Some(span) = run.span_at(cursor) else {
-        ui.label(RichText::new("I takes the first step, Space runs to the end").size(LARGE));
-        return;
-    };
-    let stage = run.stages_at(cursor).last().map(|bar| bar.stage);
-    ui.horizontal_wrapped(|ui| {
-        if let Some(method) = span.part.method() {
-            let name = RichText::new(method.label())
-                .color(theme::text(ui.visuals(), theme::method(method)));
-            ui.label(name.size(LARGE).strong());
+pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let (run, cursor) = (state.shown_run(), state.shown_cursor());
+    ui.horizontal_centered(|ui| {
+        let span = state.shown_span();
+        let stages = span.map_or(Vec::new(), |span| stages_of(state, span));
+        let place = stages.iter().position(|bar| bar.records.contains(&cursor));
+        let size = egui::vec2(COUNT, ui.available_height());
+        ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
+            ui.set_min_width(COUNT);
+            ui.add_space(size.y / 2.0 - 24.0);
+            if let Some(span) = span {
+                let method = span.part.method();
+                let color = method.map_or(ui.visuals().text_color(), theme::method);
+                let color = theme::text(ui.visuals(), color);
+                ui.label(
+                    RichText::new(part_name(span.part))
+                        .size(15.0)
+                        .color(color)
+                        .strong(),
+                );
+            }
+            if let Some(place) = place {
+                ui.weak(format!("stage {}", place + 1));
+            }
+        });
+        let size = egui::vec2(ui.available_width() - BUTTONS, ui.available_height());
+        ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
+            ui.set_min_width(size.x);
+            let (first, second) = sentences(state, run, span, cursor);
+            ui.add_space(size.y / 2.0 - 34.0);
+            let color = ui.visuals().strong_text_color();
+            ui.add(egui::Label::new(RichText::new(first).size(LARGE).color(color)).wrap());
+            ui.add(egui::Label::new(RichText::new(second).size(SMALL).weak()).truncate());
+        });
+        let button = |ui: &mut Ui, text: &str, help: &str, command: Command| {
+            let button = ui
+                .add_sized([52.0, 34.0], Button::new(text))
+                .on_hover_text(help);
+            if button.clicked() {
+                commands.send(command);
+            }
+        };
+        if state.options.lockstep.is_some() {
+            button(
+                ui,
+                "◀",
+                "All methods one step back (,)",
+                Command::GoTogether(-1),
+            );
+            button(
+                ui,
+                "▶",
+                "All methods one step on (.)",
+                Command::GoTogether(1),
+            );
+        } else {
+            button(
+                ui,
+                "◀",
+                "Previous stage (↑)",
+                Command::NextStage { back: true },
+            );
+            button(
+                ui,
+                "▶",
+                "Next stage (↓)",
+                Command::NextStage { back: false },
+            );
         }
-        ui.label(RichText::new(stage.map_or("", about)).size(LARGE));
     });
-    ui.label(RichText::new(told(run, span, cursor).unwrap_or_default()).weak());
 }
 
-/// The latest of what a part of a run has told; the future is not known yet.
-pub(super) fn told(run: &Run, span: &Span, cursor: usize) -> Option<String> {
+fn sentences(state: &AppState, run: &Run, span: Option<&Span>, cursor: usize) -> (String, String) {
+    if state.options.lockstep.is_some() {
+        return (
+            "Every method goes on by one step at a time, beside the others.".to_owned(),
+            "The . key goes on, the , key back, with Shift by fifty steps.".to_owned(),
+        );
+    }
+    let Some(span) = span else {
+        return (
+            "I takes the first step, Space runs to the end.".to_owned(),
+            String::new(),
+        );
+    };
+    let stage = run.stages_at(cursor).last().map(|bar| bar.stage);
+    let first = stage.map_or("", about).to_owned();
+    (first, latest(run, span, cursor).unwrap_or_default())
+}
+
+/// The latest decision of a part of a run, in words.
+pub(super) fn latest(run: &Run, span: &Span, cursor: usize) -> Option<String> {
     let last = span.records.end.checked_sub(1)?.min(cursor);
-    let told = run.records().get(span.records.start..=last)?;
-    let mut latest = told.iter().rev();
+    let records = run.records().get(span.records.start..=last)?;
+    let mut latest = records.iter().rev();
     latest.find_map(|record| narration::sentence(&record.event))
 }
 
-/// What a stage does, for somebody who sees it for the first time.
+/// What a stage does, for someone who sees it for the first time.
 fn about(stage: Stage) -> &'static str {
     match stage {
-        Stage::Estimator(_) => "begins with two photos, one of which has a pose and a scan.",
-        Stage::Retrieve => {
-            "First it is guessed from the photos' looks which places could be the right one."
-        }
-        Stage::Detect => {
-            "Points are found that one would find again from nearby, each with a description of its \
-             surroundings."
-        }
+        Stage::Estimator(_) => "The method begins with two photos. One has a pose and a scan.",
+        Stage::Retrieve => "The photos' looks suggest which places could be the right one.",
+        Stage::Detect => "It finds points that stand out, and describes the surroundings of each.",
         Stage::Match => {
-            "Each point of the query looks for its like in the reference; it keeps a match only if the \
-             second best is clearly worse."
+            "Each query point looks for its like in the reference and keeps only a clear winner."
         }
         Stage::DepthLift => {
-            "The scan gives matched points of the reference a depth, so they become points in space."
+            "The scan gives matched points a depth, so they become points in space."
         }
         Stage::MatchGuided => {
-            "With a first pose it is known where each point must be seen, so the search there may be more generous."
+            "A first pose says where each point must be seen, so it may match more freely."
         }
         Stage::Consensus => {
-            "Three matches give a pose, a fourth tells which; the pose that explains most matches wins."
+            "Three matches give a pose, a fourth tells which; the pose with most support wins."
         }
         Stage::Accept => "Would chance alone explain as many matches? Then there is no pose.",
         Stage::Color => "The scan takes its colours from the reference photo.",
         Stage::Search(Phase::PositionCoarse) => {
-            "At each position of a coarse grid a synthetic view is drawn and compared with the query."
+            "It renders the map at each position of a coarse grid and compares it with the query."
         }
         Stage::Search(Phase::PositionFine) => {
-            "Around the cheapest position the grid becomes finer."
+            "Around the position of lowest cost the grid becomes finer."
         }
         Stage::Search(Phase::YawCoarse) => {
-            "At the cheapest position the camera is turned left and right."
+            "At the position of lowest cost the camera turns left and right."
         }
-        Stage::Search(Phase::YawFine) => "Around the cheapest direction the steps become finer.",
+        Stage::Search(Phase::YawFine) => {
+            "Around the heading of lowest cost the steps become finer."
+        }
         Stage::Descend => {
-            "From the reference it walks downhill, first over blurred photos, then over sharper ones."
+            "From the reference it goes downhill, first over blurred photos, then over sharper ones."
         }
         Stage::SearchCoarse => {
-            "Smaller copies of the photos have wider basins: they are searched first."
+            "Smaller copies of the photos have wider basins, so it searches them first."
         }
-        Stage::RefinePlane => "The best coarse minima walk downhill in position and direction.",
+        Stage::RefinePlane => "The best coarse minima go downhill in position and heading.",
         Stage::RefineSix => "Now height, pitch and roll may change too.",
-        Stage::Judge => "The poses of several methods are held against one cost.",
+        Stage::Judge => "One cost compares the poses of several methods.",
         Stage::Assess => {
-            "What is the minimum worth? It is compared with its rivals and with shuffled pixels."
+            "How good is the minimum? It is compared with its rivals and with shuffled pixels."
         }
-        Stage::Fuse => "The poses that the references gave are made one.",
+        Stage::Fuse => "The poses from all references become one.",
     }
 }

@@ -64,6 +64,11 @@ impl Navigation {
         }
     }
 
+    /// Whether the cursor goes along with new records.
+    pub(super) fn follows(&self) -> bool {
+        self.follows && self.anchor.is_none()
+    }
+
     /// Position among the records of the run.
     pub(super) fn cursor(&self) -> usize {
         self.cursor

@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use egui::Ui;
-
 use super::command::{Command, Queue};
 use super::save_target::SaveTarget;
 use super::setup::Setup;
@@ -19,7 +17,8 @@ fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
     let name = |ending: &str| format!("{}{ending}", name_of(setup));
     let file = match target {
         SaveTarget::Recording => name(".rrd"),
-        SaveTarget::Picture(view) => name(&format!("-{}.png", view.unwrap_or("window"))),
+        SaveTarget::Picture => name("-window.png"),
+        SaveTarget::Canvas => name("-canvas.png"),
         SaveTarget::Session | SaveTarget::Restored => "session.json".to_owned(),
     };
     setup.folder.join(file)
@@ -28,7 +27,10 @@ fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
 fn command(target: SaveTarget, path: PathBuf) -> Command {
     match target {
         SaveTarget::Recording => Command::SaveRecording(path),
-        SaveTarget::Picture(view) => Command::SavePicture { view, path },
+        SaveTarget::Picture | SaveTarget::Canvas => Command::SavePicture {
+            of_canvas: target == SaveTarget::Canvas,
+            path,
+        },
         SaveTarget::Session => Command::SaveSession(path),
         SaveTarget::Restored => Command::RestoreSession(path),
     }
@@ -104,41 +106,6 @@ impl Asking {
         });
         is_over
     }
-}
-
-/// The menu of what can be saved or sent.
-pub(super) fn menu(ui: &mut Ui, commands: &Queue) {
-    ui.menu_button("Save", |ui| {
-        let mut item = |text: &str, help: &str, command: Command| {
-            if ui.button(text).on_hover_text(help).clicked() {
-                commands.send(command);
-            }
-        };
-        let ask = Command::AskWhere;
-        let help = "All that was told so far, for the Rerun viewer";
-        item("Recording …", help, ask(SaveTarget::Recording));
-        let help = "Send the run to a Rerun viewer that is running on this machine";
-        item("Stream to a Rerun viewer", help, Command::StreamRecording);
-        let help = "Start a Rerun viewer and send the run to it";
-        item("Spawn a Rerun viewer", help, Command::SpawnViewer);
-        let help = "Put the command line that repeats this run on the clipboard (Ctrl+C)";
-        item("Copy the command line", help, Command::CopyCommandLine);
-        let help = "The whole window, as PNG (Ctrl+P)";
-        item(
-            "Picture of the window …",
-            help,
-            ask(SaveTarget::Picture(None)),
-        );
-        for entry in super::views::ALL {
-            let text = format!("Picture of {} …", entry.title);
-            let target = SaveTarget::Picture(Some(entry.name));
-            item(&text, "This view, as PNG", ask(target));
-        }
-        let help = "Scene, query, settings and layout";
-        item("Session …", help, ask(SaveTarget::Session));
-        let help = "Go back to a saved session";
-        item("Restore a session …", help, ask(SaveTarget::Restored));
-    });
 }
 
 impl AppState {

@@ -5,8 +5,10 @@
 pub enum SaveTarget {
     /// All that was told so far, for the Rerun viewer.
     Recording,
-    /// A view or the whole window, as PNG.
-    Picture(Option<&'static str>),
+    /// The whole window, as PNG.
+    Picture,
+    /// The canvas, as PNG.
+    Canvas,
     /// Scene, query, settings and layout.
     Session,
     /// Back from such a file.
@@ -15,13 +17,13 @@ pub enum SaveTarget {
 
 impl SaveTarget {
     /// What is asked, as the title of the question.
-    pub(super) fn title(self) -> String {
+    pub(super) fn title(self) -> &'static str {
         match self {
-            Self::Recording => "Save the recording".to_owned(),
-            Self::Picture(None) => "Save the window as a picture".to_owned(),
-            Self::Picture(Some(view)) => format!("Save the view {view} as a picture"),
-            Self::Session => "Save the session".to_owned(),
-            Self::Restored => "Restore a session".to_owned(),
+            Self::Recording => "Save the recording",
+            Self::Picture => "Save the window as a picture",
+            Self::Canvas => "Save the canvas as a picture",
+            Self::Session => "Save the session",
+            Self::Restored => "Restore a session",
         }
     }
 }

@@ -8,12 +8,13 @@ use posescope_core::text::json_message;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::arrangement::Arrangement;
 use super::setup::Setup;
 use crate::scene::{self, Scene};
 use crate::session::{IndexFile, Task, TaskScenes};
 
 /// The version of the file's form.
-const SCHEMA: &str = "posescope.session/3";
+const SCHEMA: &str = "posescope.session/4";
 
 /// What is kept of a session.
 #[derive(Debug, Serialize, Deserialize)]
@@ -24,12 +25,12 @@ pub(super) struct SavedSession {
     references: Vec<String>,
     /// The position of the cursor.
     pub(super) cursor: usize,
-    /// The tree of views.
-    pub(super) layout: serde_json::Value,
+    /// What the window is arranged for.
+    pub(super) layout: Arrangement,
 }
 
 impl SavedSession {
-    pub(super) fn new(setup: &Setup, cursor: usize, layout: serde_json::Value) -> Self {
+    pub(super) fn new(setup: &Setup, cursor: usize, layout: Arrangement) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
             task: setup.task.clone(),

@@ -14,7 +14,7 @@ use super::setup::Setup;
 use super::window::WindowError;
 use super::{App, views};
 use crate::method::Method;
-use crate::session::RunState;
+use crate::session::{Part, RunState};
 
 /// What is to be in the picture.
 #[derive(Clone, Debug)]
@@ -135,8 +135,8 @@ impl<'a> Window<'a> {
     fn shown(&mut self, view: Option<&'static str>) -> Result<egui::FullOutput, ShotError> {
         let shot = self.shot;
         self.run_to_end()?;
-        self.go_to(shot.moment)?;
         self.app.send(Command::Arrange(shot.arrangement));
+        self.go_to(shot.moment)?;
         if view.is_some() {
             self.app.send(Command::Maximize(view));
         }
@@ -163,7 +163,8 @@ impl<'a> Window<'a> {
     fn go_to(&mut self, moment: Moment) -> Result<(), ShotError> {
         let steps = self.app.app_state().run().len();
         match moment {
-            Moment::End => self.app.send(Command::Last),
+            // The window is at the cause by itself.
+            Moment::End => {}
             Moment::Step(step) if step < steps => self.app.send(Command::MoveCursor(step)),
             Moment::Step(step) => {
                 return Err(ShotError::Unknown(format!(
@@ -178,7 +179,9 @@ impl<'a> Window<'a> {
                         "{method} is not among the methods that are run; add it to --method"
                     )));
                 }
-                self.app.send(Command::SelectMethod(method));
+                let part = self.app.state.deciding_span(method).map(|span| span.part);
+                let part = part.unwrap_or(Part::Reference(method, 0));
+                self.app.send(Command::ShowPart(part));
             }
         }
         Ok(())

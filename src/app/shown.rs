@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::camera::NamedPose;
 use crate::event::Moment;
 use crate::geometry::Pose;
 use crate::render::Comparison;
@@ -25,8 +24,6 @@ pub enum ShownReason {
     Pointer,
     /// The camera in hand is there.
     Camera,
-    /// It is that of this name.
-    Named(NamedPose),
     /// The estimator rendered it.
     Event(Moment),
 }
@@ -37,7 +34,6 @@ impl ShownReason {
         match self {
             Self::Pointer => "under the pointer",
             Self::Camera => "camera in hand",
-            Self::Named(pose) => pose.word(),
             Self::Event(Moment::Start) => "at the reference",
             Self::Event(Moment::NewBest) => "new best",
             Self::Event(Moment::End) => "result",

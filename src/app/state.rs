@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::cost_line::{CostAlong, CostLine, LineTracer};
 use super::dense_map::{DenseAsk, DenseFiller, DenseMap};
 use super::navigation::Navigation;
+use super::pictures::RunPictures;
 use super::prober::{Probe, Prober};
 use super::queries::Queries;
 use super::selection::{Known, KnownResults, Results, Selection};
@@ -13,13 +14,17 @@ use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
+use crate::diagnosis::Grade;
+use crate::event::Stage;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
+use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::params::Params;
+use crate::proof::ProofPicture;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Run, RunMode, RunState, Session, Span};
+use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
 
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +43,7 @@ pub struct KeptRun {
     pub run: Run,
     /// Where the cursor was.
     pub cursor: usize,
+    pub(super) pictures: RunPictures,
 }
 
 /// The state of the application: everything that the views draw from.
@@ -51,6 +57,10 @@ pub struct AppState {
     pub(super) session: Session,
     pub(super) ctx: egui::Context,
     pub(super) navigation: Navigation,
+    /// Pictures of the present run.
+    pictures: RunPictures,
+    /// Whether the window goes to the cause as soon as the run ends.
+    pub(super) opens_at_cause: bool,
     /// The run A, if one was kept.
     pub kept: Option<KeptRun>,
     /// What is switched on and selected.
@@ -62,8 +72,6 @@ pub struct AppState {
     /// Where the camera was before the last jump.
     pub(super) camera_before: Option<Pose>,
     pub(super) prober: Prober,
-    /// For two poses that are looked at beside each other.
-    pub(super) beside: [Prober; 2],
     /// For the cost along the line from a result to the truth.
     pub(super) line_tracer: LineTracer,
     /// For the map of every position with every heading.
@@ -93,12 +101,13 @@ impl AppState {
         Self {
             params,
             prober: Prober::new(ctx.clone()),
-            beside: [(); 2].map(|()| Prober::new(ctx.clone())),
             line_tracer: LineTracer::new(ctx.clone()),
             dense_filler: DenseFiller::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
             frames,
             session,
+            pictures: RunPictures::new(&ctx),
+            opens_at_cause: true,
             ctx,
             navigation: Navigation::default(),
             kept: None,
@@ -238,7 +247,13 @@ impl AppState {
             let methods = self.setup.direct_methods();
             self.prober.ask(&problem, &methods, &self.params, pose);
         }
-        self.poll_beside();
+        self.pictures
+            .update(self.session.run(), &self.params, self.options.shows_truth);
+        if let Some(kept) = &mut self.kept {
+            let params = Arc::new(kept.run.params.clone());
+            kept.pictures
+                .update(&kept.run, &params, self.options.shows_truth);
+        }
         if let Err(why) = self.line_tracer.poll() {
             self.note(why, true);
         }
@@ -247,18 +262,17 @@ impl AppState {
         }
     }
 
-    /// Whether the answer for one of the two poses is still worked out.
-    pub fn is_looking_beside(&self, side: usize) -> bool {
-        self.options.beside.is_some() && self.beside[side].is_busy()
-    }
-
     /// Whether anything of what the views show is still worked out, beside a run.
     pub fn is_working_out(&self) -> bool {
         self.is_probing()
-            || [0, 1].into_iter().any(|side| self.is_looking_beside(side))
             || self.is_tracing_line()
             || self.dense_filler.is_busy()
             || self.queries.is_painting()
+            || self.pictures.is_busy()
+            || self
+                .kept
+                .as_ref()
+                .is_some_and(|kept| kept.pictures.is_busy())
     }
 
     /// What is known of a method's cost along the line that was asked for last.
@@ -296,29 +310,169 @@ impl AppState {
         }
     }
 
-    fn poll_beside(&mut self) {
-        let Some(named) = self.options.beside else {
-            return;
-        };
-        let problem = self.problem().cloned();
-        let methods = self.setup.direct_methods();
-        for (side, name) in named.into_iter().enumerate() {
-            let pose = self.named_pose(name);
-            if let Err(why) = self.beside[side].poll() {
-                self.note(why, true);
-            }
-            match (&problem, pose) {
-                (Some(problem), Some(pose)) => {
-                    self.beside[side].ask(problem, &methods, &self.params, pose);
-                }
-                _ => self.beside[side].forget(),
-            }
-        }
-    }
-
     fn problem(&self) -> Option<&crate::problem::Problem> {
         let loaded = self.run().loaded.as_deref()?;
         loaded.problems.get(self.run().reference_at(self.cursor()))
+    }
+
+    /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first.
+    fn go_to_cause(&mut self) {
+        let run = self.session.run();
+        let results = || run.spans().iter().filter(|span| span.result.is_some());
+        let has_failed = |span: &&Span| {
+            let grade = span
+                .result
+                .as_ref()
+                .map(|result| result.grade_shown(self.options.shows_truth));
+            grade.is_some_and(Grade::is_failure)
+        };
+        let failed = results().find(has_failed).map(|span| span.part);
+        match (failed, results().next().map(|span| span.part)) {
+            (Some(part), _) => self.show_part(part, true),
+            (None, Some(part)) => self.show_part(part, false),
+            (None, None) => {}
+        }
+    }
+
+    /// Moves the cursor to the end of a part of the run, where `why` with the picture that proves its result.
+    pub(super) fn show_part(&mut self, part: Part, why: bool) {
+        let last = self
+            .shown_run()
+            .span_of(part)
+            .and_then(|span| span.records.end.checked_sub(1));
+        match (last, part.method()) {
+            (Some(last), _) => {
+                self.move_cursor(last);
+                self.options.shows_why = why;
+            }
+            (None, Some(method)) => {
+                self.note(format!("{} has not begun yet", method.label()), false)
+            }
+            (None, None) => {}
+        }
+    }
+
+    /// Whether a part came to something that needs an explanation.
+    pub(super) fn needs_why(&self, part: Part) -> bool {
+        let span = self
+            .shown_run()
+            .span_of(part)
+            .filter(|span| self.has_come(span));
+        let result = span.and_then(|span| self.shown_result(span));
+        result.is_some_and(|result| result.grade != Grade::Right)
+    }
+
+    /// Whether the run A is shown.
+    pub(super) fn is_showing_kept(&self) -> bool {
+        self.kept.is_some() && self.options.compare_mode == CompareMode::Kept
+    }
+
+    /// The run that is shown: the present one, or A.
+    pub(super) fn shown_run(&self) -> &Run {
+        match &self.kept {
+            Some(kept) if self.is_showing_kept() => &kept.run,
+            _ => self.run(),
+        }
+    }
+
+    /// The cursor in the run that is shown.
+    pub(super) fn shown_cursor(&self) -> usize {
+        match self.kept_cursor() {
+            Some(cursor) if self.is_showing_kept() => cursor,
+            _ => self.cursor(),
+        }
+    }
+
+    /// The part of the run that is shown at the cursor.
+    pub(super) fn shown_span(&self) -> Option<&Span> {
+        self.shown_run().span_at(self.shown_cursor())
+    }
+
+    /// The stage at the cursor that chooses what the canvas shows: the innermost one.
+    pub(super) fn shown_stage(&self) -> Option<Stage> {
+        let stages = self.shown_run().stages_at(self.shown_cursor());
+        stages.last().map(|bar| bar.stage)
+    }
+
+    /// The part that a method is judged by: its fused pose, else that of the selected reference, else its last.
+    pub(super) fn deciding_span(&self, method: Method) -> Option<&Span> {
+        let run = self.shown_run();
+        let reference = run.reference_at(self.shown_cursor());
+        let own = || {
+            let spans = run.spans().iter().filter(|span| self.has_come(span));
+            spans.filter(move |span| span.part.method() == Some(method) && span.result.is_some())
+        };
+        let fused = own().rfind(|span| span.part == Part::Fusion(method));
+        let here = || own().find(|span| span.part == Part::Reference(method, reference));
+        fused.or_else(here).or_else(|| own().next_back())
+    }
+
+    /// The result of a part with nothing in it that is hidden.
+    pub(super) fn shown_result(&self, span: &Span) -> Option<QueryResult> {
+        Some(span.result.as_ref()?.shown(self.options.shows_truth))
+    }
+
+    /// What an earlier run found for the method of a part, with nothing in it that is hidden.
+    pub(super) fn known_result(&self, part: Part) -> Option<QueryResult> {
+        let known = self.results.get(&self.setup.query)?;
+        let result = known
+            .iter()
+            .rfind(|result| Some(result.method) == part.method())?;
+        Some(result.shown(self.options.shows_truth))
+    }
+
+    /// The same result in the other run, with nothing in it that is hidden.
+    pub(super) fn other_result(&self, result: &QueryResult) -> Option<QueryResult> {
+        let kept = self.kept.as_ref()?;
+        let other = if self.is_showing_kept() {
+            self.run()
+        } else {
+            &kept.run
+        };
+        let is_same = |other: &&QueryResult| {
+            other.method == result.method
+                && other.fusion == result.fusion
+                && other.references == result.references
+        };
+        let found = other.results().find(is_same)?;
+        Some(found.shown(self.options.shows_truth))
+    }
+
+    /// Whether a record is known at the cursor: in a lecture what comes later is not.
+    pub(super) fn has_begun(&self, record: usize) -> bool {
+        !self.options.hides_future || record <= self.shown_cursor()
+    }
+
+    /// Whether a page of a lesson chooses what the canvas shows.
+    pub(super) fn is_presenting(&self) -> bool {
+        self.options.presented.is_some()
+    }
+
+    fn shown_pictures(&self) -> &RunPictures {
+        match &self.kept {
+            Some(kept) if self.is_showing_kept() => &kept.pictures,
+            _ => &self.pictures,
+        }
+    }
+
+    /// The small picture of a stage of the run that is shown, once it is made.
+    pub(super) fn thumbnail(
+        &self,
+        part: &std::ops::Range<usize>,
+        stage: &std::ops::Range<usize>,
+    ) -> Option<egui::TextureHandle> {
+        self.shown_pictures()
+            .thumbnail(self.shown_run(), part, stage)
+    }
+
+    /// The picture that proves the result of a part, once it is made.
+    pub(super) fn proof(&self, part: Part) -> Option<&Arc<ProofPicture>> {
+        self.shown_pictures().proof(part)
+    }
+
+    /// Whether proofs are still being made.
+    pub(super) fn is_proving(&self) -> bool {
+        self.shown_pictures().is_proving() || self.session.is_alive()
     }
 
     fn on_run_end(&mut self) {
@@ -327,6 +481,9 @@ impl AppState {
                 let results = self.session.run().results().cloned().collect();
                 self.results.insert(self.setup.query, results);
                 self.results_version += 1;
+                if self.opens_at_cause && self.navigation.follows() {
+                    self.go_to_cause();
+                }
             }
             RunState::Broken(why) => self.note(why.clone(), true),
             _ => {}
@@ -356,8 +513,10 @@ impl AppState {
         self.navigation = Navigation::default();
         self.hovered = None;
         self.options.selected_feature = None;
+        self.pictures.forget();
+        self.options.shows_why = false;
+        self.opens_at_cause = mode == RunMode::Running;
         self.prober.forget();
-        self.beside.iter_mut().for_each(Prober::forget);
         self.line_tracer.forget();
         self.dense_filler.forget();
     }

@@ -22,8 +22,6 @@ const OPTIONS: TextureOptions = TextureOptions {
 pub struct Textures {
     entries: RefCell<HashMap<(&'static str, usize), Entry>>,
     frame: std::cell::Cell<u64>,
-    /// The latest pair that something was made of.
-    pair: RefCell<Option<Arc<dyn Any + Send + Sync>>>,
 }
 
 struct Entry {
@@ -52,22 +50,6 @@ impl Textures {
         });
         entry.last_used = self.frame.get();
         entry.texture.clone()
-    }
-
-    /// Two sources as one: the same value for the same two, as long as it is shown.
-    pub fn pair<T: Any + Send + Sync>(&self, first: &Arc<T>, second: &Arc<T>) -> Arc<[Arc<T>; 2]> {
-        let mut latest = self.pair.borrow_mut();
-        let same = |pair: &Arc<dyn Any + Send + Sync>| {
-            let pair = Arc::clone(pair).downcast::<[Arc<T>; 2]>().ok()?;
-            let is_same = Arc::ptr_eq(&pair[0], first) && Arc::ptr_eq(&pair[1], second);
-            is_same.then_some(pair)
-        };
-        if let Some(known) = latest.as_ref().and_then(same) {
-            return known;
-        }
-        let pair = Arc::new([Arc::clone(first), Arc::clone(second)]);
-        *latest = Some(Arc::clone(&pair) as Arc<dyn Any + Send + Sync>);
-        pair
     }
 
     /// Forgets what was not shown for a while.

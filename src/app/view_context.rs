@@ -42,8 +42,6 @@ pub struct ViewContext<'a> {
     pub queries: &'a Queries,
     /// Results of the queries that were run, by query.
     pub results: &'a Results,
-    /// The pose that is looked at, whatever is looked at elsewhere.
-    pinned: Option<(&'a Probe, NamedPose)>,
     state: &'a AppState,
     commands: &'a Queue,
 }
@@ -58,7 +56,6 @@ impl<'a> ViewContext<'a> {
             textures: &state.textures,
             queries: &state.queries,
             results: &state.results,
-            pinned: None,
             state,
             commands,
         }
@@ -74,26 +71,9 @@ impl<'a> ViewContext<'a> {
         Self { cursor, ..*self }
     }
 
-    /// The same for one of the two poses that are looked at beside each other, once it is known what the
-    /// costs say of it.
-    pub(super) fn beside(&self, side: usize) -> Option<Self> {
-        let name = self.options.beside?[side];
-        let prober = self.state.beside.get(side)?;
-        let probe = prober.latest().filter(|_| !prober.is_busy())?;
-        Some(Self {
-            pinned: Some((probe, name)),
-            ..*self
-        })
-    }
-
-    /// Whether the answer for one of the two poses is still worked out.
-    pub(super) fn is_looking_beside(&self, side: usize) -> bool {
-        self.state.is_looking_beside(side)
-    }
-
     /// What the part at the cursor told last, in words.
     pub(super) fn told(&self) -> Option<String> {
-        lecture::told(self.run, self.span()?, self.cursor)
+        lecture::latest(self.run, self.span()?, self.cursor)
     }
 
     /// The kept run at the place that corresponds to the cursor.
@@ -115,6 +95,11 @@ impl<'a> ViewContext<'a> {
         } else {
             self.state.run()
         })
+    }
+
+    /// The colours of the theme.
+    pub(super) fn visuals(&self) -> egui::Visuals {
+        self.state.ctx.global_style().visuals.clone()
     }
 
     /// Asks for something to be done after this frame.
@@ -194,18 +179,12 @@ impl<'a> ViewContext<'a> {
 
     /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
     pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
-        match self.pinned {
-            Some((probe, name)) => Some((probe.pose, ShownReason::Named(name))),
-            None => self.state.looking_at(),
-        }
+        self.state.looking_at()
     }
 
     /// What is known about the pose that was asked for last.
     pub fn probe(&self) -> Option<&'a Probe> {
-        match self.pinned {
-            Some((probe, _)) => Some(probe),
-            None => self.state.probe(),
-        }
+        self.state.probe()
     }
 
     /// What the present run is doing.
@@ -215,7 +194,7 @@ impl<'a> ViewContext<'a> {
 
     /// Whether the answer for the pose that is looked at is still worked out.
     pub fn is_probing(&self) -> bool {
-        self.pinned.is_none() && self.state.is_probing()
+        self.state.is_probing()
     }
 
     /// What is known of a method's cost along the line that was asked for last, of the present run.
@@ -327,15 +306,6 @@ impl<'a> ViewContext<'a> {
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
-        if let Some((probe, name)) = self.pinned {
-            let mut comparisons = probe.comparisons.iter();
-            let (_, comparison) = comparisons.find(|(of, _)| *of == method)?;
-            return Some(ShownView {
-                comparison: Arc::clone(comparison),
-                pose: probe.pose,
-                reason: ShownReason::Named(name),
-            });
-        }
         if let Some((_, reason)) = self.looking_at()
             && let Some(probe) = self.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)

@@ -1,7 +1,8 @@
-//! How a person looks at the runs: what is switched on, and what is selected.
+//! How a user looks at the runs: what is switched on, and what is selected.
 
-use super::camera::NamedPose;
+use super::arrangement::Arrangement;
 use super::selection::VerdictChange;
+use crate::event::Stage;
 
 /// Which of two runs is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -11,26 +12,64 @@ pub enum CompareMode {
     Present,
     /// The run that was kept, A.
     Kept,
-    /// Both, beside each other.
-    SideBySide,
+}
+
+/// A tab of the inspector.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tab {
+    /// Why the result is what it is, and what helps.
+    #[default]
+    Why,
+    /// All numbers of the result.
+    Numbers,
+    /// The parameters of the run.
+    Parameters,
+    /// Every decision in words.
+    Log,
+}
+
+impl Tab {
+    /// All tabs with their titles.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::Why, "Why"),
+        (Self::Numbers, "Numbers"),
+        (Self::Parameters, "Parameters"),
+        (Self::Log, "Log"),
+    ];
 }
 
 /// What is switched on and selected.
 #[derive(Clone, Debug)]
 pub struct ViewOptions {
+    /// What the window is arranged for.
+    pub layout: Arrangement,
+    /// Whether the canvas shows why the selected result is what it is, in place of its stage.
+    pub shows_why: bool,
+    /// A view that was made large at a stage.
+    pub large: Option<(Option<Stage>, &'static str)>,
+    /// Views that a page of a lesson shows, in place of those of the stage.
+    pub presented: Option<Vec<&'static str>>,
+    /// Whether the canvas has all the room.
+    pub is_alone: bool,
+    /// The view that has all the room; without one the canvas as it is.
+    pub alone: Option<&'static str>,
+    /// Whether the list of queries is shown.
+    pub shows_queries: bool,
+    /// Whether the inspector is shown.
+    pub shows_inspector: bool,
+    /// The tab of the inspector.
+    pub tab: Tab,
     /// Which of the runs is shown.
     pub compare_mode: CompareMode,
     /// Whether the ground truth is shown.
     pub shows_truth: bool,
-    /// Whether nothing is shown of what comes behind the cursor.
+    /// Whether nothing is shown of what comes after the cursor.
     pub hides_future: bool,
-    /// With the methods beside each other, so many steps into each of them.
+    /// With the methods side by side, so many steps into each of them.
     pub lockstep: Option<usize>,
-    /// Two poses that are looked at beside each other.
-    pub beside: Option<[NamedPose; 2]>,
-    /// Which results of queries are looked at, as a condition.
+    /// Which results of queries are shown, as a condition.
     pub results_filter: String,
-    /// What has to have become of the verdicts of results that are looked at.
+    /// What the verdicts of the shown results have changed to.
     pub verdict_change: Option<VerdictChange>,
     /// Whether only what differs is shown.
     pub only_differences: bool,
@@ -38,20 +77,28 @@ pub struct ViewOptions {
     pub shows_dense_map: bool,
     /// Whether query and synthetic view are shown in turn.
     pub blinking: bool,
-    /// Whether the keyboard is wanted by the filter.
+    /// Whether the filter takes the keyboard.
     pub wants_filter: bool,
-    /// The query feature that is looked at.
+    /// The selected query feature.
     pub selected_feature: Option<usize>,
 }
 
 impl Default for ViewOptions {
     fn default() -> Self {
         Self {
+            layout: Arrangement::default(),
+            shows_why: false,
+            large: None,
+            presented: None,
+            is_alone: false,
+            alone: None,
+            shows_queries: true,
+            shows_inspector: true,
+            tab: Tab::default(),
             compare_mode: CompareMode::default(),
             shows_truth: true,
             hides_future: false,
             lockstep: None,
-            beside: None,
             results_filter: String::new(),
             verdict_change: None,
             only_differences: false,

@@ -4,11 +4,9 @@
 //! does keep is how a person looks at it: a zoom, a filter.
 
 mod batch;
-mod beside;
 mod breakpoints;
 mod canvas;
 mod charts;
-mod differences;
 mod fusion;
 mod histogram;
 mod images;
@@ -23,7 +21,6 @@ mod queries;
 mod ransac;
 mod readout;
 mod references;
-mod report;
 mod retrieval;
 mod space;
 mod surface;
@@ -156,12 +153,6 @@ pub const ALL: &[Entry] = &[
         new: |_| Box::<fusion::FusionView>::default(),
     },
     Entry {
-        name: "beside",
-        title: "Beside truth",
-        about: "what the cost compares at two poses, and which parts of the query speak for which",
-        new: |_| Box::<beside::BesideView>::default(),
-    },
-    Entry {
         name: "charts",
         title: "Charts",
         about: "the results of all queries: scatter of two measures, errors, recall, verdicts",
@@ -174,22 +165,10 @@ pub const ALL: &[Entry] = &[
         new: |_| Box::<migrations::MigrationsView>::default(),
     },
     Entry {
-        name: "differences",
-        title: "A | B",
-        about: "two runs as one table: what was changed, and what became different",
-        new: |_| Box::<differences::DifferencesView>::default(),
-    },
-    Entry {
         name: "lockstep",
         title: "Lock-step",
         about: "all methods beside each other, each as many steps into its work",
         new: |_| Box::<lockstep::LockstepView>::default(),
-    },
-    Entry {
-        name: "report",
-        title: "Report",
-        about: "verdicts, errors, timings, parameters",
-        new: |_| Box::<report::ReportView>::default(),
     },
     Entry {
         name: "log",

@@ -49,7 +49,7 @@ impl Place {
 
 impl ProofPicture {
     /// The place of each panel's picture in an area of this size, in the order of [`Self::panels`]; titles stand
-    /// right above. A wide large picture has the others below it, another one has them to its right.
+    /// right above. The others stand below the large panel or to its right, wherever it becomes larger.
     pub fn places(&self, width: f32, height: f32) -> Vec<Place> {
         let all = Place {
             left: 0.0,
@@ -57,10 +57,17 @@ impl ProofPicture {
             width,
             height,
         };
-        if self.is_wide() {
-            self.stacked(all)
+        // A small panel counts less: it may be small.
+        let worth = |places: &[Place]| -> f32 {
+            let area = |place: &Place| place.width * place.height;
+            let small: f32 = places.iter().skip(1).map(area).sum();
+            places.first().map_or(0.0, area) + 0.5 * small
+        };
+        let (below, beside) = (self.stacked(all), self.side_by_side(all));
+        if worth(&below) > worth(&beside) {
+            below
         } else {
-            self.side_by_side(all)
+            beside
         }
     }
 
@@ -70,10 +77,6 @@ impl ProofPicture {
         let places = self.places(width, MOST * width);
         let bottoms = places.iter().map(|place| place.top + place.height);
         bottoms.fold(1.0, f32::max).ceil()
-    }
-
-    fn is_wide(&self) -> bool {
-        self.large.aspect() > 1.8 && !self.large.has_cells
     }
 
     fn side_by_side(&self, all: Place) -> Vec<Place> {

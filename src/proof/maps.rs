@@ -12,7 +12,7 @@ use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
 use crate::localize::QueryResult;
 use crate::palette;
 use crate::picture;
-use crate::render::{Comparison, SyntheticView};
+use crate::render::Comparison;
 
 /// Poses that are tried between two poses, and beyond each of them at the same distances.
 const BETWEEN: usize = 40;
@@ -288,28 +288,7 @@ fn view_panel(query: &GrayImage, seen: &Seen) -> Panel {
     let view = &seen.comparison.view;
     let covered = view.pixels.len();
     let title = format!("Map seen from the {}, covers {covered} px", seen.words());
-    Panel::new(title, over(query, view))
-}
-
-/// The view in its grey values over the darkened query, which is bluish where nothing covers it.
-fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
-    const GROUND: f64 = 0.5;
-    let synthetic = picture::synthetic(view);
-    let mut covered = vec![false; (view.width * view.height) as usize];
-    for pixel in &view.pixels {
-        covered[pixel.index as usize] = true;
-    }
-    RgbImage::from_fn(view.width, view.height, |x, y| {
-        let ground = f64::from(query.get_pixel(x, y).0[0]) * GROUND;
-        let painted = f64::from(synthetic.get_pixel(x, y).0[0]);
-        let is_painted = painted > 0.0 || covered[(y * view.width + x) as usize];
-        let [red, green, blue] = if is_painted {
-            [painted; 3]
-        } else {
-            [0.75 * ground, 0.85 * ground, ground]
-        };
-        Rgb([red as u8, green as u8, blue as u8])
-    })
+    Panel::new(title, picture::over(query, view))
 }
 
 fn histogram(seen: Option<&Seen>) -> Option<Panel> {

@@ -149,52 +149,47 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     }
     Some(ProofPicture {
         large: panel,
-        below: None,
-        beside: vec![funnel(&matches)],
+        below: Some(funnel(&matches)),
+        beside: Vec::new(),
     })
 }
 
-/// How many query features passed each step, as bars.
+/// How many query features passed each step, side by side; what the truth says of them stands apart, in green.
 fn funnel(matches: &Matches<'_>) -> Panel {
-    const ROW: f32 = 26.0;
-    const LEFT: f32 = 130.0;
-    const LONGEST: f32 = 240.0;
+    const WIDTH: u32 = 720;
+    const LONGEST: f32 = 88.0;
+    const TOP: [f32; 3] = [8.0, 26.0, 40.0];
     let at_least = |index: usize| {
         let states = matches.states.iter();
         states.filter(|state| state.index() >= index).count()
     };
-    let mut rows = vec![
-        ("detected", at_least(0)),
-        ("distinct", at_least(1)),
-        ("unique", at_least(2)),
-        ("with a depth", at_least(3)),
+    const STEP: Color = [0x56, 0xB4, 0xE9];
+    let mut steps = vec![
+        ("detected", at_least(0), STEP),
+        ("distinct", at_least(1), STEP),
+        ("unique", at_least(2), STEP),
+        ("with a depth", at_least(3), STEP),
+        ("inliers", at_least(INLIER), STEP),
     ];
-    let has_truth = matches.all.iter().any(|one| one.is_true.is_some());
-    if has_truth {
-        rows.push(("true matches", matches.true_ones().count()));
-    }
-    rows.push(("inliers", at_least(INLIER)));
-    if has_truth {
+    if matches.all.iter().any(|one| one.is_true.is_some()) {
         let both = matches.inliers().filter(|one| one.is_true == Some(true));
-        rows.push(("true inliers", both.count()));
+        steps.push(("true matches", matches.true_ones().count(), palette::TRUTH));
+        steps.push(("true inliers", both.count(), palette::TRUTH));
     }
-    let height = ROW * rows.len() as f32 + 8.0;
-    let mut panel = Panel::plain(
-        "Features of the query that passed each step",
-        440,
-        height as u32,
-    );
-    let most = rows[0].1.max(1) as f32;
-    for (row, (name, count)) in rows.into_iter().enumerate() {
-        let y = ROW * (row as f32 + 0.5) + 4.0;
-        let end = LEFT + LONGEST * count as f32 / most;
+    let mut panel = Panel::plain("Features of the query that passed each step", WIDTH, 46);
+    let most = steps[0].1.max(1) as f32;
+    let column = WIDTH as f32 / steps.len() as f32;
+    for (at, (name, count, color)) in steps.into_iter().enumerate() {
+        let left = column * at as f32 + 6.0;
+        // By the root: the last steps keep so few that they would have no length.
+        let length = LONGEST * (count as f32 / most).sqrt();
         panel.line(
-            [0x56, 0xB4, 0xE9],
-            12.0,
-            [[LEFT, y], [end.max(LEFT + 1.0), y]],
+            color,
+            5.0,
+            [[left, TOP[2]], [left + length.max(1.0), TOP[2]]],
         );
-        panel.mark(Thing::Words, [6.0, y], name);
-        panel.mark(Thing::Words, [end + 8.0, y], count.to_string());
+        panel.mark(Thing::Words, [left, TOP[0]], count.to_string());
+        panel.mark(Thing::Words, [left, TOP[1]], name);
     }
     panel
 }

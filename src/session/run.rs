@@ -80,7 +80,7 @@ pub struct Run {
 }
 
 /// What a part of a run is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// The choice of the references.
     Retrieval,

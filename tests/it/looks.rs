@@ -52,11 +52,7 @@ fn at_every_moment(
         *app.app_state().run_state() == RunState::Finished
     });
     window.state_mut().send(Command::Last);
-    see(
-        window,
-        "fused",
-        &["references", "fusion", "report", "space"],
-    );
+    see(window, "fused", &["references", "fusion", "space"]);
 }
 
 /// The views of a moment that are seen: in pictures or in words.
@@ -98,8 +94,8 @@ fn words(window: &Harness<'_, App>) -> String {
     let nodes = window.root().children_recursive();
     let mut nodes = nodes.map(|node| node.accesskit_node());
     // The view comes last, behind the button that leads back to all of them.
-    let back = nodes.find(|node| node.label().as_deref() == Some("All views"));
-    assert!(back.is_some(), "no view is maximised");
+    let back = nodes.find(|node| node.label().as_deref() == Some("All panels"));
+    assert!(back.is_some(), "no view is alone");
     // A run of text repeats what it is part of.
     for node in nodes.filter(|node| node.role() != Role::TextRun) {
         let words = [node.label(), node.value()];

@@ -18,6 +18,7 @@ mod evaluation;
 mod events;
 mod foreign;
 mod frame_cache;
+mod frame_layout;
 mod gps;
 mod hardening;
 mod imports;

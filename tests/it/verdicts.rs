@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use posescope::app::{Command, Results, Setup};
+use posescope::app::{Command, Results, Setup, Tab};
 use posescope::localize::QueryResult;
-use posescope::measure::{measure, read_rows};
+use posescope::measure::{Field, measure, read_rows};
 use posescope::method::Method;
 use posescope::run::read_results;
 use posescope::scene::{self, Scene};
 
 use crate::small_sequence::SmallSequence;
-use crate::window::{finished, is_said, run_until_idle, send, setup, window_with_results};
+use crate::window::{finished, is_said, results, run_until_idle, send, setup, window_with_results};
 
 #[test]
 fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
@@ -58,9 +58,12 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
     setup.task.scene = folder;
     setup.task.protocol.methods = vec![Method::FB];
     let mut window = finished(setup);
-    send(&mut window, Command::Maximize(Some("report")));
-    assert!(is_said(&window, &error.to_string()), "{error}");
-    assert!(error.to_string().contains("max Euler"));
+    send(&mut window, Command::ShowTab(Tab::Numbers));
+    let result = &results(&window)[0];
+    for name in ["error", "rotation"] {
+        let text = Field::find(name).expect("a field").text(result);
+        assert!(is_said(&window, &text), "{name}: {text}");
+    }
 }
 
 #[test]
@@ -96,5 +99,5 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
     send(&mut window, Command::Maximize(Some("queries")));
-    assert!(is_said(&window, &format!("{failed} of 6 failed")));
+    assert!(is_said(&window, &format!("{failed} of 6 wrong")));
 }

@@ -3,7 +3,7 @@
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, shortcuts};
+use posescope::app::{ACTIONS, App, Command};
 use posescope::geometry::Pose;
 
 use crate::window::{app, is_said, press, run_until_idle, send, setup, wait, window};
@@ -38,14 +38,14 @@ fn the_list_of_keys_is_seen_whole() {
     window.state_mut().send(Command::Help);
     window.run_steps(4);
     let seen = window.ctx.content_rect();
-    for shortcut in shortcuts() {
-        let words = window.query_all_by_label_contains(shortcut.help);
+    for shortcut in ACTIONS.iter().filter(|action| !action.keys.is_empty()) {
+        let words = window.query_all_by_label_contains(shortcut.text);
         let rects: Vec<_> = words.map(|node| node.rect()).collect();
-        assert!(!rects.is_empty(), "{}", shortcut.help);
+        assert!(!rects.is_empty(), "{}", shortcut.text);
         assert!(
             rects.iter().any(|rect| seen.contains_rect(*rect)),
             "{} at {rects:?}",
-            shortcut.help
+            shortcut.text
         );
     }
 }
@@ -56,12 +56,12 @@ fn a_menu_closes_with_escape_and_the_camera_stays() {
     run_until_idle(&mut window);
     let pose = Pose::identity();
     send(&mut window, Command::TakeCamera(Some(pose)));
-    window.get_by_label("Views").click();
+    window.get_by_label("Menu").click();
     window.run_steps(2);
-    assert!(is_said(&window, "Layout: Teach"));
+    assert!(is_said(&window, "Window and files"));
     press(&mut window, Modifiers::NONE, Key::Escape);
     window.run_steps(2);
-    assert!(!is_said(&window, "Layout: Teach"));
+    assert!(!is_said(&window, "Window and files"));
     assert_eq!(app(&window).camera, Some(pose));
     press(&mut window, Modifiers::NONE, Key::Escape);
     window.run_steps(2);
@@ -75,7 +75,7 @@ fn what_is_told_goes_by_itself_and_what_went_wrong_stays() {
     press(&mut window, Modifiers::NONE, Key::Num3);
     window.run_steps(3);
     assert!(is_said(&window, "MI has not begun yet"));
-    // The card does not say that anything works while the run is paused.
+    // The bar does not say that anything works while the run is paused.
     assert!(!is_said(&window, "at work"));
     window
         .state_mut()
@@ -103,4 +103,20 @@ fn no_query_of_all_is_localised_against_itself() {
     let results = &app(&window).results;
     assert!(!results.contains_key(&reference), "{:?}", results.keys());
     assert!(is_said(&window, "no reference is chosen for query 000000"));
+}
+
+#[test]
+fn any_action_is_found_by_its_words_and_done_with_enter() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    press(&mut window, Modifiers::COMMAND, Key::K);
+    window.run_steps(3);
+    window
+        .get_by_label("Search for an action")
+        .type_text("ground truth");
+    window.run_steps(3);
+    press(&mut window, Modifiers::NONE, Key::Enter);
+    window.run_steps(3);
+    assert!(!app(&window).options.shows_truth);
+    assert!(!is_said(&window, "Search for an action"));
 }

@@ -129,23 +129,6 @@ impl Placement {
         self.painter(painter)
             .image(texture, self.picture, whole, tint);
     }
-
-    /// Paints the cells of one colour of a checkerboard of another picture of the same size.
-    pub(super) fn paint_checks(&self, painter: &Painter, texture: TextureId, cells_across: u32) {
-        let side = self.picture.width() / cells_across as f32;
-        let rows = (self.picture.height() / side).ceil() as u32;
-        let mut mesh = egui::Mesh::with_texture(texture);
-        for row in 0..rows {
-            for column in (row % 2..cells_across).step_by(2) {
-                let corner = self.picture.min + side * vec2(column as f32, row as f32);
-                let cell = Rect::from_min_size(corner, Vec2::splat(side)).intersect(self.picture);
-                let share = |at: Pos2| ((at - self.picture.min) / self.picture.size()).to_pos2();
-                let uv = Rect::from_min_max(share(cell.min), share(cell.max));
-                mesh.add_rect_with_uv(cell, uv, Color32::WHITE);
-            }
-        }
-        self.painter(painter).add(mesh);
-    }
 }
 
 /// Words in a corner of a picture, readable on any ground.

@@ -2,99 +2,161 @@
 
 use std::collections::BTreeSet;
 
-use egui::{RichText, ScrollArea, Ui};
+use egui::{Color32, Rect, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 
 use super::View;
 use super::in_sight::bring_to_the_middle;
-use super::thumbnail::{THUMBNAIL, thumbnail};
 use crate::app::{Command, ViewContext, theme};
 use crate::event::Side;
 use crate::localize::QueryResult;
 use crate::method::Method;
 
+/// Height of a name below its picture \[points\].
+const NAME: f32 = 20.0;
+
 /// The list of queries.
 #[derive(Default)]
 pub struct QueriesView {
     only_failures: bool,
+    typed: String,
     /// The query that was brought into sight.
     in_sight: Option<usize>,
 }
 
 impl View for QueriesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        ui.horizontal(|ui| {
-            let (text, help) = match context.queries.progress() {
-                Some((done, all)) => (format!("Stop ({done} of {all})"), "Stop"),
-                None => (
-                    "Run all".to_owned(),
-                    "Localise all queries, to know which fail",
-                ),
-            };
-            if ui.button(text).on_hover_text(help).clicked() {
-                context.send(Command::RunAllQueries);
-            }
-            ui.checkbox(&mut self.only_failures, "Failures only");
-            let failed = context
-                .results
-                .keys()
-                .filter(|query| context.has_failed(**query));
-            let failed = failed.count();
-            let words = format!("{failed} of {} failed", context.results.len());
-            let help = "A query counts whose answer is wrong or missing by one method at least";
-            ui.weak(words).on_hover_text(help);
-        });
-        let shown: Vec<usize> = context
-            .setup
-            .offered
-            .iter()
-            .copied()
-            .filter(|query| !self.only_failures || context.has_failed(*query))
-            .collect();
+        let field = egui::TextEdit::singleline(&mut self.typed).hint_text("Filter");
+        let field = ui.add(field.desired_width(f32::INFINITY));
+        field.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Filter queries"));
+        let failed = context
+            .results
+            .keys()
+            .filter(|query| context.has_failed(**query));
+        let failed = failed.count();
+        let words = format!("{failed} of {} wrong", context.results.len());
+        let only = ui.checkbox(&mut self.only_failures, words);
+        only.on_hover_text("Only queries where at least one method is wrong or found no pose");
+        let frames = context.setup.queries.frames();
+        let is_shown = |query: &usize| {
+            frames[*query].contains(self.typed.trim())
+                && (!self.only_failures || context.has_failed(*query))
+        };
+        let offered = context.setup.offered.iter().copied();
+        let shown: Vec<usize> = offered.filter(is_shown).collect();
+        if shown.is_empty() {
+            ui.weak("No query matches the filter.");
+        }
         let is_new = self.in_sight != Some(context.setup.query);
         self.in_sight = Some(context.setup.query);
+        let height = 0.31 * ui.available_width() + NAME;
         let area = ScrollArea::vertical().auto_shrink(false);
-        area.show_rows(ui, THUMBNAIL.y, shown.len(), |ui, rows| {
+        area.show_rows(ui, height, shown.len(), |ui, rows| {
             let place = shown.iter().position(|query| *query == context.setup.query);
             if let Some(place) = place.filter(|_| is_new) {
-                bring_to_the_middle(ui, rows.start, place, THUMBNAIL.y);
+                bring_to_the_middle(ui, rows.start, place, height);
             }
             for &query in &shown[rows] {
-                row(ui, context, query);
+                row(ui, context, query, height);
             }
         });
     }
 }
 
-fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize) {
+/// The thumbnail, below it the name and one mark for each method.
+fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
     let name = &context.setup.queries.frames()[query];
     let is_here = query == context.setup.query;
-    ui.horizontal(|ui| {
-        thumbnail(ui, context, Side::Query, query);
-        ui.vertical(|ui| {
-            let text = RichText::new(name).monospace();
-            if ui.selectable_label(is_here, text).clicked() {
-                context.send(Command::SelectQuery(query));
-            }
-            let results = context.results.get(&query).map_or(&[][..], Vec::as_slice);
-            ui.horizontal(|ui| dots(ui, context, results));
-        });
-    });
+    let (rect, response) =
+        ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_here, name));
+    let painter = ui.painter_at(rect);
+    if is_here || response.hovered() {
+        let ground = if is_here {
+            theme::selected(ui.visuals())
+        } else {
+            ui.visuals().widgets.inactive.weak_bg_fill
+        };
+        painter.rect_filled(rect, 2.0, ground);
+    }
+    let (picture, below) = rect.split_top_bottom_at_y(rect.bottom() - NAME);
+    if let Some(texture) = context.queries.thumbnail(Side::Query, query) {
+        let size = texture.size_vec2();
+        let room = picture.shrink(2.0);
+        let place = Rect::from_center_size(room.center(), size * (room.size() / size).min_elem());
+        let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        painter.image(texture.id(), place, whole, Color32::WHITE);
+    }
+    let results = context.results.get(&query).map_or(&[][..], Vec::as_slice);
+    let marks: Vec<_> = grades(context, results).collect();
+    let color = if is_here {
+        ui.visuals().selection.stroke.color
+    } else {
+        ui.visuals().text_color()
+    };
+    let left = pos2(below.left() + 4.0, below.center().y);
+    painter.text(
+        left,
+        egui::Align2::LEFT_CENTER,
+        name,
+        theme::caption(),
+        color,
+    );
+    let mut right = below.right() - 4.0;
+    for (glyph, color, _) in marks.iter().rev() {
+        let at = pos2(right, below.center().y);
+        // On the ground of what is selected the shape alone says the grade.
+        let color = if is_here {
+            ui.visuals().selection.stroke.color
+        } else {
+            *color
+        };
+        right = painter
+            .text(
+                at,
+                egui::Align2::RIGHT_CENTER,
+                glyph,
+                theme::caption(),
+                color,
+            )
+            .left()
+            - 1.0;
+    }
+    let words: Vec<&str> = marks.iter().map(|(.., words)| words.as_str()).collect();
+    let response = match words.as_slice() {
+        [] => response,
+        words => response.on_hover_text(words.join("\n")),
+    };
+    if response.clicked() {
+        context.send(Command::SelectQuery(query));
+    }
 }
 
-/// One mark per method: what it is tells the shape too.
-pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
+/// One mark for each result, with its colour and its words.
+fn grades<'a>(
+    context: &'a ViewContext<'_>,
+    results: &'a [QueryResult],
+) -> impl Iterator<Item = (&'static str, Color32, String)> + 'a {
     let shows_truth = context.options.shows_truth;
-    ui.spacing_mut().item_spacing.x = 2.0;
     let methods: BTreeSet<Method> = results.iter().map(|result| result.method).collect();
-    for method in methods {
-        for result in results.iter().filter(|r| r.method == method) {
-            // As the card says it.
-            let grade = result.grade_shown(shows_truth);
-            let color = theme::grade(ui.visuals(), grade);
-            let error = result.error.filter(|_| shows_truth);
-            let error = error.map_or(String::new(), |error| format!(", {error}"));
-            ui.label(RichText::new(grade.glyph()).color(color))
-                .on_hover_text(format!("{}: {grade}{error}", method.label()));
-        }
+    let of_method = move |method| results.iter().filter(move |result| result.method == method);
+    methods.into_iter().flat_map(of_method).map(move |result| {
+        let grade = result.grade_shown(shows_truth);
+        let error = result.error.filter(|_| shows_truth);
+        let error = error.map_or(String::new(), |error| format!(", {error}"));
+        let words = format!("{}: {grade}{error}", result.method.label());
+        (
+            grade.glyph(),
+            theme::grade(&context.visuals(), grade),
+            words,
+        )
+    })
+}
+
+/// One mark for each result, in a row.
+pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
+    ui.spacing_mut().item_spacing.x = 2.0;
+    for (glyph, color, words) in grades(context, results) {
+        ui.label(egui::RichText::new(glyph).color(color))
+            .on_hover_text(words);
     }
 }

@@ -12,20 +12,18 @@ use super::View;
 use super::canvas::{self, PanZoom};
 use crate::app::textures::color_image;
 use crate::app::{Command, ShownView, ViewContext};
-use crate::event::{Moment, Side, ViewRendered};
+use crate::event::Side;
 use crate::method::Method;
 use crate::place::place;
 use crate::problem::Problem;
 
 /// How long each of two blinking pictures is shown \[s\].
 const BLINK_S: f64 = 0.4;
-/// Squares of the checkerboard from left to right.
-const CHECKS: u32 = 12;
+/// From this width on there is room for switches, costs and a legend \[points\].
+const LARGE: f32 = 560.0;
 
 /// One picture of a direct method at a time.
 pub struct SynthesisView {
-    /// The method a person has chosen; `None` follows the cursor.
-    chosen: Option<Method>,
     mode: Mode,
     /// Share of the view in the blend.
     blend: f32,
@@ -35,7 +33,6 @@ pub struct SynthesisView {
 impl Default for SynthesisView {
     fn default() -> Self {
         Self {
-            chosen: None,
             mode: Mode::View,
             blend: 0.5,
             pan_zoom: PanZoom::default(),
@@ -46,48 +43,35 @@ impl Default for SynthesisView {
 impl View for SynthesisView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let Some(problem) = context.problem() else {
-            ui.weak("The photos are being read");
+            ui.weak("The photos are being read.");
             return;
         };
-        let method = self.chosen.unwrap_or_else(|| context.direct_method());
-        self.toolbar(ui, context, method);
+        let method = context.direct_method();
+        let is_large = ui.available_width() >= LARGE;
+        if is_large {
+            self.switches(ui, context, method);
+        }
         let shown = context.shown(method);
         match &shown {
-            Some(shown) => {
-                caption(ui, context, problem, method, shown);
-                costs(ui, context, method, shown);
-            }
+            Some(shown) => caption(ui, context, problem, method, shown),
             None => {
-                let name = method.name().to_uppercase();
-                ui.weak(format!(
-                    "{name} has rendered nothing at this step; take the camera in hand or go on"
-                ));
+                let name = method.label();
+                let words =
+                    format!("{name} has rendered nothing yet. Click on a map to see its view.");
+                ui.add(egui::Label::new(egui::RichText::new(words).weak()).truncate());
             }
         }
-        self.legend(ui, method, shown.as_ref());
+        if let Some(shown) = shown.as_ref().filter(|_| is_large) {
+            costs(ui, context, method, shown);
+            self.legend(ui, method, Some(shown));
+        }
         self.picture(ui, context, problem, method, shown.as_ref());
     }
 }
 
 impl SynthesisView {
-    fn toolbar(&mut self, ui: &mut Ui, context: &ViewContext<'_>, method: Method) {
+    fn switches(&mut self, ui: &mut Ui, context: &ViewContext<'_>, method: Method) {
         ui.horizontal_wrapped(|ui| {
-            for candidate in context.direct_methods() {
-                let name = candidate.name().to_uppercase();
-                let response = ui.selectable_label(candidate == method, &name);
-                let help = format!("Show {name} whatever the cursor is in");
-                let response = response.accessible_name(format!("{name} pictures"));
-                if response.on_hover_text(help).clicked() {
-                    self.chosen = Some(candidate);
-                }
-            }
-            let mut follows = self.chosen.is_none();
-            let help = "Show the direct method at the cursor";
-            let follow = ui.checkbox(&mut follows, "Follow").on_hover_text(help);
-            if follow.accessible_name("Follow the estimator").changed() {
-                self.chosen = (!follows).then_some(method);
-            }
-            ui.separator();
             for mode in Mode::ALL {
                 let name = mode.name(method);
                 let response = ui.selectable_label(self.mode == mode, name);
@@ -109,11 +93,8 @@ impl SynthesisView {
 
     /// What the picture's colours mean; always of one height, so that the picture stays in its place.
     fn legend(&mut self, ui: &mut Ui, method: Method, shown: Option<&ShownView>) {
-        /// Below this the longest legend takes two lines \[points\].
-        const ONE_LINE: f32 = 800.0;
-        let width = ui.available_width();
-        let size = Vec2::new(width, if width < ONE_LINE { 42.0 } else { 24.0 });
-        let layout = egui::Layout::left_to_right(egui::Align::Center).with_main_wrap(true);
+        let size = Vec2::new(ui.available_width(), 24.0);
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
         ui.allocate_ui_with_layout(size, layout, |ui| {
             ui.set_min_size(size);
             if self.mode == Mode::Blend {
@@ -143,7 +124,7 @@ impl SynthesisView {
         };
         let name = mode.name(method).to_lowercase();
         let response = ui.allocate_rect(area, Sense::click_and_drag());
-        let spoken = format!("{} picture: {name}", method.name().to_uppercase());
+        let spoken = format!("{} picture: {name}", method.label());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
 
         let query = gray_query(ui, context, problem);
@@ -160,10 +141,6 @@ impl SynthesisView {
                 at.paint(&painter, query.id(), Color32::WHITE);
                 let tint = Color32::WHITE.gamma_multiply(self.blend);
                 at.paint(&painter, view.id(), tint);
-            }
-            (Mode::Checkerboard, Some(view)) => {
-                at.paint(&painter, query.id(), Color32::WHITE);
-                at.paint_checks(&painter, view.id(), CHECKS);
             }
             (_, Some(picture)) => at.paint(&painter, picture.id(), Color32::WHITE),
         }
@@ -198,7 +175,7 @@ fn gray_query(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> TextureH
     })
 }
 
-/// Why the view is shown, where its camera is, what it costs and covers.
+/// Why the view is shown, where its camera is, what it costs and covers; in one line, whole on hover.
 fn caption(
     ui: &mut Ui,
     context: &ViewContext<'_>,
@@ -206,46 +183,25 @@ fn caption(
     method: Method,
     shown: &ShownView,
 ) {
-    let name = method.name().to_uppercase();
-    let place = place(&problem.reference_from_query(&shown.pose));
-    ui.horizontal_wrapped(|ui| {
-        ui.strong(format!("{name}, {}", shown.reason.name()));
-        ui.label(place);
-        if context.is_probing() {
-            ui.weak("the pose asked for is being worked out");
-        }
-    });
     let score = &shown.comparison.score;
     let cost = score
         .cost
         .map_or("no cost".to_owned(), |cost| format!("cost {cost:.4}"));
     let share = 100.0 * f64::from(score.covered) / problem.query.intrinsics.area();
-    let mut covered = format!("{} px covered, {share:.2} % of the query", score.covered);
-    if let Some(at_reference) = covered_at_reference(context, method).filter(|&covered| covered > 0)
-    {
-        let share = f64::from(score.covered) / f64::from(at_reference);
-        covered.push_str(&format!(", {share:.2} of the coverage at the reference"));
-    }
-    ui.horizontal_wrapped(|ui| {
-        ui.strong(cost);
-        ui.label(covered);
+    let words = format!(
+        "{}, {}: {cost}, {} px covered ({share:.1} %), {}",
+        method.label(),
+        shown.reason.name(),
+        score.covered,
+        place(&problem.reference_from_query(&shown.pose))
+    );
+    ui.horizontal(|ui| {
+        if context.is_probing() {
+            ui.spinner();
+        }
+        ui.add(egui::Label::new(&words).truncate())
+            .on_hover_text(&words);
     });
-}
-
-/// Pixels that the method's view covered at the reference pose.
-fn covered_at_reference(context: &ViewContext<'_>, method: Method) -> Option<u32> {
-    let start = |cursor: usize| {
-        let mut events = context.run.all_until::<ViewRendered>(cursor);
-        let start = events.find(|(_, event)| event.moment == Moment::Start)?;
-        Some(start.1.comparison.score.covered)
-    };
-    match context
-        .part_of(method)
-        .and_then(|(_, cursor)| start(cursor))
-    {
-        None => start(context.cursor),
-        covered => covered,
-    }
 }
 
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods

@@ -61,7 +61,7 @@ pub struct ScreenshotArgs {
         hide = true,
         requires = "screenshot",
         default_value = "inspect",
-        value_parser = PossibleValuesParser::new(["inspect", "teach", "batch"])
+        value_parser = PossibleValuesParser::new(["inspect", "lecture", "batch"])
             .try_map(|name: String| arrangement(&name).ok_or("a layout expected"))
     )]
     pub layout: Arrangement,

@@ -431,6 +431,31 @@ impl QueryResult {
         }
     }
 
+    /// What may be shown of it: with the truth hidden, nothing that needs the truth.
+    #[must_use]
+    pub fn shown(&self, shows_truth: bool) -> Self {
+        let mut shown = self.clone();
+        if shows_truth {
+            return shown;
+        }
+        shown.grade = self.grade_shown(false);
+        shown.error = None;
+        shown.initial_error = None;
+        shown.explanation = None;
+        shown
+            .diagnosis
+            .retain(|found| !found.code.rule().needs_truth);
+        if let Some(cost) = &mut shown.cost {
+            cost.truth = None;
+        }
+        for cost in &mut shown.costs_at_pose {
+            cost.truth = None;
+        }
+        let alone = shown.per_reference.iter_mut().flatten();
+        alone.for_each(|one| *one = one.shown(false));
+        shown
+    }
+
     /// What became of the query: the reason of a failure, or the grade with the error.
     pub fn words(&self) -> String {
         match &self.reason {

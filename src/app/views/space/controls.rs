@@ -6,7 +6,7 @@ use egui::{PopupCloseBehavior, RichText, Slider, Ui};
 use super::cameras::{CameraKind, SceneCamera};
 use super::cloud::Coloring;
 use crate::app::camera::NamedPose;
-use crate::app::{Command, ViewContext, shortcuts};
+use crate::app::{ACTIONS, Command, ViewContext};
 use crate::method::Method;
 
 /// What of the scene is shown.
@@ -121,14 +121,11 @@ fn layers_menu(ui: &mut Ui, layers: &mut Layers) {
 
 /// The buttons for where the camera in hand goes.
 pub(super) fn jumps(ui: &mut Ui, context: &ViewContext<'_>, blinks: bool) -> Option<ViewRequest> {
-    let keys = shortcuts();
     ui.weak("camera to");
     for target in NamedPose::ALL {
         let command = Command::JumpCamera(target);
-        let key = keys.iter().find(|shortcut| shortcut.command == command);
-        let key = key.map_or(String::new(), |shortcut| {
-            ui.ctx().format_shortcut(&shortcut.keys)
-        });
+        let action = ACTIONS.iter().find(|action| action.command == command);
+        let key = action.map_or(String::new(), |action| action.keys_text(ui.ctx()));
         let is_there = context.named_pose(target).is_some()
             && (target != NamedPose::Truth || context.options.shows_truth);
         let mut text = egui::text::LayoutJob::default();

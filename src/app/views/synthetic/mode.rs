@@ -22,7 +22,6 @@ pub(super) enum Mode {
     Query,
     View,
     Blend,
-    Checkerboard,
     Residual,
     /// What each pixel has to say in the cost.
     Weights,
@@ -33,11 +32,10 @@ pub(super) enum Mode {
 const LEGEND: f32 = 260.0;
 
 impl Mode {
-    pub(super) const ALL: [Self; 7] = [
+    pub(super) const ALL: [Self; 6] = [
         Self::Query,
         Self::View,
         Self::Blend,
-        Self::Checkerboard,
         Self::Residual,
         Self::Weights,
         Self::Coverage,
@@ -48,7 +46,6 @@ impl Mode {
             Self::Query => "Query",
             Self::View => "View",
             Self::Blend => "Blend",
-            Self::Checkerboard => "Checkerboard",
             Self::Residual => "Residual",
             Self::Weights if explains(method) == Some(ExplanationKind::Weights) => "Weights",
             Self::Weights => "Shares",
@@ -59,12 +56,8 @@ impl Mode {
     pub(super) fn about(self, method: Method) -> &'static str {
         match self {
             Self::Query => "The query in grey values",
-            Self::View => {
-                "The reference cloud in the reference photo's grey values, seen from this pose; \
-                 covered pixels spread over uncovered neighbours to be seen"
-            }
-            Self::Blend => "View over query",
-            Self::Checkerboard => "Query and view in alternate squares",
+            Self::View => "The map seen from this pose, over the darkened query",
+            Self::Blend => "View and query mixed",
             Self::Residual => "Query minus view: orange where the query is brighter",
             Self::Weights if explains(method) == Some(ExplanationKind::Weights) => {
                 "Which pixels the photometric cost counts, and which it ignores"
@@ -90,7 +83,13 @@ impl Mode {
         };
         let picture = match self {
             Self::Query => return None,
-            Self::View | Self::Blend | Self::Checkerboard => of("synthetic/view", &|made| {
+            Self::View => {
+                let query = Arc::clone(&problem.query);
+                of("synthetic/over", &move |made| {
+                    picture::over(&query.photo.gray, &made.view).into()
+                })
+            }
+            Self::Blend => of("synthetic/view", &|made| {
                 picture::synthetic(&made.view).into()
             }),
             Self::Residual => of("synthetic/residual", &|made| {

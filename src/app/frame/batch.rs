@@ -1,0 +1,203 @@
+//! The batch: what many queries came to, all results in a table, and the proof of the selected one.
+
+use egui::{
+    Align2, Color32, CornerRadius, Rect, RichText, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2,
+    vec2,
+};
+
+use super::inspector::capital;
+use super::verdicts::split;
+use super::{Panes, canvas, proof::elided};
+use crate::app::command::{Command, Queue};
+use crate::app::state::AppState;
+use crate::app::theme;
+use crate::diagnosis::Grade;
+use crate::localize::QueryResult;
+use crate::measure::Overview;
+use crate::palette;
+
+/// Height of a bar with its gap \[points\].
+const BAR: f32 = 22.0;
+/// Bars and causes that are drawn, at most.
+const MOST: usize = 8;
+
+pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    let results: Vec<QueryResult> = state
+        .results
+        .values()
+        .flatten()
+        .map(|result| result.shown(state.options.shows_truth))
+        .collect();
+    let overview = Overview::of(&results.iter().collect::<Vec<_>>());
+    ui.add_space(4.0);
+    ui.horizontal_wrapped(|ui| {
+        let headline = RichText::new(&overview.headline)
+            .size(15.0)
+            .color(ui.visuals().strong_text_color());
+        ui.label(headline);
+        let (text, help) = match state.queries.progress() {
+            Some((done, all)) => (format!("Stop ({done} of {all})"), "Stop"),
+            None => (
+                "Run all".to_owned(),
+                "Localise all queries, to know which fail",
+            ),
+        };
+        if ui.button(text).on_hover_text(help).clicked() {
+            commands.send(Command::RunAllQueries);
+        }
+    });
+    ui.add_space(4.0);
+    let rows = overview.bars.len().max(overview.causes.len()).min(MOST);
+    let (area, _) = ui.allocate_exact_size(
+        vec2(ui.available_width(), rows as f32 * BAR + 6.0),
+        Sense::hover(),
+    );
+    let (bars, causes) = area.split_left_right_at_fraction(0.5);
+    draw_bars(ui, &overview, bars.with_max_x(bars.right() - 16.0));
+    draw_causes(ui, &overview, causes);
+    panes.show(ui, "batch", state, commands);
+}
+
+/// One bar for each method: right, unmeasured, wrong, no pose.
+fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
+    const NAME: f32 = 64.0;
+    for (row, bar) in overview.bars.iter().take(MOST).enumerate() {
+        let top = area.top() + row as f32 * BAR;
+        let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
+        let words = Grade::ALL.iter().filter(|grade| bar.count(**grade) > 0);
+        let words: Vec<String> = words
+            .map(|grade| format!("{} {grade}", bar.count(*grade)))
+            .collect();
+        let spoken = format!("{}: {}", bar.name, words.join(", "));
+        let response = ui.interact(line, ui.scope_id().with(("bar", row)), Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+        let painter = ui.painter_at(line);
+        let text = ui.visuals().text_color();
+        let name = elided(ui, &bar.name, text, NAME - 4.0);
+        painter.galley(
+            pos2(line.left(), line.center().y - name.size().y / 2.0),
+            name,
+            text,
+        );
+        let width = (line.width() - NAME) / bar.total().max(1) as f32;
+        let mut left = line.left() + NAME;
+        for grade in Grade::ALL {
+            let count = bar.count(grade);
+            if count == 0 {
+                continue;
+            }
+            let part = Rect::from_min_size(
+                pos2(left, line.top()),
+                vec2(width * count as f32, line.height()),
+            );
+            let color = theme::rgb(palette::dark(palette::grade(grade)));
+            painter.rect_filled(part, CornerRadius::ZERO, color);
+            let galley = painter.layout_no_wrap(
+                format!("{count} {grade}"),
+                theme::caption(),
+                Color32::WHITE,
+            );
+            let galley = if galley.size().x + 6.0 <= part.width() {
+                galley
+            } else {
+                painter.layout_no_wrap(count.to_string(), theme::caption(), Color32::WHITE)
+            };
+            if galley.size().x + 4.0 <= part.width() {
+                painter.galley(part.center() - galley.size() / 2.0, galley, Color32::WHITE);
+            }
+            left = part.right();
+        }
+        response.on_hover_text(spoken);
+    }
+}
+
+/// The causes of all failures, in words.
+fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
+    const COUNT: f32 = 36.0;
+    let most = overview.causes.first().map_or(1, |(_, times)| *times);
+    let names = area.width() * 0.62;
+    for (row, (code, times)) in overview.causes.iter().take(MOST).enumerate() {
+        let top = area.top() + row as f32 * BAR;
+        let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
+        let title = capital(code.title());
+        let spoken = format!("{title} ({code}): {times} results");
+        let response = ui.interact(line, ui.scope_id().with(("cause", row)), Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+        let painter = ui.painter_at(line);
+        let text = ui.visuals().text_color();
+        let name = elided(ui, &title, text, names - 8.0);
+        painter.galley(
+            pos2(line.left(), line.center().y - name.size().y / 2.0),
+            name,
+            text,
+        );
+        let longest = area.width() - names - COUNT;
+        let bar = Rect::from_min_size(
+            pos2(line.left() + names, line.top() + 2.0),
+            vec2(
+                (longest * *times as f32 / most as f32).max(2.0),
+                line.height() - 4.0,
+            ),
+        );
+        painter.rect_filled(bar, 1.0, theme::ESTIMATE);
+        painter.text(
+            bar.right_center() + vec2(6.0, 0.0),
+            Align2::LEFT_CENTER,
+            times,
+            theme::caption(),
+            text,
+        );
+        response.on_hover_text(spoken);
+    }
+}
+
+/// The selected result: its name, its sentence, its proof, and one plot below.
+pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    let area = ui.available_rect_before_wrap();
+    let (upper, lower) = area.split_top_bottom_at_fraction(0.56);
+    ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
+        ui.shrink_clip_rect(upper);
+        let span = state.shown_span();
+        let result = span
+            .filter(|span| state.has_come(span))
+            .and_then(|span| state.shown_result(span));
+        match &result {
+            Some(result) => {
+                let error = result.error.map_or(String::new(), |error| {
+                    format!(" · {} off", error.translation())
+                });
+                ui.strong(format!(
+                    "{} · {}{error}",
+                    result.query,
+                    result.method_name()
+                ));
+                let text = match (result.diagnosis.first(), &result.reason) {
+                    (Some(found), _) => found.text.clone(),
+                    (None, Some(reason)) => reason.text.clone(),
+                    (None, None) => result.evidence(),
+                };
+                ui.add(egui::Label::new(split(&text).0).truncate())
+                    .on_hover_text(&text);
+            }
+            None => {
+                ui.weak("Select a result in the table.");
+            }
+        }
+        ui.horizontal(|ui| {
+            let open = ui.button("Open in Inspect");
+            if open
+                .on_hover_text("Show this query at its proof picture (Enter)")
+                .clicked()
+            {
+                commands.send(Command::OpenSelected);
+            }
+        });
+        canvas::ui(ui, state, commands, panes, 1);
+    });
+    let lower = lower.with_min_y(lower.top() + 8.0);
+    ui.scope_builder(UiBuilder::new().max_rect(lower), |ui| {
+        ui.shrink_clip_rect(lower);
+        panes.show(ui, "charts", state, commands);
+    });
+    ui.advance_cursor_after_rect(area);
+}

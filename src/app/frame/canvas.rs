@@ -1,0 +1,142 @@
+//! The canvas: one large picture that the selected stage chooses, and small ones beside it.
+
+use egui::{Rect, RichText, Sense, Ui, UiBuilder, vec2};
+
+use super::{Panes, proof, stage};
+use crate::app::command::{Command, Queue};
+use crate::app::state::AppState;
+use crate::app::theme;
+use crate::app::views;
+
+/// Share of the width that the large picture takes where others stand beside it.
+const LARGE: f32 = 0.66;
+const GAP: f32 = 8.0;
+/// Height of the name above a small picture \[points\].
+const TITLE: f32 = 18.0;
+
+/// The views on the canvas: the large one first.
+pub(in crate::app) fn scene(state: &AppState) -> Vec<&'static str> {
+    let here = state.shown_stage();
+    let of_stage = stage::scene(here);
+    let mut views: Vec<&'static str> = match &state.options.presented {
+        Some(presented) => presented.clone(),
+        None => of_stage.to_vec(),
+    };
+    if let Some((at, large)) = state.options.large
+        && at == here
+    {
+        views.retain(|view| *view != large);
+        views.insert(0, large);
+        views.truncate(of_stage.len().max(2));
+    }
+    views
+}
+
+pub(in crate::app) fn ui(
+    ui: &mut Ui,
+    state: &AppState,
+    commands: &Queue,
+    panes: &mut Panes,
+    most: usize,
+) {
+    if state.options.shows_why && !state.is_presenting() {
+        why(ui, state, panes);
+        return;
+    }
+    let mut views = scene(state);
+    views.truncate(most);
+    let area = ui.available_rect_before_wrap();
+    let (large, beside) = match views.as_slice() {
+        [] | [_] => (area, Rect::NOTHING),
+        _ => {
+            let width = area.width() * LARGE;
+            let (large, beside) = area.split_left_right_at_x(area.left() + width);
+            (large, beside.with_min_x(beside.left() + GAP))
+        }
+    };
+    if let Some(first) = views.first() {
+        inside(ui, large, |ui| panes.show(ui, first, state, commands));
+    }
+    let others = views.get(1..).unwrap_or_default();
+    let height = (beside.height() - GAP * others.len().saturating_sub(1) as f32)
+        / others.len().max(1) as f32;
+    for (index, name) in others.iter().enumerate() {
+        let corner = beside.min + vec2(0.0, index as f32 * (height + GAP));
+        let rect = Rect::from_min_size(corner, vec2(beside.width(), height));
+        let (title, rest) = rect.split_top_bottom_at_y(rect.top() + TITLE);
+        small_title(ui, state, commands, name, title);
+        inside(ui, rest, |ui| panes.show(ui, name, state, commands));
+    }
+    ui.advance_cursor_after_rect(area);
+}
+
+/// Draws something into a part of the canvas, and nothing outside of it.
+fn inside(ui: &mut Ui, rect: Rect, draw: impl FnOnce(&mut Ui)) {
+    ui.scope_builder(UiBuilder::new().max_rect(rect), |ui| {
+        ui.shrink_clip_rect(rect);
+        draw(ui);
+    });
+}
+
+/// The name above a small picture; a click makes it the large one.
+fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static str, rect: Rect) {
+    let title = views::ALL
+        .iter()
+        .find(|entry| entry.name == name)
+        .map_or(name, |entry| entry.title);
+    let response = ui.interact(rect, ui.scope_id().with(("small", name)), Sense::click());
+    let spoken = format!("Show {title} large");
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
+    let color = if response.hovered() || response.has_focus() {
+        theme::accent(ui.visuals())
+    } else {
+        ui.visuals().weak_text_color()
+    };
+    let galley = ui
+        .painter()
+        .layout_no_wrap(format!("{title}"), theme::caption(), color);
+    ui.painter()
+        .galley(rect.min + vec2(2.0, 2.0), galley, color);
+    if response.on_hover_text(spoken).clicked() {
+        let large = state.shown_stage();
+        commands.send(Command::Enlarge(large, name));
+    }
+}
+
+/// The proof picture of what is selected.
+fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
+    let part = state.shown_span().map(|span| span.part);
+    let Some(part) = part else {
+        proof::empty(ui, "Nothing has run yet. Space runs the query.");
+        return;
+    };
+    match state.proof(part) {
+        Some(picture) => {
+            if panes.proof_of != Some(part) {
+                panes.proof_of = Some(part);
+                panes.swapped = None;
+            }
+            let picture = std::sync::Arc::clone(picture);
+            proof::ui(ui, &state.textures, &picture, &mut panes.swapped);
+        }
+        None if state.is_proving() => proof::empty(ui, "The picture is being made."),
+        None => proof::empty(ui, "This method left nothing that a picture could show."),
+    }
+}
+
+/// A view alone, with a way back.
+pub(in crate::app) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    ui.horizontal(|ui| {
+        let button = ui.button(RichText::new("All panels").small());
+        if button
+            .on_hover_text("Back to the window with all its parts (M)")
+            .clicked()
+        {
+            commands.send(Command::Maximize(None));
+        }
+    });
+    match state.options.alone {
+        Some(view) => panes.show(ui, view, state, commands),
+        None => self::ui(ui, state, commands, panes, usize::MAX),
+    }
+}

@@ -1,0 +1,246 @@
+//! The inspector: why, the numbers, the parameters and the log of what is selected.
+
+mod numbers;
+
+use egui::{Button, Frame, Grid, RichText, ScrollArea, Stroke, Ui, vec2};
+use serde_json::Value;
+
+use super::Panes;
+use super::stage::three_digits;
+use super::storyboard::part_name;
+use super::verdicts::split;
+use crate::app::command::{Command, Queue};
+use crate::app::state::AppState;
+use crate::app::theme;
+use crate::app::view_options::Tab;
+use crate::diagnosis::{Diagnosis, Grade, confidence};
+use crate::localize::{Helped, QueryResult};
+
+pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    let tab = state.options.tab;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (other, title) in Tab::ALL {
+            let text = RichText::new(title).size(12.5);
+            let button = Button::selectable(tab == other, text).frame_when_inactive(false);
+            if ui.add(button).clicked() {
+                commands.send(Command::ShowTab(other));
+            }
+        }
+    });
+    ui.separator();
+    match tab {
+        Tab::Why => {
+            let area = ScrollArea::vertical().id_salt("why").auto_shrink(false);
+            area.show(ui, |ui| why(ui, state, commands));
+        }
+        Tab::Numbers => {
+            let area = ScrollArea::vertical().id_salt("numbers").auto_shrink(false);
+            area.show(ui, |ui| numbers::ui(ui, state));
+        }
+        Tab::Parameters => panes.show(ui, "parameters", state, commands),
+        Tab::Log => panes.show(ui, "log", state, commands),
+    }
+}
+
+fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let Some(span) = state.shown_span() else {
+        ui.weak("Nothing has run yet. Space runs the query.");
+        return;
+    };
+    let Some(result) = state.shown_result(span).filter(|_| state.has_come(span)) else {
+        ui.weak(format!("{} has no result yet.", part_name(span.part)));
+        return;
+    };
+    match result.diagnosis.split_first() {
+        Some((primary, others)) => {
+            finding(ui, primary);
+            helped(ui, state, commands, &result, primary);
+            if !others.is_empty() {
+                heading(ui, "Also found");
+                for (index, other) in others.iter().enumerate() {
+                    let title = RichText::new(capital(other.code.title())).size(12.5);
+                    egui::CollapsingHeader::new(title)
+                        .id_salt(("also", index))
+                        .show(ui, |ui| {
+                            ui.label(&other.text);
+                            evidence(ui, other);
+                        });
+                }
+            }
+        }
+        None => {
+            ui.strong(format!("{}: {}", part_name(span.part), result.grade));
+            let reason = result.reason.as_ref().map(|reason| reason.text.clone());
+            ui.label(reason.unwrap_or_else(|| result.evidence()));
+        }
+    }
+    if let Some(known) = &result.confidence {
+        ui.add_space(8.0);
+        let words = format!(
+            "Confidence: {} ({} likely within {} m)",
+            known.word,
+            confidence::percent(known.probability),
+            confidence::WITHIN_M
+        );
+        ui.weak(words)
+            .on_hover_text("Computed without the truth, from what the method itself leaves behind");
+    }
+    if !result.agreement.is_empty() {
+        heading(ui, "Poses of the other methods");
+        for one in &result.agreement {
+            ui.label(format!(
+                "{}: {:.2} m and {:.1}° away",
+                one.method.label(),
+                one.translation_m,
+                one.rotation_deg
+            ));
+        }
+    }
+}
+
+fn heading(ui: &mut Ui, text: &str) {
+    ui.add_space(10.0);
+    ui.label(
+        RichText::new(text)
+            .size(12.0)
+            .color(ui.visuals().weak_text_color()),
+    );
+}
+
+/// The cause in plain words, its code after it, its sentence and its numbers.
+fn finding(ui: &mut Ui, found: &Diagnosis) {
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(capital(found.code.title()));
+        ui.weak(found.code.name());
+    });
+    let (_, others) = split(&found.text);
+    if !others.is_empty() {
+        ui.label(others);
+    }
+    evidence(ui, found);
+}
+
+/// The numbers of a verdict, in its own order.
+fn evidence(ui: &mut Ui, found: &Diagnosis) {
+    let Value::Object(fields) = &found.evidence else {
+        return;
+    };
+    ui.add_space(4.0);
+    Grid::new(("evidence", found.code.name()))
+        .num_columns(2)
+        .spacing(vec2(10.0, 4.0))
+        .show(ui, |ui| {
+            for (key, value) in fields {
+                let text = match value {
+                    Value::Number(number) if number.is_u64() => number.to_string(),
+                    Value::Number(number) => number.as_f64().map(three_digits).unwrap_or_default(),
+                    Value::String(text) => text.replace('_', " "),
+                    Value::Bool(is_so) => if *is_so { "yes" } else { "no" }.to_owned(),
+                    Value::Null | Value::Array(_) | Value::Object(_) => continue,
+                };
+                let (name, unit) = readable(key);
+                ui.label(name);
+                ui.label(format!("{text}{unit}"));
+                ui.end_row();
+            }
+        });
+}
+
+/// A field of evidence as people read it: its name, and the unit behind its value.
+fn readable(key: &str) -> (String, &'static str) {
+    let units = [("_m", " m"), ("_deg", "°"), ("_px", " px")];
+    let found = units
+        .into_iter()
+        .find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, unit)));
+    let (name, unit) = found.unwrap_or((key, ""));
+    (capital(&name.replace('_', " ")), unit)
+}
+
+/// With a capital letter first.
+pub(in crate::app) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_uppercase().chain(letters).collect(),
+        None => String::new(),
+    }
+}
+
+/// What made the result right, in groups; what may, where nothing was tried.
+fn helped(
+    ui: &mut Ui,
+    state: &AppState,
+    commands: &Queue,
+    result: &QueryResult,
+    primary: &Diagnosis,
+) {
+    if !result.grade.is_failure() {
+        return;
+    }
+    let Some(explanation) = &result.explanation else {
+        heading(ui, "What may help");
+        ui.label(primary.code.rule().advice);
+        if result.error.or(result.initial_error).is_some() && state.setup.task.protocol.explain == 0
+        {
+            let button = ui
+                .button("Try what would help")
+                .on_hover_text("Run the query again in other ways (E)");
+            if button.clicked() {
+                commands.send(Command::Explain);
+            }
+        }
+        return;
+    };
+    let is_other = |helped: &&Helped| helped.args.iter().any(|arg| arg == "--method");
+    let (other, own): (Vec<&Helped>, Vec<&Helped>) = explanation.helped.iter().partition(is_other);
+    for (title, group) in [("This helps", own), ("Another method", other)] {
+        if group.is_empty() {
+            continue;
+        }
+        heading(ui, title);
+        for helped in group {
+            ui.push_id(("remedy", &helped.args), |ui| remedy(ui, commands, helped));
+        }
+    }
+    let failed = explanation.runs.saturating_sub(explanation.helped.len());
+    heading(ui, "Tried, did not help");
+    let words = match (failed, explanation.complete) {
+        (0, _) => "none".to_owned(),
+        (failed, true) => format!("{failed} of {} remedies", explanation.runs),
+        (failed, false) => format!(
+            "{failed} of {} remedies, then the search was stopped",
+            explanation.runs
+        ),
+    };
+    ui.weak(words);
+    ui.weak("The truth chose these. Click one to run it.");
+}
+
+fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
+    let args: Vec<&str> = helped
+        .args
+        .iter()
+        .map(String::as_str)
+        .filter(|arg| *arg != "--set")
+        .collect();
+    let stroke = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
+    let frame = Frame::new()
+        .stroke(stroke)
+        .corner_radius(3.0)
+        .inner_margin(vec2(8.0, 4.0));
+    let response = frame.show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.label(RichText::new(args.join(" ")).monospace().size(12.0));
+        let color = theme::grade(ui.visuals(), Grade::Right);
+        ui.label(RichText::new(format!("● {}", helped.error.translation())).color(color));
+    });
+    let response = response.response.interact(egui::Sense::click());
+    let spoken = format!("Run with {}", args.join(" "));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
+    if response
+        .on_hover_text("Keeps this run as A and runs the query with this")
+        .clicked()
+    {
+        commands.send(Command::Try(helped.args.clone()));
+    }
+}

@@ -1,0 +1,214 @@
+//! A proof picture on the canvas.
+
+use egui::{Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
+
+use crate::app::textures::{Textures, color_image};
+use crate::app::theme;
+use crate::palette;
+use crate::proof::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
+
+/// Half the size of a mark \[points\].
+const MARK: f32 = 7.0;
+
+/// Draws a proof into the room there is. The large panel takes the place of a small one that is clicked.
+pub(super) fn ui(
+    ui: &mut Ui,
+    textures: &Textures,
+    proof: &ProofPicture,
+    swapped: &mut Option<usize>,
+) {
+    let area = ui.available_rect_before_wrap();
+    let shown = match *swapped {
+        Some(small) => proof.swapped(small),
+        None => proof.clone(),
+    };
+    let places = shown.places(area.width(), area.height());
+    for (index, (panel, place)) in shown.panels().zip(&places).enumerate() {
+        let rect = on_screen(area, place);
+        let response = ui.interact(rect, ui.scope_id().with(("panel", index)), Sense::click());
+        let title = panel.title.clone();
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &title));
+        draw(ui, textures, panel, rect);
+        let first_small = 1 + usize::from(shown.below.is_some());
+        if let Some(small) = index.checked_sub(first_small) {
+            let response = response.on_hover_text("Click to show this large");
+            if response.hovered() {
+                let stroke = Stroke::new(1.0, theme::accent(ui.visuals()));
+                ui.painter()
+                    .rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
+            }
+            if response.clicked() {
+                // The one that was large before stands in the place of the one that is large now.
+                *swapped = if *swapped == Some(small) {
+                    None
+                } else {
+                    Some(small)
+                };
+            }
+        }
+    }
+    ui.advance_cursor_after_rect(area);
+}
+
+fn on_screen(area: Rect, place: &Place) -> Rect {
+    let corner = area.min + vec2(place.left, place.top);
+    Rect::from_min_size(corner, vec2(place.width, place.height))
+}
+
+fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect) {
+    let words = ui.visuals().text_color();
+    let title = pos2(rect.left(), rect.top() - 3.0);
+    let room = ui.max_rect().right() - rect.left();
+    let galley = elided(ui, &panel.title, words, room);
+    ui.painter()
+        .galley(title - vec2(0.0, galley.size().y), galley, words);
+    let texture = textures.of(ui.ctx(), "proof", &panel.picture, |picture| {
+        color_image(&image::DynamicImage::ImageRgb8(picture.clone()))
+    });
+    let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+    let painter = ui.painter_at(rect.expand(1.0).intersect(ui.clip_rect()));
+    painter.image(texture.id(), rect, whole, Color32::WHITE);
+    let scale = rect.size() / vec2(panel.picture.width() as f32, panel.picture.height() as f32);
+    let at = |point: [f32; 2]| rect.min + vec2(point[0], point[1]) * scale;
+    for line in &panel.lines {
+        let points = line.points.iter().map(|point| at(*point)).collect();
+        painter.add(Shape::line(
+            points,
+            Stroke::new(line.width, theme::rgb(line.color)),
+        ));
+    }
+    for mark in &panel.marks {
+        draw_mark(&painter, mark.thing, at(mark.at));
+    }
+    labels(
+        &painter,
+        panel.marks.iter().map(|mark| (mark, at(mark.at))),
+        rect,
+    );
+    if let Some(scale) = &panel.scale {
+        color_scale(&painter, scale, rect);
+    }
+}
+
+/// Draws a mark in its shape and colour, with a dark edge.
+pub(in crate::app) fn draw_mark(painter: &egui::Painter, thing: Thing, at: Pos2) {
+    let color = theme::rgb(thing.color());
+    for stroke in [Stroke::new(5.0, Color32::BLACK), Stroke::new(2.5, color)] {
+        match thing {
+            Thing::Reference => {
+                painter.circle_stroke(at, MARK, stroke);
+            }
+            Thing::Truth => {
+                painter.hline(at.x - MARK..=at.x + MARK, at.y, stroke);
+                painter.vline(at.x, at.y - MARK..=at.y + MARK, stroke);
+            }
+            Thing::Result(_) => {
+                let corners = [
+                    vec2(0.0, -MARK),
+                    vec2(MARK, 0.0),
+                    vec2(0.0, MARK),
+                    vec2(-MARK, 0.0),
+                ];
+                painter.add(Shape::closed_line(
+                    corners.map(|to| at + to).to_vec(),
+                    stroke,
+                ));
+            }
+            Thing::Dot(_) => {
+                painter.circle_stroke(at, 3.0, stroke);
+            }
+            Thing::Words => {}
+        }
+    }
+}
+
+/// Labels beside their marks, inside the panel, none upon another.
+fn labels<'a>(painter: &egui::Painter, marks: impl Iterator<Item = (&'a Mark, Pos2)>, panel: Rect) {
+    const GAP: f32 = MARK + 6.0;
+    let mut taken: Vec<Rect> = Vec::new();
+    for (mark, at) in marks.filter(|(mark, _)| !mark.label.is_empty()) {
+        let galley = painter.layout_no_wrap(mark.label.clone(), theme::caption(), Color32::WHITE);
+        let size = galley.size();
+        if mark.thing == Thing::Words {
+            painter.galley(at - vec2(0.0, size.y / 2.0), galley, Color32::WHITE);
+            continue;
+        }
+        let left = if at.x + GAP + size.x < panel.right() {
+            at.x + GAP
+        } else {
+            (at.x - GAP - size.x).max(panel.left() + 3.0)
+        };
+        let place = |down: f32| {
+            Rect::from_min_size(pos2(left, at.y - size.y / 2.0 + down), size)
+                .expand2(vec2(3.0, 1.0))
+        };
+        let step = size.y + 4.0;
+        let free = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0]
+            .map(|rows| place(rows * step))
+            .into_iter()
+            .find(|rect| {
+                panel.contains_rect(*rect) && !taken.iter().any(|other| other.intersects(*rect))
+            });
+        let rect = free.unwrap_or_else(|| place(0.0));
+        painter.rect_filled(rect, 2.0, Color32::from_black_alpha(190));
+        painter.galley(rect.min + vec2(3.0, 1.0), galley, Color32::WHITE);
+        taken.push(rect);
+    }
+}
+
+/// What the colours mean, in the lower left corner.
+fn color_scale(painter: &egui::Painter, scale: &ColorScale, panel: Rect) {
+    const BAR: egui::Vec2 = vec2(90.0, 12.0);
+    const STEPS: usize = 45;
+    let galley =
+        |words: &str| painter.layout_no_wrap(words.to_owned(), theme::caption(), Color32::WHITE);
+    let (dark, bright) = (galley(&scale.dark), galley(&scale.bright));
+    let width = dark.size().x + bright.size().x + BAR.x + 20.0;
+    let corner = pos2(panel.left() + 4.0, panel.bottom() - 22.0);
+    painter.rect_filled(
+        Rect::from_min_size(corner, vec2(width, 18.0)),
+        2.0,
+        Color32::from_black_alpha(190),
+    );
+    let start = corner + vec2(dark.size().x + 10.0, 3.0);
+    for step in 0..STEPS {
+        let color = theme::rgb(palette::viridis((step as f64 + 0.5) / STEPS as f64));
+        let wide = BAR.x / STEPS as f32;
+        let rect = Rect::from_min_size(
+            start + vec2(step as f32 * wide, 0.0),
+            vec2(wide + 0.5, BAR.y),
+        );
+        painter.rect_filled(rect, 0.0, color);
+    }
+    let after = start + vec2(BAR.x + 5.0, -1.0);
+    painter.galley(corner + vec2(5.0, 2.0), dark, Color32::WHITE);
+    painter.galley(after, bright, Color32::WHITE);
+}
+
+/// Words in one line that ends with an ellipsis where they do not fit.
+pub(super) fn elided(
+    ui: &Ui,
+    words: &str,
+    color: Color32,
+    width: f32,
+) -> std::sync::Arc<egui::Galley> {
+    let mut job =
+        egui::text::LayoutJob::simple_singleline(words.to_owned(), theme::caption(), color);
+    job.wrap = egui::text::TextWrapping::truncate_at_width(width.max(1.0));
+    ui.fonts_mut(|fonts| fonts.layout_job(job))
+}
+
+/// A message in the middle of the place where a picture will be.
+pub(super) fn empty(ui: &mut Ui, words: &str) {
+    let rect = ui.available_rect_before_wrap();
+    let color = ui.visuals().weak_text_color();
+    let response = ui.allocate_rect(rect, Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, words));
+    ui.painter().text(
+        rect.center(),
+        Align2::CENTER_CENTER,
+        words,
+        egui::FontId::proportional(15.0),
+        color,
+    );
+}

@@ -1,0 +1,163 @@
+//! The toolbar: one line with the scene, the query, its references, running and what is shown.
+
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{Align, Button, Label, Layout, PopupCloseBehavior, RichText, Ui};
+
+use super::Panes;
+use crate::app::action::{self, ACTIONS, Group, button};
+use crate::app::arrangement::Arrangement;
+use crate::app::command::{Command, Queue};
+use crate::app::state::AppState;
+use crate::app::theme;
+use crate::event::Side;
+use crate::session::RunState;
+
+/// Room of the buttons at the right, and of those in the middle \[points\].
+const RIGHT: f32 = 500.0;
+const MIDDLE: f32 = 260.0;
+
+pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    ui.horizontal_centered(|ui| {
+        menu(ui, state, commands);
+        let room = ui.available_width() - RIGHT - MIDDLE;
+        let size = egui::vec2(room.max(200.0), ui.available_height());
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(size.x);
+            query(ui, state, commands, panes);
+        });
+        let size = egui::vec2(MIDDLE, ui.available_height());
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(size.x);
+            running(ui, state, commands, panes);
+        });
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            shown(ui, state, commands)
+        });
+    });
+}
+
+/// What is seldom needed.
+fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let response = ui.menu_button("Menu", |ui| {
+        for (group, title) in Group::ALL {
+            ui.menu_button(title, |ui| {
+                for action in ACTIONS.iter().filter(|action| action.group == group) {
+                    action.menu_item(ui, state, commands);
+                }
+            });
+        }
+        ui.menu_button("Views", |ui| {
+            for entry in crate::app::views::ALL {
+                if ui.button(entry.title).on_hover_text(entry.about).clicked() {
+                    commands.send(Command::ShowView(entry.name));
+                    ui.close();
+                }
+            }
+        });
+    });
+    response.response.on_hover_text("All actions");
+}
+
+fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    let setup = &state.setup;
+    let scene = RichText::new(setup.queries.name()).strong();
+    ui.add(Label::new(scene).truncate())
+        .on_hover_text("The scene of the query");
+    ui.weak("›");
+    button(ui, state, commands, "◀", Command::NextQuery { back: true });
+    ui.label(RichText::new(setup.query_name()).strong())
+        .on_hover_text("The query");
+    button(ui, state, commands, "▶", Command::NextQuery { back: false });
+    ui.weak("against");
+    let names: Vec<String> = setup
+        .chosen
+        .frames
+        .iter()
+        .map(|&reference| setup.label(Side::Reference, reference))
+        .collect();
+    let text = match names.as_slice() {
+        [] => "no reference yet".to_owned(),
+        [one] => one.clone(),
+        [first, others @ ..] => format!("{first} and {} more", others.len()),
+    };
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let chip = Button::new(format!("{text} ▾")).truncate();
+    let (response, _) = MenuButton::from_button(chip).config(config).ui(ui, |ui| {
+        ui.set_min_size(egui::vec2(380.0, 420.0));
+        ui.set_max_size(egui::vec2(380.0, 420.0));
+        panes.show(ui, "references", state, commands);
+    });
+    let all = names.join(", ");
+    let spoken = format!("References: {all}");
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
+    response.on_hover_text(format!("The references: {all}. Click to choose others"));
+}
+
+fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+    let is_running = matches!(state.run_state(), RunState::Running | RunState::Loading);
+    let is_paused = matches!(state.run_state(), RunState::Paused { .. });
+    let text = if is_running { "Pause" } else { "▶ Run" };
+    let run = ui.add_sized([64.0, 26.0], Button::new(text));
+    let tooltip = action::of(&Command::RunOrPause).map(|action| action.tooltip(ui.ctx()));
+    if run.on_hover_text(tooltip.unwrap_or_default()).clicked() {
+        commands.send(Command::RunOrPause);
+    }
+    ui.add_enabled_ui(is_paused || is_running, |ui| {
+        button(ui, state, commands, "Stage", Command::StepOver);
+        button(ui, state, commands, "Step", Command::StepInto);
+    });
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let count = state.setup.task.breakpoints.len();
+    let text = if count == 0 {
+        "Break".to_owned()
+    } else {
+        format!("Break ({count})")
+    };
+    let (response, _) = MenuButton::new(text).config(config).ui(ui, |ui| {
+        ui.set_min_size(egui::vec2(320.0, 260.0));
+        ui.set_max_size(egui::vec2(320.0, 260.0));
+        panes.show(ui, "breakpoints", state, commands);
+    });
+    response.on_hover_text("Where the run stops");
+}
+
+/// What is shown, and the layouts; from the right.
+fn shown(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    button(ui, state, commands, "?", Command::Help);
+    button(ui, state, commands, "Search", Command::Search);
+    ui.separator();
+    for (arrangement, title, _) in Arrangement::ALL.into_iter().rev() {
+        let is_on = state.options.layout == arrangement;
+        let tooltip =
+            action::of(&Command::Arrange(arrangement)).map(|action| action.tooltip(ui.ctx()));
+        let response = ui.add(Button::selectable(is_on, title));
+        if response
+            .on_hover_text(tooltip.unwrap_or_default())
+            .clicked()
+        {
+            commands.send(Command::Arrange(arrangement));
+        }
+    }
+    ui.separator();
+    compare(ui, state, commands);
+    button(ui, state, commands, "Truth", Command::ShowTruth);
+}
+
+fn compare(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let text = match (state.kept.is_some(), state.is_showing_kept()) {
+        (false, _) => RichText::new("Compare"),
+        (true, true) => RichText::new("Run A").color(theme::accent(ui.visuals())),
+        (true, false) => RichText::new("Run B").color(theme::accent(ui.visuals())),
+    };
+    let button = Button::new(text).min_size(egui::vec2(72.0, 0.0));
+    let (response, _) = MenuButton::from_button(button).ui(ui, |ui| {
+        for action in ACTIONS
+            .iter()
+            .filter(|action| action.group == Group::Compare)
+        {
+            action.menu_item(ui, state, commands);
+        }
+    });
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Compare"));
+    response.on_hover_text("Keep a run as A and compare later ones with it");
+}

@@ -1,0 +1,255 @@
+//! The verdict bar: what each method's result is worth, and the selected one in one sentence.
+
+use egui::{
+    Align, Button, Label, Layout, Rect, RichText, Role, Sense, Stroke, Ui, UiBuilder, WidgetInfo,
+    pos2, vec2,
+};
+
+use super::proof::elided;
+use super::storyboard::part_name;
+use crate::app::action;
+use crate::app::command::{Command, Queue};
+use crate::app::lecture;
+use crate::app::state::AppState;
+use crate::app::theme;
+use crate::diagnosis::{Confidence, confidence};
+use crate::localize::QueryResult;
+use crate::session::{Part, RunState, Span};
+
+/// Width of a cell, of one among more than four, and of the button \[points\].
+const CELL: f32 = 128.0;
+const NARROW_CELL: f32 = 92.0;
+const BUTTON: f32 = 190.0;
+/// What to press while the run waits.
+const HINT: &str =
+    "Space runs the query to its end, I steps into the next event, ? lists all keys.";
+
+/// Draws the cells, the sentence and the remedy.
+pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+    let area = ui.available_rect_before_wrap();
+    let methods = &state.setup.task.protocol.methods;
+    let width = if methods.len() > 4 { NARROW_CELL } else { CELL };
+    let mut left = area.left();
+    for &method in methods {
+        let rect = Rect::from_min_size(pos2(left, area.top()), vec2(width, area.height()));
+        let span = state.deciding_span(method);
+        let part = span.map_or(Part::Reference(method, 0), |span| span.part);
+        cell(ui, state, commands, rect, part, span);
+        left += width;
+    }
+    let rest = Rect::from_min_max(pos2(left + 12.0, area.top()), area.max);
+    let (words, button) = rest.split_left_right_at_x(rest.right() - BUTTON);
+    let span = state.shown_span();
+    let result = span
+        .filter(|span| state.has_come(span))
+        .and_then(|span| state.shown_result(span));
+    let layout = Layout::top_down(Align::Min);
+    ui.scope_builder(
+        UiBuilder::new()
+            .max_rect(words.shrink2(vec2(0.0, 8.0)))
+            .layout(layout),
+        |ui| {
+            let (first, second) = sentence(state, span, result.as_ref());
+            ui.add(
+                Label::new(
+                    RichText::new(&first)
+                        .size(15.0)
+                        .color(ui.visuals().strong_text_color()),
+                )
+                .truncate(),
+            )
+            .on_hover_text(&first);
+            if !second.is_empty() {
+                ui.add(Label::new(RichText::new(&second).weak()).truncate())
+                    .on_hover_text(&second);
+            }
+        },
+    );
+    ui.scope_builder(
+        UiBuilder::new()
+            .max_rect(button.shrink2(vec2(8.0, 16.0)))
+            .layout(Layout::right_to_left(Align::Center)),
+        |ui| {
+            if let Some(result) = result.filter(|result| result.grade.is_failure()) {
+                remedy(ui, state, commands, &result);
+            }
+        },
+    );
+    ui.advance_cursor_after_rect(area);
+}
+
+fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, span: Option<&Span>) {
+    let response = ui.interact(rect, ui.scope_id().with(("verdict", part)), Sense::click());
+    let result = span.and_then(|span| state.shown_result(span));
+    let is_here = state
+        .shown_span()
+        .is_some_and(|here| here.part.method() == part.method());
+    let painter = ui.painter_at(rect);
+    if is_here || response.hovered() {
+        painter.rect_filled(rect, 0.0, ui.visuals().widgets.inactive.weak_bg_fill);
+    }
+    let Some(method) = part.method() else { return };
+    painter.hline(
+        rect.x_range(),
+        rect.top() + 1.5,
+        Stroke::new(3.0, theme::method(method)),
+    );
+    painter.vline(
+        rect.right() - 0.5,
+        rect.y_range(),
+        ui.visuals().widgets.noninteractive.bg_stroke,
+    );
+    let color = theme::text(ui.visuals(), theme::method(method));
+    let name = painter.layout_no_wrap(part_name(part), theme::strong(), color);
+    painter.galley(rect.min + vec2(10.0, 12.0), name, color);
+    let (words, color) = match &result {
+        Some(result) => worth(ui, result),
+        None => (
+            waiting(state, part).to_owned(),
+            ui.visuals().weak_text_color(),
+        ),
+    };
+    let galley = elided(ui, &words, color, rect.width() - 14.0);
+    painter.galley(rect.min + vec2(10.0, 34.0), galley, color);
+    let spoken = format!("{}: {words}", part_name(part));
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_here, &spoken));
+    let help = match state.known_result(part).filter(|_| result.is_none()) {
+        Some(known) => format!("{spoken}. An earlier run found: {}", known.words()),
+        None => spoken.clone(),
+    };
+    if response.on_hover_text(help).clicked() {
+        commands.send(Command::ShowPart(part));
+    }
+}
+
+/// The grade with the error, or the confidence where there is no grade.
+fn worth(ui: &Ui, result: &QueryResult) -> (String, egui::Color32) {
+    let color = theme::grade(ui.visuals(), result.grade);
+    let words = match (&result.error, &result.confidence) {
+        (Some(error), _) => format!(
+            "{} {} {}",
+            result.grade.glyph(),
+            result.grade,
+            error.translation()
+        ),
+        (None, Some(known)) if result.pose.is_some() => {
+            let low = if known.word == Confidence::Low {
+                "◆ "
+            } else {
+                ""
+            };
+            format!(
+                "{low}{} likely right",
+                confidence::percent(known.probability)
+            )
+        }
+        _ => format!("{} {}", result.grade.glyph(), result.grade),
+    };
+    (words, color)
+}
+
+fn waiting(state: &AppState, part: Part) -> &'static str {
+    match state.shown_run().span_of(part) {
+        Some(_) => state.run_state().of_what_has_begun(),
+        None => "not run yet",
+    }
+}
+
+/// The sentence of what is selected, and the one below it.
+fn sentence(
+    state: &AppState,
+    span: Option<&Span>,
+    result: Option<&QueryResult>,
+) -> (String, String) {
+    let Some(span) = span else {
+        return match state.run_state() {
+            RunState::Loading => (
+                "The photos and the cloud are being read.".to_owned(),
+                String::new(),
+            ),
+            RunState::Broken(why) => (why.clone(), String::new()),
+            _ => (HINT.to_owned(), String::new()),
+        };
+    };
+    let Some(result) = result else {
+        let first = format!(
+            "{} is {}.",
+            part_name(span.part),
+            state.run_state().of_what_has_begun()
+        );
+        let is_waiting = matches!(state.run_state(), RunState::Paused { .. });
+        if is_waiting && state.run().results().next().is_none() {
+            return (first, HINT.to_owned());
+        }
+        let latest = lecture::latest(state.shown_run(), span, state.shown_cursor());
+        return (first, latest.unwrap_or_default());
+    };
+    let text = match (result.diagnosis.first(), &result.reason) {
+        (Some(found), _) => found.text.clone(),
+        (None, Some(reason)) => reason.text.clone(),
+        (None, None) => result.evidence(),
+    };
+    split(&text)
+}
+
+/// The first sentence, and the others.
+pub(in crate::app) fn split(text: &str) -> (String, String) {
+    match text.split_once(". ") {
+        Some((first, others)) => (format!("{first}."), others.to_owned()),
+        None => (text.to_owned(), String::new()),
+    }
+}
+
+/// The best of what helped, or the offer to look for it; always of the same width.
+fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult) {
+    let size = vec2(BUTTON - 16.0, 30.0);
+    let explaining = state
+        .run()
+        .explaining
+        .filter(|explaining| explaining.method == result.method);
+    let can_explain = result.error.or(result.initial_error).is_some();
+    let (text, command) = match (&result.explanation, explaining) {
+        (Some(explanation), _) => match explanation.best() {
+            Some(helped) => {
+                let args = helped.args.iter().filter(|arg| *arg != "--set");
+                let args: Vec<&str> = args.map(String::as_str).collect();
+                let text = format!("Try {} → {}", args.join(" "), helped.error.translation());
+                (text, Some(Command::Try(helped.args.clone())))
+            }
+            None => (
+                format!("None of {} remedies helped", explanation.runs),
+                None,
+            ),
+        },
+        (None, Some(explaining)) => (
+            format!("Trying {} of {} …", explaining.tried, explaining.remedies),
+            None,
+        ),
+        (None, None) if can_explain && state.setup.task.protocol.explain == 0 => {
+            ("Try what would help".to_owned(), Some(Command::Explain))
+        }
+        (None, None) => return,
+    };
+    let is_on = command.is_some();
+    let button = Button::new(text.as_str())
+        .truncate()
+        .min_size(size)
+        .fill(theme::selected(ui.visuals()));
+    let response = ui.add_enabled(is_on, button.wrap_mode(egui::TextWrapMode::Truncate));
+    let help = match &command {
+        Some(Command::Explain) => {
+            action::of(&Command::Explain).map(|action| action.tooltip(ui.ctx()))
+        }
+        Some(_) => Some(format!(
+            "{text}. Keeps this run as A and runs the query with this"
+        )),
+        None => None,
+    };
+    let response = match help {
+        Some(help) => response.on_hover_text(help),
+        None => response,
+    };
+    if let Some(command) = command.filter(|_| response.clicked()) {
+        commands.send(command);
+    }
+}

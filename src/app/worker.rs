@@ -1,0 +1,112 @@
+//! A thread that answers questions one after the other.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread;
+
+/// Answers questions in their order, beside the window's thread. [`Worker::forget`] drops those that wait.
+pub(super) struct Worker<Q, A> {
+    questions: Sender<(usize, Q)>,
+    /// An answer, or `None` where the question ended in a panic.
+    answers: Receiver<(usize, Option<A>)>,
+    /// Grows when questions are dropped; older ones are not worked on.
+    epoch: Arc<AtomicUsize>,
+    waiting: usize,
+}
+
+impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
+    /// Starts the thread. It wakes the window for each answer.
+    pub(super) fn new(
+        name: &str,
+        ctx: egui::Context,
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> Self {
+        let (questions, inbox) = mpsc::channel::<(usize, Q)>();
+        let (outbox, answers) = mpsc::channel();
+        let epoch = Arc::new(AtomicUsize::new(0));
+        let now = Arc::clone(&epoch);
+        // Without a thread `ask` finds nobody to send to.
+        let _ = thread::Builder::new().name(name.to_owned()).spawn(move || {
+            for (asked, question) in inbox {
+                if asked < now.load(Ordering::Relaxed) {
+                    continue;
+                }
+                let answer = catch_unwind(AssertUnwindSafe(|| answer(question)));
+                if outbox.send((asked, answer.ok())).is_err() {
+                    break;
+                }
+                ctx.request_repaint();
+            }
+        });
+        Self {
+            questions,
+            answers,
+            epoch,
+            waiting: 0,
+        }
+    }
+
+    /// Asks a question.
+    pub(super) fn ask(&mut self, question: Q) {
+        let epoch = self.epoch.load(Ordering::Relaxed);
+        if self.questions.send((epoch, question)).is_ok() {
+            self.waiting += 1;
+        }
+    }
+
+    /// The answers since the last call. `None` stands for a question that ended in a panic.
+    pub(super) fn poll(&mut self) -> Vec<Option<A>> {
+        let now = self.epoch.load(Ordering::Relaxed);
+        let mut taken = Vec::new();
+        while let Ok((asked, answer)) = self.answers.try_recv() {
+            if asked == now {
+                self.waiting -= 1;
+                taken.push(answer);
+            }
+        }
+        taken
+    }
+
+    /// Drops all questions that wait, and the answer to the one at work.
+    pub(super) fn forget(&mut self) {
+        self.epoch.fetch_add(1, Ordering::Relaxed);
+        self.waiting = 0;
+    }
+
+    /// Whether an answer is still to come.
+    pub(super) fn is_busy(&self) -> bool {
+        self.waiting > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn answers_come_in_order_and_dropped_questions_have_none() {
+        let ctx = egui::Context::default();
+        let mut worker = Worker::new("test", ctx, |number: u32| {
+            assert!(number != 13, "a question that panics");
+            2 * number
+        });
+        let collect = |worker: &mut Worker<u32, u32>| {
+            let mut all = Vec::new();
+            while worker.is_busy() {
+                all.extend(worker.poll());
+                thread::sleep(Duration::from_millis(1));
+            }
+            all
+        };
+        worker.ask(1);
+        worker.forget();
+        for number in [2, 13, 3] {
+            worker.ask(number);
+        }
+        assert_eq!(collect(&mut worker), [Some(4), None, Some(6)]);
+    }
+}

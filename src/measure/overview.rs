@@ -1,0 +1,166 @@
+//! Many results at a glance: one sentence, a bar for each method, and the causes by how often they occur.
+
+use std::collections::BTreeMap;
+
+use crate::diagnosis::{Code, Grade};
+use crate::localize::QueryResult;
+
+/// What a run came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overview {
+    /// How the best method did, why its worst failures failed, and what mends most of them.
+    pub headline: String,
+    /// One bar for each method, in the order of the results.
+    pub bars: Vec<Bar>,
+    /// The primary causes of all failures, the most frequent first.
+    pub causes: Vec<(Code, usize)>,
+}
+
+/// How many results of a method have each grade.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bar {
+    /// The method, with its fusion.
+    pub name: String,
+    /// In the order of [`Grade::ALL`].
+    pub counts: [usize; Grade::ALL.len()],
+}
+
+impl Bar {
+    /// All results of the method.
+    pub fn total(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// Those of a grade.
+    pub fn count(&self, grade: Grade) -> usize {
+        let place = Grade::ALL.iter().position(|known| *known == grade);
+        place.map_or(0, |place| self.counts[place])
+    }
+}
+
+impl Overview {
+    /// Of the results of a run.
+    pub fn of(results: &[&QueryResult]) -> Self {
+        let mut bars: Vec<Bar> = Vec::new();
+        let mut causes: Vec<(Code, usize)> = Vec::new();
+        for result in results {
+            let name = result.method_name();
+            let known = bars.iter().position(|bar| bar.name == name);
+            let at = known.unwrap_or_else(|| {
+                bars.push(Bar {
+                    name,
+                    counts: [0; Grade::ALL.len()],
+                });
+                bars.len() - 1
+            });
+            let place = Grade::ALL.iter().position(|grade| *grade == result.grade);
+            bars[at].counts[place.unwrap_or(0)] += 1;
+            if result.grade.is_failure() {
+                count(&mut causes, result);
+            }
+        }
+        // A stable sort: causes that are as frequent stay in the order in which they occur.
+        causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
+        Self {
+            headline: headline(results, &bars),
+            bars,
+            causes,
+        }
+    }
+}
+
+fn count(causes: &mut Vec<(Code, usize)>, result: &QueryResult) {
+    let Some(primary) = result.diagnosis.first() else {
+        return;
+    };
+    match causes.iter_mut().find(|(code, _)| *code == primary.code) {
+        Some((_, times)) => *times += 1,
+        None => causes.push((primary.code, 1)),
+    }
+}
+
+fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
+    let is_measured = results
+        .iter()
+        .any(|result| matches!(result.grade, Grade::Right | Grade::Wrong));
+    let worth = |bar: &Bar| match is_measured {
+        true => bar.count(Grade::Right),
+        false => bar.total() - bar.count(Grade::NoPose),
+    };
+    // Of equal ones the first.
+    let Some(best) = bars.iter().rev().max_by_key(|bar| worth(bar)) else {
+        return "There are no results yet.".to_owned();
+    };
+    let (name, good, total) = (&best.name, worth(best), best.total());
+    let queries = if total == 1 { "query" } else { "queries" };
+    if !is_measured {
+        return format!(
+            "{name} gives a pose for {good} of {total} {queries}. The truth is not known."
+        );
+    }
+    let mut words = format!("{name} is right for {good} of {total} {queries}.");
+    let failed: Vec<&&QueryResult> = results
+        .iter()
+        .filter(|result| result.method_name() == *name && result.grade.is_failure())
+        .collect();
+    let mut causes = Vec::new();
+    failed.iter().for_each(|result| count(&mut causes, result));
+    if let Some((code, times)) = causes.iter().rev().max_by_key(|(_, times)| *times) {
+        words += &format!(
+            " Most frequent cause of its {} failures: {} ({times}).",
+            failed.len(),
+            code.title()
+        );
+    }
+    let mut mends: BTreeMap<String, usize> = BTreeMap::new();
+    let explained = failed
+        .iter()
+        .filter_map(|result| result.explanation.as_ref());
+    for helped in explained.flat_map(|explanation| &explanation.helped) {
+        let args = helped
+            .args
+            .iter()
+            .map(String::as_str)
+            .filter(|arg| *arg != "--set");
+        *mends.entry(args.collect::<Vec<_>>().join(" ")).or_default() += 1;
+    }
+    if let Some((args, times)) = mends.iter().rev().max_by_key(|(_, times)| **times) {
+        words += &format!(" `{args}` mends {times}.");
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::metrics::tests::row;
+
+    #[test]
+    fn the_headline_names_the_best_method_and_its_most_frequent_cause() {
+        let mut rows = vec![
+            row("1", "fb", Some(0.1)),
+            row("2", "fb", None),
+            row("1", "mi", Some(0.1)),
+            row("2", "mi", Some(9.0)),
+        ];
+        rows[3].diagnosis = vec![crate::measure::metrics::tests::finding(Code::D3)];
+        rows.push(row("3", "mi", Some(0.2)));
+        let all: Vec<&QueryResult> = rows.iter().collect();
+        let overview = Overview::of(&all);
+        assert_eq!(
+            overview.headline,
+            format!(
+                "MI is right for 2 of 3 queries. Most frequent cause of its 1 failures: {} (1).",
+                Code::D3.title()
+            )
+        );
+        let counts: Vec<_> = overview
+            .bars
+            .iter()
+            .map(|bar| (bar.name.as_str(), bar.count(Grade::Right), bar.total()))
+            .collect();
+        assert_eq!(counts, [("FB", 1, 2), ("MI", 2, 3)]);
+        assert_eq!(overview.causes, [(Code::D3, 1)]);
+        assert_eq!(Overview::of(&[]).headline, "There are no results yet.");
+    }
+}
