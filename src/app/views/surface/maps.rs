@@ -1,14 +1,16 @@
-//! One large map of the positions: their cost, of all or of those that may win, or their coverage.
+//! The map of the positions: their cost or their coverage.
 
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
 use super::marks::{MapMark, MarkKind, heading, place};
-use super::scale::{NO_SAY, Scale, bar, number};
+use super::scale::{BELOW_FLOOR, Scale, number};
 use super::search::{Search, Searched, cell_of};
+use crate::app::views::legend::{cost_bar, swatch};
 use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
+use crate::proof::Thing;
 use crate::render::Score;
 
 /// What the map shows.
@@ -37,11 +39,10 @@ const LOWER_AXIS: f32 = 30.0;
 /// The sides that a map may have \[points\].
 const SIDES: std::ops::RangeInclusive<f32> = 120.0..=480.0;
 
-/// The map with its switches. Its pictures change with the cursor and with the floor, so each lattice
-/// has a texture that is painted anew where its pixels differ.
+/// The map with its switches. Each lattice has a texture, which is painted again when its pixels change.
 pub(super) struct CostMap {
     shows_coverage: bool,
-    /// Whether cells that may not win have no colour.
+    /// Whether cells below the coverage floor are grey.
     is_floored: bool,
     painted: Vec<(ColorImage, TextureHandle)>,
 }
@@ -72,14 +73,12 @@ pub(super) struct MapContent<'a> {
     pub(super) dense: Option<&'a DenseSurface>,
     pub(super) scale: &'a Scale,
     pub(super) marks: &'a [MapMark],
-    /// The floor of the slider.
-    pub(super) floor: f64,
     /// From the result to the truth, where both are known and shown.
     pub(super) line: Option<[Offset; 2]>,
 }
 
 impl MapContent<'_> {
-    /// The lattices that are drawn, each upon those before it.
+    /// The lattices, each drawn over those before it.
     fn layers(&self) -> Vec<&ScoredLattice> {
         match self.dense {
             Some(dense) => vec![dense.cheapest().as_ref()],
@@ -92,14 +91,14 @@ impl MapContent<'_> {
         }
     }
 
-    /// The hypothesis that a cell of a layer shows; of a dense map, with the heading.
+    /// The hypothesis of a cell; in a dense map it includes the heading of lowest cost.
     fn offset(&self, layer: &ScoredLattice, cell: usize) -> Option<Offset> {
         let cheapest = self.dense.and_then(|dense| dense.at(cell));
         let offset = cheapest.map(|(offset, _)| offset);
         offset.or_else(|| layer.lattice.offset(cell))
     }
 
-    /// How much is tried, in words.
+    /// How many hypotheses are tried, in words.
     fn progress(&self) -> String {
         if let Some(dense) = self.dense {
             return format!("dense, {} of {} tried", dense.tried(), dense.hypotheses());
@@ -110,7 +109,7 @@ impl MapContent<'_> {
 }
 
 impl CostMap {
-    /// Whether cells that may not win have no colour.
+    /// Whether cells below the coverage floor are grey.
     pub(super) fn is_floored(&self) -> bool {
         self.is_floored
     }
@@ -123,21 +122,20 @@ impl CostMap {
         }
     }
 
-    /// What is switched on.
+    /// The switches of the map, for the coverage floor of the run.
     pub(super) fn switches(&mut self, ui: &mut Ui, floor: f64) {
         let help = "Colour by coverage instead of cost";
         ui.toggle_value(&mut self.shows_coverage, "Coverage")
             .on_hover_text(help);
         let words = format!("Floor {:.0} %", 100.0 * floor);
-        let help = "Leave cells without colour that cover too little to win: less than this share of what \
-                    the reference pose covers";
+        let help = "Grey out cells that cover less than this share of the reference view";
         ui.add_enabled_ui(!self.shows_coverage, |ui| {
             ui.toggle_value(&mut self.is_floored, words)
                 .on_hover_text(help);
         });
     }
 
-    /// Draws the map; answers the pose under the pointer, with its cost in words, and the map's width.
+    /// Draws the map. Returns the pose under the pointer with its cost in words, and the map's width.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -145,7 +143,7 @@ impl CostMap {
         shown: &MapContent<'_>,
     ) -> (Option<(Pose, String)>, f32) {
         let map = self.map();
-        // As high as what is seen, less what is above and below the map.
+        // As high as the visible part of the view, less what is above and below the map.
         let room = (ui.available_width() - LEFT_AXIS - 2.0).min(ui.clip_rect().height() - 84.0);
         let side = room.clamp(*SIDES.start(), *SIDES.end());
         let group = ui.make_persistent_id("maps");
@@ -160,7 +158,7 @@ impl CostMap {
         let takes_camera = !is_panning
             && (answer.response.clicked() || answer.response.dragged_by(PointerButton::Primary));
         overlay(ui, shown, &answer.transform, pointed_at);
-        let told = pointed_at.map(|cell| {
+        let under_pointer = pointed_at.map(|cell| {
             let pose = shown.search.pose(&cell.offset);
             if takes_camera && context.camera() != Some(pose) {
                 context.send(Command::TakeCamera(Some(pose)));
@@ -168,29 +166,37 @@ impl CostMap {
             let score = shown.layers()[cell.layer].scores[cell.cell];
             (pose, readout(shown, score, &cell.offset))
         });
-        (told, side + LEFT_AXIS)
+        (under_pointer, side + LEFT_AXIS)
     }
 
-    /// What the colours of the map mean.
+    /// The meaning of the map's colours.
     pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32) {
         match (self.map(), scale.cost_ends()) {
-            (Map::Coverage, _) => bar(ui, width, "coverage", &scale.coverage_ends()),
-            (_, Some(ends)) => bar(ui, width, "cost", &ends),
+            (Map::Coverage, _) => cost_bar(ui, width, "coverage", &scale.coverage_ends()),
+            (_, Some(ends)) => cost_bar(ui, width, "cost", &ends),
             (_, None) => {
                 ui.weak("no cost yet");
             }
+        }
+        if self.map() == Map::Floored {
+            ui.horizontal(|ui| {
+                swatch(ui, BELOW_FLOOR);
+                ui.weak("below the coverage floor");
+            });
         }
     }
 
     /// The textures of the map with their places.
     fn images(&mut self, ui: &Ui, shown: &MapContent<'_>, map: Map) -> Vec<PlotImage> {
-        let least_covered = shown.search.least_covered(shown.floor);
+        let least_covered = shown.search.least_covered;
         let color = |score: &Score| match map {
             Map::Coverage => shown.scale.coverage(shown.search.coverage(score.covered)),
-            Map::Cost => score.cost.map_or(NO_SAY, |cost| shown.scale.cost(cost)),
+            Map::Cost => score
+                .cost
+                .map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost)),
             Map::Floored => score
                 .eligible_cost(least_covered)
-                .map_or(NO_SAY, |cost| shown.scale.cost(cost)),
+                .map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost)),
         };
         let mut images = Vec::new();
         for (index, layer) in shown.layers().into_iter().enumerate() {
@@ -230,7 +236,7 @@ impl CostMap {
     }
 }
 
-/// One pixel per cell, the row farthest ahead first; what is not tried is left out.
+/// One pixel per cell, the row farthest ahead first; cells that are not tried are transparent.
 fn picture(layer: &ScoredLattice, color: impl Fn(&Score) -> Color32) -> ColorImage {
     let Lattice { columns, rows, .. } = layer.lattice;
     let cells = (0..rows)
@@ -257,7 +263,7 @@ fn plot(
     } else {
         PointerButton::Middle
     };
-    // The numbers are kept from pushing the maps about.
+    // Wider numbers must not move the map.
     let narrow = |axis: AxisHints<'static>, thickness| {
         axis.min_thickness(thickness)
             .label_spacing(egui::Rangef::new(24.0, 40.0))
@@ -267,7 +273,7 @@ fn plot(
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
     let forward = narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, "forward [m]"));
     let bounds = whole(shown);
-    // Another extent, as the search goes on, is another plot: one that is there keeps its bounds.
+    // A plot keeps its bounds, so a map of another extent is another plot.
     let extent = bounds.width().to_bits();
     let answer = Plot::new(("cost map", extent))
         .width(side + LEFT_AXIS)
@@ -287,7 +293,7 @@ fn plot(
         .show(ui, |plot| {
             let wheel = plot.ctx().input(|input| input.smooth_scroll_delta.y);
             if plot.response().hovered() && wheel != 0.0 {
-                // Taken from the scroll area around.
+                // The scroll area around must not scroll too.
                 plot.ctx()
                     .input_mut(|input| input.smooth_scroll_delta = egui::Vec2::ZERO);
                 plot.zoom_bounds_around_hovered(egui::Vec2::splat((wheel / 200.0).exp()));
@@ -309,7 +315,7 @@ fn small(ui: &Ui, text: &str) -> egui::RichText {
         .color(ui.visuals().weak_text_color())
 }
 
-/// How much of a lattice is scored, in words.
+/// How many positions of a lattice are scored, in words.
 pub(super) fn progress(searched: &Searched) -> String {
     let all = searched.surface.lattice.hypotheses().count();
     format!(
@@ -338,13 +344,13 @@ fn whole(shown: &MapContent<'_>) -> PlotBounds {
     PlotBounds::new_symmetrical(MARGIN * half)
 }
 
-/// The cell at a place of the screen, of the lattice that lies on top there.
+/// The cell at a place of the screen, in the uppermost lattice there.
 fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Option<Cell> {
     let point = transform.value_from_position(at);
     let layers = shown.layers();
     layers.iter().enumerate().rev().find_map(|(index, layer)| {
         let cell = cell_of(&layer.lattice, point.x, point.y)?;
-        // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
+        // Where a fine lattice is not tried yet, the coarse one below it is visible.
         let is_seen = index == 0 || layer.scores[cell].is_some();
         let offset = shown.offset(layer, cell).filter(|_| is_seen)?;
         Some(Cell {
@@ -355,7 +361,7 @@ fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Optio
     })
 }
 
-/// What is known of the cell at an offset, in words.
+/// The cost and coverage of the cell at an offset, in words.
 fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> String {
     let at = match shown.dense {
         Some(_) => format!("{}, {}", place(offset), heading(offset)),
@@ -369,7 +375,7 @@ fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> Str
         None => "no cost".to_owned(),
     };
     let coverage = shown.search.coverage(score.covered);
-    let note = if score.covered < shown.search.least_covered(shown.floor) {
+    let note = if score.covered < shown.search.least_covered {
         ", below the floor"
     } else {
         ""
@@ -429,11 +435,11 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
             painter.extend(egui::Shape::dashed_line(&ends, stroke, 6.0, 4.0));
         }
     }
-    // A small map is not to vanish under its marks.
+    // Marks must not cover a small map.
     let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
     for mark in shown.marks {
         let at = screen(&mark.offset);
-        if mark.kind == MarkKind::Truth && !transform.frame().contains(at) {
+        if mark.kind == MarkKind::Thing(Thing::Truth) && !transform.frame().contains(at) {
             mark.paint_beyond(&painter, *transform.frame(), at, reach);
         } else {
             mark.paint(&painter, at, reach);
