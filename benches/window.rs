@@ -280,7 +280,7 @@ fn filter_10000_results(bencher: Bencher) {
 }
 
 /// What a view of 10,000 results costs in a frame in which nothing changes.
-#[divan::bench(args = ["batch", "charts", "migrations", "queries"], sample_count = 30, sample_size = 1)]
+#[divan::bench(args = ["batch", "charts", "queries"], sample_count = 30, sample_size = 1)]
 fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
     with_window(|window| {
         let mut batch = ManyResults::write(window).open(window);

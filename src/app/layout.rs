@@ -187,7 +187,7 @@ const TAB_GAP: f32 = 5.0;
 
 /// Views that are looked for beside each other. One that a layout does not have is opened among its kin.
 const KIN: [&[&str]; 3] = [
-    &["charts", "batch", "migrations"],
+    &["charts", "batch"],
     &["images", "retrieval", "synthetic", "beside", "lockstep"],
     &["report", "differences", "log"],
 ];
@@ -277,13 +277,7 @@ fn sorting() -> Tree<String> {
     let mut tiles = Tiles::default();
     let batch = tabs(
         &mut tiles,
-        &[
-            "batch",
-            "charts",
-            "migrations",
-            views::QUERIES,
-            "references",
-        ],
+        &["batch", "charts", views::QUERIES, "references"],
     );
     let pictures = tabs(&mut tiles, &["images", "synthetic"]);
     let words = tabs(&mut tiles, &["surface", "ransac", "report"]);

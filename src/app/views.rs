@@ -17,7 +17,6 @@ mod legend;
 mod lockstep;
 mod log;
 mod mesh_painter;
-mod migrations;
 mod parameters;
 mod queries;
 mod ransac;
@@ -164,14 +163,8 @@ pub const ALL: &[Entry] = &[
     Entry {
         name: "charts",
         title: "Charts",
-        about: "the results of all queries: scatter of two measures, errors, recall, verdicts",
+        about: "the results of all queries: scatter of two measures, recall, verdicts",
         new: |_| Box::<charts::ChartsView>::default(),
-    },
-    Entry {
-        name: "migrations",
-        title: "Migrations",
-        about: "what became of the verdicts of all queries since other results, as a matrix",
-        new: |_| Box::<migrations::MigrationsView>::default(),
     },
     Entry {
         name: "differences",

@@ -4,10 +4,8 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command};
 use posescope::cost::Explanation;
-use posescope::event::{
-    ConsensusJudged, DebugEvent, HypothesisTried, Moment, PhaseSearched, PoseScored, ViewRendered,
-};
-use posescope::grid::{DenseSurface, GridParams, Offset, Phase, least_covered};
+use posescope::event::{ConsensusJudged, DebugEvent, HypothesisTried, PoseScored, ViewRendered};
+use posescope::grid::{DenseSurface, GridParams, Offset, Phase};
 use posescope::method::Method;
 use posescope::session::{RunMode, Span};
 
@@ -205,51 +203,6 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
     let untried = hover(&mut window, "Cost map", 0.5, 0.1);
     assert_eq!(untried, None);
     text(&window, "not tried yet at (0.0, 3.0) m");
-}
-
-#[test]
-fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
-    let mut window = finished();
-    send(&mut window, Command::Maximize(Some("surface")));
-    move_to_end(&mut window, Method::MI);
-    let surfaces = told::<PhaseSearched>(&window, Method::MI);
-    let surface = &surfaces[0].1.surface;
-    assert_eq!(surface.lattice.phase, Phase::PositionCoarse);
-    let views = told::<ViewRendered>(&window, Method::MI);
-    assert_eq!(views[0].1.moment, Moment::Start);
-    let covered = views[0].1.comparison.score.covered;
-    let own = surface.minimum();
-    let minimum = |floor: f64| surface.minimum_with(least_covered(floor, covered));
-    let floors = || {
-        (11..=1000)
-            .step_by(5)
-            .map(|thousandth| f64::from(thousandth) / 1000.0)
-    };
-    let moving = floors().find(|&floor| minimum(floor) != own && minimum(floor).is_some());
-    let moving = (moving.expect("a floor above the minimum's coverage") / 0.005).round() * 0.005;
-    let slider = window.get_by_role_and_label(egui::Role::Slider, "coverage floor");
-    slider.set_value_accesskit(moving);
-    window.run_steps(3);
-    let cell = minimum(moving).expect("some position may win");
-    let offset = surface.lattice.offset(cell).expect("a hypothesis");
-    let cost = surface.scores[cell]
-        .and_then(|score| score.cost)
-        .expect("a cost");
-    let expected = format!(
-        "The minimum moves to ({:.1}, {:.1}) m at this floor, cost {cost:.4}",
-        offset.right_m + 0.0,
-        offset.forward_m + 0.0
-    );
-    assert_eq!(text(&window, "The minimum moves"), expected);
-
-    window.get_by_label("Run with this floor").click();
-    window.run_steps(2);
-    finish(&mut window);
-    let floor = app(&window).setup.task.params.grid.coverage_floor;
-    assert!((floor - moving).abs() < 1e-9, "{floor}");
-    let surfaces = told::<PhaseSearched>(&window, Method::MI);
-    assert_eq!(surfaces[0].1.surface.minimum(), Some(cell));
-    assert!(texts(&window, "The minimum moves").is_empty());
 }
 
 #[test]
@@ -478,7 +431,7 @@ fn filled_densely() -> Harness<'static, App> {
     window.state_mut().send(Command::Maximize(Some("surface")));
     window.key_press(egui::Key::F);
     window.run_steps(2);
-    for (name, value) in [("Positions each", "0.25"), ("headings each", "2.5")] {
+    for (name, value) in [("Positions every", "0.25"), ("headings every", "2.5")] {
         let field = window.get_by_role_and_label(egui::accesskit::Role::SpinButton, name);
         field.click();
         window.run_steps(2);
@@ -545,7 +498,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     }
     assert!(turned > 3, "nowhere is another heading cheaper");
     let (least, best) = filled.minimum().expect("textured walls");
-    let words = text(&window, "Least of all: cost ");
+    let words = text(&window, "Lowest of all: cost ");
     assert!(
         words.contains(&format!("{:.4}", best.cost.expect("covered"))),
         "{words}"
@@ -553,7 +506,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     has(&words, "from the truth; the search ended");
 
     // A click on its mark in the legend takes the camera there, heading and all.
-    click(&window, "least of all ");
+    click(&window, "lowest of all ");
     window.run_steps(2);
     let camera = app(&window).camera.expect("taken");
     let found = Offset::of(&problem.reference_from_query(&camera));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::frame::{Frame, Points};
 use super::guarded;
-use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
+use super::pipelines::{COLOR, DEPTH, Pipelines};
 
 /// The picture and what is needed to draw it anew.
 #[derive(Default)]
@@ -19,9 +19,8 @@ pub(super) struct Picture {
 /// Textures of the size of the pane.
 struct RenderTarget {
     size: [u32; 2],
-    samples: wgpu::TextureView,
+    color: wgpu::Texture,
     depth: wgpu::TextureView,
-    resolved: wgpu::Texture,
     bind_group: wgpu::BindGroup,
 }
 
@@ -134,13 +133,13 @@ impl Picture {
 
     #[cfg(test)]
     pub(super) fn texture(&self) -> Option<&wgpu::Texture> {
-        self.target.as_ref().map(|target| &target.resolved)
+        self.target.as_ref().map(|target| &target.color)
     }
 }
 
 impl RenderTarget {
     fn new(device: &wgpu::Device, pipelines: &Pipelines, size: [u32; 2]) -> Self {
-        let texture = |format, sample_count, usage| {
+        let texture = |format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("space"),
                 size: wgpu::Extent3d {
@@ -149,7 +148,7 @@ impl RenderTarget {
                     depth_or_array_layers: 1,
                 },
                 mip_level_count: 1,
-                sample_count,
+                sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format,
                 usage,
@@ -159,35 +158,34 @@ impl RenderTarget {
         let attached = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
-        let resolved = texture(COLOR, 1, attached | read);
-        let whole = wgpu::BindingResource::TextureView(&view(&resolved));
+        let color = texture(COLOR, attached | read);
+        let whole = wgpu::BindingResource::TextureView(&view(&color));
         Self {
             size,
-            samples: view(&texture(COLOR, SAMPLES, attached)),
-            depth: view(&texture(DEPTH, SAMPLES, attached)),
+            depth: view(&texture(DEPTH, attached)),
             bind_group: bind(device, &pipelines.blit_layout, whole),
-            resolved,
+            color,
         }
     }
 
-    /// A pass that begins with the background. Only what the samples are resolved to is kept.
+    /// A pass that begins with the background.
     fn begin<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
         frame: &Frame,
     ) -> wgpu::RenderPass<'a> {
-        let resolved = self.resolved.create_view(&Default::default());
+        let color = self.color.create_view(&Default::default());
         let background = frame.background.to_array();
         let [r, g, b, a] = background.map(|value| f64::from(value) / 255.0);
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("space"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.samples,
+                view: &color,
                 depth_slice: None,
-                resolve_target: Some(&resolved),
+                resolve_target: None,
                 ops: wgpu::Operations {
                     load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
-                    store: wgpu::StoreOp::Discard,
+                    store: wgpu::StoreOp::Store,
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {

@@ -3,8 +3,6 @@
 use super::frame::{Line, Spot};
 use super::guarded;
 
-/// Samples in a pixel: lines have smooth edges.
-pub(super) const SAMPLES: u32 = 4;
 /// Format of the picture. Values are written as egui encodes them.
 pub(super) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -48,12 +46,12 @@ impl Pipelines {
         let triangles = wgpu::PrimitiveTopology::TriangleList;
         let instance = wgpu::VertexStepMode::Instance;
         let corner = wgpu::VertexStepMode::Vertex;
-        let part = |vertex, topology, stride: usize, step_mode, attributes| {
+        let part = |vertex, fragment, topology, stride: usize, step_mode, attributes| {
             let spec = PipelineSpec {
                 layout: &view_layout,
                 shaders: &scene,
                 vertex,
-                fragment: "paint",
+                fragment,
                 buffer: Some(wgpu::VertexBufferLayout {
                     array_stride: stride as u64,
                     step_mode,
@@ -65,9 +63,9 @@ impl Pipelines {
             spec.pipeline(device)
         };
         Self {
-            points: part("point", strip, Spot::BYTES, instance, &spot),
-            lines: part("line", strip, Line::BYTES, instance, &line),
-            faces: part("face", triangles, Spot::BYTES, corner, &spot),
+            points: part("point", "paint", strip, Spot::BYTES, instance, &spot),
+            lines: part("line", "stroke", strip, Line::BYTES, instance, &line),
+            faces: part("face", "paint", triangles, Spot::BYTES, corner, &spot),
             blit: PipelineSpec {
                 layout: &blit_layout,
                 shaders: &blit,
@@ -145,10 +143,7 @@ impl PipelineSpec<'_> {
                 topology: self.topology,
                 ..wgpu::PrimitiveState::default()
             },
-            multisample: wgpu::MultisampleState {
-                count: if depth.is_some() { SAMPLES } else { 1 },
-                ..wgpu::MultisampleState::default()
-            },
+            multisample: wgpu::MultisampleState::default(),
             depth_stencil: depth,
             fragment: Some(wgpu::FragmentState {
                 module: self.shaders,
