@@ -125,9 +125,10 @@ pub(super) fn paint_mark(painter: &Painter, thing: Thing, at: Pos2, radius: f32)
 
 /// Paints the ring of a minimum with its number.
 pub(super) fn paint_minimum(painter: &Painter, number: &str, at: Pos2, radius: f32) {
-    painter.circle(at, radius, Color32::WHITE, Stroke::new(1.0, Color32::BLACK));
-    let font = FontId::proportional(1.9 * radius);
-    painter.text(at, Align2::CENTER_CENTER, number, font, Color32::BLACK);
+    painter.circle_filled(at, radius + 1.5, Color32::BLACK);
+    painter.circle_stroke(at, radius, Stroke::new(1.5, Color32::WHITE));
+    let font = FontId::proportional(1.7 * radius);
+    painter.text(at, Align2::CENTER_CENTER, number, font, Color32::WHITE);
 }
 
 /// The shape of a mark in a plot.

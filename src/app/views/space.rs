@@ -323,7 +323,8 @@ impl SpaceView {
             _ => Vec::new(),
         };
         if let Some(search) = content.search.as_ref().filter(|_| self.layers.path) {
-            lines.extend(ground::path(geometry, &search.way, theme::ESTIMATE));
+            let color = theme::method(search.method);
+            lines.extend(ground::path(geometry, &search.way, color));
         }
         if self.layers.rays {
             lines.extend_from_slice(&content.rays.lines);

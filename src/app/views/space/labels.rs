@@ -19,7 +19,7 @@ pub(super) fn cameras(
     view_camera: &ViewCamera,
     cameras: &[SceneCamera],
 ) -> Option<CameraKind> {
-    const RADIUS: f32 = 6.0;
+    const RADIUS: f32 = 8.0;
     let seen = |camera: &SceneCamera| {
         let at = view_camera.project(&camera.centre())? + pane.min.to_vec2();
         pane.shrink(4.0).contains(at).then_some(at)

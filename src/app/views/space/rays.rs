@@ -100,7 +100,8 @@ pub(super) fn rays(
         let (color, width) = if selected == Some(lifted.query) {
             (color, 4.0)
         } else {
-            (color.gamma_multiply(0.55), 1.0)
+            // Pale: the cameras matter more.
+            (color.gamma_multiply(0.25), 1.0)
         };
         let along = |share: f64| geometry.spot(&(centre + share * (point - centre)));
         let mut piece = |from: f64, to: f64| {

@@ -213,8 +213,7 @@ pub(super) fn legend(
     let mut pointed_at = None;
     let rows = |ui: &mut Ui| {
         // The room for the mark is part of the button, so that both wrap together.
-        let icon = ui.spacing().icon_width;
-        ui.spacing_mut().button_padding = vec2(0.5 * icon + 4.0, 1.0);
+        ui.spacing_mut().button_padding = vec2(3.0 * RADIUS, 1.0);
         for mark in marks {
             // Without a frame a button would have no room beside its words.
             let button = egui::Button::new(egui::RichText::new(&mark.words).small())
@@ -222,7 +221,10 @@ pub(super) fn legend(
                 .stroke(Stroke::NONE)
                 .wrap_mode(wrap_mode);
             let response = ui.add(button.sense(Sense::click()));
-            let at = pos2(response.rect.left() + 5.0, response.rect.center().y);
+            let at = pos2(
+                response.rect.left() + 1.5 * RADIUS,
+                response.rect.center().y,
+            );
             mark.kind.paint(ui.painter(), at, RADIUS);
             if response.hovered() {
                 pointed_at = Some(mark.pose);
