@@ -103,10 +103,9 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
     let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
     for (switch, map) in [
-        ("", "Cost map above the floor"),
+        ("", "Cost map"),
         ("Coverage", "Coverage map"),
-        ("Coverage", "Cost map above the floor"),
-        ("Floor", "Cost map"),
+        ("Coverage", "Cost map"),
     ] {
         if !switch.is_empty() {
             click(&window, switch);
@@ -467,7 +466,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     let inside = positions.filter(|(right, ahead)| right * right + ahead * ahead <= 144);
     assert_eq!(filled.hypotheses(), 9 * inside.count());
     assert!(filled.is_complete());
-    let words = text(&window, "Cost map above the floor: dense, ");
+    let words = text(&window, "Cost map: dense, ");
     let all = filled.hypotheses();
     assert!(words.ends_with(&format!("{all} of {all} tried")), "{words}");
 

@@ -87,8 +87,7 @@ impl SurfaceView {
             }
             let Some(search) = search else { return };
             ui.separator();
-            self.map
-                .switches(ui, context.run.params.grid.coverage_floor);
+            self.map.switch(ui);
             dense::switch(ui, context);
             if let Some(around) = search.span.part.method().filter(|around| *around != shown) {
                 ui.weak(format!("inside {}", around.label()));
@@ -107,6 +106,7 @@ impl SurfaceView {
         search: &Search<'_>,
     ) -> Option<Pose> {
         let width = ui.available_width();
+        let floor = context.run.params.grid.coverage_floor;
         self.dense.ui(ui, context, search);
         let dense = self.dense(context, search);
         let scale = match dense {
@@ -135,7 +135,7 @@ impl SurfaceView {
                     ui.vertical(|ui| {
                         let room = ui.available_width().min(WIDE_LEGEND);
                         ui.set_max_width(room);
-                        self.map.colours(ui, &scale, room);
+                        self.map.colours(ui, &scale, room, floor);
                         pointed_at = legend(ui, context, &marks, egui::TextWrapMode::Wrap);
                     });
                 }
@@ -145,7 +145,7 @@ impl SurfaceView {
         let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
         readout.say(ui, words, HELP);
         if !has_legend {
-            self.map.colours(ui, &scale, width);
+            self.map.colours(ui, &scale, width, floor);
             pointed_at = legend(ui, context, &marks, egui::TextWrapMode::Extend);
         }
         ui.separator();
@@ -162,7 +162,7 @@ impl SurfaceView {
         context: &ViewContext<'a>,
         search: &Search<'_>,
     ) -> Option<&'a DenseSurface> {
-        let wanted = self.dense.wanted(context, search, self.map.is_floored())?;
+        let wanted = self.dense.wanted(context, search)?;
         context.send(Command::FillDenseMap(wanted));
         let map = context.dense_map(search.method)?;
         map.surface().ok().filter(|_| *map.ask() == wanted)

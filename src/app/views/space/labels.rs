@@ -1,8 +1,8 @@
 //! What is written over the picture: cameras, metres, the legend.
 
 use egui::{
-    Align, Color32, CornerRadius, Layout, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, UiBuilder,
-    WidgetInfo, vec2,
+    Align, Color32, CornerRadius, Layout, Pos2, Rect, RichText, Role, Sense, Shape, Stroke, Ui,
+    UiBuilder, WidgetInfo, vec2,
 };
 
 use super::cameras::{CameraKind, SceneCamera};
@@ -108,6 +108,7 @@ pub(super) fn legend(ui: &mut Ui, pane: Rect, cost: Option<(&str, [String; 2])>,
         .layout(Layout::bottom_up(Align::LEFT));
     let mut ui = ui.new_child(corner);
     ui.spacing_mut().item_spacing.y = 2.0;
+    let ground = ui.painter().add(Shape::Noop);
     let line = |ui: &mut Ui, words: String, color: Color32| {
         let color = theme::text(ui.visuals(), color);
         let text = RichText::new(words).font(theme::caption()).color(color);
@@ -140,6 +141,12 @@ pub(super) fn legend(ui: &mut Ui, pane: Rect, cost: Option<(&str, [String; 2])>,
             format!("cost of {method} (grey: below the coverage floor)"),
             text,
         );
+    }
+    if ui.min_rect().height() > 1.0 {
+        let fill = ui.visuals().extreme_bg_color.gamma_multiply(0.75);
+        let place = ui.min_rect().expand(3.0);
+        let ground_shape = Shape::rect_filled(place, CornerRadius::same(2), fill);
+        ui.painter().set(ground, ground_shape);
     }
 }
 

@@ -38,7 +38,6 @@ impl DenseSteps {
         &self,
         context: &ViewContext<'_>,
         search: &Search<'_>,
-        is_floored: bool,
     ) -> Option<DenseAsk> {
         let is_wanted = context.options.shows_dense_map && context.is_present();
         let reference = search.span.part.reference().filter(|_| is_wanted)?;
@@ -47,7 +46,7 @@ impl DenseSteps {
             reference,
             step_m: self.step_m(search),
             yaw_step_deg: self.yaw_step_deg(),
-            least_covered: if is_floored { search.least_covered } else { 0 },
+            least_covered: search.least_covered,
         })
     }
 

@@ -3,9 +3,9 @@
 use egui::{Ui, vec2};
 use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotPoint, Points, VLine};
 
-use super::scale::{BELOW_FLOOR, number};
+use super::scale::number;
 use super::search::Search;
-use crate::app::views::legend::{self, paint_mark, plot_shape, swatch};
+use crate::app::views::legend::{self, paint_mark, plot_shape};
 use crate::app::{Command, CostAlong, CostLine, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
@@ -66,8 +66,6 @@ struct Profile {
     unit: &'static str,
     /// Distance, rising, and cost; no cost where too little is covered, and before it is known.
     costs: Vec<(f64, Option<f64>)>,
-    /// Costs below the coverage floor.
-    below_floor: Vec<[f64; 2]>,
     /// Whether all of them are known.
     is_complete: bool,
     step_m: f64,
@@ -90,16 +88,11 @@ impl Profile {
             let cost = score.and_then(|score| score.eligible_cost(least_covered));
             (share * length, cost)
         });
-        let below_floor = along.scores.iter().filter_map(|(share, score)| {
-            let score = score.filter(|score| score.covered < least_covered)?;
-            Some([share * length, score.cost.filter(|cost| cost.is_finite())?])
-        });
         Self {
             line,
             length,
             unit,
             costs: costs.collect(),
-            below_floor: below_floor.collect(),
             is_complete: along.is_complete(),
             step_m,
         }
@@ -228,11 +221,6 @@ fn draw(
         .y_axis_label("cost")
         .label_formatter(label)
         .show(ui, |plot| {
-            plot.points(
-                Points::new("below the floor", profile.below_floor.clone())
-                    .color(BELOW_FLOOR)
-                    .radius(1.5),
-            );
             for (index, stretch) in stretches.into_iter().enumerate() {
                 let line = Line::new(search.method.label(), stretch).color(color);
                 plot.line(line.width(2.0).id(("along", index)));
@@ -253,7 +241,7 @@ fn draw(
         let words = format!("Cost from the result to the truth: {spoken}");
         egui::WidgetInfo::labeled(egui::Role::Image, true, words)
     });
-    key(ui, profile, result);
+    key(ui, result);
     let at = answer.response.hover_pos()?;
     if !answer.transform.frame().contains(at) || profile.length <= 0.0 {
         return None;
@@ -266,16 +254,12 @@ fn draw(
     Some(pose)
 }
 
-fn key(ui: &mut Ui, profile: &Profile, result: Thing) {
+fn key(ui: &mut Ui, result: Thing) {
     ui.horizontal_wrapped(|ui| {
         for (thing, name) in [(result, "result"), (Thing::Truth, "truth")] {
             let (rect, _) = ui.allocate_exact_size(vec2(14.0, 12.0), egui::Sense::hover());
             paint_mark(ui.painter(), thing, rect.center(), 4.5);
             ui.weak(name);
-        }
-        if !profile.below_floor.is_empty() {
-            swatch(ui, BELOW_FLOOR);
-            ui.weak("covers too little");
         }
     });
 }

@@ -13,24 +13,6 @@ use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
 use crate::proof::Thing;
 use crate::render::Score;
 
-/// What the map shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Map {
-    Cost,
-    Coverage,
-    Floored,
-}
-
-impl Map {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Cost => "Cost map",
-            Self::Coverage => "Coverage map",
-            Self::Floored => "Cost map above the floor",
-        }
-    }
-}
-
 /// The width of the numbers left of the map \[points\].
 const LEFT_AXIS: f32 = 34.0;
 /// The height of the numbers below the map \[points\].
@@ -39,22 +21,11 @@ const LOWER_AXIS: f32 = 30.0;
 /// The sides that a map may have \[points\].
 const SIDES: std::ops::RangeInclusive<f32> = 120.0..=480.0;
 
-/// The map with its switches. Each lattice has a texture, which is painted again when its pixels change.
+/// The map with its switch. Each lattice has a texture, which is painted again when its pixels change.
+#[derive(Default)]
 pub(super) struct CostMap {
     shows_coverage: bool,
-    /// Whether cells below the coverage floor are grey.
-    is_floored: bool,
     painted: Vec<(ColorImage, TextureHandle)>,
-}
-
-impl Default for CostMap {
-    fn default() -> Self {
-        Self {
-            shows_coverage: false,
-            is_floored: true,
-            painted: Vec::new(),
-        }
-    }
 }
 
 /// A cell of a lattice.
@@ -109,30 +80,19 @@ impl MapContent<'_> {
 }
 
 impl CostMap {
-    /// Whether cells below the coverage floor are grey.
-    pub(super) fn is_floored(&self) -> bool {
-        self.is_floored
-    }
-
-    fn map(&self) -> Map {
-        match (self.shows_coverage, self.is_floored) {
-            (true, _) => Map::Coverage,
-            (false, true) => Map::Floored,
-            (false, false) => Map::Cost,
+    fn name(&self) -> &'static str {
+        if self.shows_coverage {
+            "Coverage map"
+        } else {
+            "Cost map"
         }
     }
 
-    /// The switches of the map, for the coverage floor of the run.
-    pub(super) fn switches(&mut self, ui: &mut Ui, floor: f64) {
+    /// Switches between costs and coverages.
+    pub(super) fn switch(&mut self, ui: &mut Ui) {
         let help = "Colour by coverage instead of cost";
         ui.toggle_value(&mut self.shows_coverage, "Coverage")
             .on_hover_text(help);
-        let words = format!("Floor {:.0} %", 100.0 * floor);
-        let help = "Grey out cells that cover less than this share of the reference view";
-        ui.add_enabled_ui(!self.shows_coverage, |ui| {
-            ui.toggle_value(&mut self.is_floored, words)
-                .on_hover_text(help);
-        });
     }
 
     /// Draws the map. Returns the pose under the pointer with its cost in words, and the map's width.
@@ -142,13 +102,12 @@ impl CostMap {
         context: &ViewContext<'_>,
         shown: &MapContent<'_>,
     ) -> (Option<(Pose, String)>, f32) {
-        let map = self.map();
         // As high as the visible part of the view, less what is above and below the map.
         let room = (ui.available_width() - LEFT_AXIS - 2.0).min(ui.clip_rect().height() - 84.0);
         let side = room.clamp(*SIDES.start(), *SIDES.end());
         let group = ui.make_persistent_id("maps");
-        let images = self.images(ui, shown, map);
-        let answer = plot(ui, shown, map, group, side, images);
+        let images = self.images(ui, shown);
+        let answer = plot(ui, shown, self.name(), group, side, images);
         let at = answer.response.interact_pointer_pos();
         let at = answer.response.hover_pos().or(at);
         let pointed_at = at
@@ -170,37 +129,43 @@ impl CostMap {
     }
 
     /// The meaning of the map's colours.
-    pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32) {
-        match (self.map(), scale.cost_ends()) {
-            (Map::Coverage, _) => cost_bar(ui, width, "coverage", &scale.coverage_ends()),
-            (_, Some(ends)) => cost_bar(ui, width, "cost", &ends),
-            (_, None) => {
+    pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32, floor: f64) {
+        if self.shows_coverage {
+            cost_bar(ui, width, "coverage", &scale.coverage_ends());
+            return;
+        }
+        match scale.cost_ends() {
+            Some(ends) => cost_bar(ui, width, "cost", &ends),
+            None => {
                 ui.weak("no cost yet");
             }
         }
-        if self.map() == Map::Floored {
-            ui.horizontal(|ui| {
-                swatch(ui, BELOW_FLOOR);
-                ui.weak("below the coverage floor");
-            });
-        }
+        ui.horizontal(|ui| {
+            swatch(ui, BELOW_FLOOR);
+            let help =
+                "These cells cover less than this share of the reference view and are not eligible";
+            ui.weak(format!("coverage below {:.0} %", 100.0 * floor))
+                .on_hover_text(help);
+        });
     }
 
     /// The textures of the map with their places.
-    fn images(&mut self, ui: &Ui, shown: &MapContent<'_>, map: Map) -> Vec<PlotImage> {
+    fn images(&mut self, ui: &Ui, shown: &MapContent<'_>) -> Vec<PlotImage> {
         let least_covered = shown.search.least_covered;
-        let color = |score: &Score| match map {
-            Map::Coverage => shown.scale.coverage(shown.search.coverage(score.covered)),
-            Map::Cost => score
-                .cost
-                .map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost)),
-            Map::Floored => score
-                .eligible_cost(least_covered)
-                .map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost)),
+        let color = |score: &Score| {
+            if self.shows_coverage {
+                return shown.scale.coverage(shown.search.coverage(score.covered));
+            }
+            let cost = score.eligible_cost(least_covered);
+            cost.map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost))
         };
+        let pictures: Vec<ColorImage> = shown
+            .layers()
+            .into_iter()
+            .map(|layer| picture(layer, color))
+            .collect();
         let mut images = Vec::new();
-        for (index, layer) in shown.layers().into_iter().enumerate() {
-            let image = picture(layer, color);
+        for (index, (layer, image)) in shown.layers().into_iter().zip(pictures).enumerate() {
             let id = self.paint(ui, index, image);
             let Lattice {
                 columns,
@@ -253,7 +218,7 @@ fn picture(layer: &ScoredLattice, color: impl Fn(&Score) -> Color32) -> ColorIma
 fn plot(
     ui: &mut Ui,
     shown: &MapContent<'_>,
-    map: Map,
+    name: &str,
     group: Id,
     side: f32,
     images: Vec<PlotImage>,
@@ -303,7 +268,7 @@ fn plot(
             }
         });
     answer.response.widget_info(|| {
-        let name = format!("{}: {}", map.name(), shown.progress());
+        let name = format!("{name}: {}", shown.progress());
         egui::WidgetInfo::labeled(egui::Role::Image, true, name)
     });
     answer
