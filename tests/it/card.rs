@@ -154,7 +154,7 @@ fn what_helped_is_tried_by_a_button_and_compared_with_the_run_before() {
 fn nothing_moves_for_a_note_or_a_run_that_is_kept() {
     let mut window = finished(setup());
     let places = |window: &Harness<'_, App>| {
-        ["Run all", "Theme", "Reset view"].map(|label| window.get_by_label(label).rect())
+        ["Run all", "Theme", "View"].map(|label| window.get_by_label(label).rect())
     };
     // Sizes are known a frame late.
     window.run_steps(3);
