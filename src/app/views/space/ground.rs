@@ -143,7 +143,7 @@ pub(super) fn path(geometry: &SceneGeometry, offsets: &[Offset], color: Color32)
         .map(|pair| Line {
             ends: [place(&pair[0]), place(&pair[1])],
             color,
-            width: 2.5,
+            width: 2.0,
         })
         .collect()
 }

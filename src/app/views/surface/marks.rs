@@ -213,7 +213,7 @@ pub(super) fn legend(
     let mut pointed_at = None;
     let rows = |ui: &mut Ui| {
         // The room for the mark is part of the button, so that both wrap together.
-        ui.spacing_mut().button_padding = vec2(3.0 * RADIUS, 1.0);
+        ui.spacing_mut().button_padding = vec2(3.4 * RADIUS, 1.0);
         for mark in marks {
             // Without a frame a button would have no room beside its words.
             let button = egui::Button::new(egui::RichText::new(&mark.words).small())
