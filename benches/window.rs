@@ -9,10 +9,12 @@ use std::sync::Arc;
 
 use divan::Bencher;
 use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
 use nalgebra::Point3;
 use posescope::app::{self, App, Arrangement, Command, KnownResults, Results, Setup};
 use posescope::cloud::Cloud;
 use posescope::localize::QueryResult;
+use posescope::method::Method;
 use posescope::run::{QueryCamera, ScenePair};
 use posescope::scene::{self, Scene, SceneError};
 use posescope::session::{RunMode, RunState, Task};
@@ -137,6 +139,42 @@ fn scrubbing(bencher: Bencher) {
     with_window(|window| scrub(bencher, window, draw));
 }
 
+/// The window with the 3-D view alone, at the end of MI's search.
+fn in_space(window: &mut Window) -> egui::Pos2 {
+    window.state_mut().send(Command::SelectMethod(Method::MI));
+    window.state_mut().send(Command::Maximize(Some("space")));
+    window.run_steps(3);
+    window.get_by_label_contains("3-D view of").rect().center()
+}
+
+/// A frame while the pointer turns the cloud: all points are drawn anew.
+#[divan::bench(sample_count = 60, sample_size = 1)]
+fn orbiting(bencher: Bencher) {
+    with_window(|window| {
+        let middle = in_space(window);
+        window.drag_at(middle);
+        window.step();
+        let mut turned = 0.0;
+        bencher.bench_local(|| {
+            turned += 3.0;
+            window.hover_at(middle + egui::vec2(turned, 0.0));
+            draw(window);
+        });
+        window.drop_at(middle);
+        window.state_mut().send(Command::Maximize(None));
+    });
+}
+
+/// A frame while the cursor goes over the run beside a cloud that stays where it is.
+#[divan::bench(sample_count = 60, sample_size = 1)]
+fn scrubbing_in_space(bencher: Bencher) {
+    with_window(|window| {
+        in_space(window);
+        scrub(bencher, window, draw);
+        window.state_mut().send(Command::Maximize(None));
+    });
+}
+
 /// The results of the window's query, repeated over the frames of its scene: a run folder of so many.
 struct ManyResults {
     folder: tempfile::TempDir,
@@ -242,7 +280,7 @@ fn filter_10000_results(bencher: Bencher) {
 }
 
 /// What a view of 10,000 results costs in a frame in which nothing changes.
-#[divan::bench(args = ["batch", "charts", "migrations", "queries"], sample_count = 30, sample_size = 1)]
+#[divan::bench(args = ["batch", "charts", "queries"], sample_count = 30, sample_size = 1)]
 fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
     with_window(|window| {
         let mut batch = ManyResults::write(window).open(window);

@@ -15,7 +15,6 @@ mod legend;
 mod lockstep;
 mod log;
 mod mesh_painter;
-mod migrations;
 mod parameters;
 mod queries;
 mod ransac;
@@ -155,14 +154,8 @@ pub const ALL: &[Entry] = &[
     Entry {
         name: "charts",
         title: "Charts",
-        about: "the results of all queries: scatter of two measures, errors, recall, verdicts",
+        about: "the results of all queries: scatter of two measures, recall, verdicts",
         new: |_| Box::<charts::ChartsView>::default(),
-    },
-    Entry {
-        name: "migrations",
-        title: "Migrations",
-        about: "what became of the verdicts of all queries since other results, as a matrix",
-        new: |_| Box::<migrations::MigrationsView>::default(),
     },
     Entry {
         name: "lockstep",

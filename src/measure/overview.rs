@@ -44,7 +44,7 @@ impl Overview {
         let mut bars: Vec<Bar> = Vec::new();
         let mut causes: Vec<(Code, usize)> = Vec::new();
         for result in results {
-            let name = result.method_name();
+            let name = label(result);
             let known = bars.iter().position(|bar| bar.name == name);
             let at = known.unwrap_or_else(|| {
                 bars.push(Bar {
@@ -67,6 +67,12 @@ impl Overview {
             causes,
         }
     }
+}
+
+/// The method as people write it, with its fusion.
+fn label(result: &QueryResult) -> String {
+    let fusion = result.fusion.map(|fusion| format!(" {fusion}"));
+    format!("{}{}", result.method.label(), fusion.unwrap_or_default())
 }
 
 fn count(causes: &mut Vec<(Code, usize)>, result: &QueryResult) {
@@ -101,15 +107,15 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     let mut words = format!("{name} is right for {good} of {total} {queries}.");
     let failed: Vec<&&QueryResult> = results
         .iter()
-        .filter(|result| result.method_name() == *name && result.grade.is_failure())
+        .filter(|result| label(result) == *name && result.grade.is_failure())
         .collect();
     let mut causes = Vec::new();
     failed.iter().for_each(|result| count(&mut causes, result));
     if let Some((code, times)) = causes.iter().rev().max_by_key(|(_, times)| *times) {
         words += &format!(
-            " Most frequent cause of its {} failures: {} ({times}).",
-            failed.len(),
-            code.title()
+            " Most frequent cause of its failures: {} ({times} of {}).",
+            code.title(),
+            failed.len()
         );
     }
     let mut mends: BTreeMap<String, usize> = BTreeMap::new();
@@ -150,7 +156,7 @@ mod tests {
         assert_eq!(
             overview.headline,
             format!(
-                "MI is right for 2 of 3 queries. Most frequent cause of its 1 failures: {} (1).",
+                "MI is right for 2 of 3 queries. Most frequent cause of its failures: {} (1 of 1).",
                 Code::D3.title()
             )
         );

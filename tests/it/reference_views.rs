@@ -167,18 +167,6 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
         "there is no retrieval index; `posescope index walls"
     ));
 
-    let left = |label| {
-        window
-            .get_all_by_label(label)
-            .next()
-            .map(|n| n.rect().left())
-    };
-    assert!(
-        left("Restart") < left("not chosen"),
-        "they lie on each other"
-    );
-    assert!(left("not chosen") < left("Truth"));
-
     index(&file, &Params::default());
     assert_eq!(
         pick(&mut window, Selection::Retrieved(2)),
@@ -287,7 +275,7 @@ fn the_bar_says_how_many_frames_were_looked_at() {
     let mut is_told = false;
     while *app(&window).run_state() == RunState::Loading {
         window.step();
-        is_told |= is_said(&window, "Choosing references: 2 of 2 frames");
+        is_told |= is_said(&window, "choosing references, 2 of 2");
     }
     assert!(is_told);
 }

@@ -4,10 +4,8 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command};
 use posescope::cost::Explanation;
-use posescope::event::{
-    ConsensusJudged, DebugEvent, HypothesisTried, Moment, PhaseSearched, PoseScored, ViewRendered,
-};
-use posescope::grid::{DenseSurface, GridParams, Offset, Phase, least_covered};
+use posescope::event::{ConsensusJudged, DebugEvent, HypothesisTried, PoseScored, ViewRendered};
+use posescope::grid::{DenseSurface, GridParams, Offset, Phase};
 use posescope::method::Method;
 use posescope::session::{RunMode, Span};
 
@@ -19,9 +17,8 @@ fn finished() -> Harness<'static, App> {
     let mut setup = setup();
     setup.mode = RunMode::Running;
     let mut window = window(setup);
-    // It shares its place with the view of the space.
-    window.state_mut().send(Command::ShowView("ransac"));
     finish(&mut window);
+    send(&mut window, Command::Maximize(Some("surface")));
     window
 }
 
@@ -105,10 +102,9 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
     let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
     for (switch, map) in [
-        ("", "Cost map above the floor"),
+        ("", "Cost map"),
         ("Coverage", "Coverage map"),
-        ("Coverage", "Cost map above the floor"),
-        ("Floor", "Cost map"),
+        ("Coverage", "Cost map"),
     ] {
         if !switch.is_empty() {
             click(&window, switch);
@@ -208,53 +204,9 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
 }
 
 #[test]
-fn the_slider_moves_the_minimum_as_the_recorded_scores_say() {
-    let mut window = finished();
-    send(&mut window, Command::Maximize(Some("surface")));
-    move_to_end(&mut window, Method::MI);
-    let surfaces = told::<PhaseSearched>(&window, Method::MI);
-    let surface = &surfaces[0].1.surface;
-    assert_eq!(surface.lattice.phase, Phase::PositionCoarse);
-    let views = told::<ViewRendered>(&window, Method::MI);
-    assert_eq!(views[0].1.moment, Moment::Start);
-    let covered = views[0].1.comparison.score.covered;
-    let own = surface.minimum();
-    let minimum = |floor: f64| surface.minimum_with(least_covered(floor, covered));
-    let floors = || {
-        (11..=1000)
-            .step_by(5)
-            .map(|thousandth| f64::from(thousandth) / 1000.0)
-    };
-    let moving = floors().find(|&floor| minimum(floor) != own && minimum(floor).is_some());
-    let moving = (moving.expect("a floor above the minimum's coverage") / 0.005).round() * 0.005;
-    let slider = window.get_by_role_and_label(egui::Role::Slider, "coverage floor");
-    slider.set_value_accesskit(moving);
-    window.run_steps(3);
-    let cell = minimum(moving).expect("some position may win");
-    let offset = surface.lattice.offset(cell).expect("a hypothesis");
-    let cost = surface.scores[cell]
-        .and_then(|score| score.cost)
-        .expect("a cost");
-    let expected = format!(
-        "The minimum moves to ({:.1}, {:.1}) m at this floor, cost {cost:.4}",
-        offset.right_m + 0.0,
-        offset.forward_m + 0.0
-    );
-    assert_eq!(text(&window, "The minimum moves"), expected);
-
-    window.get_by_label("Run with this floor").click();
-    window.run_steps(2);
-    finish(&mut window);
-    let floor = app(&window).setup.task.params.grid.coverage_floor;
-    assert!((floor - moving).abs() < 1e-9, "{floor}");
-    let surfaces = told::<PhaseSearched>(&window, Method::MI);
-    assert_eq!(surfaces[0].1.surface.minimum(), Some(cell));
-    assert!(texts(&window, "The minimum moves").is_empty());
-}
-
-#[test]
 fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
     let mut window = finished();
+    send(&mut window, Command::Maximize(Some("histogram")));
     for (at, view) in told::<ViewRendered>(&window, Method::MI) {
         move_to(&mut window, at);
         let cost = view.comparison.score.cost.expect("textured walls");
@@ -278,6 +230,7 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
 #[test]
 fn a_bin_under_the_pointer_tells_its_pairs() {
     let mut window = finished();
+    send(&mut window, Command::Maximize(Some("histogram")));
     let views = told::<ViewRendered>(&window, Method::MI);
     let (at, view) = views.last().expect("the result");
     move_to(&mut window, *at);
@@ -304,6 +257,7 @@ fn a_bin_under_the_pointer_tells_its_pairs() {
 #[test]
 fn the_residuals_of_pm_say_what_was_ignored() {
     let mut window = finished();
+    send(&mut window, Command::Maximize(Some("histogram")));
     move_to_end(&mut window, Method::PM);
     let views = told::<ViewRendered>(&window, Method::PM);
     let view = &views.last().expect("the result").1;
@@ -323,7 +277,7 @@ fn the_residuals_of_pm_say_what_was_ignored() {
 #[test]
 fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     let mut window = finished();
-    window.state_mut().send(Command::ShowView("ransac"));
+    window.state_mut().send(Command::Maximize(Some("ransac")));
     let trials = told::<HypothesisTried>(&window, Method::FB);
     for (made, (at, tried)) in trials.iter().enumerate().step_by(trials.len() / 5 + 1) {
         move_to(&mut window, *at);
@@ -353,7 +307,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
 #[test]
 fn the_acceptance_test_is_told_in_words() {
     let mut window = finished();
-    window.state_mut().send(Command::ShowView("ransac"));
+    window.state_mut().send(Command::Maximize(Some("ransac")));
     let (at, judged) = told::<ConsensusJudged>(&window, Method::FB)[0].clone();
     assert!(judged.accepted);
     move_to(&mut window, at);
@@ -374,31 +328,30 @@ fn the_acceptance_test_is_told_in_words() {
 
 #[test]
 fn every_moment_of_a_run_can_be_drawn() {
-    // From the first frame on, when nothing is read yet.
     let mut window = finished();
-    window.state_mut().send(Command::ShowView("ransac"));
     let records = app(&window).run().len();
-    for cursor in (0..records).step_by(9).chain([records - 1]) {
-        move_to(&mut window, cursor);
-        // Each says what is missing, or names what it draws.
-        let surface =
-            texts(&window, "Nothing is searched yet").len() + texts(&window, "Cost map").len();
-        assert_eq!(surface, 1, "the cost surface at {cursor}");
-        let histogram = [
-            "No synthetic view yet",
-            "Joint histogram of",
-            "Residuals of",
-        ];
-        let histogram: usize = histogram
-            .iter()
-            .map(|part| texts(&window, part).len())
-            .sum();
-        assert_eq!(histogram, 1, "the histogram at {cursor}");
-        let ransac = texts(&window, "No hypothesis yet").len()
-            + texts(&window, "log likelihood by trial").len();
-        assert_eq!(ransac, 1, "RANSAC at {cursor}");
+    // Each view says what is missing, or names what it draws.
+    let views: [(&str, &[&str]); 3] = [
+        ("surface", &["Nothing is searched yet", "Cost map"]),
+        (
+            "histogram",
+            &[
+                "No synthetic view yet",
+                "Joint histogram of",
+                "Residuals of",
+            ],
+        ),
+        ("ransac", &["No hypothesis yet", "log likelihood by trial"]),
+    ];
+    for (view, said) in views {
+        send(&mut window, Command::Maximize(Some(view)));
+        for cursor in (0..records).step_by(9).chain([records - 1]) {
+            move_to(&mut window, cursor);
+            let count: usize = said.iter().map(|part| texts(&window, part).len()).sum();
+            assert_eq!(count, 1, "{view} at {cursor}");
+        }
+        window.check_accessibility();
     }
-    window.check_accessibility();
 }
 
 #[test]
@@ -478,7 +431,7 @@ fn filled_densely() -> Harness<'static, App> {
     window.state_mut().send(Command::Maximize(Some("surface")));
     window.key_press(egui::Key::F);
     window.run_steps(2);
-    for (name, value) in [("Positions each", "0.25"), ("headings each", "2.5")] {
+    for (name, value) in [("Positions every", "0.25"), ("headings every", "2.5")] {
         let field = window.get_by_role_and_label(egui::accesskit::Role::SpinButton, name);
         field.click();
         window.run_steps(2);
@@ -514,7 +467,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     let inside = positions.filter(|(right, ahead)| right * right + ahead * ahead <= 144);
     assert_eq!(filled.hypotheses(), 9 * inside.count());
     assert!(filled.is_complete());
-    let words = text(&window, "Cost map above the floor: dense, ");
+    let words = text(&window, "Cost map: dense, ");
     let all = filled.hypotheses();
     assert!(words.ends_with(&format!("{all} of {all} tried")), "{words}");
 
@@ -545,7 +498,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     }
     assert!(turned > 3, "nowhere is another heading cheaper");
     let (least, best) = filled.minimum().expect("textured walls");
-    let words = text(&window, "Least of all: cost ");
+    let words = text(&window, "Lowest of all: cost ");
     assert!(
         words.contains(&format!("{:.4}", best.cost.expect("covered"))),
         "{words}"
@@ -553,7 +506,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     has(&words, "from the truth; the search ended");
 
     // A click on its mark in the legend takes the camera there, heading and all.
-    click(&window, "least of all ");
+    click(&window, "lowest of all ");
     window.run_steps(2);
     let camera = app(&window).camera.expect("taken");
     let found = Offset::of(&problem.reference_from_query(&camera));

@@ -5,7 +5,6 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, Command};
 use posescope::event::PhaseSearched;
-use posescope::geometry::Pose;
 use posescope::grid::Phase;
 use posescope::session::RunMode;
 
@@ -57,10 +56,6 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
     window.run_steps(2);
 }
 
-fn in_hand(window: &Harness<'_, App>) -> Pose {
-    app(window).camera.expect("a camera is in hand")
-}
-
 #[test]
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let mut window = finished();
@@ -96,11 +91,24 @@ fn the_truth_hides_with_its_errors() {
     assert!(window.query_by_label_contains("Truth: ").is_none());
 }
 
+/// Chooses an entry of the view's own menu.
+fn choose(window: &mut Harness<'_, App>, name: &str) {
+    click(window, "View");
+    click(window, name);
+    // Beside the menu: it closes.
+    let pane = window.get_by_label_contains("3-D view of").rect();
+    let corner = pane.left_bottom() + egui::vec2(pane.width() / 2.0, -4.0);
+    window.drag_at(corner);
+    window.step();
+    window.drop_at(corner);
+    window.run_steps(2);
+}
+
 #[test]
 fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     let mut window = finished();
-    assert!(headline(&window).contains("From outside"));
-    click(&mut window, "● FB");
+    assert!(headline(&window).contains("Drag: turn"));
+    choose(&mut window, "Through FB");
     assert!(headline(&window).contains("Through FB"));
     let pane = window.get_by_label_contains("3-D view of").rect();
     drag(
@@ -109,18 +117,22 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
         egui::vec2(30.0, 0.0),
         egui::Modifiers::NONE,
     );
-    assert!(headline(&window).contains("From outside"));
-    click(&mut window, "× Truth");
+    assert!(headline(&window).contains("Drag: turn"));
+    // A click on a label does the same.
+    choose(&mut window, "Whole scene");
+    window.get_by_label_contains("Truth: ").click();
+    window.run_steps(2);
+    assert!(headline(&window).contains("Through Truth"));
     send(&mut window, Command::ShowTruth);
     assert!(headline(&window).contains("Truth has no pose at this step"));
-    click(&mut window, "Reset view");
-    assert!(headline(&window).contains("From outside"));
+    choose(&mut window, "Whole scene");
+    assert!(headline(&window).contains("Drag: turn"));
 }
 
 #[test]
 fn shifting_takes_the_labels_along() {
     let mut window = finished();
-    click(&mut window, "Top");
+    choose(&mut window, "From above");
     let place = |window: &Harness<'_, App>| window.get_by_label_contains("Reference: ").rect().min;
     let before = place(&window);
     let pane = window.get_by_label_contains("3-D view of").rect();
@@ -133,73 +145,6 @@ fn shifting_takes_the_labels_along() {
         moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0,
         "{moved}"
     );
-}
-
-#[test]
-fn the_camera_in_hand_is_dragged_along_the_ground_and_turned() {
-    let mut window = finished();
-    click(&mut window, "Top");
-    let pose = start(&window);
-    send(&mut window, Command::TakeCamera(Some(pose)));
-    let before = in_hand(&window);
-    let handle = window
-        .get_by_label_contains("Camera in hand")
-        .rect()
-        .center();
-    drag(
-        &mut window,
-        handle,
-        egui::vec2(40.0, 0.0),
-        egui::Modifiers::NONE,
-    );
-    let moved = before.inverse() * in_hand(&window);
-    assert!(moved.translation.x > 0.1, "to the right: {moved}");
-    assert!(moved.translation.y.abs() < 1e-6 && moved.translation.z.abs() < 0.05);
-    assert!(moved.rotation.angle() < 1e-6);
-
-    let before = in_hand(&window);
-    let handle = window
-        .get_by_label_contains("Camera in hand")
-        .rect()
-        .center();
-    drag(
-        &mut window,
-        handle,
-        egui::vec2(40.0, 0.0),
-        egui::Modifiers::ALT,
-    );
-    let turned = before.inverse() * in_hand(&window);
-    assert!(turned.translation.vector.norm() < 1e-9);
-    let ahead = turned.rotation * nalgebra::Vector3::z();
-    assert!(ahead.x > 0.05, "to the right: {ahead}");
-}
-
-fn start(window: &Harness<'_, App>) -> Pose {
-    let loaded = app(window).run().loaded.as_deref().expect("is read");
-    loaded.problems[0].reference.world_from_camera
-}
-
-#[test]
-fn jumps_and_blinking_go_between_two_poses() {
-    let mut window = finished();
-    click(&mut window, "Start 5");
-    let begin = in_hand(&window);
-    click(&mut window, "Truth 9");
-    let truth = in_hand(&window);
-    assert_ne!(begin, truth);
-    click(&mut window, "Blink poses");
-    let mut seen = Vec::new();
-    for _ in 0..12 {
-        // egui's clock goes on by a quarter of a second each step.
-        window.step();
-        if seen.last() != Some(&in_hand(&window)) {
-            seen.push(in_hand(&window));
-        }
-    }
-    assert!(seen.len() >= 4, "{} changes", seen.len());
-    assert!(seen.iter().all(|pose| [begin, truth].contains(pose)));
-    click(&mut window, "Let go");
-    assert_eq!(app(&window).camera, None);
 }
 
 /// The number that follows some words.
@@ -218,7 +163,7 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
     // The hybrid took the pose of FB and searched nothing.
     let method = posescope::method::Method::MI;
     send(&mut window, Command::SelectMethod(method));
-    click(&mut window, "Top");
+    choose(&mut window, "From above");
     let pane = window.get_by_label_contains("3-D view of").rect();
     let mut found = 0;
     for (x, y) in [(0.5, 0.5), (0.4, 0.55), (0.55, 0.4), (0.6, 0.6)] {
@@ -270,6 +215,52 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
 }
 
 #[test]
+fn the_ground_has_the_colours_of_the_cost_map() {
+    let mut setup = setup();
+    setup.mode = RunMode::Running;
+    // A coarse grid beside the truth: the fine positions reach lower costs.
+    for assignment in ["grid.coarse_step=1.7", "grid.fine_range=1"] {
+        setup.task.params.assign(assignment).expect("a parameter");
+    }
+    let mut window = window(setup);
+    run_until_idle(&mut window);
+    send(
+        &mut window,
+        Command::SelectMethod(posescope::method::Method::MI),
+    );
+    let bar = |window: &mut Harness<'_, App>, view| {
+        send(window, Command::Maximize(Some(view)));
+        label(window, "Colours of cost")
+    };
+    let on_ground = bar(&mut window, "space");
+    assert_eq!(on_ground, bar(&mut window, "surface"));
+    // The lowest cost is that of a fine position, which the first surface does not have.
+    let run = app(&window).run();
+    let mut spans = run.spans().iter();
+    let span = spans.find(|span| span.part.method() == Some(posescope::method::Method::MI));
+    let end = span.expect("MI ran").records.end;
+    let surfaces: Vec<_> = run
+        .all_until::<PhaseSearched>(end - 1)
+        .map(|(_, searched)| &searched.surface)
+        .collect();
+    let lowest = |phase| {
+        let of_phase = surfaces
+            .iter()
+            .filter(|surface| surface.lattice.phase == phase);
+        let costs = of_phase.flat_map(|surface| {
+            (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell))
+        });
+        costs.fold(f64::INFINITY, f64::min)
+    };
+    let (coarse, fine) = (lowest(Phase::PositionCoarse), lowest(Phase::PositionFine));
+    assert!(fine < coarse, "{fine} {coarse}");
+    assert!(
+        on_ground.contains(&format!("{fine:.4} is bright")),
+        "{on_ground}"
+    );
+}
+
+#[test]
 fn without_a_graphics_card_the_view_says_so() {
     let window = finished();
     assert!(window.query_by_label_contains("No graphics card").is_some());
@@ -281,7 +272,7 @@ fn drawn() -> Option<PaintedWindow> {
     setup.mode = RunMode::Running;
     let mut painted = painted(setup, [1500.0, 950.0])?;
     run_until_idle(&mut painted.window);
-    painted.window.step();
+    send(&mut painted.window, Command::Maximize(Some("space")));
     Some(painted)
 }
 

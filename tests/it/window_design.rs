@@ -334,8 +334,7 @@ fn empty_views_say_what_to_do() {
     for (view, words) in [
         ("surface", "Nothing is searched yet"),
         ("batch", "No query was run yet: Run all"),
-        ("charts", "No result to draw: run all queries"),
-        ("migrations", "There are no results A"),
+        ("charts", "No results match. Run all queries"),
         ("fusion", "reference"),
     ] {
         waiting.state_mut().send(Command::Maximize(Some(view)));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
+use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::View;
 use crate::app::{Command, ResultRow, ViewContext, theme};
@@ -11,14 +12,14 @@ use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
 
-/// What the table shows, with the width of its column \[points\].
+/// The columns of the table with their widths \[points\].
 const COLUMNS: [(&str, f32); 10] = [
     ("query", 84.0),
     ("method", 56.0),
     ("grade", 104.0),
     ("error", 60.0),
     ("code", 48.0),
-    ("cause", *CAUSE.start()),
+    ("cause", CAUSE),
     ("rotation", 64.0),
     ("start", 60.0),
     ("probability", 76.0),
@@ -28,24 +29,24 @@ const COLUMNS: [(&str, f32); 10] = [
 /// Width of the column with the verdicts of the results A \[points\].
 const WAS: f32 = 40.0;
 
-/// The widest that causes are shown, and the narrowest before the table is moved sideways \[points\].
-const CAUSE: std::ops::RangeInclusive<f32> = 120.0..=900.0;
+/// The least width of the causes, which have the rest of the room \[points\].
+const CAUSE: f32 = 120.0;
 
 /// The results of all queries that were run.
 #[derive(Default)]
 pub struct BatchView {
     order: Option<Order>,
-    /// What was shown last, and what it was made from.
+    /// What was shown last, with what it was made from.
     made: Option<(Made, Shown)>,
 }
 
-/// The rows in their order, and what is said of them.
+/// The rows in their order, and a line about them.
 struct Shown {
     rows: Vec<ResultRow>,
     words: String,
 }
 
-/// What the rows depend on, beside their order; equal where it is the very same.
+/// What the rows were made from.
 struct Made {
     chosen: Rc<[ResultRow]>,
     order: Option<Order>,
@@ -76,9 +77,7 @@ impl View for BatchView {
             }
         };
         if context.results.is_empty() {
-            ui.weak(
-                "No query was run yet: Run all in the list of queries, or open the folder of a run",
-            );
+            ui.weak("No query was run yet: Run all in the list of queries, or open a run folder");
             return;
         }
         self.make(context, chosen);
@@ -86,26 +85,42 @@ impl View for BatchView {
             return;
         };
         ui.weak(words);
-        let height = ui.spacing().interact_size.y;
+        let (height, has_before) = (ui.spacing().interact_size.y, context.has_results_before());
         // The names of the columns move sideways with the rows, and stay above them.
-        let sideways = ScrollArea::horizontal().auto_shrink(false);
-        let columns = columns(ui, context);
-        sideways.show(ui, |ui| {
-            header(ui, context, &columns, &mut self.order);
-            let area = ScrollArea::vertical().auto_shrink(false);
-            area.show_rows(ui, height, rows.len(), |ui, range| {
-                for row in &rows[range] {
-                    if let Some(result) = context.result(*row) {
-                        draw(ui, context, &columns, *row, result);
-                    }
+        ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
+            let mut table = TableBuilder::new(ui).striped(true).sense(Sense::click());
+            for (name, width) in COLUMNS {
+                table = table.column(match name {
+                    "cause" => Column::remainder().at_least(width).clip(true),
+                    _ => Column::exact(width),
+                });
+            }
+            if has_before {
+                table = table.column(Column::exact(WAS));
+            }
+            let table = table.header(height, |mut names| {
+                for (name, _) in COLUMNS {
+                    names.col(|ui| header(ui, name, &mut self.order));
                 }
+                if has_before {
+                    names.col(|ui| {
+                        let was = ui.label(RichText::new("was").small());
+                        was.on_hover_text("The primary verdict in A");
+                    });
+                }
+            });
+            table.body(|body| {
+                body.rows(height, rows.len(), |mut row| {
+                    let at = rows[row.index()];
+                    draw(&mut row, context, at);
+                });
             });
         });
     }
 }
 
 impl BatchView {
-    /// Sorts, where anything has changed.
+    /// Sorts when something has changed.
     fn make(&mut self, context: &ViewContext<'_>, chosen: Rc<[ResultRow]>) {
         let version = context.results_version();
         if let Some((made, _)) = &self.made
@@ -131,24 +146,24 @@ impl BatchView {
     }
 }
 
-/// What the results are held against, and what has to have become of them.
+/// Which results are compared with these, and which changes are shown.
 fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
     ui.horizontal_wrapped(|ui| {
         if let Some(change) = &context.options.verdict_change {
             let button = ui.button(format!("{change} ×"));
-            if button.on_hover_text("Look at all verdicts again").clicked() {
+            if button.on_hover_text("Show all verdicts again").clicked() {
                 context.send(Command::FilterVerdictChange(None));
             }
         }
         let keep = ui.button("Keep results as A");
-        let help = "Hold the results that follow against these: change a setting, Run all, look at Migrations";
+        let help = "Compare later results with these: change a setting, run all queries, and see Verdicts since A in Charts";
         if keep.on_hover_text(help).clicked() {
             context.send(Command::KeepResults);
         }
         if context.has_results_before() {
             let mut only = context.options.only_differences;
             let toggle = ui.toggle_value(&mut only, "Only what changed");
-            if toggle.on_hover_text("Verdicts that are others than in A (D)").clicked() {
+            if toggle.on_hover_text("Only results whose verdict differs from A (D)").clicked() {
                 context.send(Command::OnlyDifferences);
             }
             let forget = ui.button("Forget A");
@@ -159,7 +174,7 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
     });
 }
 
-/// How many are shown, and how many of them are wrong or missing, by method.
+/// How many results are shown, and how many of each method are wrong or missing.
 fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
     let results: usize = context.results.values().map(Vec::len).sum();
     let mut failed: BTreeMap<Method, usize> = BTreeMap::new();
@@ -178,120 +193,64 @@ fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
     )
 }
 
-/// The columns with their widths: causes have what the others leave.
-fn columns(ui: &Ui, context: &ViewContext<'_>) -> [(&'static str, f32); COLUMNS.len()] {
-    let spacing = ui.spacing().item_spacing.x;
-    let own = COLUMNS.iter().filter(|(name, _)| *name != "cause");
-    let mut others: f32 = own.map(|(_, width)| width + spacing).sum();
-    if context.has_results_before() {
-        others += WAS + spacing;
-    }
-    let room = ui.available_width() - others - ui.spacing().scroll.allocated_width();
-    COLUMNS.map(|(name, width)| match name {
-        "cause" => (name, room.clamp(*CAUSE.start(), *CAUSE.end())),
-        _ => (name, width),
-    })
-}
-
-/// The names of the columns. A click sorts, another one the other way round, a third not at all.
-fn header(
-    ui: &mut Ui,
-    context: &ViewContext<'_>,
-    columns: &[(&str, f32)],
-    order: &mut Option<Order>,
-) {
-    ui.horizontal(|ui| {
-        for &(name, width) in columns {
-            let Ok(field) = Field::find(name) else {
-                continue;
-            };
-            let own = order.filter(|order| order.field == field);
-            let text = match own {
-                Some(Order {
-                    descending: false, ..
-                }) => format!("{name} ▲"),
-                Some(_) => format!("{name} ▼"),
-                None => name.to_owned(),
-            };
-            let button = Button::new(RichText::new(text).small()).frame(false);
-            let response = ui.add_sized([width, ui.spacing().interact_size.y], button);
-            if response.on_hover_text(field.about).clicked() {
-                *order = match own {
-                    None => Some(Order {
-                        field,
-                        descending: false,
-                    }),
-                    Some(Order {
-                        descending: false, ..
-                    }) => Some(Order {
-                        field,
-                        descending: true,
-                    }),
-                    Some(_) => None,
-                };
-            }
-        }
-        if context.has_results_before() {
-            let size = [WAS, ui.spacing().interact_size.y];
-            let label = egui::Label::new(RichText::new("was").small());
-            ui.add_sized(size, label)
-                .on_hover_text("The primary verdict in A");
-        }
-    });
-}
-
-fn draw(
-    ui: &mut Ui,
-    context: &ViewContext<'_>,
-    columns: &[(&str, f32)],
-    at: ResultRow,
-    result: &QueryResult,
-) {
-    let ResultRow { query, place } = at;
-    let grade = result.grade;
-    let is_here = query == context.setup.query;
-    let row = ui.horizontal(|ui| {
-        for &(name, width) in columns {
-            let Ok(field) = Field::find(name) else {
-                continue;
-            };
-            let mut text = RichText::new(match name {
-                "grade" => format!("{} {grade}", grade.glyph()),
-                _ => field.text(result),
-            });
-            if name == "grade" {
-                text = text.color(theme::grade(ui.visuals(), grade));
-            } else if name == "method" {
-                text = text.color(theme::text(ui.visuals(), theme::method(result.method)));
-            } else if is_here {
-                text = text.strong();
-            }
-            let label = egui::Label::new(text).truncate().selectable(false);
-            ui.add_sized([width, ui.spacing().interact_size.y], label);
-        }
-        if context.has_results_before() {
-            let primary = |result: &QueryResult| Some(result.diagnosis.first()?.code);
-            let was = context
-                .result_before(at)
-                .map(|was| verdict_name(primary(was)));
-            let mut text = RichText::new(was.unwrap_or("–"));
-            if was.is_some_and(|was| was != verdict_name(primary(result))) {
-                text = text.strong();
-            }
-            let label = egui::Label::new(text).selectable(false);
-            ui.add_sized([WAS, ui.spacing().interact_size.y], label);
-        }
-    });
-    let answer = row.response.interact(Sense::click());
-    let primary = result.diagnosis.first().map(|finding| finding.text.clone());
-    let answer = match primary {
-        Some(text) => answer.on_hover_text(text),
-        None => answer,
+/// The name of a column. A click sorts by it, the next one reverses, the third ends it.
+fn header(ui: &mut Ui, name: &str, order: &mut Option<Order>) {
+    let Ok(field) = Field::find(name) else {
+        return;
     };
+    let own = order.filter(|order| order.field == field);
+    let (text, next) = match own.map(|order| order.descending) {
+        None => (name.to_owned(), Some(false)),
+        Some(false) => (format!("{name} ▲"), Some(true)),
+        Some(true) => (format!("{name} ▼"), None),
+    };
+    let button = ui.add(Button::new(RichText::new(text).small()).frame(false));
+    if button.on_hover_text(field.about).clicked() {
+        *order = next.map(|descending| Order { field, descending });
+    }
+}
+
+fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
+    let Some(result) = context.result(at) else {
+        return;
+    };
+    let is_here = at.query == context.setup.query;
+    let label = |ui: &mut Ui, text: RichText| {
+        ui.add(egui::Label::new(text).truncate().selectable(false));
+    };
+    for (name, _) in COLUMNS {
+        row.col(|ui| {
+            let Ok(field) = Field::find(name) else {
+                return;
+            };
+            let (grade, visuals) = (result.grade, ui.visuals());
+            let text = match name {
+                "grade" => RichText::new(format!("{} {grade}", grade.glyph()))
+                    .color(theme::grade(visuals, grade)),
+                "method" => RichText::new(field.text(result))
+                    .color(theme::text(visuals, theme::method(result.method))),
+                _ if is_here => RichText::new(field.text(result)).strong(),
+                _ => RichText::new(field.text(result)),
+            };
+            label(ui, text);
+        });
+    }
+    if context.has_results_before() {
+        let primary = |result: &QueryResult| Some(result.diagnosis.first()?.code);
+        let was = context.result_before(at);
+        let was = was.map(|was| verdict_name(primary(was)));
+        let text = RichText::new(was.unwrap_or("–"));
+        let is_change = was.is_some_and(|was| was != verdict_name(primary(result)));
+        row.col(|ui| label(ui, if is_change { text.strong() } else { text }));
+    }
+    let mut answer = row.response();
+    if let Some(finding) = result.diagnosis.first() {
+        answer = answer.on_hover_text(&finding.text);
+    }
     if answer.clicked() {
         context.send(Command::OpenResult {
-            query,
-            result: place,
+            query: at.query,
+            result: at.place,
         });
     }
 }

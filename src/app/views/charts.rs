@@ -1,64 +1,57 @@
-//! The results of all queries as pictures: any two measures against each other, how many are how good, and
-//! which verdicts are frequent.
+//! The results of all queries as pictures: any two measures, recall, and the verdicts.
 
+mod matrix;
 mod recall;
-mod verdicts;
 
 use std::collections::BTreeMap;
 
 use egui::{ComboBox, DragValue, Ui};
-use egui_plot::{Legend, Line, MarkerShape, Plot, PlotPoint, Points};
+use egui_plot::{Legend, MarkerShape, Plot, PlotPoint, Points};
 
 use super::View;
 use crate::app::{Command, ResultRow, ViewContext, theme};
 use crate::diagnosis::Grade;
 use crate::localize::QueryResult;
 use crate::measure::{Field, Value};
-use crate::method::Method;
+use matrix::Columns;
 
 /// What is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Chart {
     #[default]
     Scatter,
-    Errors,
     Recall,
     Verdicts,
 }
 
 impl Chart {
-    const ALL: [(Self, &'static str, &'static str); 4] = [
+    const ALL: [(Self, &'static str, &'static str); 3] = [
         (Self::Scatter, "Scatter", "Any two measures of each result"),
-        (
-            Self::Errors,
-            "Errors",
-            "The share of results within an error",
-        ),
         (
             Self::Recall,
             "Recall",
-            "The share that is right, over what right means: metres and degrees together",
+            "The share of right results over the tolerance in metres and degrees",
         ),
         (
             Self::Verdicts,
             "Verdicts",
-            "How often each verdict is the first, by method or by condition",
+            "How often each verdict is the primary one",
         ),
     ];
 }
 
-/// How near to a point the pointer must be to mean it \[points\].
+/// The pointer chooses a point within this distance \[points\].
 const REACH: f32 = 10.0;
 
-/// The results that the batch's condition chooses.
+/// The results that match the filter of Batch.
 pub struct ChartsView {
     chart: Chart,
     across: &'static str,
     up: &'static str,
-    /// The greatest error that is drawn \[m\].
+    /// The largest tolerance that is drawn \[m\].
     limit_m: f64,
-    /// Whether verdicts are told by condition too.
-    by_condition: bool,
+    /// The columns of the verdicts.
+    columns: Columns,
 }
 
 impl Default for ChartsView {
@@ -68,7 +61,7 @@ impl Default for ChartsView {
             across: "start",
             up: "error",
             limit_m: 2.0,
-            by_condition: false,
+            columns: Columns::default(),
         }
     }
 }
@@ -87,7 +80,7 @@ impl View for ChartsView {
             }
         };
         if results.is_empty() {
-            ui.weak("No result to draw: run all queries, open the folder of a run, or ask for others in Batch");
+            ui.weak("No results match. Run all queries, open a run folder, or change the filter in Batch");
             return;
         }
         ui.horizontal_wrapped(|ui| {
@@ -101,26 +94,23 @@ impl View for ChartsView {
                     measure(ui, "Across", &mut self.across);
                     measure(ui, "Up", &mut self.up);
                 }
-                Chart::Errors | Chart::Recall => {
+                Chart::Recall => {
                     let label = ui.label("up to");
                     let drag = DragValue::new(&mut self.limit_m).range(0.05..=100.0);
                     ui.add(drag.speed(0.05).suffix(" m")).labelled_by(label.id);
                 }
                 Chart::Verdicts => {
-                    ui.selectable_value(&mut self.by_condition, false, "by method");
-                    ui.selectable_value(&mut self.by_condition, true, "by condition")
-                        .on_hover_text(
-                            "A column for each pair of scenes that queries and references are from",
-                        );
+                    for (columns, name, about) in Columns::ALL {
+                        ui.selectable_value(&mut self.columns, columns, name)
+                            .on_hover_text(about);
+                    }
                 }
             }
         });
         match self.chart {
             Chart::Scatter => self.scatter(ui, context, &results),
-            Chart::Errors => self.errors(ui, &results),
             Chart::Recall => recall::ui(ui, context, &results, self.limit_m),
-            Chart::Verdicts if self.by_condition => verdicts::by_condition(ui, context, &results),
-            Chart::Verdicts => verdicts::by_method(ui, &results),
+            Chart::Verdicts => matrix::ui(ui, context, &results, self.columns),
         }
     }
 }
@@ -208,71 +198,5 @@ impl ChartsView {
         });
         let words = format!("{} {}{code}", result.query, result.method.label());
         plot.response.clone().on_hover_text_at_pointer(words);
-    }
-
-    fn errors(&self, ui: &mut Ui, results: &[Chosen<'_>]) {
-        let mut errors: BTreeMap<Method, (usize, Vec<f64>)> = BTreeMap::new();
-        for (_, result) in results {
-            let (all, known) = errors.entry(result.method).or_default();
-            *all += 1;
-            known.extend(result.error.map(|error| error.translation_m));
-        }
-        let limit_m = self.limit_m;
-        let plot = Plot::new("errors")
-            .x_axis_label("error [m]")
-            .y_axis_label("share within it [%]")
-            .default_x_bounds(0.0, limit_m)
-            .default_y_bounds(0.0, 100.0)
-            .legend(Legend::default())
-            .show(ui, |plot| {
-                for (method, (all, mut errors)) in errors {
-                    errors.sort_by(f64::total_cmp);
-                    let line = steps(&errors, all, limit_m);
-                    plot.line(
-                        Line::new(method.label(), line)
-                            .color(theme::method(method))
-                            .width(2.0),
-                    );
-                }
-            });
-        plot.response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Image, true, "Share of results within an error")
-        });
-    }
-}
-
-/// The share \[%\] of `all` results whose error is at most that, as a line of steps. The errors are sorted;
-/// results without one are within none.
-fn steps(errors: &[f64], all: usize, limit_m: f64) -> Vec<[f64; 2]> {
-    let share = |count: usize| 100.0 * count as f64 / all.max(1) as f64;
-    let mut line = vec![[0.0, 0.0]];
-    let within = errors.iter().take_while(|error| **error <= limit_m);
-    for (index, &error) in within.enumerate() {
-        line.extend([[error, share(index)], [error, share(index + 1)]]);
-    }
-    let last = line.last().map_or(0.0, |point| point[1]);
-    line.push([limit_m, last]);
-    line
-}
-
-#[cfg(test)]
-mod tests {
-    use super::steps;
-
-    #[test]
-    fn what_has_no_error_is_within_none() {
-        let line = steps(&[0.5, 1.0, 3.0], 4, 2.0);
-        assert_eq!(
-            line,
-            [
-                [0.0, 0.0],
-                [0.5, 0.0],
-                [0.5, 25.0],
-                [1.0, 25.0],
-                [1.0, 50.0],
-                [2.0, 50.0]
-            ]
-        );
-        assert_eq!(steps(&[], 0, 1.0), [[0.0, 0.0], [1.0, 0.0]]);
     }
 }

@@ -1,8 +1,16 @@
-//! What the colours of a picture mean.
+//! What colours and marks of a picture mean: one bar and one mark for one thing in every view.
 
-use egui::{Align2, Color32, Mesh, Role, Sense, TextStyle, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, FontId, Mesh, Painter, Pos2, Role, Sense, Shape, Stroke, TextStyle, Ui, Vec2,
+    WidgetInfo, pos2, vec2,
+};
+use egui_plot::MarkerShape;
 
+use crate::app::{ViewContext, theme};
+use crate::diagnosis::Grade;
+use crate::geometry::{Pose, PoseError};
 use crate::palette;
+use crate::proof::Thing;
 
 /// A bar of colours from 0 to 1, with words at some of its places beneath it. `name` says what it
 /// shows, with the unit.
@@ -14,15 +22,13 @@ pub(super) fn color_bar(
     ticks: &[(f64, &str)],
 ) {
     const BAR: f32 = 9.0;
-    const MARGIN: f32 = 12.0;
     const STEPS: u32 = 32;
     let font = TextStyle::Small.resolve(ui.style());
     let size = vec2(width, BAR + 2.0 + font.size);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
     response.on_hover_text(name);
-    let (left, right) = (rect.left() + MARGIN, rect.right() - MARGIN);
-    let at = |share: f64| left + share as f32 * (right - left);
+    let at = |share: f64| rect.left() + share as f32 * rect.width();
     let (top, bottom) = (rect.top(), rect.top() + BAR);
     let mut mesh = Mesh::default();
     for step in 0..=STEPS {
@@ -41,9 +47,24 @@ pub(super) fn color_bar(
     for (share, words) in ticks {
         let x = at(*share);
         painter.vline(x, bottom - 3.0..=bottom + 2.0, (1.0, text));
-        let below = pos2(x, bottom + 1.0);
-        painter.text(below, Align2::CENTER_TOP, words, font.clone(), text);
+        let galley = painter.layout_no_wrap((*words).to_owned(), font.clone(), text);
+        // Words at an end stay within the bar.
+        let half = 0.5 * galley.size().x;
+        let middle = x.max(rect.left() + half).min(rect.right() - half);
+        painter.galley(pos2(middle - half, bottom + 1.0), galley, text);
     }
+}
+
+/// The bar of [`palette::viridis`] between two numbers.
+pub(super) fn cost_bar(ui: &mut Ui, width: f32, what: &str, [dark, bright]: &[String; 2]) {
+    let name = format!("Colours of {what}: {dark} is dark, {bright} is bright");
+    color_bar(
+        ui,
+        width,
+        &name,
+        theme::viridis,
+        &[(0.0, dark), (1.0, bright)],
+    );
 }
 
 /// The bar of [`palette::depth`].
@@ -55,6 +76,66 @@ pub(super) fn depth_bar(ui: &mut Ui, width: f32) {
         .map(palette::depth_share)
         .zip(words)
         .collect();
-    let color = |share| crate::app::theme::rgb(palette::turbo(share));
-    color_bar(ui, width, "depth, m", color, &ticks);
+    color_bar(ui, width, "depth, m", theme::turbo, &ticks);
+}
+
+/// A square of a colour.
+pub(super) fn swatch(ui: &mut Ui, color: Color32) {
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(10.0), Sense::hover());
+    ui.painter().rect_filled(rect, 1.0, color);
+}
+
+/// The mark of a result. It has the colour of its grade, which is grey where the truth is unknown or hidden.
+pub(super) fn result(context: &ViewContext<'_>, pose: &Pose) -> Thing {
+    let right = context.setup.task.protocol.right;
+    let grade = match context.truth() {
+        None => Grade::Unmeasured,
+        Some(truth) if right.contains(&PoseError::between(truth, pose)) => Grade::Right,
+        Some(_) => Grade::Wrong,
+    };
+    Thing::Result(palette::grade(grade))
+}
+
+/// Paints a mark of a radius \[points\] with a dark rim, in the shapes that proofs have.
+pub(super) fn paint_mark(painter: &Painter, thing: Thing, at: Pos2, radius: f32) {
+    let color = theme::rgb(thing.color());
+    for (width, color) in [(4.5, Color32::BLACK), (2.5, color)] {
+        let stroke = Stroke::new(width, color);
+        match thing {
+            Thing::Reference => {
+                painter.circle_stroke(at, radius, stroke);
+            }
+            Thing::Truth => {
+                let arm = radius + 0.5 * (width - 2.5);
+                painter.hline(at.x - arm..=at.x + arm, at.y, stroke);
+                painter.vline(at.x, at.y - arm..=at.y + arm, stroke);
+            }
+            Thing::Result(_) => {
+                let corners = [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)];
+                let corners = corners.map(|(x, y)| at + radius * vec2(x, y));
+                painter.add(Shape::closed_line(corners.to_vec(), stroke));
+            }
+            Thing::Dot(_) => {
+                painter.circle_filled(at, 0.5 * radius + 0.5 * (width - 2.5), color);
+            }
+            Thing::Words => {}
+        }
+    }
+}
+
+/// Paints the ring of a minimum with its number.
+pub(super) fn paint_minimum(painter: &Painter, number: &str, at: Pos2, radius: f32) {
+    painter.circle_filled(at, radius + 1.5, Color32::BLACK);
+    painter.circle_stroke(at, radius, Stroke::new(1.5, Color32::WHITE));
+    let font = FontId::proportional(1.7 * radius);
+    painter.text(at, Align2::CENTER_CENTER, number, font, Color32::WHITE);
+}
+
+/// The shape of a mark in a plot.
+pub(super) fn plot_shape(thing: Thing) -> MarkerShape {
+    match thing {
+        Thing::Truth => MarkerShape::Plus,
+        Thing::Result(_) => MarkerShape::Diamond,
+        Thing::Reference | Thing::Dot(_) | Thing::Words => MarkerShape::Circle,
+    }
 }

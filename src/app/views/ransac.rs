@@ -1,4 +1,4 @@
-//! MLESAC: every hypothesis, the best so far, and what became of it.
+//! MLESAC: every hypothesis, the best so far, and the test of the result.
 
 mod trials;
 mod verdict;
@@ -59,7 +59,9 @@ impl View for RansacView {
                 let trials =
                     source.and_then(|(span, end)| self.read(context, span.records.start..end));
                 let (Some((span, end)), Some(trials)) = (source, trials) else {
-                    ui.weak("No hypothesis yet: FB (1) tries some in its stage ransac");
+                    ui.weak(
+                        "No hypothesis yet. Run FB (1), which tries hypotheses in its stage ransac",
+                    );
                     return;
                 };
                 head(ui, context, span, trials);
@@ -69,8 +71,8 @@ impl View for RansacView {
     }
 }
 
-/// Where the trials of the cursor are: the part of the run, and behind its last record to show. That
-/// of FB, unless the cursor is in the hybrid, which runs FB inside itself.
+/// The part of the run with the trials, and the end of its records up to the cursor. That of FB, unless the
+/// cursor is in the hybrid, which runs FB inside itself.
 fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
     let is_inside =
         context.is_inside_hybrid(Method::FB) && context.latest::<HypothesisTried>().is_some();
@@ -83,7 +85,7 @@ fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
 }
 
 impl RansacView {
-    /// The trials among some records. They are read once as long as the cursor stays.
+    /// The trials among some records. They are read again only when the cursor moves.
     fn read(&mut self, context: &ViewContext<'_>, records: Range<usize>) -> Option<&Trials> {
         let loaded = context.run.loaded.as_ref()?;
         let is_known = self
@@ -112,7 +114,7 @@ fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
         let made = trials.made();
         ui.label(match trials.needed().filter(|needed| *needed < most) {
             Some(needed) => format!("{made} trials made, {needed} needed"),
-            None => format!("{made} trials made of the {most} allowed, more are needed"),
+            None => format!("{made} trials made, more are needed than the {most} allowed"),
         });
         if trials.without_pose > 0 {
             ui.weak(format!("{} samples have no pose", trials.without_pose));
@@ -178,7 +180,7 @@ fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
     }
 }
 
-/// The drawn points of a plot; the last one has none, and is clicked at its line.
+/// The points of a plot that can be clicked; the last plot has the corners of its line.
 fn points_of(trials: &Trials, quantity: PlotQuantity) -> &[[f64; 2]] {
     match quantity {
         PlotQuantity::Likelihood => &trials.likelihood.points,

@@ -1,400 +1,345 @@
-//! The scene in space: the cloud, the cameras, the rays, the search on the ground.
+//! The scene in 3-D: the cloud, the cameras, the rays, the costs on the ground.
 
-mod camera_drag;
 mod cameras;
 mod cloud;
-mod controls;
 mod gpu;
 mod ground;
 mod labels;
 mod orbit;
-mod progress;
 mod rays;
 mod scene_geometry;
 mod view_camera;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use eframe::egui_wgpu::RenderState;
-use egui::{Color32, Rect, Response, Role, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo};
-use nalgebra::{Point2, Point3};
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{
+    Align, Layout, PointerButton, PopupCloseBehavior, Rect, Response, Role, Sense, Ui, UiBuilder,
+    Vec2, WidgetInfo,
+};
+use nalgebra::Point3;
 
 use super::View;
-use crate::app::camera::NamedPose;
-use crate::app::textures::color_image;
-use crate::app::{Command, ViewContext, theme};
-use crate::picture;
-use camera_drag::CameraDrag;
+use super::surface::scale::{Scale, number};
+use super::surface::search::Search;
+use crate::app::{ViewContext, theme};
 use cameras::{CameraKind, SceneCamera};
-use cloud::{Coloring, PreparedCloud};
-use controls::{Layers, ViewRequest};
+use cloud::PreparedCloud;
 use gpu::{Frame, Painter, Points};
-use ground::CostGround;
-use labels::Bar;
+use ground::Cell;
 use orbit::Orbit;
-use progress::{LiftedFeatures, SearchProgress};
-use rays::Rays;
+use rays::{LiftedFeatures, Rays};
 use scene_geometry::SceneGeometry;
 use view_camera::ViewCamera;
 
-/// How long one of two poses is shown while they blink.
-const BLINK: Duration = Duration::from_millis(600);
+/// Where the scene is seen from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Eye {
+    /// Behind and above the reference, far enough to see every camera.
+    #[default]
+    Overview,
+    /// Where the user moved it.
+    Orbit(Orbit),
+    /// Through a camera.
+    Through(CameraKind),
+}
 
-/// The view of the scene in space.
+/// What of the scene is shown.
+struct Layers {
+    cloud: bool,
+    cost: bool,
+    path: bool,
+    rays: bool,
+    grid: bool,
+}
+
+/// The view of the scene in 3-D.
 pub struct SpaceView {
-    /// `None` where there is no graphics card to draw with.
+    /// `None` without a graphics card.
     painter: Option<Painter>,
     layers: Layers,
-    orbit: Option<Orbit>,
-    through: Option<LookThrough>,
+    eye: Eye,
     /// The shape of the pane.
     height_over_width: f32,
-    camera_drag: CameraDrag,
     cloud: Option<PreparedCloud>,
-    /// The points of no cloud.
+    /// The points of an empty cloud.
     nothing: Arc<Points>,
-    /// When the camera in hand changes its pose next, in egui's time \[s\]; `None` while it does not.
-    next_flip: Option<f64>,
 }
 
-/// A camera that one looks through, and how much the picture is magnified and shifted.
-#[derive(Clone, Copy)]
-struct LookThrough {
-    kind: CameraKind,
-    magnified: f64,
-    shifted: Vec2,
-}
-
-/// All that is there to be drawn at the cursor.
-struct SceneContent {
+/// What there is to draw at the cursor.
+struct SceneContent<'a> {
+    geometry: SceneGeometry,
     cameras: Vec<SceneCamera>,
-    search: CostGround,
-    path: Vec<crate::grid::Offset>,
     rays: Rays,
+    search: Option<Search<'a>>,
+    cells: Vec<Cell>,
+    scale: Option<Scale>,
+}
+
+impl<'a> SceneContent<'a> {
+    fn at(context: &ViewContext<'a>) -> Option<Self> {
+        let geometry = SceneGeometry::of(context)?;
+        let features = LiftedFeatures::at(context);
+        let search = Search::at(context, context.direct_method());
+        let selected = context.options.selected_feature;
+        Some(Self {
+            cameras: cameras::cameras(context, &geometry, &features, search.as_ref()),
+            rays: rays::rays(&geometry, &features, selected),
+            cells: search.as_ref().map_or(Vec::new(), ground::cells),
+            scale: search.as_ref().map(|search| Scale::of(context.run, search)),
+            geometry,
+            search,
+        })
+    }
 }
 
 impl SpaceView {
-    /// A view for a window, with a graphics card or without.
+    /// A view for a window with or without a graphics card.
     pub fn new(state: Option<&RenderState>) -> Self {
         Self {
             painter: state.map(Painter::new),
-            layers: Layers::default(),
-            orbit: None,
-            through: None,
+            layers: Layers {
+                cloud: true,
+                cost: true,
+                path: true,
+                rays: true,
+                grid: true,
+            },
+            eye: Eye::default(),
             height_over_width: 1.0,
-            camera_drag: CameraDrag::default(),
             cloud: None,
             nothing: Arc::default(),
-            next_flip: None,
         }
     }
 }
 
 impl View for SpaceView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let Some(geometry) = SceneGeometry::of(context) else {
-            ui.weak("There is no scene before the query and its reference are read");
+        let Some(content) = SceneContent::at(context) else {
+            ui.weak("The scene appears when the query and its reference are read");
             return;
         };
-        let content = self.content(context, &geometry);
-        let through = self.through.map(|through| through.kind);
-        let looks = ui.horizontal_wrapped(|ui| {
-            controls::looks(
-                ui,
-                &context.setup.task.protocol.methods,
-                &mut self.layers,
-                &content.cameras,
-                through,
-            )
-        });
-        let jumps =
-            ui.horizontal_wrapped(|ui| controls::jumps(ui, context, self.next_flip.is_some()));
-        if let Some(request) = looks.inner.or(jumps.inner) {
-            self.apply(request, &geometry, &content.cameras);
+        match &self.painter {
+            None => {
+                ui.weak("No graphics card: points, lines and surfaces are not drawn");
+            }
+            Some(painter) => {
+                if let Some(why) = painter.trouble() {
+                    ui.colored_label(
+                        ui.visuals().error_fg_color,
+                        format!("Nothing is drawn in 3-D: {why}"),
+                    );
+                }
+            }
         }
-        self.blink(ui, context);
-        self.say_trouble(ui);
-        self.pane(ui, context, &geometry, &content);
+        // The marks are made for a dark ground.
+        let style = ui.ctx().style_of(egui::Theme::Dark);
+        ui.scope(|ui| {
+            ui.style_mut().visuals = style.visuals.clone();
+            self.pane(ui, context, &content);
+        });
     }
 }
 
 impl SpaceView {
-    fn content(&self, context: &ViewContext<'_>, geometry: &SceneGeometry) -> SceneContent {
-        let features = LiftedFeatures::at(context);
-        let search = SearchProgress::at(context);
-        let relief_m = if self.layers.relief {
-            0.2 * geometry.radius_m
-        } else {
-            0.0
-        };
-        SceneContent {
-            cameras: cameras::cameras(context, geometry, &features, &search),
-            rays: rays::rays(geometry, &features, context.options.selected_feature),
-            search: CostGround::new(&search, &context.run.params.grid).with_relief(relief_m),
-            path: search.path,
-        }
-    }
-
-    fn apply(&mut self, request: ViewRequest, geometry: &SceneGeometry, cameras: &[SceneCamera]) {
-        match request {
-            ViewRequest::Reset => {
-                // As long as nobody turns it, the overview follows what there is to be seen.
-                self.orbit = None;
-                self.through = None;
-            }
-            ViewRequest::Top => {
-                let (middle, radius_m) = self.overview(geometry, cameras);
-                self.orbit = Some(Orbit::from_above(middle, radius_m));
-                self.through = None;
-            }
-            ViewRequest::Through(kind) => {
-                let is_new = self.through.is_none_or(|through| through.kind != kind);
-                self.through = is_new.then_some(LookThrough {
-                    kind,
-                    magnified: 1.0,
-                    shifted: Vec2::ZERO,
-                });
-            }
-            ViewRequest::Blink => {
-                self.next_flip = match self.next_flip {
-                    Some(_) => None,
-                    None => Some(0.0),
-                };
-            }
-        }
-    }
-
-    fn blink(&mut self, ui: &Ui, context: &ViewContext<'_>) {
-        let Some(next) = self.next_flip else { return };
-        if context.camera().is_none() || context.named_pose(NamedPose::Last).is_none() {
-            self.next_flip = None;
-            return;
-        }
-        let now = ui.input(|input| input.time);
-        if now >= next {
-            context.send(Command::JumpCamera(NamedPose::Last));
-            self.next_flip = Some(now + BLINK.as_secs_f64());
-        }
-        ui.ctx().request_repaint_after(BLINK);
-    }
-
-    fn say_trouble(&self, ui: &mut Ui) {
-        let Some(painter) = &self.painter else {
-            ui.weak("No graphics card: points, lines and surfaces are not drawn");
-            return;
-        };
-        if let Some(why) = painter.trouble() {
-            ui.horizontal_wrapped(|ui| {
-                ui.colored_label(theme::ESTIMATE, format!("Nothing is drawn in space: {why}"));
-                if ui.button("Draw again").clicked() {
-                    painter.try_again();
-                }
-            });
-        }
-    }
-
-    fn pane(
-        &mut self,
-        ui: &mut Ui,
-        context: &ViewContext<'_>,
-        geometry: &SceneGeometry,
-        content: &SceneContent,
-    ) {
+    fn pane(&mut self, ui: &mut Ui, context: &ViewContext<'_>, content: &SceneContent<'_>) {
         let size = ui.available_size().max(Vec2::splat(60.0));
         let (pane, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         self.height_over_width = size.y / size.x;
-        self.steer(ui, geometry, &response, &content.cameras);
-        let view_camera = self.view_camera(geometry, size, &content.cameras);
+        self.steer(ui, &response, content);
+        let view_camera = self.view_camera(size, content);
 
-        let points = self.points(context, geometry);
+        let points = self.points(context, &content.geometry);
         let count = points.len();
-        let marks = self.draw(ui, pane, geometry, content, &view_camera, points);
-        let through = self.looked_through(&content.cameras);
-        if let Some(camera) = through {
-            self.photo(ui, context, pane, &view_camera, camera);
-        }
-        labels::marks(ui, pane, &view_camera, &marks);
-        self.legend(ui, pane, context, content);
-        let headline = self.headline(&view_camera, &response, geometry, content);
+        self.draw(ui, pane, content, &view_camera, points);
+        let cost = self.layers.cost && !content.cells.is_empty();
+        let ends = content.scale.as_ref().and_then(Scale::cost_ends);
+        let method = content.search.as_ref().map(|search| search.method.label());
+        let cost = method.as_deref().zip(ends.filter(|_| cost));
+        let no_rays = Rays::default();
+        let rays = if self.layers.rays {
+            &content.rays
+        } else {
+            &no_rays
+        };
+        labels::legend(ui, pane, cost, rays);
+        let headline = self.headline(&view_camera, &response, content);
         labels::headline(ui, pane, &headline);
-
-        let hand = content
-            .cameras
-            .iter()
-            .find(|camera| camera.kind == CameraKind::Hand);
-        let held = hand.and_then(|camera| {
-            self.camera_drag
-                .ui(ui, pane, &view_camera, geometry, camera)
-        });
-        if let Some(pose) = held {
-            context.send(Command::TakeCamera(Some(pose)));
-        }
         if let Some(kind) = labels::cameras(ui, pane, &view_camera, &content.cameras) {
-            self.apply(ViewRequest::Through(kind), geometry, &content.cameras);
+            self.eye = Eye::Through(kind);
         }
+        self.menu(ui, pane, content);
         response.widget_info(|| {
             let words = format!("3-D view of {count} points. {headline}");
             WidgetInfo::labeled(Role::Image, true, words)
         });
     }
 
-    /// Turns, shifts and zooms as the pointer says.
-    fn steer(
-        &mut self,
-        ui: &Ui,
-        geometry: &SceneGeometry,
-        response: &Response,
-        cameras: &[SceneCamera],
-    ) {
-        let size = response.rect.size();
-        let delta = response.drag_delta();
-        let shifts = response.dragged_by(egui::PointerButton::Secondary)
-            || response.dragged_by(egui::PointerButton::Middle)
-            || ui.input(|input| input.modifiers.shift);
-        let is_dragged = response.dragged() && delta != Vec2::ZERO;
-        let pose = self
-            .looked_through(cameras)
-            .map(|camera| camera.scene_from_camera);
-        if let (true, false, Some(pose)) = (is_dragged, shifts, pose) {
-            // Whoever turns leaves the camera.
-            self.orbit = Some(Orbit::leaving(&pose, 4.0 * geometry.camera_m()));
-            self.through = None;
+    /// The menu in the upper right corner.
+    fn menu(&mut self, ui: &mut Ui, pane: Rect, content: &SceneContent<'_>) {
+        let corner = UiBuilder::new()
+            .max_rect(pane.shrink(6.0))
+            .layout(Layout::right_to_left(Align::TOP));
+        let mut ui = ui.new_child(corner);
+        let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+        MenuButton::new("View").config(config).ui(&mut ui, |ui| {
+            let help = "Show every camera (double click)";
+            if ui.button("Whole scene").on_hover_text(help).clicked() {
+                self.eye = Eye::Overview;
+            }
+            if ui.button("From above").clicked() {
+                let (middle, radius_m) = self.overview(content);
+                self.eye = Eye::Orbit(Orbit::from_above(middle, radius_m));
+            }
+            ui.separator();
+            for camera in &content.cameras {
+                let is_chosen = self.eye == Eye::Through(camera.kind);
+                let text = format!("Through {}", camera.kind.name());
+                let button = ui.selectable_label(is_chosen, text);
+                if button.on_hover_text(&camera.about).clicked() {
+                    self.eye = Eye::Through(camera.kind);
+                }
+            }
+            ui.separator();
+            let Layers {
+                cloud,
+                cost,
+                path,
+                rays,
+                grid,
+            } = &mut self.layers;
+            ui.checkbox(cloud, "Cloud");
+            ui.checkbox(cost, "Cost on the ground");
+            ui.checkbox(path, "Way of the search");
+            ui.checkbox(rays, "Rays to lifted points");
+            ui.checkbox(grid, "Grid");
+        });
+    }
+
+    /// A drag turns, with Shift or another button it moves; the wheel zooms; a double click shows everything.
+    fn steer(&mut self, ui: &Ui, response: &Response, content: &SceneContent<'_>) {
+        if response.double_clicked() {
+            self.eye = Eye::Overview;
+            return;
         }
-        let zoomed = response.hover_pos().and_then(|at| {
+        let (by, size) = (response.drag_delta(), response.rect.size());
+        let is_dragged = response.dragged() && by != Vec2::ZERO;
+        if let Some(camera) = self.looked_through(content) {
+            // Turning leaves the camera.
+            if is_dragged {
+                let ahead_m = 4.0 * content.geometry.camera_m();
+                self.eye = Eye::Orbit(Orbit::leaving(&camera.scene_from_camera, ahead_m));
+            }
+            return;
+        }
+        let mut orbit = self.orbit(content);
+        if is_dragged {
+            let moves = response.dragged_by(PointerButton::Secondary)
+                || response.dragged_by(PointerButton::Middle)
+                || ui.input(|input| input.modifiers.shift);
+            if moves {
+                orbit.pan(by, size);
+            } else {
+                orbit.turn(by);
+            }
+            self.eye = Eye::Orbit(orbit);
+        }
+        if let Some(at) = response.hover_pos() {
             let (scroll, pinch) =
                 ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
             let factor = f64::from(pinch) * (0.004 * f64::from(scroll)).exp();
-            (factor != 1.0).then_some((factor, at - response.rect.min.to_vec2()))
-        });
-        let (middle, radius_m) = self.overview(geometry, cameras);
-        let overview = Orbit::overview(middle, radius_m);
-        match (&mut self.through, pose) {
-            (Some(through), Some(_)) => {
-                if is_dragged {
-                    through.shifted += delta;
-                }
-                if let Some((factor, at)) = zoomed {
-                    let middle = (0.5 * size).to_pos2();
-                    let k = factor as f32;
-                    through.magnified *= factor;
-                    through.shifted = (1.0 - k) * (at - middle) + k * through.shifted;
-                }
-            }
-            _ => {
-                if !is_dragged && zoomed.is_none() {
-                    return;
-                }
-                let orbit = self.orbit.get_or_insert(overview);
-                match (is_dragged, shifts) {
-                    (true, true) => orbit.pan(delta, size),
-                    (true, false) => orbit.turn(delta),
-                    (false, _) => {}
-                }
-                if let Some((factor, at)) = zoomed {
-                    orbit.zoom(1.0 / factor, at, size);
-                }
+            if factor != 1.0 {
+                orbit.zoom(1.0 / factor, at - response.rect.min.to_vec2(), size);
+                self.eye = Eye::Orbit(orbit);
             }
         }
     }
 
-    /// What is seen as long as nobody has turned the scene: reference, estimates and truth together.
-    fn overview(&self, geometry: &SceneGeometry, cameras: &[SceneCamera]) -> (Point3<f64>, f64) {
-        let centres: Vec<Point3<f64>> = cameras.iter().map(SceneCamera::centre).collect();
-        geometry.overview(&centres, f64::from(self.height_over_width))
+    /// The circle that shows reference, estimates and truth together.
+    fn overview(&self, content: &SceneContent<'_>) -> (Point3<f64>, f64) {
+        let centres: Vec<Point3<f64>> = content.cameras.iter().map(SceneCamera::centre).collect();
+        let height_over_width = f64::from(self.height_over_width);
+        content.geometry.overview(&centres, height_over_width)
     }
 
-    fn looked_through<'a>(&self, cameras: &'a [SceneCamera]) -> Option<&'a SceneCamera> {
-        let wanted = self.through?.kind;
-        cameras.iter().find(|camera| camera.kind == wanted)
+    fn orbit(&self, content: &SceneContent<'_>) -> Orbit {
+        match self.eye {
+            Eye::Orbit(orbit) => orbit,
+            Eye::Overview | Eye::Through(_) => {
+                let (middle, radius_m) = self.overview(content);
+                Orbit::overview(middle, radius_m)
+            }
+        }
     }
 
-    fn view_camera(
-        &self,
-        geometry: &SceneGeometry,
-        size: Vec2,
-        cameras: &[SceneCamera],
-    ) -> ViewCamera {
-        match (self.through, self.looked_through(cameras)) {
-            (Some(through), Some(camera)) => {
+    fn looked_through<'c>(&self, content: &'c SceneContent<'_>) -> Option<&'c SceneCamera> {
+        let mut cameras = content.cameras.iter();
+        cameras.find(|camera| self.eye == Eye::Through(camera.kind))
+    }
+
+    fn view_camera(&self, size: Vec2, content: &SceneContent<'_>) -> ViewCamera {
+        match self.looked_through(content) {
+            Some(camera) => {
                 ViewCamera::of_camera(camera.scene_from_camera, &camera.intrinsics, size)
-                    .magnified(through.magnified, (0.5 * size).to_pos2())
-                    .shifted(through.shifted)
             }
-            _ => {
-                let overview = || {
-                    let (middle, radius_m) = self.overview(geometry, cameras);
-                    Orbit::overview(middle, radius_m)
-                };
-                self.orbit.unwrap_or_else(overview).view_camera(size)
-            }
+            None => self.orbit(content).view_camera(size),
         }
     }
 
-    /// The cloud's points, made ready once.
+    /// The points of the cloud, prepared once.
     fn points(&mut self, context: &ViewContext<'_>, geometry: &SceneGeometry) -> Arc<Points> {
-        self.cloud = match context.problem().filter(|_| self.layers.cloud) {
-            Some(problem) => {
-                let (reference, colored) = (&problem.reference, progress::colored(context));
-                let wanted = self.layers.coloring;
-                let is_current =
-                    |cloud: &PreparedCloud| cloud.is(geometry, reference, colored, wanted);
-                let made = || PreparedCloud::new(geometry, reference, colored, wanted);
-                Some(self.cloud.take().filter(is_current).unwrap_or_else(made))
-            }
-            None => None,
+        let Some(problem) = context.problem().filter(|_| self.layers.cloud) else {
+            return Arc::clone(&self.nothing);
         };
-        let cloud = self.cloud.as_ref();
-        cloud.map_or_else(
-            || Arc::clone(&self.nothing),
-            |cloud| Arc::clone(&cloud.points),
-        )
+        let (reference, params) = (&problem.reference, &context.run.params.render);
+        let known = self.cloud.take();
+        let known = known.filter(|cloud| cloud.is(geometry, reference, params));
+        let cloud = known.unwrap_or_else(|| PreparedCloud::new(geometry, reference, params));
+        let points = Arc::clone(&cloud.points);
+        self.cloud = Some(cloud);
+        points
     }
 
-    /// Draws what is in space; answers with what is to be written beside the grid.
+    /// Draws all but marks and labels of cameras.
     fn draw(
         &self,
         ui: &Ui,
         pane: Rect,
-        geometry: &SceneGeometry,
-        content: &SceneContent,
+        content: &SceneContent<'_>,
         view_camera: &ViewCamera,
         points: Arc<Points>,
-    ) -> Vec<ground::GridLabel> {
-        let visuals = ui.visuals();
+    ) {
+        let (visuals, geometry) = (ui.visuals(), &content.geometry);
         let mut lines = Vec::new();
-        let mut faces = Vec::new();
-        let mut marks = Vec::new();
+        let mut metres = Vec::new();
         if self.layers.grid {
             let text = visuals.text_color();
-            let (grid, beside) = ground::grid(
-                geometry,
-                text.gamma_multiply(0.25),
-                text.gamma_multiply(0.6),
-            );
-            lines.extend(grid);
-            marks = beside;
+            let [pale, strong] = [0.25, 0.6].map(|share| text.gamma_multiply(share));
+            (lines, metres) = ground::grid(geometry, pale, strong);
         }
-        if self.layers.cost {
-            faces = content.search.faces(geometry);
-        }
-        if self.layers.path {
-            lines.extend(ground::path(geometry, &content.path, theme::ESTIMATE));
+        let faces = match &content.scale {
+            Some(scale) if self.layers.cost => ground::faces(geometry, &content.cells, scale),
+            _ => Vec::new(),
+        };
+        if let Some(search) = content.search.as_ref().filter(|_| self.layers.path) {
+            let color = theme::method(search.method);
+            lines.extend(ground::path(geometry, &search.way, color));
         }
         if self.layers.rays {
             lines.extend_from_slice(&content.rays.lines);
         }
-        let through = self.looked_through(&content.cameras);
         for camera in &content.cameras {
-            if through.is_none_or(|through| through.kind != camera.kind) {
-                lines.extend(camera.lines());
+            if self.eye != Eye::Through(camera.kind) {
+                lines.extend(camera.lines(&geometry.below(&camera.centre())));
             }
         }
+        let background = visuals.extreme_bg_color;
         match &self.painter {
             Some(painter) => {
                 let frame = Frame {
                     view_camera: *view_camera,
-                    background: visuals.extreme_bg_color,
+                    background,
                     points,
                     lines,
                     faces,
@@ -402,103 +347,26 @@ impl SpaceView {
                 painter.paint(&ui.painter_at(pane), pane, frame);
             }
             None => {
-                ui.painter()
-                    .rect_filled(pane, 0.0, visuals.extreme_bg_color);
+                ui.painter().rect_filled(pane, 0.0, background);
             }
         }
-        marks
+        labels::metres(ui, pane, view_camera, &metres);
     }
 
-    /// The photo over what its camera sees, and the border of its image.
-    fn photo(
-        &self,
-        ui: &Ui,
-        context: &ViewContext<'_>,
-        pane: Rect,
-        view_camera: &ViewCamera,
-        camera: &SceneCamera,
-    ) {
-        let Some(problem) = context.problem() else {
-            return;
-        };
-        let (ctx, textures) = (ui.ctx(), context.textures);
-        let texture = if camera.kind.is_query() {
-            textures.of(ctx, "photo in space", &problem.query, |query| {
-                color_image(&picture::photo(&query.photo))
-            })
-        } else {
-            textures.of(ctx, "photo in space", &problem.reference, |reference| {
-                color_image(&picture::photo(&reference.photo))
-            })
-        };
-        let intrinsics = &camera.intrinsics;
-        let corner = |x: f64, y: f64| {
-            view_camera.place_pixel(intrinsics, &Point2::new(x, y)) + pane.min.to_vec2()
-        };
-        let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
-        let image = Rect::from_two_pos(corner(-0.5, -0.5), corner(width - 0.5, height - 0.5));
-        let painter = ui.painter_at(pane);
-        let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-        let tint = Color32::WHITE.gamma_multiply(self.layers.photo);
-        painter.image(texture.id(), image, uv, tint);
-        let border = Stroke::new(2.0, camera.color);
-        painter.rect_stroke(image, 0.0, border, StrokeKind::Outside);
-    }
-
-    fn legend(&self, ui: &Ui, pane: Rect, context: &ViewContext<'_>, content: &SceneContent) {
-        let mut bars = Vec::new();
-        if let Some(cloud) = &self.cloud
-            && cloud.coloring != Coloring::Photo
-        {
-            let (low, high) = cloud.range_m;
-            let title = match (cloud.coloring, self.layers.coloring) {
-                (Coloring::Depth, _) => "m from the reference",
-                (_, Coloring::Photo) => "m above the ground (not coloured by the photo yet)",
-                _ => "m above the ground",
-            };
-            bars.push(Bar {
-                title: title.to_owned(),
-                ends: [format!("{low:.1}"), format!("{high:.1}")],
-                color: theme::turbo,
-            });
-        }
-        if let Some((least, greatest)) = content.search.costs().filter(|_| self.layers.cost) {
-            let method = context.searching_method();
-            bars.push(Bar {
-                title: format!("cost of {}; grey: no say", method.name().to_uppercase()),
-                ends: [format!("{greatest:.4}"), format!("{least:.4}")],
-                color: theme::viridis,
-            });
-        }
-        let Rays {
-            inliers,
-            outliers,
-            undecided,
-            ..
-        } = content.rays;
-        let mut words = Vec::new();
-        if self.layers.rays && inliers + outliers > 0 {
-            words.push((format!("–– {inliers} inliers"), rays::inlier_color()));
-            words.push((format!("- - {outliers} outliers"), rays::outlier_color()));
-        }
-        if self.layers.rays && undecided > 0 {
-            words.push((format!("–– {undecided} lifted matches"), theme::CAMERA));
-        }
-        labels::legend(ui, pane, &bars, &words);
-    }
-
-    /// Where one looks from, and what is under the pointer.
+    /// Where the eye is, and what is under the pointer.
     fn headline(
         &self,
         view_camera: &ViewCamera,
         response: &Response,
-        geometry: &SceneGeometry,
-        content: &SceneContent,
+        content: &SceneContent<'_>,
     ) -> String {
-        let mut words = match (self.through, self.looked_through(&content.cameras)) {
-            (Some(through), Some(_)) => format!("Through {}", through.kind.name()),
-            (Some(through), None) => format!("{} has no pose at this step", through.kind.name()),
-            (None, _) => "From outside".to_owned(),
+        let SceneContent { geometry, .. } = content;
+        let mut words = match (self.eye, self.looked_through(content)) {
+            (Eye::Through(kind), Some(_)) => format!("Through {}; drag to leave it", kind.name()),
+            (Eye::Through(kind), None) => format!("{} has no pose at this step", kind.name()),
+            (Eye::Overview | Eye::Orbit(_), _) => {
+                "Drag: turn; Shift+drag: move; wheel: zoom".to_owned()
+            }
         };
         let under = response.hover_pos().and_then(|at| {
             let ray = view_camera.ray(at - response.rect.min.to_vec2());
@@ -507,19 +375,18 @@ impl SpaceView {
             (place.coords.norm() < 3.0 * geometry.radius_m).then_some(place)
         });
         if let Some(place) = under {
-            let cell = content.search.cell_at(place.x, place.z);
+            let cell = ground::cell_at(&content.cells, place.x, place.z);
             let cell = cell.filter(|_| self.layers.cost);
-            match cell.map(|cell| (cell.offset, cell.cost)) {
-                Some((offset, Some(cost))) => words.push_str(&format!(
-                    "; cost {cost:.4} at ({:.1}, {:.1}) m",
-                    offset.right_m, offset.forward_m
-                )),
-                Some((offset, None)) => words.push_str(&format!(
-                    "; no say at ({:.1}, {:.1}) m",
-                    offset.right_m, offset.forward_m
-                )),
-                None => words.push_str(&format!("; ground at ({:.1}, {:.1}) m", place.x, place.z)),
-            }
+            let (what, [right_m, forward_m]) = match cell {
+                Some(cell) => {
+                    let Cell { offset, cost, .. } = cell;
+                    let cost = cost.map(|cost| format!("cost {}", number(cost)));
+                    let what = cost.unwrap_or_else(|| "below the coverage floor".to_owned());
+                    (what, [offset.right_m, offset.forward_m])
+                }
+                None => ("ground".to_owned(), [place.x, place.z]),
+            };
+            words += &format!(" – {what} at ({right_m:.1}, {forward_m:.1}) m");
         }
         words
     }

@@ -1,25 +1,25 @@
-//! Recall: the share of results that are right, the stricter or the laxer right is meant.
+//! Recall: the share of right results over the tolerance.
 
 use std::collections::BTreeMap;
 
 use egui::Ui;
 use egui_plot::{Legend, Line, LineStyle, Plot, VLine};
 
-use super::{Chosen, steps};
+use super::Chosen;
 use crate::app::{ViewContext, theme};
 use crate::diagnosis::Tolerance;
 use crate::localize::QueryResult;
 use crate::method::Method;
 
-/// How lax right has to be meant for a result to be right \[m\]: metres and degrees grow together, in the
-/// proportion of the run's own tolerance. Nothing is lax enough for a result without an error.
+/// The smallest tolerance at which this result is right \[m\]; degrees scale with metres, as in the run's own
+/// tolerance. `None` without an error.
 fn limit_m(result: &QueryResult, right: Tolerance) -> Option<f64> {
     let error = result.error?;
     let degrees = error.rotation_deg / right.rotation_deg;
     Some(error.translation_m.max(degrees * right.translation_m))
 }
 
-/// The results that a method has, and how lax right has to be meant for each that has an error.
+/// The number of results of each method, and the tolerances that they need.
 type Limits = BTreeMap<Method, (usize, Vec<f64>)>;
 
 fn limits<'a>(results: impl Iterator<Item = &'a QueryResult>, right: Tolerance) -> Limits {
@@ -61,13 +61,15 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
     ui.weak(&words);
     let degrees_of = right.rotation_deg / right.translation_m;
     let plot = Plot::new("recall")
-        .x_axis_label(format!("right means within x m and {degrees_of:.3} x °"))
-        .y_axis_label("share that is right [%]")
+        .x_axis_label(format!(
+            "tolerance x [m], with {degrees_of:.3} ° for each m"
+        ))
+        .y_axis_label("share of right results [%]")
         .default_x_bounds(0.0, most_m)
         .default_y_bounds(0.0, 100.0)
         .legend(Legend::default())
         .show(ui, |plot| {
-            let own = VLine::new("right, as the run means it", right.translation_m);
+            let own = VLine::new("tolerance of the run", right.translation_m);
             plot.vline(own.color(theme::TRUTH).style(LineStyle::dashed_loose()));
             for (run, limits) in [("A", &before), ("", &now)] {
                 for (method, (all, known)) in limits {
@@ -85,4 +87,40 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
         let words = format!("Recall. {words}");
         egui::WidgetInfo::labeled(egui::Role::Image, true, words)
     });
+}
+
+/// The share \[%\] of `all` results within each tolerance, as a line of steps. The tolerances that results
+/// need are sorted; results without one are never within.
+fn steps(needed: &[f64], all: usize, limit_m: f64) -> Vec<[f64; 2]> {
+    let share = |count: usize| 100.0 * count as f64 / all.max(1) as f64;
+    let mut line = vec![[0.0, 0.0]];
+    let within = needed.iter().take_while(|needed| **needed <= limit_m);
+    for (index, &tolerance) in within.enumerate() {
+        line.extend([[tolerance, share(index)], [tolerance, share(index + 1)]]);
+    }
+    let last = line.last().map_or(0.0, |point| point[1]);
+    line.push([limit_m, last]);
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::steps;
+
+    #[test]
+    fn a_result_without_an_error_is_never_within() {
+        let line = steps(&[0.5, 1.0, 3.0], 4, 2.0);
+        assert_eq!(
+            line,
+            [
+                [0.0, 0.0],
+                [0.5, 0.0],
+                [0.5, 25.0],
+                [1.0, 25.0],
+                [1.0, 50.0],
+                [2.0, 50.0]
+            ]
+        );
+        assert_eq!(steps(&[], 0, 1.0), [[0.0, 0.0], [1.0, 0.0]]);
+    }
 }

@@ -1,13 +1,12 @@
-//! The joint histogram with its margins, entropies and the mutual information.
+//! The joint histogram with its entropies and the mutual information.
 
 use std::sync::Arc;
 
 use egui::{Color32, Rect, Stroke, Ui};
-use egui_plot::{Bar, BarChart, GridInput, GridMark, Plot, PlotImage, PlotPoint};
+use egui_plot::{GridInput, GridMark, Plot, PlotImage, PlotPoint};
 
-use super::comparison;
+use crate::app::ViewContext;
 use crate::app::views::readout::Readout;
-use crate::app::{ViewContext, theme};
 use crate::cost::JointHistogram;
 use crate::cost::Similarity;
 use crate::estimator::{self, Entry};
@@ -17,9 +16,6 @@ use crate::render::Comparison;
 
 /// Grey values of an axis.
 const GREYS: f64 = 256.0;
-/// Where the marginal bars begin, and how long the longest is, in the unit of the axes.
-const MARGIN_FROM: f64 = GREYS + 6.0;
-const MARGIN_LENGTH: f64 = 52.0;
 
 /// Draws the histogram of a comparison.
 pub(super) fn ui(
@@ -31,7 +27,6 @@ pub(super) fn ui(
 ) {
     let cost = estimator::find(method).and_then(Entry::cost);
     let sees = cost.map_or("value", |cost| cost.sees);
-    let margins = Margins::of(histogram);
     let texture = context
         .textures
         .of(ui.ctx(), "joint histogram", shown, |_| {
@@ -53,166 +48,79 @@ pub(super) fn ui(
         .allow_boxed_zoom(false)
         .x_grid_spacer(grey_marks)
         .y_grid_spacer(grey_marks)
-        .x_axis_label(format!("{sees} of the synthetic view"))
-        .y_axis_label(format!("{sees} of the query"))
-        .include_x(-4.0)
-        .include_y(-4.0)
-        .include_x(MARGIN_FROM + MARGIN_LENGTH)
-        .include_y(MARGIN_FROM + MARGIN_LENGTH)
+        .x_axis_label(format!("{sees}, synthetic view"))
+        .y_axis_label(format!("{sees}, query"))
+        .include_x(0.0)
+        .include_y(0.0)
+        .include_x(GREYS)
+        .include_y(GREYS)
         .set_margin_fraction(egui::Vec2::ZERO)
         .show(ui, |plot| {
             let middle = PlotPoint::new(0.5 * GREYS, 0.5 * GREYS);
             let size = [GREYS as f32; 2];
             plot.add(PlotImage::new("bins", texture.id(), middle, size));
-            let color = ui_color(plot.ctx());
-            let bars = |counts: &[u32]| margins.bars(counts);
-            let synthetic = BarChart::new("synthetic", bars(&margins.synthetic));
-            plot.bar_chart(synthetic.color(color).allow_hover(false));
-            let query = BarChart::new("query", bars(&margins.query)).horizontal();
-            plot.bar_chart(query.color(color).allow_hover(false));
         });
     let name = format!(
         "Joint histogram of {} pairs in {} bins per axis",
-        margins.pairs, histogram.bins
+        histogram.counts.iter().sum::<u32>(),
+        histogram.bins
     );
     answer
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     let pointed_at = answer.response.hover_pos().and_then(|at| {
         let point = answer.transform.value_from_position(at);
-        margins.at(histogram, point.x, point.y)
+        bin_at(histogram, point.x, point.y)
     });
-    if let Some(pointed_at) = &pointed_at {
-        let corner = |[x, y]: [f64; 2]| answer.transform.position_from_point(&PlotPoint::new(x, y));
-        let rect = Rect::from_two_pos(corner(pointed_at.from), corner(pointed_at.to));
+    if let Some(bin) = &pointed_at {
+        let width = GREYS / histogram.bins as f64;
+        let corner = |column: usize, row: usize| {
+            let point = PlotPoint::new(column as f64 * width, row as f64 * width);
+            answer.transform.position_from_point(&point)
+        };
+        let (row, column) = (bin.row, bin.column);
+        let rect = Rect::from_two_pos(corner(column, row), corner(column + 1, row + 1));
         for (width, color) in [(3.0, Color32::BLACK), (1.5, Color32::WHITE)] {
             let stroke = Stroke::new(width, color);
             ui.painter()
                 .rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
         }
     }
-    let words = pointed_at.as_ref().map(|at| at.words.as_str());
-    readout.say(ui, words, "Point at a bin (bright: many)");
-    numbers(ui, context, method, shown, histogram);
+    let words = pointed_at.as_ref().map(|bin| bin.words.as_str());
+    readout.say(ui, words, "Point at a bin (bright: many pairs)");
+    numbers(ui, method, shown, histogram);
 }
 
-fn ui_color(ctx: &egui::Context) -> Color32 {
-    ctx.global_style().visuals.weak_text_color()
-}
-
-/// Marks at the grey values alone, not at the margins' bars.
+/// Marks at every quarter of the grey values.
 fn grey_marks(_: GridInput) -> Vec<GridMark> {
-    (0..=4)
-        .map(|quarter| GridMark {
-            value: 64.0 * f64::from(quarter),
-            step_size: 64.0,
-        })
-        .collect()
+    let quarters = (0..=4).map(|quarter| GridMark {
+        value: 64.0 * f64::from(quarter),
+        step_size: 64.0,
+    });
+    quarters.collect()
 }
 
-/// How often each bin of one image occurs.
-struct Margins {
-    query: Vec<u32>,
-    synthetic: Vec<u32>,
-    pairs: u32,
-    most: u32,
-}
-
-/// A bin or a bar under the pointer.
-struct PointedAt {
-    from: [f64; 2],
-    to: [f64; 2],
+/// A bin under the pointer.
+struct Bin {
+    row: usize,
+    column: usize,
     words: String,
 }
 
-impl Margins {
-    fn of(histogram: &JointHistogram) -> Self {
-        let JointHistogram { bins, counts, .. } = histogram;
-        let mut query = Vec::with_capacity(*bins);
-        let mut synthetic = vec![0; *bins];
-        for row in counts.chunks(*bins) {
-            query.push(row.iter().sum());
-            for (sum, count) in synthetic.iter_mut().zip(row) {
-                *sum += count;
-            }
-        }
-        let most = query.iter().chain(&synthetic).copied().max();
-        Self {
-            pairs: query.iter().sum(),
-            most: most.unwrap_or(0).max(1),
-            query,
-            synthetic,
-        }
-    }
-
-    fn bars(&self, counts: &[u32]) -> Vec<Bar> {
-        let width = GREYS / counts.len() as f64;
-        let bar = |(bin, &count): (usize, &u32)| {
-            let length = MARGIN_LENGTH * f64::from(count) / f64::from(self.most);
-            Bar::new((bin as f64 + 0.5) * width, length)
-                .width(0.9 * width)
-                .base_offset(MARGIN_FROM)
-        };
-        counts.iter().enumerate().map(bar).collect()
-    }
-
-    /// What is at a point of the plot.
-    fn at(&self, histogram: &JointHistogram, synthetic: f64, query: f64) -> Option<PointedAt> {
-        let bins = histogram.bins;
-        let width = GREYS / bins as f64;
-        let bin = |value: f64| {
-            (0.0..GREYS)
-                .contains(&value)
-                .then_some((value / width) as usize)
-        };
-        let is_bar = |value: f64| (MARGIN_FROM..=MARGIN_FROM + MARGIN_LENGTH).contains(&value);
-        let ends = |bin: usize| (bin as f64 * width, (bin + 1) as f64 * width);
-        let share = |count: u32| 100.0 * f64::from(count) / f64::from(self.pairs.max(1));
-        let grey = |bin: usize| greys(bin, bins);
-        match (bin(synthetic), bin(query)) {
-            (Some(column), Some(row)) => {
-                let count = histogram.counts[row * bins + column];
-                let ((left, right), (low, high)) = (ends(column), ends(row));
-                Some(PointedAt {
-                    from: [left, low],
-                    to: [right, high],
-                    words: format!(
-                        "{count} pairs ({:.2} %): query {}, synthetic {}",
-                        share(count),
-                        grey(row),
-                        grey(column)
-                    ),
-                })
-            }
-            (Some(column), None) if is_bar(query) => {
-                let (left, right) = ends(column);
-                let count = self.synthetic[column];
-                Some(PointedAt {
-                    from: [left, MARGIN_FROM],
-                    to: [right, MARGIN_FROM + MARGIN_LENGTH],
-                    words: format!(
-                        "{count} pixels ({:.2} %): synthetic {}",
-                        share(count),
-                        grey(column)
-                    ),
-                })
-            }
-            (None, Some(row)) if is_bar(synthetic) => {
-                let (low, high) = ends(row);
-                let count = self.query[row];
-                Some(PointedAt {
-                    from: [MARGIN_FROM, low],
-                    to: [MARGIN_FROM + MARGIN_LENGTH, high],
-                    words: format!(
-                        "{count} pixels ({:.2} %): query {}",
-                        share(count),
-                        grey(row)
-                    ),
-                })
-            }
-            _ => None,
-        }
-    }
+/// The bin at a place of the plot.
+fn bin_at(histogram: &JointHistogram, synthetic: f64, query: f64) -> Option<Bin> {
+    let bins = histogram.bins;
+    let bin = |value: f64| {
+        let bin = (value * bins as f64 / GREYS) as usize;
+        (0.0..GREYS).contains(&value).then_some(bin)
+    };
+    let (column, row) = (bin(synthetic)?, bin(query)?);
+    let pairs: u32 = histogram.counts.iter().sum();
+    let count = histogram.counts[row * bins + column];
+    let share = 100.0 * f64::from(count) / f64::from(pairs.max(1));
+    let (in_query, in_view) = (greys(row, bins), greys(column, bins));
+    let words = format!("{count} pairs ({share:.2} %): query {in_query}, synthetic {in_view}");
+    Some(Bin { row, column, words })
 }
 
 /// The grey values of a bin in words; whole ones where the bins hold whole ones.
@@ -227,13 +135,7 @@ fn greys(bin: usize, bins: usize) -> String {
 }
 
 /// The formula with its numbers.
-fn numbers(
-    ui: &mut Ui,
-    context: &ViewContext<'_>,
-    method: Method,
-    shown: &Comparison,
-    histogram: &JointHistogram,
-) {
+fn numbers(ui: &mut Ui, method: Method, shown: &Comparison, histogram: &JointHistogram) {
     let cost = estimator::find(method).and_then(Entry::cost);
     // The histogram's entropies are natural ones.
     let bits = |nats: f64| nats / std::f64::consts::LN_2;
@@ -263,15 +165,6 @@ fn numbers(
             shown.score.covered
         ));
     }
-    let quality: fn(f64) -> f64 = |cost| 1.0 - cost;
-    ui.separator();
-    ui.label(
-        egui::RichText::new(method.label())
-            .color(theme::text(ui.visuals(), theme::method(method)))
-            .strong(),
-    );
-    let quality = similarity.map(|similarity| (similarity.name, quality));
-    comparison(ui, context, method, shown.score.cost, quality);
 }
 
 #[cfg(test)]
@@ -280,25 +173,16 @@ mod tests {
     use crate::cost::IntensityPair;
 
     #[test]
-    fn the_pointer_finds_its_bin_and_its_bars() {
+    fn the_pointer_finds_its_bin() {
         let pairs = [(0.0, 255.0), (10.0, 250.0), (200.0, 3.0)]
             .map(|(query, synthetic)| IntensityPair { query, synthetic });
         let histogram = JointHistogram::of(&pairs, 16);
-        let margins = Margins::of(&histogram);
-        let words = |x, y| margins.at(&histogram, x, y).map(|at| at.words);
+        let words = |x, y| bin_at(&histogram, x, y).map(|bin| bin.words);
         assert_eq!(
             words(250.0, 5.0).as_deref(),
             Some("2 pairs (66.67 %): query 0 to 15, synthetic 240 to 255")
         );
-        assert_eq!(
-            words(1.0, 270.0).as_deref(),
-            Some("1 pixels (33.33 %): synthetic 0 to 15")
-        );
-        assert_eq!(
-            words(270.0, 1.0).as_deref(),
-            Some("2 pixels (66.67 %): query 0 to 15")
-        );
-        assert_eq!(words(270.0, 270.0), None);
+        assert_eq!(words(270.0, 1.0), None);
         assert_eq!(words(-1.0, 5.0), None);
     }
 

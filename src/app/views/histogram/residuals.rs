@@ -1,10 +1,10 @@
 //! How far query and synthetic view differ, and which half of the differences PM counts.
 
-use egui::{Color32, Ui};
+use egui::Ui;
 use egui_plot::{Bar, BarChart, HoverPosition, LineStyle, Plot, VLine};
 
-use super::comparison;
-use crate::app::{ViewContext, theme};
+use crate::app::theme;
+use crate::app::views::legend::swatch;
 use crate::cost::{IntensityPair, PhotometricWeights};
 use crate::method::Method;
 use crate::render::Comparison;
@@ -15,13 +15,7 @@ const WIDTH: usize = 4;
 const BARS: usize = 512 / WIDTH;
 
 /// Draws the residuals of a comparison.
-pub(super) fn ui(
-    ui: &mut Ui,
-    context: &ViewContext<'_>,
-    method: Method,
-    shown: &Comparison,
-    weights: &PhotometricWeights,
-) {
+pub(super) fn ui(ui: &mut Ui, method: Method, shown: &Comparison, weights: &PhotometricWeights) {
     let counts = counts(&shown.pairs, weights);
     let median = f64::from(weights.threshold).sqrt();
     let ignored = ui.visuals().weak_text_color();
@@ -57,11 +51,13 @@ pub(super) fn ui(
     let kept = weights.counted.iter().filter(|counted| **counted).count();
     let left_out = weights.counted.len() - kept;
     ui.horizontal_wrapped(|ui| {
-        legend(ui, counted, &format!("{kept} pixels count"));
-        legend(ui, ignored, &format!("{left_out} are ignored"));
+        swatch(ui, counted);
+        ui.label(format!("{kept} pixels count"));
+        swatch(ui, ignored);
+        ui.label(format!("{left_out} are ignored"));
     });
     ui.label(format!(
-        "The median difference is {median:.2} grey values (dashed); whatever differs more is ignored"
+        "The median difference is {median:.2} grey values (dashed). Pixels that differ more are ignored"
     ));
     if let Some(cost) = shown.score.cost {
         let power = weights.power;
@@ -74,19 +70,6 @@ pub(super) fn ui(
             "cost = {mean} = {cost:.4}, as if all differed by {throughout:.2} grey values"
         ));
     }
-    ui.separator();
-    ui.label(
-        egui::RichText::new(method.label())
-            .color(theme::text(ui.visuals(), counted))
-            .strong(),
-    );
-    comparison(ui, context, method, shown.score.cost, None);
-}
-
-fn legend(ui: &mut Ui, color: Color32, words: &str) {
-    let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());
-    ui.painter().rect_filled(rect, 1.0, color);
-    ui.label(words);
 }
 
 /// Per bar, the pixels that count and those that are ignored.

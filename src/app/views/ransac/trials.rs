@@ -1,10 +1,10 @@
-//! The trials as curves, thinned to what can be seen.
+//! The trials as curves, with no more points than a plot can show.
 
 use crate::event::{Event, HypothesisTried};
 use crate::robust::Trial;
 use crate::trace::Record;
 
-/// Points of a curve are thinned to the least and greatest of as many stretches.
+/// A curve keeps the lowest and the highest point of each of so many stretches.
 const STRETCHES: usize = 400;
 
 /// The trials up to the cursor.
@@ -21,7 +21,7 @@ pub(super) struct Trials {
     /// The best trial: that whose hypothesis was refined last.
     pub(super) best: Option<Trial>,
     last: Option<Trial>,
-    /// The record at which each trial was told.
+    /// The record of each trial.
     records: Vec<usize>,
 }
 
@@ -93,7 +93,7 @@ impl Trials {
         self.records.len()
     }
 
-    /// Trials that the best so far asks for.
+    /// Trials needed by the best so far.
     pub(super) fn needed(&self) -> Option<usize> {
         Some(self.last.as_ref()?.trials_needed)
     }

@@ -77,7 +77,7 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
             let Some(lifted) = correspondences.get(index) else {
                 continue;
             };
-            let help = "Look at this feature";
+            let help = "Select this feature";
             if ui
                 .link(format!("match {index}"))
                 .on_hover_text(help)
@@ -89,7 +89,7 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
             ui.end_row();
         }
     });
-    ui.weak("here, best: reprojection errors for this hypothesis and for the best so far");
+    ui.weak("here, best: reprojection errors of this hypothesis and of the best so far");
 }
 
 /// The keypoints that a sample's indices refer to.
@@ -207,7 +207,7 @@ fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &Cons
             acceptance.log10_nfa
         ),
         (AcceptanceRule::Consensus, None) => {
-            format!("{inliers} {agreeing}; so few matches are never more than chance")
+            format!("{inliers} {agreeing}; so few matches could always be chance")
         }
         (AcceptanceRule::Paper, _) => {
             format!("{inliers} {agreeing} {} 4, the paper's rule", compared(is_met))
@@ -225,7 +225,7 @@ fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &Cons
     let limit_m = radius_m * (1.0 + params.radius_slack);
     let note = match params.accept {
         AcceptanceRule::Consensus => "",
-        AcceptanceRule::Paper => " (the paper's rule does not ask)",
+        AcceptanceRule::Paper => " (the paper's rule ignores it)",
     };
     ui.label(format!(
         "{distance_m:.2} m from the reference {} {limit_m:.2} m, the radius of {radius_m:.1} m and {:.0} %{note}",

@@ -1,11 +1,6 @@
-// Puts the finished picture into the pane, and the finished cloud behind lines and faces, pixel by
-// pixel.
+// Puts the finished picture into the pane, pixel by pixel.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
-// A depth texture, read as any other: OpenGL cannot load single texels of one that is declared as
-// depth, and wants a sampler that does not filter.
-@group(0) @binding(1) var depths: texture_2d<f32>;
-@group(0) @binding(2) var nearest: sampler;
 
 struct Seen {
     @builtin(position) clip: vec4f,
@@ -37,17 +32,4 @@ fn linear(seen: Seen) -> @location(0) vec4f {
     let low = color.rgb / 12.92;
     let high = pow((color.rgb + 0.055) / 1.055, vec3f(2.4));
     return vec4f(select(high, low, color.rgb <= vec3f(0.04045)), color.a);
-}
-
-struct Behind {
-    @location(0) color: vec4f,
-    @builtin(frag_depth) depth: f32,
-}
-
-// Into a target of the same size.
-@fragment
-fn backdrop(seen: Seen) -> Behind {
-    let at = vec2u(seen.clip.xy);
-    let uv = seen.clip.xy / vec2f(textureDimensions(depths));
-    return Behind(textureLoad(picture, at, 0), textureSampleLevel(depths, nearest, uv, 0.0).r);
 }

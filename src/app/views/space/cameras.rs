@@ -1,17 +1,20 @@
-//! The cameras of the scene: the reference's, the estimates, the true one, that in hand.
+//! The cameras of the scene: reference, truth, estimates, and the camera in hand.
 
-use egui::Color32;
 use nalgebra::{Point2, Point3};
 
 use super::gpu::Line;
-use super::progress::{LiftedFeatures, SearchProgress};
+use super::rays::LiftedFeatures;
 use super::scene_geometry::{SceneGeometry, spot};
+use crate::app::views::legend;
+use crate::app::views::surface::search::Search;
 use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
 use crate::estimator::{self, Parts};
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
+use crate::palette;
 use crate::place::place;
+use crate::proof::Thing;
 
 /// Whose camera it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +22,7 @@ pub(super) enum CameraKind {
     Reference,
     Truth,
     Estimate(Method),
-    /// The best pose of a method that is still at work.
+    /// The best pose so far of a method that is not finished.
     BestSoFar(Method),
     /// The camera in hand.
     Hand,
@@ -28,17 +31,7 @@ pub(super) enum CameraKind {
 }
 
 impl CameraKind {
-    /// All that one may want to look through, in the order of the buttons.
-    pub(super) fn to_look_through(methods: &[Method]) -> Vec<Self> {
-        let estimates = methods.iter().map(|&method| Self::Estimate(method));
-        [Self::Reference, Self::Truth]
-            .into_iter()
-            .chain(estimates)
-            .chain([Self::Hand])
-            .collect()
-    }
-
-    /// The name on a button.
+    /// The name on its label.
     pub(super) fn name(self) -> String {
         match self {
             Self::Reference => "Reference".to_owned(),
@@ -47,29 +40,6 @@ impl CameraKind {
             Self::BestSoFar(method) => format!("{}, best so far", method.name().to_uppercase()),
             Self::Hand => "In hand".to_owned(),
             Self::Pointer => "Under the pointer".to_owned(),
-        }
-    }
-
-    /// Its shape: no two cameras are told apart by colour alone.
-    pub(super) fn shape(self) -> &'static str {
-        match self {
-            Self::Reference => "○",
-            Self::Truth => "×",
-            Self::Estimate(method) | Self::BestSoFar(method) => {
-                const SHAPES: [&str; 6] = ["●", "▲", "■", "◆", "◇", "□"];
-                SHAPES[rank(method) % SHAPES.len()]
-            }
-            Self::Hand => "▶",
-            Self::Pointer => "↓",
-        }
-    }
-
-    fn color(self) -> Color32 {
-        match self {
-            Self::Reference => theme::REFERENCE,
-            Self::Truth => theme::TRUTH,
-            Self::Estimate(_) | Self::BestSoFar(_) => theme::ESTIMATE,
-            Self::Hand | Self::Pointer => theme::CAMERA,
         }
     }
 
@@ -83,10 +53,9 @@ impl CameraKind {
         }
     }
 
-    fn stroke_width(self) -> f32 {
+    fn line_width(self) -> f32 {
         match self {
-            Self::Reference | Self::Truth | Self::Estimate(_) => 2.0,
-            Self::Hand => 3.0,
+            Self::Reference | Self::Truth | Self::Estimate(_) | Self::Hand => 2.5,
             Self::BestSoFar(_) | Self::Pointer => 1.0,
         }
     }
@@ -113,10 +82,10 @@ pub(super) struct SceneCamera {
     pub(super) intrinsics: Intrinsics,
     /// How far the image plane is drawn from the centre \[m\].
     pub(super) depth_m: f64,
-    /// Where it is and how good, in words.
+    /// Where it is and how far from the truth, in words.
     pub(super) about: String,
-    /// An estimate that is known to be right is not in the colour of wrong ones.
-    pub(super) color: Color32,
+    /// Its mark, which is the same in every picture.
+    pub(super) thing: Thing,
 }
 
 impl SceneCamera {
@@ -136,8 +105,8 @@ impl SceneCamera {
         })
     }
 
-    /// The frustum, with a roof that shows where up is.
-    pub(super) fn lines(&self) -> Vec<Line> {
+    /// The frustum with a roof that shows which side is up, and a pole down to the ground, where `foot` is.
+    pub(super) fn lines(&self, foot: &Point3<f64>) -> Vec<Line> {
         let centre = self.centre();
         let corners = self.corners();
         let middle = nalgebra::center(&corners[0], &corners[1]);
@@ -145,10 +114,10 @@ impl SceneCamera {
         let roof = middle + up;
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
             ends: [spot(&from), spot(&to)],
-            color: self.color,
-            width: self.kind.stroke_width(),
+            color: theme::rgb(self.thing.color()),
+            width: self.kind.line_width(),
         };
-        let mut lines = Vec::with_capacity(10);
+        let mut lines = vec![line(centre, *foot)];
         for side in 0..4 {
             lines.push(line(centre, corners[side]));
             lines.push(line(corners[side], corners[(side + 1) % 4]));
@@ -159,31 +128,33 @@ impl SceneCamera {
     }
 }
 
-/// Every camera there is at the cursor.
+/// Every camera at the cursor; those that matter most come last.
 pub(super) fn cameras(
     context: &ViewContext<'_>,
     geometry: &SceneGeometry,
     features: &LiftedFeatures<'_>,
-    search: &SearchProgress<'_>,
+    search: Option<&Search<'_>>,
 ) -> Vec<SceneCamera> {
     let Some(problem) = context.problem() else {
         return Vec::new();
     };
     let truth = context.truth();
-    let right = context.setup.task.protocol.right;
     let camera = |kind: CameraKind, world: Pose| {
         let reference_from_camera = geometry.reference_from(&world);
         let mut about = format!("from the reference: {}", place(&reference_from_camera));
-        let mut color = kind.color();
         if let Some(truth) = truth
             && kind != CameraKind::Truth
         {
             let error = PoseError::between(truth, &world);
             about.push_str(&format!("; from the truth {error}"));
-            if matches!(kind, CameraKind::Estimate(_)) && right.contains(&error) {
-                color = theme::TRUTH;
-            }
         }
+        let thing = match kind {
+            CameraKind::Reference => Thing::Reference,
+            CameraKind::Truth => Thing::Truth,
+            CameraKind::Estimate(_) => legend::result(context, &world),
+            CameraKind::BestSoFar(_) => Thing::Result(palette::NO_POSE),
+            CameraKind::Hand | CameraKind::Pointer => Thing::Dot(palette::UNDECIDED),
+        };
         SceneCamera {
             kind,
             world,
@@ -195,7 +166,7 @@ pub(super) fn cameras(
             },
             depth_m: kind.size() * geometry.camera_m(),
             about,
-            color,
+            thing,
         }
     };
     let mut all = vec![camera(
@@ -223,7 +194,7 @@ pub(super) fn cameras(
     all
 }
 
-/// The estimate of a method: of that at the cursor only once the cursor has come to its end.
+/// The estimate of a method; of the one at the cursor only at its end.
 fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
     let (span, cursor) = context.part_of(method)?;
     (cursor + 1 >= span.records.end)
@@ -231,17 +202,20 @@ fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
         .flatten()
 }
 
-/// Where the estimator at the cursor stands, in the reference camera's frame, until it has ended.
+/// The best pose so far of the estimator at the cursor, in the reference camera's frame, until its end.
 fn best_so_far(
     context: &ViewContext<'_>,
     features: &LiftedFeatures<'_>,
-    search: &SearchProgress<'_>,
+    search: Option<&Search<'_>>,
 ) -> Option<(Method, Pose)> {
     let span = context.span()?;
     if span.result.is_some() && context.cursor + 1 >= span.records.end {
         return None;
     }
-    let by_search = search.path.last().map(|best| best.reference_from_camera());
+    // The search may be of another part of the run.
+    let by_search = search.filter(|search| search.span.part == span.part);
+    let by_search = by_search.and_then(|search| search.way.last());
+    let by_search = by_search.map(|best| best.reference_from_camera());
     let method = span.part.method()?;
     let best = match estimator::find(method).map(|entry| &entry.parts) {
         Some(Parts::Features) => features.reference_from_query,

@@ -5,7 +5,6 @@
 //! pass, and only if something in it has changed; within the pass it is copied into the pane.
 
 mod frame;
-mod guard;
 mod picture;
 mod pipelines;
 #[cfg(test)]
@@ -24,7 +23,8 @@ use pipelines::Pipelines;
 
 /// Draws one view's frames. Errors of the graphics card stay inside and can be asked for.
 pub(super) struct Painter {
-    pipelines: Arc<Pipelines>,
+    /// `Err` says what the device refused.
+    pipelines: Arc<Result<Pipelines, String>>,
     picture: Arc<Mutex<Picture>>,
 }
 
@@ -34,7 +34,7 @@ impl Painter {
         let mut renderer = state.renderer.write();
         let shared = &mut renderer.callback_resources;
         let pipelines = shared
-            .entry::<Arc<Pipelines>>()
+            .entry::<Arc<Result<Pipelines, String>>>()
             .or_insert_with(|| Arc::new(Pipelines::new(&state.device, state.target_format)));
         Self {
             pipelines: Arc::clone(pipelines),
@@ -44,13 +44,9 @@ impl Painter {
 
     /// Why nothing can be drawn, if so.
     pub(super) fn trouble(&self) -> Option<String> {
-        let drawn = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
-        self.pipelines.trouble().or_else(|| drawn.trouble())
-    }
-
-    /// Forgets the trouble of the last picture, to try again.
-    pub(super) fn try_again(&self) {
-        *self.picture.lock().unwrap_or_else(PoisonError::into_inner) = Picture::default();
+        let picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
+        let refused = self.pipelines.as_ref().as_ref().err();
+        refused.or(picture.trouble()).cloned()
     }
 
     /// Puts a frame into the pane.
@@ -69,7 +65,7 @@ impl Painter {
 
 /// A frame on its way to the screen.
 struct PaintCallback {
-    pipelines: Arc<Pipelines>,
+    pipelines: Arc<Result<Pipelines, String>>,
     picture: Arc<Mutex<Picture>>,
     rect: Rect,
     frame: Frame,
@@ -92,12 +88,13 @@ impl CallbackTrait for PaintCallback {
         };
         let viewport = info.viewport_in_pixels();
         let size = [viewport.width_px, viewport.height_px].map(|side| side.max(0) as u32);
-        if size.contains(&0) {
-            return Vec::new();
+        if let Ok(pipelines) = self.pipelines.as_ref()
+            && !size.contains(&0)
+        {
+            let mut picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
+            let scale = screen.pixels_per_point;
+            picture.draw(pipelines, device, queue, &self.frame, size, scale);
         }
-        let mut picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
-        let scale = screen.pixels_per_point;
-        picture.draw(&self.pipelines, device, queue, &self.frame, size, scale);
         // Submitted already: an error in it then belongs to this view and not to all of egui.
         Vec::new()
     }
@@ -108,9 +105,37 @@ impl CallbackTrait for PaintCallback {
         pass: &mut wgpu::RenderPass<'static>,
         _resources: &CallbackResources,
     ) {
-        if self.pipelines.trouble().is_none() {
+        if let Ok(pipelines) = self.pipelines.as_ref() {
             let picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
-            picture.show(&self.pipelines, pass);
+            picture.show(pipelines, pass);
         }
     }
+}
+
+/// Runs something whose errors are wanted as values instead of a panic.
+fn guarded<T>(device: &wgpu::Device, run: impl FnOnce() -> T) -> Result<T, String> {
+    let filters = [
+        wgpu::ErrorFilter::Internal,
+        wgpu::ErrorFilter::OutOfMemory,
+        wgpu::ErrorFilter::Validation,
+    ];
+    let scopes = filters.map(|filter| device.push_error_scope(filter));
+    let value = run();
+    let mut error = None;
+    for scope in scopes.into_iter().rev() {
+        error = error.or(pollster::block_on(scope.pop()));
+    }
+    error.map_or(Ok(value), |error| Err(one_line(&error.to_string())))
+}
+
+/// An error of wgpu in one line: what caused it, without the headings.
+fn one_line(text: &str) -> String {
+    let causes = text
+        .split_once("Caused by:")
+        .map_or(text, |(_, causes)| causes);
+    let lines = causes
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join(": ")
 }

@@ -1,191 +1,93 @@
-//! What lies on the ground: the grid with its metres, the cost surface, the way of the search.
+//! What lies on the ground: the grid with its metres, the cost map, the way of the search.
 
 use egui::Color32;
 use nalgebra::Point3;
 
-use super::cloud::share;
 use super::gpu::{Line, Spot};
-use super::progress::SearchProgress;
 use super::scene_geometry::{SceneGeometry, spot};
-use crate::app::theme;
+use crate::app::views::surface::scale::{BELOW_FLOOR, Scale};
+use crate::app::views::surface::search::{Search, Searched};
 use crate::grid::{Offset, Phase, ScoredLattice};
 
 /// The layers above the ground \[m\], so that none hides another.
 const FINE_ABOVE_M: f64 = 0.02;
 const GRID_ABOVE_M: f64 = 0.04;
 const PATH_ABOVE_M: f64 = 0.06;
-/// Cells without a say.
-const SILENT: Color32 = Color32::from_gray(90);
 
-/// One hypothesis of the positions.
+/// A square of the cost map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cell {
     pub(super) offset: Offset,
     /// Side of the square \[m\].
     pub(super) step_m: f64,
-    /// `None` where the hypothesis has no say.
+    /// `None` below the coverage floor.
     pub(super) cost: Option<f64>,
-    is_fine: bool,
+    /// Height above the ground \[m\].
+    above_m: f64,
 }
 
-/// The cost surface as it is at the cursor.
-#[derive(Default)]
-pub(super) struct CostGround {
-    cells: Vec<Cell>,
-    /// Least and greatest cost: the ends of the colours.
-    costs: Option<(f64, f64)>,
-    /// How much the greatest cost is raised above the least one \[m\].
-    relief_m: f64,
-}
-
-impl CostGround {
-    /// The latest coarse positions and, where they came later, the fine ones; of a phase that is
-    /// not complete, what is scored so far.
-    pub(super) fn new(progress: &SearchProgress<'_>, params: &crate::grid::GridParams) -> Self {
-        let is_coarse = |surface: &&std::sync::Arc<ScoredLattice>| {
-            surface.lattice.phase == Phase::PositionCoarse
-        };
-        let begin = progress.surfaces.iter().rposition(is_coarse).unwrap_or(0);
-        let mut cells = Vec::new();
-        let under_way = progress.scored.first().map(|scored| scored.phase);
-        // A new round begins with an empty ground.
-        if under_way != Some(Phase::PositionCoarse) {
-            for surface in &progress.surfaces[begin..] {
-                cells.extend(complete(surface));
-            }
-        }
-        cells.extend(progress.scored.iter().filter_map(|scored| {
-            let (is_fine, step_m) = match scored.phase {
-                Phase::PositionCoarse => (false, params.coarse_step_m),
-                Phase::PositionFine => (true, params.fine_step_m),
-                Phase::YawCoarse | Phase::YawFine => return None,
-            };
-            let has_say = scored.coverage >= params.coverage_floor;
-            Some(Cell {
-                offset: scored.offset,
-                step_m,
-                cost: scored.score.cost.filter(|_| has_say),
-                is_fine,
-            })
-        }));
-        Self {
-            cells,
-            costs: progress.costs,
-            relief_m: 0.0,
-        }
-    }
-
-    /// The same with costs as heights: the least on the ground, the greatest this far above.
-    pub(super) fn with_relief(self, relief_m: f64) -> Self {
-        Self { relief_m, ..self }
-    }
-
-    pub(super) fn costs(&self) -> Option<(f64, f64)> {
-        self.costs.filter(|_| !self.cells.is_empty())
-    }
-
-    /// The cell at a place of the ground; a fine one before the coarse one below it.
-    pub(super) fn cell_at(&self, right_m: f64, forward_m: f64) -> Option<&Cell> {
-        self.cells.iter().rev().find(|cell| {
-            let Offset {
-                right_m: x,
-                forward_m: z,
-                ..
-            } = cell.offset;
-            (right_m - x).abs().max((forward_m - z).abs()) <= 0.5 * cell.step_m
-        })
-    }
-
-    /// The squares, as two triangles each; raised ones with their walls.
-    pub(super) fn faces(&self, geometry: &SceneGeometry) -> Vec<Spot> {
-        let mut faces = Vec::with_capacity(6 * self.cells.len());
-        for cell in &self.cells {
-            let Offset {
-                right_m, forward_m, ..
-            } = cell.offset;
-            let half = 0.5 * cell.step_m;
-            let height = self.height(cell);
-            let place = |right: f64, forward: f64, above: f64| {
-                let (x, z) = (right_m + right * half, forward_m + forward * half);
-                spot(&geometry.on_ground(x, z, above))
-            };
-            let color = self.color(cell);
-            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-            let above = if cell.is_fine { FINE_ABOVE_M } else { 0.0 };
-            quad(
-                &mut faces,
-                corners.map(|(x, z)| place(x, z, above + height)),
-                color,
-            );
-            if height > 0.0 {
-                let shaded = color.lerp_to_gamma(Color32::BLACK, 0.35);
-                for side in 0..4 {
-                    let [(ax, az), (bx, bz)] = [corners[side], corners[(side + 1) % 4]];
-                    let wall = [
-                        place(ax, az, above),
-                        place(bx, bz, above),
-                        place(bx, bz, above + height),
-                        place(ax, az, above + height),
-                    ];
-                    quad(&mut faces, wall, shaded);
-                }
-            }
-        }
-        faces
-    }
-
-    fn color(&self, cell: &Cell) -> Color32 {
-        match (cell.cost, self.costs) {
-            (Some(cost), Some(costs)) => theme::viridis(merit(cost, costs)),
-            _ => SILENT,
-        }
-    }
-
-    fn height(&self, cell: &Cell) -> f64 {
-        match (cell.cost, self.costs) {
-            (Some(cost), Some(costs)) => self.relief_m * (1.0 - merit(cost, costs)).clamp(0.0, 1.0),
-            _ => 0.0,
-        }
-    }
-}
-
-fn complete(surface: &ScoredLattice) -> Vec<Cell> {
-    let lattice = &surface.lattice;
-    if lattice.phase.is_yaw() {
-        return Vec::new();
-    }
-    lattice
-        .hypotheses()
-        .filter(|(cell, _)| surface.scores[*cell].is_some())
-        .map(|(cell, offset)| Cell {
-            offset,
-            step_m: lattice.step,
-            cost: surface.eligible_cost(cell),
-            is_fine: lattice.phase == Phase::PositionFine,
-        })
+/// The cost map at the cursor: the latest coarse positions and the fine ones on top of them.
+pub(super) fn cells(search: &Search<'_>) -> Vec<Cell> {
+    let positions: Vec<&Searched> = search.positions().collect();
+    let is_coarse = |searched: &&Searched| searched.phase() == Phase::PositionCoarse;
+    // A new round covers the one before.
+    let first = positions.iter().rposition(is_coarse).unwrap_or(0);
+    positions[first..]
+        .iter()
+        .flat_map(|searched| cells_of(&searched.surface))
         .collect()
 }
 
-/// 1 for the least cost, 0 for the greatest; where all are equal, all are best.
-fn merit(cost: f64, costs: (f64, f64)) -> f64 {
-    1.0 - share(cost, costs)
+fn cells_of(surface: &ScoredLattice) -> impl Iterator<Item = Cell> {
+    let lattice = &surface.lattice;
+    let is_fine = lattice.phase == Phase::PositionFine;
+    let scored = lattice
+        .hypotheses()
+        .filter(|(cell, _)| surface.scores[*cell].is_some());
+    scored.map(move |(cell, offset)| Cell {
+        offset,
+        step_m: lattice.step,
+        cost: surface.eligible_cost(cell),
+        above_m: if is_fine { FINE_ABOVE_M } else { 0.0 },
+    })
 }
 
-fn quad(faces: &mut Vec<Spot>, corners: [[f32; 3]; 4], color: Color32) {
-    let order = [0, 1, 2, 0, 2, 3];
-    faces.extend(order.map(|corner| Spot {
-        at: corners[corner],
-        color,
-    }));
+/// The cell at a place of the ground; a fine one before the coarse one below it.
+pub(super) fn cell_at(cells: &[Cell], right_m: f64, forward_m: f64) -> Option<&Cell> {
+    cells.iter().rev().find(|cell| {
+        let right = (right_m - cell.offset.right_m).abs();
+        let forward = (forward_m - cell.offset.forward_m).abs();
+        right.max(forward) <= 0.5 * cell.step_m
+    })
 }
 
-/// A number to be written beside the grid.
+/// The squares in the colours of the cost map, as two triangles each.
+pub(super) fn faces(geometry: &SceneGeometry, cells: &[Cell], scale: &Scale) -> Vec<Spot> {
+    let mut faces = Vec::with_capacity(6 * cells.len());
+    for cell in cells {
+        let half = 0.5 * cell.step_m;
+        let color = cell.cost.map_or(BELOW_FLOOR, |cost| scale.cost(cost));
+        let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
+        let corners = corners.map(|(right, forward)| {
+            let (x, z) = (cell.offset.right_m + right, cell.offset.forward_m + forward);
+            spot(&geometry.on_ground(x, z, cell.above_m))
+        });
+        let order = [0, 1, 2, 0, 2, 3];
+        faces.extend(order.map(|corner| Spot {
+            at: corners[corner],
+            color,
+        }));
+    }
+    faces
+}
+
+/// A number beside the grid.
 pub(super) struct GridLabel {
     pub(super) at: Point3<f64>,
     pub(super) text: String,
 }
 
-/// Lines on the ground in round distances, and the circle within which the query is sought.
+/// Lines on the ground at round distances, and the circle that is searched.
 pub(super) fn grid(
     geometry: &SceneGeometry,
     color: Color32,
@@ -232,7 +134,7 @@ pub(super) fn grid(
     (lines, marks)
 }
 
-/// The way of the search from best to best.
+/// The way of the search from one best position to the next.
 pub(super) fn path(geometry: &SceneGeometry, offsets: &[Offset], color: Color32) -> Vec<Line> {
     let place =
         |offset: &Offset| spot(&geometry.on_ground(offset.right_m, offset.forward_m, PATH_ABOVE_M));
@@ -241,7 +143,7 @@ pub(super) fn path(geometry: &SceneGeometry, offsets: &[Offset], color: Color32)
         .map(|pair| Line {
             ends: [place(&pair[0]), place(&pair[1])],
             color,
-            width: 2.5,
+            width: 2.0,
         })
         .collect()
 }
@@ -269,48 +171,24 @@ mod tests {
             },
             step_m,
             cost,
-            is_fine: step_m < 1.0,
-        }
-    }
-
-    fn ground() -> CostGround {
-        CostGround {
-            cells: vec![
-                cell(0.0, 1.0, Some(2.0)),
-                cell(1.0, 1.0, Some(4.0)),
-                cell(2.0, 1.0, None),
-                cell(1.0, 0.2, Some(3.0)),
-            ],
-            costs: Some((2.0, 4.0)),
-            relief_m: 0.0,
+            above_m: 0.0,
         }
     }
 
     #[test]
     fn the_pointer_finds_the_fine_cell_above_the_coarse_one() {
-        let ground = ground();
-        let cost_at = |right| ground.cell_at(right, 0.0).map(|cell| cell.cost);
+        let cells = [
+            cell(0.0, 1.0, Some(2.0)),
+            cell(1.0, 1.0, Some(4.0)),
+            cell(2.0, 1.0, None),
+            cell(1.0, 0.2, Some(3.0)),
+        ];
+        let cost_at = |right| cell_at(&cells, right, 0.0).map(|cell| cell.cost);
         assert_eq!(cost_at(1.05), Some(Some(3.0)));
         assert_eq!(cost_at(1.3), Some(Some(4.0)));
         assert_eq!(cost_at(2.0), Some(None));
         assert_eq!(cost_at(9.0), None);
-        assert_eq!(ground.cell_at(0.0, 0.6), None);
-    }
-
-    #[test]
-    fn low_costs_are_bright_and_on_the_ground_and_silent_cells_grey() {
-        let flat = ground().faces(&geometry());
-        assert_eq!(flat.len(), 4 * 6);
-        assert_eq!(flat[0].color, theme::viridis(1.0));
-        assert_eq!(flat[6].color, theme::viridis(0.0));
-        assert_eq!(flat[12].color, SILENT);
-        let ground = ground().with_relief(3.0);
-        let highest = |faces: &[Spot]| faces.iter().map(|f| -f.at[1]).fold(f32::MIN, f32::max);
-        // The cell of the greatest cost stands 3 m above the ground, 1.6 m below the camera.
-        assert!((highest(&ground.faces(&geometry())) - (3.0 - 1.6)).abs() < 1e-6);
-        assert!((highest(&flat) - (0.02 - 1.6)).abs() < 1e-6);
-        // Two cells have walls: the greatest and the middle cost.
-        assert_eq!(ground.faces(&geometry()).len(), 4 * 6 + 2 * 4 * 6);
+        assert_eq!(cell_at(&cells, 0.0, 0.6), None);
     }
 
     #[test]

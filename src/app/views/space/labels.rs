@@ -1,69 +1,70 @@
-//! What is written over the picture: cameras, metres, colour bars.
+//! What is written over the picture: cameras, metres, the legend.
 
-use egui::text::LayoutJob;
 use egui::{
-    Align2, Color32, CornerRadius, Pos2, Rect, Role, Sense, Stroke, TextFormat, Ui, Vec2,
-    WidgetInfo, vec2,
+    Align, Color32, CornerRadius, Layout, Pos2, Rect, RichText, Role, Sense, Shape, Stroke, Ui,
+    UiBuilder, WidgetInfo, vec2,
 };
 
 use super::cameras::{CameraKind, SceneCamera};
 use super::ground::GridLabel;
+use super::rays::{Rays, inlier_color, outlier_color};
 use super::view_camera::ViewCamera;
 use crate::app::theme;
+use crate::app::views::legend::{cost_bar, paint_mark};
 
-/// Labels of cameras, none over another; a click on one answers with its camera.
+/// Marks and labels of cameras, no label over another. Returns the camera whose label is clicked.
 pub(super) fn cameras(
     ui: &Ui,
     pane: Rect,
     view_camera: &ViewCamera,
     cameras: &[SceneCamera],
 ) -> Option<CameraKind> {
+    const RADIUS: f32 = 8.0;
     let seen = |camera: &SceneCamera| {
         let at = view_camera.project(&camera.centre())? + pane.min.to_vec2();
         pane.shrink(4.0).contains(at).then_some(at)
     };
-    let mut shown: Vec<(Pos2, &SceneCamera)> = cameras
-        .iter()
+    let painter = ui.painter_at(pane);
+    let shown = cameras.iter();
+    let mut shown: Vec<(Pos2, &SceneCamera)> = shown
         .filter_map(|camera| Some((seen(camera)?, camera)))
         .collect();
+    // The truth last, so that nothing hides it.
+    shown.sort_by_key(|(_, camera)| camera.kind == CameraKind::Truth);
+    for (at, camera) in &shown {
+        paint_mark(&painter, camera.thing, *at, RADIUS);
+    }
     shown.sort_by(|a, b| a.0.y.total_cmp(&b.0.y));
     let mut taken: Vec<Rect> = Vec::new();
     let mut clicked = None;
     for (at, camera) in shown {
-        let galley = ui.painter().layout_job(name(ui, camera));
-        let size = galley.size() + vec2(8.0, 4.0);
-        let mut place = Rect::from_min_size(at + vec2(9.0, -0.5 * size.y), size);
-        place = inside(place, pane);
+        let visuals = ui.visuals();
+        let color = visuals.strong_text_color();
+        let galley = painter.layout_no_wrap(camera.kind.name(), theme::label(), color);
+        let size = galley.size() + vec2(24.0, 4.0);
+        let corner = at + vec2(12.0, -0.5 * size.y);
+        let mut place = inside(Rect::from_min_size(corner, size), pane);
         while let Some(other) = taken.iter().find(|other| other.intersects(place)) {
             place = place.translate(vec2(0.0, other.bottom() - place.top() + 1.0));
         }
         taken.push(place);
-        let response = ui.interact(
-            place,
-            ui.scope_id().with(camera.kind.name()),
-            Sense::click(),
-        );
+        let id = ui.scope_id().with(camera.kind.name());
+        let response = ui.interact(place, id, Sense::click());
         let words = format!("{}: {}", camera.kind.name(), camera.about);
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &words));
-        let visuals = ui.visuals();
-        let painter = ui.painter_at(pane);
-        let color = camera.color;
-        painter.line_segment([at, place.left_center()], Stroke::new(1.0, color));
-        painter.circle_filled(at, 2.5, color);
-        let fill = visuals.window_fill.gamma_multiply(0.85);
-        let border = if response.hovered() {
-            visuals.strong_text_color()
-        } else {
-            color
-        };
+        let own = theme::rgb(camera.thing.color());
+        let border = if response.hovered() { color } else { own };
+        painter.line_segment([at, place.left_center()], Stroke::new(1.0, own));
         painter.rect(
             place,
             CornerRadius::same(3),
-            fill,
+            visuals.window_fill.gamma_multiply(0.85),
             Stroke::new(1.0, border),
             egui::StrokeKind::Inside,
         );
-        painter.galley(place.min + vec2(4.0, 2.0), galley, visuals.text_color());
+        let mark = place.left_center() + vec2(10.0, 0.0);
+        paint_mark(&painter, camera.thing, mark, 4.5);
+        painter.galley(place.min + vec2(20.0, 2.0), galley, color);
         let response = response.on_hover_text(format!("{words}\nClick to look through it"));
         if response.clicked() {
             clicked = Some(camera.kind);
@@ -72,35 +73,23 @@ pub(super) fn cameras(
     clicked
 }
 
-fn name(ui: &Ui, camera: &SceneCamera) -> LayoutJob {
-    let format = |color| TextFormat::simple(theme::label(), color);
-    let mut job = LayoutJob::default();
-    let shape = camera.kind.shape();
-    let own = theme::text(ui.visuals(), camera.color);
-    job.append(shape, 0.0, format(own));
-    let color = ui.visuals().strong_text_color();
-    job.append(&camera.kind.name(), 4.0, format(color));
-    job
-}
-
 fn inside(place: Rect, pane: Rect) -> Rect {
     let right = (place.right() - pane.right()).max(0.0);
     let left = (pane.left() - place.left()).max(0.0);
     place.translate(vec2(left - right, 0.0))
 }
 
-/// The metres of the grid; those that would lie over another are left out.
-pub(super) fn marks(ui: &Ui, pane: Rect, view_camera: &ViewCamera, marks: &[GridLabel]) {
+/// The metres of the grid; a number that would cover another is omitted.
+pub(super) fn metres(ui: &Ui, pane: Rect, view_camera: &ViewCamera, labels: &[GridLabel]) {
     let painter = ui.painter_at(pane);
     let mut taken: Vec<Rect> = Vec::new();
-    for mark in marks {
-        let Some(at) = view_camera.project(&mark.at) else {
+    for label in labels {
+        let Some(at) = view_camera.project(&label.at) else {
             continue;
         };
         let at = at + pane.min.to_vec2();
         let color = ui.visuals().text_color();
-        let font = theme::caption();
-        let galley = painter.layout_no_wrap(mark.text.clone(), font, color);
+        let galley = painter.layout_no_wrap(label.text.clone(), theme::caption(), color);
         let place = Rect::from_min_size(at + vec2(3.0, 1.0), galley.size());
         if pane.contains_rect(place) && !taken.iter().any(|other| other.intersects(place)) {
             let ground = ui.visuals().extreme_bg_color.gamma_multiply(0.6);
@@ -111,47 +100,53 @@ pub(super) fn marks(ui: &Ui, pane: Rect, view_camera: &ViewCamera, marks: &[Grid
     }
 }
 
-/// A colour map with the values at its ends.
-pub(super) struct Bar {
-    pub(super) title: String,
-    pub(super) ends: [String; 2],
-    pub(super) color: fn(f64) -> Color32,
-}
-
-/// Colour maps and lines of words in the lower left corner.
-pub(super) fn legend(ui: &Ui, pane: Rect, bars: &[Bar], words: &[(String, Color32)]) {
-    const BAR: Vec2 = vec2(90.0, 8.0);
-    let painter = ui.painter_at(pane);
-    let text = ui.visuals().text_color();
-    let font = theme::caption();
-    let line = 15.0;
-    let mut bottom = pane.left_bottom() + vec2(8.0, -6.0);
-    let written = |at: Pos2, words: &str, color: Color32| {
-        let galley = painter.layout_no_wrap(words.to_owned(), font.clone(), color);
-        let place = Align2::LEFT_BOTTOM.anchor_size(at, galley.size());
-        let ground = ui.visuals().extreme_bg_color.gamma_multiply(0.6);
-        painter.rect_filled(place.expand(1.0), CornerRadius::same(2), ground);
-        painter.galley(place.min, galley, color);
-        place.right()
+/// The colours of the costs and of the rays, in the lower left corner.
+pub(super) fn legend(ui: &mut Ui, pane: Rect, cost: Option<(&str, [String; 2])>, rays: &Rays) {
+    const BAR: f32 = 150.0;
+    let corner = UiBuilder::new()
+        .max_rect(pane.shrink2(vec2(8.0, 6.0)))
+        .layout(Layout::bottom_up(Align::LEFT));
+    let mut ui = ui.new_child(corner);
+    ui.spacing_mut().item_spacing.y = 2.0;
+    let ground = ui.painter().add(Shape::Noop);
+    let line = |ui: &mut Ui, words: String, color: Color32| {
+        let color = theme::text(ui.visuals(), color);
+        let text = RichText::new(words).font(theme::caption()).color(color);
+        ui.add(egui::Label::new(text).selectable(false));
     };
-    for (words, color) in words.iter().rev() {
-        written(bottom, words, theme::text(ui.visuals(), *color));
-        bottom.y -= line;
+    if rays.inliers + rays.outliers > 0 {
+        line(
+            &mut ui,
+            format!("- - {} outliers", rays.outliers),
+            outlier_color(),
+        );
+        line(
+            &mut ui,
+            format!("–– {} inliers", rays.inliers),
+            inlier_color(),
+        );
     }
-    for bar in bars.iter().rev() {
-        let right = written(bottom, &bar.ends[0], text) + 5.0;
-        let place = Rect::from_min_size(Pos2::new(right, bottom.y - 11.0), BAR);
-        const STEPS: u32 = 30;
-        let width = BAR.x / STEPS as f32;
-        for step in 0..STEPS {
-            let share = (f64::from(step) + 0.5) / f64::from(STEPS);
-            let left = place.left() + width * step as f32;
-            let piece = Rect::from_min_size(Pos2::new(left, place.top()), vec2(width, BAR.y));
-            painter.rect_filled(piece, CornerRadius::ZERO, (bar.color)(share));
-        }
-        let at = Pos2::new(place.right() + 5.0, bottom.y);
-        written(at, &format!("{} {}", bar.ends[1], bar.title), text);
-        bottom.y -= line;
+    if rays.undecided > 0 {
+        line(
+            &mut ui,
+            format!("–– {} lifted matches", rays.undecided),
+            theme::CAMERA,
+        );
+    }
+    if let Some((method, ends)) = cost {
+        cost_bar(&mut ui, BAR, "cost", &ends);
+        let text = ui.visuals().text_color();
+        line(
+            &mut ui,
+            format!("cost of {method} (grey: below the coverage floor)"),
+            text,
+        );
+    }
+    if ui.min_rect().height() > 1.0 {
+        let fill = ui.visuals().extreme_bg_color.gamma_multiply(0.75);
+        let place = ui.min_rect().expand(3.0);
+        let ground_shape = Shape::rect_filled(place, CornerRadius::same(2), fill);
+        ui.painter().set(ground, ground_shape);
     }
 }
 
@@ -159,7 +154,8 @@ pub(super) fn legend(ui: &Ui, pane: Rect, bars: &[Bar], words: &[(String, Color3
 pub(super) fn headline(ui: &Ui, pane: Rect, words: &str) {
     let painter = ui.painter_at(pane);
     let color = ui.visuals().strong_text_color();
-    let galley = painter.layout(words.to_owned(), theme::label(), color, pane.width() - 16.0);
+    // The menu is on the right.
+    let galley = painter.layout(words.to_owned(), theme::label(), color, pane.width() - 80.0);
     let place = Rect::from_min_size(pane.min + vec2(8.0, 6.0), galley.size());
     let ground = ui.visuals().extreme_bg_color.gamma_multiply(0.6);
     painter.rect_filled(place.expand(2.0), CornerRadius::same(2), ground);

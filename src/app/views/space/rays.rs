@@ -4,10 +4,67 @@ use egui::Color32;
 use nalgebra::Point3;
 
 use super::gpu::Line;
-use super::progress::LiftedFeatures;
 use super::scene_geometry::SceneGeometry;
-use crate::app::theme;
+use crate::app::{ViewContext, theme};
+use crate::depth::LiftedMatch;
+use crate::event::Event;
 use crate::features::FeatureState;
+use crate::geometry::Pose;
+use crate::method::Method;
+use crate::session::Run;
+
+/// The matches that FB lifts into space, and the camera that it finds with them.
+#[derive(Default)]
+pub(super) struct LiftedFeatures<'a> {
+    lifted: &'a [LiftedMatch],
+    states: Option<&'a [FeatureState]>,
+    /// The best pose so far: that of MLESAC, then the refined one.
+    pub(super) reference_from_query: Option<Pose>,
+}
+
+impl<'a> LiftedFeatures<'a> {
+    /// From the estimator at the cursor, if it lifts matches; else from FB's part.
+    pub(super) fn at(context: &ViewContext<'a>) -> Self {
+        let here = if context.is_inside_hybrid(Method::FB) {
+            Self::until(context.run, context.cursor)
+        } else {
+            Self::default()
+        };
+        if !here.lifted.is_empty() {
+            return here;
+        }
+        match context.part_of(Method::FB) {
+            Some((_, cursor)) => Self::until(context.run, cursor),
+            None => here,
+        }
+    }
+
+    /// What the estimator at a cursor reported up to there.
+    fn until(run: &'a Run, cursor: usize) -> Self {
+        let mut features = Self::default();
+        let start = run
+            .span_at(cursor)
+            .map_or(cursor, |span| span.records.start);
+        let records = run.records().get(start..=cursor).unwrap_or_default();
+        for record in records {
+            match &record.event {
+                Event::DepthsLifted(event) => features.lifted = &event.matches,
+                Event::MatchesGuided(event) => features.lifted = &event.matches,
+                Event::FeaturesClassified(event) => features.states = Some(&event.states),
+                Event::HypothesisTried(event) => {
+                    if let Some(best) = &event.trial.best {
+                        features.reference_from_query = Some(best.pose.inverse());
+                    }
+                }
+                Event::PoseRefined(event) => {
+                    features.reference_from_query = Some(event.reference_from_query);
+                }
+                _ => {}
+            }
+        }
+        features
+    }
+}
 
 /// The rays, and how many of each kind.
 #[derive(Default)]
@@ -19,31 +76,34 @@ pub(super) struct Rays {
 }
 
 /// From the estimated camera; before there is one, from the reference camera that saw the points.
-/// The rays of inliers are drawn through, those of outliers dashed. `selected` is drawn broad.
+/// Rays of outliers are dashed. `selected` is drawn broad.
 pub(super) fn rays(
     geometry: &SceneGeometry,
-    progress: &LiftedFeatures<'_>,
+    features: &LiftedFeatures<'_>,
     selected: Option<usize>,
 ) -> Rays {
-    let centre = match &progress.reference_from_query {
+    let centre = match &features.reference_from_query {
         Some(pose) => Point3::from(pose.translation.vector),
         None => Point3::origin(),
     };
     let mut rays = Rays::default();
-    for ray in progress.rays() {
-        let is_selected = selected == Some(ray.query);
-        let (color, count) = match ray.is_inlier {
-            Some(true) => (inlier_color(), &mut rays.inliers),
-            Some(false) => (outlier_color(), &mut rays.outliers),
+    for lifted in features.lifted {
+        let Some(point) = lifted.point else { continue };
+        let state = features.states.and_then(|states| states.get(lifted.query));
+        let is_outlier = state.is_some_and(|state| !matches!(state, FeatureState::Inlier { .. }));
+        let (color, count) = match state {
+            Some(_) if is_outlier => (outlier_color(), &mut rays.outliers),
+            Some(_) => (inlier_color(), &mut rays.inliers),
             None => (theme::CAMERA, &mut rays.undecided),
         };
         *count += 1;
-        let (color, width) = if is_selected {
+        let (color, width) = if selected == Some(lifted.query) {
             (color, 4.0)
         } else {
-            (color.gamma_multiply(0.55), 1.0)
+            // Pale: the cameras matter more.
+            (color.gamma_multiply(0.25), 1.0)
         };
-        let along = |share: f64| geometry.spot(&(centre + share * (ray.point - centre)));
+        let along = |share: f64| geometry.spot(&(centre + share * (point - centre)));
         let mut piece = |from: f64, to: f64| {
             rays.lines.push(Line {
                 ends: [along(from), along(to)],
@@ -51,7 +111,7 @@ pub(super) fn rays(
                 width,
             });
         };
-        if ray.is_inlier == Some(false) {
+        if is_outlier {
             const DASHES: u32 = 12;
             for dash in 0..DASHES {
                 let from = f64::from(dash) / f64::from(DASHES);

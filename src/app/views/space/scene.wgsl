@@ -38,6 +38,14 @@ fn point(
     return Seen(clip, color);
 }
 
+struct Stroke {
+    @builtin(position) clip: vec4f,
+    @location(0) color: vec4f,
+    // Distance from the middle of the line [px], and where it ends, both times w with w itself: so they
+    // change evenly on the screen.
+    @location(1) across: vec3f,
+}
+
 // A stroke of the same width everywhere, between two points.
 @vertex
 fn line(
@@ -46,12 +54,12 @@ fn line(
     @location(1) end: vec3f,
     @location(2) color: vec4f,
     @location(3) width: f32,
-) -> Seen {
+) -> Stroke {
     var a = view.clip_from_scene * vec4f(begin, 1.0);
     var b = view.clip_from_scene * vec4f(end, 1.0);
     // What is behind the eye has no place in the picture: cut it off at the near plane.
     if a.w < view.near && b.w < view.near {
-        return Seen(vec4f(0.0, 0.0, -1.0, 1.0), color);
+        return Stroke(vec4f(0.0, 0.0, -1.0, 1.0), color, vec3f(1.0));
     }
     if a.w < view.near {
         a = mix(a, b, (view.near - a.w) / (b.w - a.w));
@@ -64,9 +72,10 @@ fn line(
     let across = vec2f(-along.y, along.x) / reach;
     let at = corner(index);
     var clip = select(a, b, at.x > 0.0);
-    let shift = across * at.y * 0.5 * width * view.scale;
-    clip += vec4f(shift / to_px * clip.w, 0.0, 0.0);
-    return Seen(clip, color);
+    // Half a pixel more for the soft edge.
+    let half = 0.5 * width * view.scale + 0.5;
+    clip += vec4f(across * at.y * half / to_px * clip.w, 0.0, 0.0);
+    return Stroke(clip, color, vec3f(at.y * half, half, 1.0) * clip.w);
 }
 
 @vertex
@@ -77,4 +86,10 @@ fn face(@location(0) position: vec3f, @location(1) color: vec4f) -> Seen {
 @fragment
 fn paint(seen: Seen) -> @location(0) vec4f {
     return seen.color;
+}
+
+@fragment
+fn stroke(seen: Stroke) -> @location(0) vec4f {
+    let covered = (seen.across.y - abs(seen.across.x)) / seen.across.z;
+    return seen.color * clamp(covered, 0.0, 1.0);
 }

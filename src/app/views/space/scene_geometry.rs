@@ -44,8 +44,14 @@ impl SceneGeometry {
         self.scene_from_reference * Point3::new(right_m, GROUND_M - above_m, forward_m)
     }
 
-    /// The circle on the ground that an overview shows: its middle, and its radius \[m\]. All cameras are in
-    /// it, in a pane that is so many times as high as it is wide.
+    /// The place on the ground straight below another.
+    pub(super) fn below(&self, in_scene: &Point3<f64>) -> Point3<f64> {
+        let place = self.scene_from_reference.inverse() * in_scene;
+        self.on_ground(place.x, place.z, 0.0)
+    }
+
+    /// The circle on the ground that an overview shows: its middle and its radius \[m\]. It contains all
+    /// cameras, for a pane of this shape.
     pub(super) fn overview<'a>(
         &self,
         cameras: impl IntoIterator<Item = &'a Point3<f64>>,

@@ -1,7 +1,7 @@
 //! The camera that the pane shows the scene through: an eye in the scene, and its projection.
 
 use egui::{Pos2, Vec2, pos2};
-use nalgebra::{Point2, Point3, Unit, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -53,27 +53,6 @@ impl ViewCamera {
         }
     }
 
-    /// The same eye with a longer or shorter focal length; what is seen at `fixed` stays there.
-    pub(super) fn magnified(self, factor: f64, fixed: Pos2) -> Self {
-        let about = [f64::from(fixed.x), f64::from(fixed.y)];
-        Self {
-            focal: self.focal.map(|focal| factor * focal),
-            centre: [0, 1].map(|axis| about[axis] + factor * (self.centre[axis] - about[axis])),
-            ..self
-        }
-    }
-
-    /// The same eye with its picture moved across the pane.
-    pub(super) fn shifted(self, by: Vec2) -> Self {
-        Self {
-            centre: [
-                self.centre[0] + f64::from(by.x),
-                self.centre[1] + f64::from(by.y),
-            ],
-            ..self
-        }
-    }
-
     /// Where a point of the scene is seen; `None` where it is not in front of the eye.
     pub(super) fn project(&self, point: &Point3<f64>) -> Option<Pos2> {
         self.project_from_eye(&self.in_eye(point))
@@ -92,15 +71,6 @@ impl ViewCamera {
                 (self.focal[1] * point.y / point.z + self.centre[1]) as f32,
             )
         })
-    }
-
-    /// Where the pixel of a camera is seen that the eye looks through.
-    pub(super) fn place_pixel(&self, intrinsics: &Intrinsics, pixel: &Point2<f64>) -> Pos2 {
-        let seen = intrinsics.unproject(pixel, 1.0);
-        pos2(
-            (self.focal[0] * seen.x + self.centre[0]) as f32,
-            (self.focal[1] * seen.y + self.centre[1]) as f32,
-        )
     }
 
     /// The direction in which a place of the pane looks, in the scene.
@@ -216,7 +186,6 @@ mod tests {
             prop_assert!((seen - expected).length() < near, "{seen:?} {expected:?}");
             let straight = view_camera.project(&(scene_from_camera * in_camera)).expect("in front");
             prop_assert!((straight - expected).length() < near);
-            prop_assert!((view_camera.place_pixel(&KITTI, &pixel) - expected).length() < near);
         }
 
         /// A ray goes through all that is seen where it begins.
@@ -239,16 +208,6 @@ mod tests {
             }
         }
 
-        #[test]
-        fn magnifying_keeps_what_is_under_the_pointer(
-            at in (0.0_f32..640.0, 0.0_f32..480.0), factor in 0.2..5.0,
-        ) {
-            let at = Pos2::from(at);
-            let before = ViewCamera::of_camera(Pose::identity(), &KITTI, Vec2::new(640.0, 480.0));
-            let after = before.magnified(factor, at);
-            let seen = before.ray(at).direction.into_inner();
-            prop_assert!((after.ray(at).direction.into_inner() - seen).norm() < 1e-9);
-        }
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! The map of every position with every heading: what is asked for, how far it is, what it says of the
-//! search.
+//! The map of every position with every heading: its steps, its progress, and how the search compares
+//! with it.
 
 use egui::{DragValue, Ui};
 
@@ -10,7 +10,7 @@ use crate::geometry::{Pose, PoseError};
 use crate::grid::{DenseSurface, MOST_CELLS};
 use crate::method::Method;
 
-/// How finely the map is filled, where somebody has said.
+/// How finely the map is filled, where the user chose.
 #[derive(Default)]
 pub(super) struct DenseSteps {
     step_m: Option<f64>,
@@ -23,7 +23,7 @@ const STEPS_M: std::ops::RangeInclusive<f64> = 0.02..=5.0;
 const YAW_STEPS_DEG: std::ops::RangeInclusive<f64> = 0.05..=10.0;
 
 impl DenseSteps {
-    /// A tenth of a metre, or more where that were more positions than within ten metres.
+    /// A tenth of a metre; more where the search reaches farther than ten metres.
     fn step_m(&self, search: &Search<'_>) -> f64 {
         let usual_m = (search.problem.uncertainty_radius_m / 100.0).clamp(0.1, *STEPS_M.end());
         self.step_m.unwrap_or(usual_m)
@@ -33,12 +33,11 @@ impl DenseSteps {
         self.yaw_step_deg.unwrap_or(0.5)
     }
 
-    /// The map that is wanted, if one is: of the present run, under a floor.
+    /// The map to fill, if it is shown, for the present run.
     pub(super) fn wanted(
         &self,
         context: &ViewContext<'_>,
         search: &Search<'_>,
-        least_covered: u32,
     ) -> Option<DenseAsk> {
         let is_wanted = context.options.shows_dense_map && context.is_present();
         let reference = search.span.part.reference().filter(|_| is_wanted)?;
@@ -47,17 +46,17 @@ impl DenseSteps {
             reference,
             step_m: self.step_m(search),
             yaw_step_deg: self.yaw_step_deg(),
-            least_covered,
+            least_covered: search.least_covered,
         })
     }
 
-    /// The steps, how far the map is, and how the search has done by it.
+    /// The steps, the progress, and how the search compares.
     pub(super) fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
         if !context.options.shows_dense_map {
             return;
         }
         if !context.is_present() {
-            ui.weak("The dense map is of the present run, B");
+            ui.weak("The dense map is filled for the present run, B, only");
             return;
         }
         ui.horizontal_wrapped(|ui| {
@@ -68,21 +67,21 @@ impl DenseSteps {
                     .speed(0.01)
                     .max_decimals(2)
                     .suffix(suffix)
-                    // Not at every digit that is typed: the map begins anew.
+                    // Each change empties the map, so wait until the number is complete.
                     .update_while_editing(false);
                 ui.add(drag).labelled_by(label.id).changed()
             };
             let (mut step_m, mut yaw_step_deg) = (self.step_m(search), self.yaw_step_deg());
-            if number("Positions each", &mut step_m, STEPS_M, " m") {
+            if number("Positions every", &mut step_m, STEPS_M, " m") {
                 self.step_m = Some(step_m);
             }
-            if number("headings each", &mut yaw_step_deg, YAW_STEPS_DEG, "°") {
+            if number("headings every", &mut yaw_step_deg, YAW_STEPS_DEG, "°") {
                 self.yaw_step_deg = Some(yaw_step_deg);
             }
             match known(context, search.method) {
-                Some(map) => told(ui, map),
+                Some(map) => progress(ui, map),
                 None => {
-                    ui.weak("the dense map begins");
+                    ui.weak("starting");
                 }
             }
         });
@@ -100,13 +99,13 @@ fn known<'a>(context: &ViewContext<'a>, method: Method) -> Option<&'a DenseMap> 
     context.dense_map(method)
 }
 
-/// How far the map is.
-fn told(ui: &mut Ui, map: &DenseMap) {
+/// How much of the map is filled.
+fn progress(ui: &mut Ui, map: &DenseMap) {
     let surface = match map.surface() {
         Ok(surface) => surface,
         Err(error) => {
             let words = format!(
-                "{:.0} positions are too many, at most {MOST_CELLS}: take a larger step",
+                "{:.0} positions are too many (at most {MOST_CELLS}). Choose a larger step",
                 error.cells
             );
             ui.colored_label(ui.visuals().error_fg_color, words);
@@ -137,7 +136,7 @@ fn told(ui: &mut Ui, map: &DenseMap) {
     );
 }
 
-/// A number with its thousands apart.
+/// A number with a comma after its thousands.
 fn grouped(number: usize) -> String {
     let digits = number.to_string();
     let mut words = String::new();
@@ -150,7 +149,7 @@ fn grouped(number: usize) -> String {
     words
 }
 
-/// Where the least of all hypotheses is, how far the search ended from it, and how far the truth is.
+/// The lowest cost of all hypotheses, how far it is from the truth, and how far the search ended from it.
 fn compared(
     context: &ViewContext<'_>,
     search: &Search<'_>,
@@ -159,20 +158,20 @@ fn compared(
     let (offset, score) = surface.minimum()?;
     let (least, pose) = (score.cost?, search.pose(&offset));
     let so_far = if surface.is_complete() { "" } else { " so far" };
-    let mut words = format!("Least of all{so_far}: cost {}", number(least));
+    let mut words = format!("Lowest of all{so_far}: cost {}", number(least));
     if let Some(truth) = context.truth() {
         words += &format!(", {} from the truth", apart(truth, &pose));
     }
     let result = context.estimate(search.span.part.method()?);
     let best = search.assessed.map(|assessed| assessed.best);
     if let (Some(result), Some(best)) = (result, best) {
-        let dearer = match best - least {
-            much if much > LEAST_DIFFERENCE => format!("{} dearer", number(much)),
-            much if much < -LEAST_DIFFERENCE => format!("{} cheaper", number(-much)),
-            _ => "as cheap".to_owned(),
+        let compared = match best - least {
+            more if more > LEAST_DIFFERENCE => format!("at a cost {} higher", number(more)),
+            more if more < -LEAST_DIFFERENCE => format!("at a cost {} lower", number(-more)),
+            _ => "at the same cost".to_owned(),
         };
         let apart = apart(&result, &pose);
-        words += &format!("; the search ended {apart} away, {dearer}");
+        words += &format!("; the search ended {apart} away, {compared}");
     }
     Some(words)
 }
@@ -186,8 +185,8 @@ fn apart(a: &Pose, b: &Pose) -> String {
 /// Shows or hides the map.
 pub(super) fn switch(ui: &mut Ui, context: &ViewContext<'_>) {
     let mut shown = context.options.shows_dense_map;
-    let help = "Every position with every heading, shown as it fills: of each position the cheapest \
-                heading (F)";
+    let help =
+        "Score every position with every heading, and show the lowest cost at each position (F)";
     if ui
         .toggle_value(&mut shown, "Dense")
         .on_hover_text(help)

@@ -1,33 +1,17 @@
-//! One large map of the positions: their cost, of all or of those that may win, or their coverage.
+//! The map of the positions: their cost or their coverage.
 
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
 use super::marks::{MapMark, MarkKind, heading, place};
-use super::scale::{NO_SAY, Scale, bar, number};
+use super::scale::{BELOW_FLOOR, Scale, number};
 use super::search::{Search, Searched, cell_of};
+use crate::app::views::legend::{cost_bar, swatch};
 use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
+use crate::proof::Thing;
 use crate::render::Score;
-
-/// What the map shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Map {
-    Cost,
-    Coverage,
-    Floored,
-}
-
-impl Map {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Cost => "Cost map",
-            Self::Coverage => "Coverage map",
-            Self::Floored => "Cost map above the floor",
-        }
-    }
-}
 
 /// The width of the numbers left of the map \[points\].
 const LEFT_AXIS: f32 = 34.0;
@@ -37,23 +21,11 @@ const LOWER_AXIS: f32 = 30.0;
 /// The sides that a map may have \[points\].
 const SIDES: std::ops::RangeInclusive<f32> = 120.0..=480.0;
 
-/// The map with its switches. Its pictures change with the cursor and with the floor, so each lattice
-/// has a texture that is painted anew where its pixels differ.
+/// The map with its switch. Each lattice has a texture, which is painted again when its pixels change.
+#[derive(Default)]
 pub(super) struct CostMap {
     shows_coverage: bool,
-    /// Whether cells that may not win have no colour.
-    is_floored: bool,
     painted: Vec<(ColorImage, TextureHandle)>,
-}
-
-impl Default for CostMap {
-    fn default() -> Self {
-        Self {
-            shows_coverage: false,
-            is_floored: true,
-            painted: Vec::new(),
-        }
-    }
 }
 
 /// A cell of a lattice.
@@ -72,14 +44,12 @@ pub(super) struct MapContent<'a> {
     pub(super) dense: Option<&'a DenseSurface>,
     pub(super) scale: &'a Scale,
     pub(super) marks: &'a [MapMark],
-    /// The floor of the slider.
-    pub(super) floor: f64,
     /// From the result to the truth, where both are known and shown.
     pub(super) line: Option<[Offset; 2]>,
 }
 
 impl MapContent<'_> {
-    /// The lattices that are drawn, each upon those before it.
+    /// The lattices, each drawn over those before it.
     fn layers(&self) -> Vec<&ScoredLattice> {
         match self.dense {
             Some(dense) => vec![dense.cheapest().as_ref()],
@@ -92,14 +62,14 @@ impl MapContent<'_> {
         }
     }
 
-    /// The hypothesis that a cell of a layer shows; of a dense map, with the heading.
+    /// The hypothesis of a cell; in a dense map it includes the heading of lowest cost.
     fn offset(&self, layer: &ScoredLattice, cell: usize) -> Option<Offset> {
         let cheapest = self.dense.and_then(|dense| dense.at(cell));
         let offset = cheapest.map(|(offset, _)| offset);
         offset.or_else(|| layer.lattice.offset(cell))
     }
 
-    /// How much is tried, in words.
+    /// How many hypotheses are tried, in words.
     fn progress(&self) -> String {
         if let Some(dense) = self.dense {
             return format!("dense, {} of {} tried", dense.tried(), dense.hypotheses());
@@ -110,47 +80,34 @@ impl MapContent<'_> {
 }
 
 impl CostMap {
-    /// Whether cells that may not win have no colour.
-    pub(super) fn is_floored(&self) -> bool {
-        self.is_floored
-    }
-
-    fn map(&self) -> Map {
-        match (self.shows_coverage, self.is_floored) {
-            (true, _) => Map::Coverage,
-            (false, true) => Map::Floored,
-            (false, false) => Map::Cost,
+    fn name(&self) -> &'static str {
+        if self.shows_coverage {
+            "Coverage map"
+        } else {
+            "Cost map"
         }
     }
 
-    /// What is switched on.
-    pub(super) fn switches(&mut self, ui: &mut Ui, floor: f64) {
+    /// Switches between costs and coverages.
+    pub(super) fn switch(&mut self, ui: &mut Ui) {
         let help = "Colour by coverage instead of cost";
         ui.toggle_value(&mut self.shows_coverage, "Coverage")
             .on_hover_text(help);
-        let words = format!("Floor {:.0} %", 100.0 * floor);
-        let help = "Leave cells without colour that cover too little to win: less than this share of what \
-                    the reference pose covers";
-        ui.add_enabled_ui(!self.shows_coverage, |ui| {
-            ui.toggle_value(&mut self.is_floored, words)
-                .on_hover_text(help);
-        });
     }
 
-    /// Draws the map; answers the pose under the pointer, with its cost in words, and the map's width.
+    /// Draws the map. Returns the pose under the pointer with its cost in words, and the map's width.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
         shown: &MapContent<'_>,
     ) -> (Option<(Pose, String)>, f32) {
-        let map = self.map();
-        // As high as what is seen, less what is above and below the map.
+        // As high as the visible part of the view, less what is above and below the map.
         let room = (ui.available_width() - LEFT_AXIS - 2.0).min(ui.clip_rect().height() - 84.0);
         let side = room.clamp(*SIDES.start(), *SIDES.end());
         let group = ui.make_persistent_id("maps");
-        let images = self.images(ui, shown, map);
-        let answer = plot(ui, shown, map, group, side, images);
+        let images = self.images(ui, shown);
+        let answer = plot(ui, shown, self.name(), group, side, images);
         let at = answer.response.interact_pointer_pos();
         let at = answer.response.hover_pos().or(at);
         let pointed_at = at
@@ -160,7 +117,7 @@ impl CostMap {
         let takes_camera = !is_panning
             && (answer.response.clicked() || answer.response.dragged_by(PointerButton::Primary));
         overlay(ui, shown, &answer.transform, pointed_at);
-        let told = pointed_at.map(|cell| {
+        let under_pointer = pointed_at.map(|cell| {
             let pose = shown.search.pose(&cell.offset);
             if takes_camera && context.camera() != Some(pose) {
                 context.send(Command::TakeCamera(Some(pose)));
@@ -168,33 +125,47 @@ impl CostMap {
             let score = shown.layers()[cell.layer].scores[cell.cell];
             (pose, readout(shown, score, &cell.offset))
         });
-        (told, side + LEFT_AXIS)
+        (under_pointer, side + LEFT_AXIS)
     }
 
-    /// What the colours of the map mean.
-    pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32) {
-        match (self.map(), scale.cost_ends()) {
-            (Map::Coverage, _) => bar(ui, width, "coverage", &scale.coverage_ends()),
-            (_, Some(ends)) => bar(ui, width, "cost", &ends),
-            (_, None) => {
+    /// The meaning of the map's colours.
+    pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32, floor: f64) {
+        if self.shows_coverage {
+            cost_bar(ui, width, "coverage", &scale.coverage_ends());
+            return;
+        }
+        match scale.cost_ends() {
+            Some(ends) => cost_bar(ui, width, "cost", &ends),
+            None => {
                 ui.weak("no cost yet");
             }
         }
+        ui.horizontal(|ui| {
+            swatch(ui, BELOW_FLOOR);
+            let help =
+                "These cells cover less than this share of the reference view and are not eligible";
+            ui.weak(format!("coverage below {:.0} %", 100.0 * floor))
+                .on_hover_text(help);
+        });
     }
 
     /// The textures of the map with their places.
-    fn images(&mut self, ui: &Ui, shown: &MapContent<'_>, map: Map) -> Vec<PlotImage> {
-        let least_covered = shown.search.least_covered(shown.floor);
-        let color = |score: &Score| match map {
-            Map::Coverage => shown.scale.coverage(shown.search.coverage(score.covered)),
-            Map::Cost => score.cost.map_or(NO_SAY, |cost| shown.scale.cost(cost)),
-            Map::Floored => score
-                .eligible_cost(least_covered)
-                .map_or(NO_SAY, |cost| shown.scale.cost(cost)),
+    fn images(&mut self, ui: &Ui, shown: &MapContent<'_>) -> Vec<PlotImage> {
+        let least_covered = shown.search.least_covered;
+        let color = |score: &Score| {
+            if self.shows_coverage {
+                return shown.scale.coverage(shown.search.coverage(score.covered));
+            }
+            let cost = score.eligible_cost(least_covered);
+            cost.map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost))
         };
+        let pictures: Vec<ColorImage> = shown
+            .layers()
+            .into_iter()
+            .map(|layer| picture(layer, color))
+            .collect();
         let mut images = Vec::new();
-        for (index, layer) in shown.layers().into_iter().enumerate() {
-            let image = picture(layer, color);
+        for (index, (layer, image)) in shown.layers().into_iter().zip(pictures).enumerate() {
             let id = self.paint(ui, index, image);
             let Lattice {
                 columns,
@@ -230,7 +201,7 @@ impl CostMap {
     }
 }
 
-/// One pixel per cell, the row farthest ahead first; what is not tried is left out.
+/// One pixel per cell, the row farthest ahead first; cells that are not tried are transparent.
 fn picture(layer: &ScoredLattice, color: impl Fn(&Score) -> Color32) -> ColorImage {
     let Lattice { columns, rows, .. } = layer.lattice;
     let cells = (0..rows)
@@ -247,7 +218,7 @@ fn picture(layer: &ScoredLattice, color: impl Fn(&Score) -> Color32) -> ColorIma
 fn plot(
     ui: &mut Ui,
     shown: &MapContent<'_>,
-    map: Map,
+    name: &str,
     group: Id,
     side: f32,
     images: Vec<PlotImage>,
@@ -257,7 +228,7 @@ fn plot(
     } else {
         PointerButton::Middle
     };
-    // The numbers are kept from pushing the maps about.
+    // Wider numbers must not move the map.
     let narrow = |axis: AxisHints<'static>, thickness| {
         axis.min_thickness(thickness)
             .label_spacing(egui::Rangef::new(24.0, 40.0))
@@ -267,7 +238,7 @@ fn plot(
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
     let forward = narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, "forward [m]"));
     let bounds = whole(shown);
-    // Another extent, as the search goes on, is another plot: one that is there keeps its bounds.
+    // A plot keeps its bounds, so a map of another extent is another plot.
     let extent = bounds.width().to_bits();
     let answer = Plot::new(("cost map", extent))
         .width(side + LEFT_AXIS)
@@ -287,7 +258,7 @@ fn plot(
         .show(ui, |plot| {
             let wheel = plot.ctx().input(|input| input.smooth_scroll_delta.y);
             if plot.response().hovered() && wheel != 0.0 {
-                // Taken from the scroll area around.
+                // The scroll area around must not scroll too.
                 plot.ctx()
                     .input_mut(|input| input.smooth_scroll_delta = egui::Vec2::ZERO);
                 plot.zoom_bounds_around_hovered(egui::Vec2::splat((wheel / 200.0).exp()));
@@ -297,7 +268,7 @@ fn plot(
             }
         });
     answer.response.widget_info(|| {
-        let name = format!("{}: {}", map.name(), shown.progress());
+        let name = format!("{name}: {}", shown.progress());
         egui::WidgetInfo::labeled(egui::Role::Image, true, name)
     });
     answer
@@ -309,7 +280,7 @@ fn small(ui: &Ui, text: &str) -> egui::RichText {
         .color(ui.visuals().weak_text_color())
 }
 
-/// How much of a lattice is scored, in words.
+/// How many positions of a lattice are scored, in words.
 pub(super) fn progress(searched: &Searched) -> String {
     let all = searched.surface.lattice.hypotheses().count();
     format!(
@@ -338,13 +309,13 @@ fn whole(shown: &MapContent<'_>) -> PlotBounds {
     PlotBounds::new_symmetrical(MARGIN * half)
 }
 
-/// The cell at a place of the screen, of the lattice that lies on top there.
+/// The cell at a place of the screen, in the uppermost lattice there.
 fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Option<Cell> {
     let point = transform.value_from_position(at);
     let layers = shown.layers();
     layers.iter().enumerate().rev().find_map(|(index, layer)| {
         let cell = cell_of(&layer.lattice, point.x, point.y)?;
-        // Through the cells of a fine lattice that are not tried yet, the coarse one is seen.
+        // Where a fine lattice is not tried yet, the coarse one below it is visible.
         let is_seen = index == 0 || layer.scores[cell].is_some();
         let offset = shown.offset(layer, cell).filter(|_| is_seen)?;
         Some(Cell {
@@ -355,7 +326,7 @@ fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Optio
     })
 }
 
-/// What is known of the cell at an offset, in words.
+/// The cost and coverage of the cell at an offset, in words.
 fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> String {
     let at = match shown.dense {
         Some(_) => format!("{}, {}", place(offset), heading(offset)),
@@ -369,7 +340,7 @@ fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> Str
         None => "no cost".to_owned(),
     };
     let coverage = shown.search.coverage(score.covered);
-    let note = if score.covered < shown.search.least_covered(shown.floor) {
+    let note = if score.covered < shown.search.least_covered {
         ", below the floor"
     } else {
         ""
@@ -429,11 +400,11 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
             painter.extend(egui::Shape::dashed_line(&ends, stroke, 6.0, 4.0));
         }
     }
-    // A small map is not to vanish under its marks.
+    // Marks must not cover a small map.
     let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
     for mark in shown.marks {
         let at = screen(&mark.offset);
-        if mark.kind == MarkKind::Truth && !transform.frame().contains(at) {
+        if mark.kind == MarkKind::Thing(Thing::Truth) && !transform.frame().contains(at) {
             mark.paint_beyond(&painter, *transform.frame(), at, reach);
         } else {
             mark.paint(&painter, at, reach);

@@ -10,14 +10,18 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::Span;
 
-/// What a direct method has told about its search.
-pub(super) struct Search<'a> {
-    pub(super) method: Method,
+/// What a direct method has recorded of its search.
+pub(in crate::app::views) struct Search<'a> {
+    pub(in crate::app::views) method: Method,
     pub(super) problem: &'a Problem,
     /// The part of the run that it is read from: the method's own, or the hybrid's.
-    pub(super) span: &'a Span,
+    pub(in crate::app::views) span: &'a Span,
     /// Pixels covered at the reference pose, which all coverages are shares of.
     pub(super) covered_at_reference: u32,
+    /// Pixels that a hypothesis must cover to be eligible: the coverage floor.
+    pub(super) least_covered: u32,
+    /// Where the search stood: at the reference, and at each best so far.
+    pub(in crate::app::views) way: Vec<Offset>,
     /// The lattices, in the order of the search; the last one may be incomplete.
     pub(super) lattices: Vec<Searched>,
     /// The hypothesis of the cursor, while a lattice is being searched.
@@ -27,49 +31,51 @@ pub(super) struct Search<'a> {
     pub(super) steps: Vec<&'a DescentStepped>,
 }
 
-/// A lattice with the scores that were told.
-pub(super) struct Searched {
+/// A lattice with the scores so far.
+pub(in crate::app::views) struct Searched {
     /// Cells without a score are not tried yet, or no hypotheses.
-    pub(super) surface: Arc<ScoredLattice>,
+    pub(in crate::app::views) surface: Arc<ScoredLattice>,
     pub(super) tried: usize,
-    /// Whether its minimum was told.
+    /// Whether its minimum is known.
     pub(super) is_complete: bool,
 }
 
 impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
-    pub(super) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
+    pub(in crate::app::views) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
         let (span, cursor) = part(context, method)?;
         let problems = &context.run.loaded.as_deref()?.problems;
         let problem = problems.get(span.part.reference()?)?;
         let end = span.records.end.min(cursor + 1);
         let records = context.run.records().get(span.records.start..end)?;
         let mut events = records.iter().map(|record| &record.event);
-        let covered_at_reference = events.find_map(|event| match event {
-            Event::ViewRendered(view) if view.moment == Moment::Start => {
-                Some(view.comparison.score.covered)
-            }
+        let start = events.find_map(|event| match event {
+            Event::ViewRendered(view) if view.moment == Moment::Start => Some(view),
             _ => None,
         })?;
+        let covered_at_reference = start.comparison.score.covered;
+        let params = &context.run.params.grid;
+        let least_covered = grid::least_covered(params.coverage_floor, covered_at_reference);
         let mut search = Self {
             method,
             problem,
             span,
             covered_at_reference,
+            least_covered,
+            way: vec![start.offset],
             lattices: Vec::new(),
             hypothesis: None,
             assessed: None,
             steps: Vec::new(),
         };
-        let params = &context.run.params.grid;
-        let least_covered = grid::least_covered(params.coverage_floor, covered_at_reference);
         let mut centre = Offset::default();
         let mut filling: Option<Filling> = None;
         for event in events {
             match event {
+                Event::ViewRendered(view) => search.way.push(view.offset),
                 Event::PoseScored(scored) => {
-                    // What is told of a lattice before its end are its hypotheses, one by one; where
-                    // they are follows from the parameters.
+                    // An unfinished lattice reports single hypotheses; their cells follow from the
+                    // parameters.
                     let radius_m = problem.uncertainty_radius_m;
                     if filling.is_none() {
                         let lattice = Lattice::new(scored.phase, centre, radius_m, params);
@@ -97,7 +103,7 @@ impl<'a> Search<'a> {
             }
         }
         if search.lattices.is_empty() && filling.is_none() && search.assessed.is_none() {
-            // Where it is going to look follows from the parameters: an empty map, to point at.
+            // The parameters say where it will search: an empty map, to point at.
             let radius_m = problem.uncertainty_radius_m;
             let coarse = Lattice::new(Phase::PositionCoarse, centre, radius_m, params);
             filling = coarse.ok().map(Filling::new);
@@ -109,7 +115,7 @@ impl<'a> Search<'a> {
     }
 
     /// The lattices of positions, in the order in which they are drawn.
-    pub(super) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
+    pub(in crate::app::views) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
         self.lattices
             .iter()
             .filter(|searched| !searched.phase().is_yaw())
@@ -121,11 +127,6 @@ impl<'a> Search<'a> {
             .iter()
             .rev()
             .find(|searched| searched.phase() == phase)
-    }
-
-    /// Pixels that a hypothesis must cover under a floor.
-    pub(super) fn least_covered(&self, floor: f64) -> u32 {
-        grid::least_covered(floor, self.covered_at_reference)
     }
 
     /// Covered pixels as a share of those at the reference pose.
@@ -155,11 +156,11 @@ impl<'a> Search<'a> {
 }
 
 impl Searched {
-    pub(super) fn phase(&self) -> Phase {
+    pub(in crate::app::views) fn phase(&self) -> Phase {
         self.surface.lattice.phase
     }
 
-    /// The cell of least cost under a floor, with its offset and cost.
+    /// The eligible cell of lowest cost.
     pub(super) fn minimum(&self, least_covered: u32) -> Option<Minimum> {
         let cell = self.surface.minimum_with(least_covered)?;
         Some(Minimum {
@@ -170,7 +171,7 @@ impl Searched {
     }
 }
 
-/// A cell with the least cost of its surroundings.
+/// A cell with the lowest cost around.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Minimum {
     pub(super) cell: usize,
@@ -178,8 +179,8 @@ pub(super) struct Minimum {
     pub(super) cost: f64,
 }
 
-/// The part of the run to read a direct method's search from, and the cursor in it. A hybrid runs
-/// others inside itself, one of which is then the one at the cursor.
+/// The part of the run to read a direct method's search from, and the cursor in it. A hybrid at the
+/// cursor may run the method inside itself.
 fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usize)> {
     let is_inside = context.is_inside_hybrid(method) && context.latest::<PoseScored>().is_some();
     if is_inside {
@@ -193,7 +194,7 @@ fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usiz
 struct Filling {
     lattice: Lattice,
     cells: Vec<(usize, Offset)>,
-    told: usize,
+    tried: usize,
     scores: Vec<Option<crate::render::Score>>,
 }
 
@@ -201,24 +202,24 @@ impl Filling {
     fn new(lattice: Lattice) -> Self {
         Self {
             cells: lattice.hypotheses().collect(),
-            told: 0,
+            tried: 0,
             scores: vec![None; lattice.cells()],
             lattice,
         }
     }
 
     fn take(&mut self, scored: &PoseScored) {
-        if let Some(&(cell, offset)) = self.cells.get(self.told)
+        if let Some(&(cell, offset)) = self.cells.get(self.tried)
             && offset == scored.offset
         {
             self.scores[cell] = Some(scored.score);
         }
-        self.told += 1;
+        self.tried += 1;
     }
 
     fn done(self, least_covered: u32) -> Searched {
         Searched {
-            tried: self.told,
+            tried: self.tried,
             is_complete: false,
             surface: Arc::new(ScoredLattice {
                 lattice: self.lattice,

@@ -1,0 +1,291 @@
+//! Primary verdicts as a matrix: by method, by condition, or against the results A.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use egui::{Button, Color32, Grid, RichText, ScrollArea, Ui};
+
+use super::Chosen;
+use crate::app::{Command, VerdictChange, ViewContext, theme};
+use crate::diagnosis::Code;
+use crate::localize::QueryResult;
+use crate::measure::{Migration, verdict_name};
+use crate::method::Method;
+
+/// What the columns of the matrix are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Columns {
+    #[default]
+    Methods,
+    Conditions,
+    Now,
+}
+
+impl Columns {
+    pub(super) const ALL: [(Self, &'static str, &'static str); 3] = [
+        (Self::Methods, "by method", "A column for each method"),
+        (
+            Self::Conditions,
+            "by condition",
+            "A column for each pair of scenes of queries and references",
+        ),
+        (
+            Self::Now,
+            "since A",
+            "Verdicts of the results A in rows, those of now in columns",
+        ),
+    ];
+}
+
+/// A number of the matrix, and what a click on it does.
+struct Cell {
+    row: String,
+    column: String,
+    text: RichText,
+    /// What it counts.
+    words: String,
+    is_chosen: bool,
+    command: Command,
+}
+
+/// Draws the matrix. A click on a number shows its results in Batch.
+pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>], columns: Columns) {
+    let results = || results.iter().map(|(_, result)| *result);
+    let ok = theme::text(ui.visuals(), theme::TRUTH);
+    let tables = match columns {
+        Columns::Methods => {
+            let column = |result: &QueryResult| (result.method.label(), String::new());
+            vec![(String::new(), tally(results(), column, ok))]
+        }
+        Columns::Conditions => by_method(results().map(|result| (result.method, result)))
+            .map(|(method, own)| (method.label(), tally(own.into_iter(), condition, ok)))
+            .collect(),
+        Columns::Now => {
+            if !context.has_results_before() {
+                ui.weak(
+                    "Nothing to compare with. Open two runs with --before, or click Keep results as A in Batch, \
+                     change a setting and run all queries again",
+                );
+                return;
+            }
+            let migrations = context.migrations();
+            if migrations.is_empty() {
+                ui.weak("A has no result in common with these: scenes, queries, methods and settings differ");
+                return;
+            }
+            ui.label(changes(&migrations));
+            let wrong = theme::text(ui.visuals(), theme::ESTIMATE);
+            let change = |one: &Migration| migration(context, one, [ok, wrong]);
+            by_method(migrations.iter().map(|one| (one.method, one)))
+                .map(|(method, own)| (method.label(), own.into_iter().map(change).collect()))
+                .collect()
+        }
+    };
+    let corner = match columns {
+        Columns::Methods | Columns::Conditions => "verdict",
+        Columns::Now => "A ↓  now →",
+    };
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        for (title, cells) in tables {
+            if !title.is_empty() {
+                ui.strong(&title);
+            }
+            ui.push_id(&title, |ui| table(ui, context, corner, cells));
+            ui.add_space(8.0);
+        }
+    });
+}
+
+fn by_method<T>(all: impl Iterator<Item = (Method, T)>) -> impl Iterator<Item = (Method, Vec<T>)> {
+    let mut groups: BTreeMap<Method, Vec<T>> = BTreeMap::new();
+    for (method, one) in all {
+        groups.entry(method).or_default().push(one);
+    }
+    groups.into_iter()
+}
+
+/// The scenes of queries and references, such as `street:night ← street:overcast`, and the filter for them.
+fn condition(result: &QueryResult) -> (String, String) {
+    let references = &result.scene;
+    let queries = result.query_scene.as_ref().unwrap_or(references);
+    let name = if queries == references {
+        references.clone()
+    } else {
+        format!("{queries} ← {references}")
+    };
+    let filter = format!(" and queries = \"{queries}\" and scene = \"{references}\"");
+    (name, filter)
+}
+
+/// Counts the verdicts of each column; `column` gives its name and the filter for it.
+fn tally<'a>(
+    results: impl Iterator<Item = &'a QueryResult>,
+    column: impl Fn(&QueryResult) -> (String, String),
+    ok: Color32,
+) -> Vec<Cell> {
+    let mut counts: BTreeMap<_, usize> = BTreeMap::new();
+    let mut sums: BTreeMap<String, usize> = BTreeMap::new();
+    for result in results {
+        let code = result.diagnosis.first().map(|finding| finding.code);
+        let (name, filter) = column(result);
+        *sums.entry(name.clone()).or_default() += 1;
+        *counts
+            .entry((code, name, result.method, filter))
+            .or_default() += 1;
+    }
+    let cells = counts.into_iter();
+    let cell = |((code, column, method, scenes), count): (
+        (Option<Code>, String, Method, String),
+        usize,
+    )| {
+        let row = verdict_name(code).to_owned();
+        let all = sums[&column];
+        let text = format!("{count} ({:.0} %)", 100.0 * count as f64 / all as f64);
+        let text = RichText::new(text);
+        let filter = code.map_or("\"\"", Code::name);
+        let place = if scenes.is_empty() {
+            String::new()
+        } else {
+            format!(", {column}")
+        };
+        Cell {
+            words: format!("{} {row}{place}: {count} of {all}", method.label()),
+            text: if code.is_none() { text.color(ok) } else { text },
+            row,
+            column,
+            is_chosen: false,
+            command: Command::FilterResults(format!(
+                "method = {method} and code = {filter}{scenes}"
+            )),
+        }
+    };
+    cells.map(cell).collect()
+}
+
+fn migration(context: &ViewContext<'_>, one: &Migration, [ok, wrong]: [Color32; 2]) -> Cell {
+    let change = VerdictChange {
+        method: one.method,
+        before: one.before.clone(),
+        after: one.after.clone(),
+    };
+    let is_chosen = context.options.verdict_change.as_ref() == Some(&change);
+    let name = verdict_name(None);
+    let text = RichText::new(one.count.to_string());
+    let text = match (one.is_change(), is_chosen) {
+        (_, true) => text,
+        (false, _) => text.weak(),
+        (true, _) if one.after == name => text.strong().color(ok),
+        (true, _) if one.before == name => text.strong().color(wrong),
+        (true, _) => text.strong(),
+    };
+    Cell {
+        row: one.before.clone(),
+        column: one.after.clone(),
+        text,
+        words: format!("{change}: {}", one.count),
+        is_chosen,
+        command: Command::FilterVerdictChange((!is_chosen).then_some(change)),
+    }
+}
+
+/// Such as `12 of 160 verdicts changed: MI ok → D2 3, FB R3 → ok 2`.
+fn changes(migrations: &[Migration]) -> String {
+    let all: usize = migrations.iter().map(|one| one.count).sum();
+    let changed: Vec<&Migration> = migrations.iter().filter(|one| one.is_change()).collect();
+    let count: usize = changed.iter().map(|one| one.count).sum();
+    if changed.is_empty() {
+        return format!("None of {all} verdicts changed");
+    }
+    let each = changed.iter().map(|one| {
+        let name = one.method.label();
+        format!("{name} {} → {} {}", one.before, one.after, one.count)
+    });
+    let each: Vec<String> = each.collect();
+    format!("{count} of {all} verdicts changed: {}", each.join(", "))
+}
+
+/// Names in the order of the verdicts, `ok` first; those that are none stay in the order of the alphabet.
+fn in_order<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
+    let place = |name: &str| Code::all().iter().position(|code| code.name() == name);
+    let names: BTreeSet<_> = names.map(|name| (place(name), name)).collect();
+    names.into_iter().map(|(_, name)| name).collect()
+}
+
+fn table(ui: &mut Ui, context: &ViewContext<'_>, corner: &str, cells: Vec<Cell>) {
+    let rows: Vec<String> = in_order(cells.iter().map(|cell| &cell.row))
+        .into_iter()
+        .cloned()
+        .collect();
+    let columns = in_order(cells.iter().map(|cell| &cell.column)).into_iter();
+    let columns: Vec<String> = columns.cloned().collect();
+    let header = |ui: &mut Ui, name: &str| {
+        let answer = ui.strong(name);
+        if let Ok(code) = name.parse::<Code>() {
+            answer.on_hover_text(code.title());
+        }
+    };
+    let mut places: BTreeMap<(String, String), Cell> = BTreeMap::new();
+    for cell in cells {
+        places.insert((cell.row.clone(), cell.column.clone()), cell);
+    }
+    Grid::new("matrix").striped(true).show(ui, |ui| {
+        ui.weak(corner);
+        columns.iter().for_each(|column| header(ui, column));
+        ui.end_row();
+        for row in rows {
+            header(ui, &row);
+            for column in &columns {
+                match places.remove(&(row.clone(), column.clone())) {
+                    Some(cell) => number(ui, context, cell),
+                    None => {
+                        ui.weak("·");
+                    }
+                }
+            }
+            ui.end_row();
+        }
+    });
+}
+
+fn number(ui: &mut Ui, context: &ViewContext<'_>, cell: Cell) {
+    let button = Button::selectable(cell.is_chosen, cell.text).min_size(egui::vec2(34.0, 0.0));
+    let answer = ui.add(button);
+    answer.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &cell.words));
+    let help = format!("{}. Click to show them", cell.words);
+    if answer.on_hover_text(help).clicked() {
+        context.send(cell.command);
+        context.send(Command::ShowView("batch"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verdicts_are_in_the_order_of_the_codes_after_ok() {
+        let codes: Vec<String> = Code::all()
+            .iter()
+            .map(|code| code.name().to_owned())
+            .collect();
+        let ok = "ok".to_owned();
+        let ordered = in_order(codes.iter().rev().chain([&ok]));
+        assert_eq!(ordered[0], &ok);
+        assert!(ordered[1..].iter().copied().eq(&codes));
+    }
+
+    #[test]
+    fn the_most_frequent_change_is_named_first() {
+        let of = |before: &str, after: &str, count| Migration {
+            method: Method::MI,
+            before: before.to_owned(),
+            after: after.to_owned(),
+            count,
+        };
+        let all = [of("ok", "ok", 7), of("ok", "D2", 3), of("D3", "ok", 2)];
+        assert_eq!(
+            changes(&all),
+            "5 of 12 verdicts changed: MI ok → D2 3, MI D3 → ok 2"
+        );
+        assert_eq!(changes(&all[..1]), "None of 7 verdicts changed");
+    }
+}
