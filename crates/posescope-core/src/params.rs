@@ -137,7 +137,7 @@ impl Params {
         for (group, entries) in &table {
             let Some(entries) = entries.as_table() else {
                 return Err(ParamError::Syntax(format!(
-                    "`{group}` stands outside a group; parameters live in tables such as [fb]"
+                    "`{group}` is outside a group; parameters belong to tables such as [fb]"
                 )));
             };
             for (name, value) in entries {
