@@ -1,5 +1,5 @@
-//! A COLMAP model as text, in `NAME/sparse/0`, with its photos in `NAME/images`. The points are some of
-//! each frame's scan, which it alone observes.
+//! A COLMAP model as text, in `NAME/sparse/0`, with its photos in `NAME/images`. The points are a part of each frame's
+//! scan, observed by that frame only.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -18,16 +18,16 @@ pub(super) const LAYOUT: Layout = Layout {
     create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
 };
 
-/// How many points of a frame are written at most: a photo has some thousand features.
+/// The most points per frame: a photo has some thousand features.
 const MOST_POINTS: usize = 2000;
 
-/// A pixel, and the point that is seen there in the world's frame \[m\].
+/// A pixel, and the point there in the world frame \[m\].
 type Observation = (Point2<f64>, Point3<f64>);
 
 struct Writer {
     folder: PathBuf,
     drive: Drive,
-    /// What each written frame observes.
+    /// The observations of each written frame.
     observed: Mutex<BTreeMap<usize, Vec<Observation>>>,
 }
 
