@@ -1,4 +1,4 @@
-//! Measures of many results: tables, plots, gates, comparisons, exports.
+//! Evaluates the results of many queries: tables, plots, gates, comparisons, exports.
 
 mod chance;
 mod diff;

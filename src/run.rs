@@ -1,4 +1,4 @@
-//! Experiments over many queries, and the folders that their results go to.
+//! Runs over many queries: protocols, presets and run folders.
 
 #[cfg(feature = "cli")]
 mod arguments;

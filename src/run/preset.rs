@@ -11,33 +11,33 @@ use crate::localize::Selection;
 use crate::method::Method;
 use crate::text::UnknownWord;
 
-/// What an experiment asks where the user says nothing else.
+/// The defaults of an experiment, which options override.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Preset {
-    /// What it is about, in a few words.
+    /// A short title.
     pub title: String,
-    /// The tables of the paper that it fills.
+    /// The tables of the paper that it reproduces.
     pub tables: Vec<u8>,
     /// The methods.
     pub methods: Vec<Method>,
     /// How references are chosen.
     pub references: Selection,
-    /// Numbers of references; each gives results.
+    /// Numbers of references, each with its own results.
     pub counts: Vec<usize>,
     /// How the poses of several references are fused.
     pub fusions: Vec<Fusion>,
-    /// Uncertainty radii \[m\]; each gives results.
+    /// Uncertainty radii \[m\], each with its own results.
     pub radii_m: Vec<f64>,
     /// Share of the frames that are queries.
     pub share: f64,
-    /// How far around the known position references are chosen \[m\]; `None` within the uncertainty radius.
+    /// The prior \[m\] within which references are chosen; `None`: the uncertainty radius.
     pub prior_m: Option<ByDataSet>,
-    /// The translation error from which on a pose counts as a failure \[m\].
+    /// The translation error from which a pose counts as a failure \[m\].
     pub failure_radius_m: ByDataSet,
 }
 
-/// A number that the paper chose for each of its data sets.
+/// A number that depends on the paper's data set.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ByDataSet {
@@ -79,8 +79,8 @@ impl Preset {
     }
 }
 
-/// The protocol of an experiment, or without one: every frame against one reference. `scene` is the name of
-/// the references' scene; the paper asked other things of RobotCar than of KITTI.
+/// The protocol of a preset, or without one of every frame against one random reference. `scene` is the name of
+/// the references' scene: the paper uses other numbers for RobotCar than for KITTI.
 ///
 /// # Errors
 /// A preset that cannot be read; a test reads them all.
@@ -105,7 +105,7 @@ pub fn defaults(experiment: Option<Experiment>, scene: &str) -> Result<Protocol,
     })
 }
 
-/// The translation error from which on a pose counts as a failure \[m\], by the references' scene.
+/// The translation error from which a pose counts as a failure \[m\], by the references' scene.
 pub fn default_failure_radius_m(scene: &str) -> f64 {
     let radius = ByDataSet {
         kitti: 10.0,

@@ -9,7 +9,7 @@ use crate::params::Params;
 use crate::problem::Problem;
 use crate::table::{Align, Table};
 
-/// What the methods made of one query, so far.
+/// The report on one query so far.
 pub(super) fn markdown(
     problems: &[Problem],
     results: &[QueryResult],
@@ -37,19 +37,19 @@ pub(super) fn markdown(
     text += &costs_at_poses(results);
     let degraded = identity.degraded;
     if !degraded.is_none() {
-        text += &format!("The photo of the query was degraded before: `{degraded}`.\n\n");
+        text += &format!("The query photo was degraded: `{degraded}`.\n\n");
     }
     text += &changes(&identity.configuration);
     let Origin(origin) = origin;
     text += &format!(
-        "\nThe world is drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \
+        "\nPositions are drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \
          world coordinates. Axes: x right, y down, z forward.\n",
         origin.x, origin.y, origin.z
     );
     text
 }
 
-/// What went wrong, in sentences: the primary verdict of each method, what it leads to, what helped.
+/// The failures in sentences: primary verdict, consequences and remedies of each method.
 fn story(results: &[QueryResult]) -> String {
     let mut text = String::new();
     for result in results.iter().filter(|result| !result.diagnosis.is_empty()) {
@@ -98,7 +98,7 @@ fn errors(results: &[QueryResult]) -> String {
     let mut text = table.to_markdown();
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
-        text += &format!("\nThe first reference itself, from the truth: {error}.\n");
+        text += &format!("\nDistance of the first reference from the truth: {error}.\n");
     }
     text + "\n"
 }
@@ -164,7 +164,7 @@ fn costs(results: &[QueryResult]) -> String {
     section("Costs", &table)
 }
 
-/// What our costs say of the poses of other systems.
+/// Our costs at the poses of other systems.
 fn costs_at_poses(results: &[QueryResult]) -> String {
     let mut table = Table::new("", "", ["pose", "cost of", "pose", "truth", "coverage"]);
     table.align[1] = Align::Left;
@@ -182,7 +182,7 @@ fn costs_at_poses(results: &[QueryResult]) -> String {
     section("Costs at the poses of other systems", &table)
 }
 
-/// A table below its title; nothing without rows.
+/// A table with a title; empty without rows.
 fn section(title: &str, table: &Table) -> String {
     if table.rows.is_empty() {
         "\n".to_owned()
@@ -200,7 +200,7 @@ fn changes(configuration: &str) -> String {
     if changes.is_empty() {
         return "## Parameters\n\nAll at their defaults.\n".to_owned();
     }
-    let mut text = "## Parameters\n\nAll at their defaults but these:\n\n".to_owned();
+    let mut text = "## Parameters\n\nAll at their defaults, except:\n\n".to_owned();
     for change in changes {
         text += &format!("- `{change}`\n");
     }
