@@ -29,10 +29,7 @@ pub struct Protocol {
     /// Take the queries from another scene with the same world frame
     ///
     /// `eval` takes several; it pairs every scene of references with every scene of queries.
-    #[cfg_attr(
-        feature = "cli",
-        arg(long, help_heading = "Queries", value_name = "SCENE")
-    )]
+    #[cfg_attr(feature = "cli", arg(long, help_heading = "Queries", value_name = "SCENE"))]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub query_scene: Vec<String>,
     /// Rough positions of the queries
@@ -41,12 +38,7 @@ pub struct Protocol {
     /// must also list at least three frames with a known pose.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Queries",
-            value_name = "FILE",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Queries", value_name = "FILE", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gps: Option<PathBuf>,
@@ -54,10 +46,7 @@ pub struct Protocol {
     ///
     /// --seed determines the draw. Frames drawn by a percentage are not used as references; frames drawn by a
     /// number may be.
-    #[cfg_attr(
-        feature = "cli",
-        arg(long, help_heading = "Queries", value_name = "40|10%")
-    )]
+    #[cfg_attr(feature = "cli", arg(long, help_heading = "Queries", value_name = "40|10%"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<Limit>,
     /// Degrade the query photos first, for example gamma=0.4,noise=8,invert; --help lists the steps
@@ -82,11 +71,7 @@ pub struct Protocol {
     /// --gps is matches:1.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long = "reference",
-            help_heading = "References",
-            value_name = "FRAME|HOW:K"
-        )
+        arg(long = "reference", help_heading = "References", value_name = "FRAME|HOW:K")
     )]
     #[serde(rename = "reference")]
     pub references: Vec<Reference>,
@@ -124,12 +109,7 @@ pub struct Protocol {
     /// `eval` takes one per scene, in the same order.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "References",
-            value_name = "FILE",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "References", value_name = "FILE", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub index: Vec<PathBuf>,
@@ -139,12 +119,7 @@ pub struct Protocol {
     /// FILE is in TUM or KITTI format, COLMAP's images.txt, or lines of `name qw qx qy qz x y z`.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Methods",
-            value_name = "NAME=FILE",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Methods", value_name = "NAME=FILE", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub estimates: Vec<EstimatesFile>,
@@ -167,12 +142,7 @@ pub struct Protocol {
     /// references. Without this option, each reference gives its own pose; `eval` fuses several by r-wavg.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long = "fusion",
-            help_heading = "Methods",
-            value_name = "HOW",
-            value_delimiter = ','
-        )
+        arg(long = "fusion", help_heading = "Methods", value_name = "HOW", value_delimiter = ',')
     )]
     #[serde(rename = "fusion", skip_serializing_if = "Vec::is_empty")]
     pub fusions: Vec<Fusion>,
@@ -181,12 +151,7 @@ pub struct Protocol {
     /// DIR holds hloc's features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Methods",
-            value_name = "DIR",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Methods", value_name = "DIR", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub matches: Option<PathBuf>,
@@ -210,12 +175,7 @@ pub struct Protocol {
     /// The largest error of a right pose [default: 1m,5deg]
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Judging",
-            value_name = "METRES,DEGREES",
-            required = false
-        )
+        arg(long, help_heading = "Judging", value_name = "METRES,DEGREES", required = false)
     )]
     #[serde(skip_serializing_if = "is_default")]
     pub right: Tolerance,
@@ -265,12 +225,7 @@ pub struct Protocol {
     /// The format of the scenes [default: detected]
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Everywhere",
-            value_name = "NAME",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Everywhere", value_name = "NAME", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<String>,

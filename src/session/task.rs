@@ -19,10 +19,7 @@ pub struct Task {
     /// How a query is localised.
     pub protocol: Protocol,
     /// Parameters of the estimators.
-    #[serde(
-        serialize_with = "write_params",
-        deserialize_with = "posescope_core::text::parsed"
-    )]
+    #[serde(serialize_with = "write_params", deserialize_with = "posescope_core::text::parsed")]
     pub params: Params,
     /// Where the run stops.
     pub breakpoints: Vec<Breakpoint>,

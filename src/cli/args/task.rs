@@ -76,12 +76,7 @@ pub struct TaskArgs {
     /// The camera of a photo [default: from EXIF]
     ///
     /// Focal lengths and principal point [px], a camera line of COLMAP, or a cameras.txt.
-    #[arg(
-        long,
-        value_name = "fx,fy,cx,cy",
-        requires = "query",
-        conflicts_with = "query_scene"
-    )]
+    #[arg(long, value_name = "fx,fy,cx,cy", requires = "query", conflicts_with = "query_scene")]
     #[arg(help_heading = "Queries", hide_short_help = true)]
     pub camera: Option<CameraArgument>,
     #[command(flatten)]
