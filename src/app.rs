@@ -23,6 +23,7 @@ mod layout;
 mod lecture;
 mod lesson;
 mod navigation;
+mod pictures;
 mod prober;
 mod queries;
 mod run_results;

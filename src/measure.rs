@@ -30,7 +30,7 @@ pub use diff::{Change, Difference, RunComparison};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
 pub use gate::{Gate, GateResult};
-pub use known::{KnownError, KnownFailures, KnownReport};
+pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
 pub use migration::{Migration, migrations, verdict_name};
 #[cfg(feature = "cli")]

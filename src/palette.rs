@@ -12,8 +12,6 @@ pub type Rgb = [u8; 3];
 
 /// A reference.
 pub const REFERENCE: Rgb = [0x00, 0x72, 0xB2];
-/// A reference on a map of costs, whose dark end hides blue.
-pub const REFERENCE_ON_COSTS: Rgb = [0xFF; 3];
 /// An estimate, and wrong results.
 pub const ESTIMATE: Rgb = [0xE4, 0x57, 0x2E];
 /// The truth, and right results.

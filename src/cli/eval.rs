@@ -16,8 +16,8 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::report::{PICTURES, write_html};
 use posescope::run::{
-    Draw, Execution, Experiment, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair,
-    Scenes, Sweep, defaults, inputs, known, merge,
+    Draw, Execution, Preset, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair, Scenes,
+    Sweep, defaults, inputs, known, merge,
 };
 use posescope::scene::Retriever;
 use posescope::session::command_line;
@@ -166,7 +166,6 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
     let scenes = Scenes::open(&args.scenes, &given.query_scene, given.format.as_deref())?;
     let first = scenes.references.first();
     let defaults = defaults(given.preset, first.map_or("", |scene| scene.name()));
-    let defaults = defaults.map_err(|error| CliError::Usage(error.to_string()))?;
     let mut protocol = args.protocol.over(defaults)?;
     if protocol.is_by_hand() {
         return Err(CliError::Usage(
@@ -177,7 +176,7 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
     }
     let has_several = protocol.selection().count() > 1;
     // The large experiment has the fusion of a run without preset.
-    let has_own_fusions = protocol.preset.is_some_and(|one| one != Experiment::Large);
+    let has_own_fusions = protocol.preset.is_some_and(|one| one != Preset::Large);
     if has_several && !args.protocol.has("fusions") && !has_own_fusions {
         protocol.fusions = Fusion::all().filter(|f| f.name == "r-wavg").collect();
     }

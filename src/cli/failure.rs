@@ -8,7 +8,6 @@ use image::ImageError;
 use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::ChoiceError;
-use posescope::measure::KnownError;
 use posescope::run::{DrawError, FolderError, ProtocolError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::session::JobError;
@@ -49,8 +48,6 @@ pub enum CliError {
     Choice(#[from] ChoiceError),
     #[error(transparent)]
     Folder(#[from] FolderError),
-    #[error(transparent)]
-    Known(#[from] KnownError),
     #[error(transparent)]
     Draw(#[from] DrawError),
     #[error(transparent)]

@@ -33,15 +33,15 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
     if let Some(plot) = args.plot {
         return draw(args, plot, terminal);
     }
-    let form = match args.form {
-        Form::Html => {
-            let path = write_html(&args.run, None, PICTURES, args.out.as_deref())?;
-            terminal.say(|| format!("Report: {}", path.display()));
-            return Ok(());
-        }
-        Form::Poses(format) => return poses(args, &run, format, terminal),
-        form => form,
-    };
+    let form = args.form;
+    if form == Form::Html {
+        let path = write_html(&args.run, None, PICTURES, args.out.as_deref())?;
+        terminal.say(|| format!("Report: {}", path.display()));
+        return Ok(());
+    }
+    if let Some(format) = form.poses() {
+        return poses(args, &run, format, terminal);
+    }
     let mut results = read_rows(&args.run)?;
     if let Some(right) = args.right {
         let graded = results.into_iter().map(|result| result.graded(right));

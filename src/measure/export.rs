@@ -26,22 +26,6 @@ pub enum Format {
     Vloc,
 }
 
-impl Format {
-    /// All formats by their names.
-    pub const ALL: [(&'static str, Self); 4] = [
-        ("tum", Self::Tum),
-        ("kitti", Self::Kitti),
-        ("colmap", Self::Colmap),
-        ("vloc", Self::Vloc),
-    ];
-
-    /// The format with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        let found = Self::ALL.iter().find(|(known, _)| *known == name);
-        found.map(|(_, format)| *format)
-    }
-}
-
 /// Why a run cannot be exported in a format.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {

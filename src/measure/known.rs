@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::method::Method;
-use crate::run::is_called;
+use crate::run::{FolderError, is_called};
 
 /// A list of queries that are known to fail: `QUERY METHOD` or `QUERY METHOD CODE` per line, with comments after `#`.
 #[derive(Clone, Debug, Default)]
@@ -23,29 +23,6 @@ struct KnownFailure {
     method: Method,
     /// With a code, only failures with this primary verdict are known.
     code: Option<Code>,
-}
-
-/// Why the list cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum KnownError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// A line is malformed.
-    #[error("{}:{line}: {message}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What was expected.
-        message: String,
-    },
 }
 
 /// The known failures in a run.
@@ -76,12 +53,9 @@ impl KnownFailures {
     /// Reads the list.
     ///
     /// # Errors
-    /// [`KnownError`] with file and line.
-    pub fn read(path: &Path) -> Result<Self, KnownError> {
-        let text = std::fs::read_to_string(path).map_err(|source| KnownError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
+    /// A file that cannot be read, or a malformed line.
+    pub fn read(path: &Path) -> Result<Self, FolderError> {
+        let text = std::fs::read_to_string(path).map_err(FolderError::io(path))?;
         let mut lines = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let words: Vec<&str> = line
@@ -90,7 +64,7 @@ impl KnownFailures {
                 .unwrap_or_default()
                 .split_whitespace()
                 .collect();
-            let error = |message: String| KnownError::Line {
+            let error = |message: String| FolderError::Damaged {
                 path: path.to_owned(),
                 line: index + 1,
                 message,
@@ -190,7 +164,7 @@ mod tests {
     use super::super::metrics::tests::{finding, row};
     use super::*;
 
-    fn read(text: &str) -> Result<KnownFailures, KnownError> {
+    fn read(text: &str) -> Result<KnownFailures, FolderError> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("known.txt");
         std::fs::write(&path, text).expect("writable");

@@ -1,8 +1,10 @@
-//! Presets: the paper's experiments as files, for any scene.
+//! Presets: the paper's experiments, for any scene.
+
+use std::fmt;
+use std::str::FromStr;
 
 use serde::Deserialize;
 
-use super::experiment::Experiment;
 use super::limit::Limit;
 use super::protocol::Protocol;
 use super::reference::Reference;
@@ -11,45 +13,44 @@ use crate::localize::Selection;
 use crate::method::Method;
 use crate::text::UnknownWord;
 
-/// The defaults of an experiment, which options override.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// One of the experiments of the paper's section 4.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// One random reference within 10, 15, 20 and 25 m (section 4.3, table 3).
+    Single,
+    /// One to five references, four fusions (section 4.4, table 4).
+    Multi,
+    /// References from retrieval within a large prior (section 4.5, tables 5 and 6).
+    Large,
+}
+
+/// The defaults of a preset in its file, which options override.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Preset {
-    /// A short title.
-    pub title: String,
-    /// The tables of the paper that it reproduces.
-    pub tables: Vec<u8>,
-    /// The methods.
-    pub methods: Vec<Method>,
-    /// How references are chosen.
-    pub references: Selection,
-    /// Numbers of references, each with its own results.
-    pub counts: Vec<usize>,
-    /// How the poses of several references are fused.
-    pub fusions: Vec<Fusion>,
-    /// Uncertainty radii \[m\], each with its own results.
-    pub radii_m: Vec<f64>,
-    /// Share of the frames that are queries.
-    pub share: f64,
+struct Defaults {
+    methods: Vec<Method>,
+    references: Selection,
+    fusions: Vec<Fusion>,
+    radii_m: Vec<f64>,
+    /// The share of the frames that are queries.
+    share: f64,
     /// The prior \[m\] within which references are chosen; `None`: the uncertainty radius.
-    pub prior_m: Option<ByDataSet>,
-    /// The translation error from which a pose counts as a failure \[m\].
-    pub failure_radius_m: ByDataSet,
+    prior_m: Option<ByDataSet>,
+    failure_radius_m: ByDataSet,
 }
 
 /// A number that depends on the paper's data set.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ByDataSet {
+struct ByDataSet {
     /// For KITTI, and for any scene of another data set.
-    pub kitti: f64,
-    /// For RobotCar.
-    pub robotcar: f64,
+    kitti: f64,
+    robotcar: f64,
 }
 
 impl ByDataSet {
     /// The number for a scene of this name.
-    pub fn of_scene(self, name: &str) -> f64 {
+    fn of_scene(self, name: &str) -> f64 {
         if name.starts_with("robotcar") {
             self.robotcar
         } else {
@@ -59,50 +60,74 @@ impl ByDataSet {
 }
 
 impl Preset {
-    /// Every preset: its name and its file.
-    pub const ALL: [(&'static str, &'static str); 3] = [
-        ("single", include_str!("../../assets/presets/single.toml")),
-        ("multi", include_str!("../../assets/presets/multi.toml")),
-        ("large", include_str!("../../assets/presets/large.toml")),
+    /// All presets with their names and files.
+    const ALL: [(Self, &'static str, &'static str); 3] = [
+        (
+            Self::Single,
+            "single",
+            include_str!("../../assets/presets/single.toml"),
+        ),
+        (
+            Self::Multi,
+            "multi",
+            include_str!("../../assets/presets/multi.toml"),
+        ),
+        (
+            Self::Large,
+            "large",
+            include_str!("../../assets/presets/large.toml"),
+        ),
     ];
 
-    /// The preset of a name.
-    ///
-    /// # Errors
-    /// The names of all presets.
-    pub fn named(name: &str) -> Result<Self, UnknownWord> {
-        let unknown = || UnknownWord::among(name, "preset", Self::ALL.map(|(name, _)| name));
-        let file = Self::ALL.iter().find(|(known, _)| *known == name);
-        let (_, file) = file.ok_or_else(unknown)?;
-        // A test reads the files.
-        toml::from_str(file).map_err(|_| unknown())
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+
+    fn defaults(self) -> Defaults {
+        let defaults = toml::from_str(Self::ALL[self as usize].2);
+        defaults.unwrap_or_else(|error| unreachable!("a test reads the file: {error}"))
     }
 }
 
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Preset {
+    type Err = UnknownWord;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWord> {
+        let found = Self::ALL.into_iter().find(|(_, known, _)| *known == name);
+        let unknown = || UnknownWord::among(name, "preset", Self::ALL.map(|(_, name, _)| name));
+        found.map(|(preset, ..)| preset).ok_or_else(unknown)
+    }
+}
+
+posescope_core::serde_as_text!(Preset);
+
 /// The protocol of a preset, or without one of every frame against one random reference. `scene` is the name of
 /// the references' scene: the paper uses other numbers for RobotCar than for KITTI.
-///
-/// # Errors
-/// A preset that cannot be read; a test reads them all.
-pub fn defaults(experiment: Option<Experiment>, scene: &str) -> Result<Protocol, UnknownWord> {
-    let Some(experiment) = experiment else {
-        return Ok(Protocol {
+pub fn defaults(preset: Option<Preset>, scene: &str) -> Protocol {
+    let Some(defaults) = preset.map(Preset::defaults) else {
+        return Protocol {
             failure_radius_m: Some(default_failure_radius_m(scene)),
             ..Protocol::default()
-        });
+        };
     };
-    let preset = Preset::named(experiment.name())?;
-    Ok(Protocol {
-        preset: Some(experiment),
-        methods: preset.methods,
-        references: vec![Reference::Chosen(preset.references)],
-        fusions: preset.fusions,
-        radii_m: preset.radii_m,
-        limit: Some(Limit::Percent(100.0 * preset.share)),
-        prior_m: preset.prior_m.map(|prior| prior.of_scene(scene)),
-        failure_radius_m: Some(preset.failure_radius_m.of_scene(scene)),
+    Protocol {
+        preset,
+        methods: defaults.methods,
+        references: vec![Reference::Chosen(defaults.references)],
+        fusions: defaults.fusions,
+        radii_m: defaults.radii_m,
+        limit: Some(Limit::Percent(100.0 * defaults.share)),
+        prior_m: defaults.prior_m.map(|prior| prior.of_scene(scene)),
+        failure_radius_m: Some(defaults.failure_radius_m.of_scene(scene)),
         ..Protocol::default()
-    })
+    }
 }
 
 /// The translation error from which a pose counts as a failure \[m\], by the references' scene.
@@ -121,8 +146,9 @@ mod tests {
     #[test]
     fn presets_ask_what_the_experiments_of_the_paper_do() {
         let of = |name: &str, scene: &str| {
-            let experiment: Experiment = name.parse().expect("an experiment");
-            defaults(Some(experiment), scene).expect("a preset")
+            let preset: Preset = name.parse().expect("a preset");
+            assert_eq!(preset.name(), name);
+            defaults(Some(preset), scene)
         };
         let single = of("single", "kitti/00");
         assert_eq!(single.radii_m, [10.0, 15.0, 20.0, 25.0]);
@@ -138,11 +164,6 @@ mod tests {
         };
         assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
         assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
-        for experiment in Experiment::ALL {
-            let preset = Preset::named(experiment.name()).expect("a preset");
-            let most = preset.counts.last().copied();
-            assert_eq!(most, Some(preset.references.count()), "{experiment}");
-        }
-        assert!(Preset::named("small").is_err());
+        assert!("small".parse::<Preset>().is_err());
     }
 }

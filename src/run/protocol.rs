@@ -6,8 +6,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::estimates_file::EstimatesFile;
-use super::experiment::Experiment;
 use super::limit::Limit;
+use super::preset::Preset;
 use super::reference::Reference;
 use crate::diagnosis::Tolerance;
 use crate::estimator;
@@ -165,7 +165,7 @@ pub struct Protocol {
         arg(long = "preset", help_heading = "Methods", value_name = "NAME")
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub preset: Option<Experiment>,
+    pub preset: Option<Preset>,
     /// The seed of every random choice [default: 0]
     #[cfg_attr(
         feature = "cli",

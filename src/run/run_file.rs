@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::experiment::Experiment;
-use super::preset::default_failure_radius_m;
+use super::preset::{Preset, default_failure_radius_m};
 use super::protocol::{Protocol, known};
 use super::scene_pair::{QueryCamera, ScenePair};
 use crate::describe::ParamError;
@@ -190,7 +189,7 @@ impl RunFile {
     pub fn settings(&self) -> Vec<Setting> {
         let most_references = self.protocol.selection().count();
         let counts = match self.protocol.preset {
-            Some(Experiment::Multi) => 1..=most_references,
+            Some(Preset::Multi) => 1..=most_references,
             _ => most_references..=most_references,
         };
         let radii = self.protocol.radii_m.iter();

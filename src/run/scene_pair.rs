@@ -92,22 +92,14 @@ pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (QueryCamera, V
 }
 
 impl From<Intrinsics> for QueryCamera {
-    fn from(intrinsics: Intrinsics) -> Self {
-        let Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = intrinsics;
+    fn from(camera: Intrinsics) -> Self {
         Self {
-            width,
-            height,
-            fx,
-            fy,
-            cx,
-            cy,
+            width: camera.width,
+            height: camera.height,
+            fx: camera.fx,
+            fy: camera.fy,
+            cx: camera.cx,
+            cy: camera.cy,
         }
     }
 }

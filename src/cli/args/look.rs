@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use clap::{Args, ValueEnum};
 use posescope::diagnosis::{Code, Tolerance};
-use posescope::measure::{Condition, Field, Order, Plot, TableName};
+use posescope::measure::{Condition, Field, Format, Order, Plot, TableName};
 
 #[derive(Debug, Args)]
 pub struct ResultsArgs {
@@ -27,12 +26,7 @@ pub struct ResultsArgs {
     /// The form: text, json, csv, markdown, latex, html, or poses as tum, kitti, colmap, vloc
     ///
     /// json prints lines of results.jsonl, html writes the report, vloc is the format of visuallocalization.net.
-    #[arg(
-        long = "as",
-        value_name = "FORM",
-        default_value = "text",
-        value_parser = PossibleValuesParser::new(Form::NAMES).map(|name: String| Form::named(&name))
-    )]
+    #[arg(long = "as", value_name = "FORM", value_enum, default_value = "text")]
     pub form: Form,
     /// The table: rows, summary, verdicts, or paper:1 … paper:6
     #[arg(long, value_name = "TABLE", value_enum, default_value = "rows")]
@@ -73,7 +67,7 @@ pub struct CompareArgs {
 }
 
 /// The form of results.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Form {
     Text,
     Json,
@@ -81,23 +75,21 @@ pub enum Form {
     Markdown,
     Latex,
     Html,
-    /// Poses, in a format of another program.
-    Poses(posescope::measure::Format),
+    Tum,
+    Kitti,
+    Colmap,
+    Vloc,
 }
 
 impl Form {
-    const NAMES: [&'static str; 10] = [
-        "text", "json", "csv", "markdown", "latex", "html", "tum", "kitti", "colmap", "vloc",
-    ];
-
-    fn named(name: &str) -> Self {
-        match name {
-            "json" => Self::Json,
-            "csv" => Self::Csv,
-            "markdown" => Self::Markdown,
-            "latex" => Self::Latex,
-            "html" => Self::Html,
-            other => posescope::measure::Format::from_name(other).map_or(Self::Text, Self::Poses),
+    /// The format of poses, if it is one.
+    pub fn poses(self) -> Option<Format> {
+        match self {
+            Self::Tum => Some(Format::Tum),
+            Self::Kitti => Some(Format::Kitti),
+            Self::Colmap => Some(Format::Colmap),
+            Self::Vloc => Some(Format::Vloc),
+            _ => None,
         }
     }
 }

@@ -9,7 +9,6 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{Point2, Point3};
 
 use super::{Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_image};
-use crate::camera::Intrinsics;
 use crate::scene::SceneError;
 
 pub(super) const LAYOUT: Layout = Layout {
@@ -69,16 +68,12 @@ impl DriveWriter for Writer {
     }
 
     fn finish(&self) -> Result<(), SceneError> {
-        let Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = self.drive.intrinsics;
-        let parameters = joined(&[fx, fy, cx + 0.5, cy + 0.5]);
-        let cameras = format!("1 PINHOLE {width} {height} {parameters}\n");
+        let camera = self.drive.intrinsics;
+        let parameters = joined(&[camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]);
+        let cameras = format!(
+            "1 PINHOLE {} {} {parameters}\n",
+            camera.width, camera.height
+        );
         let (mut images, mut points) = (String::new(), String::new());
         let observed = self.observed.lock().unwrap_or_else(PoisonError::into_inner);
         let mut id = 0;

@@ -114,18 +114,14 @@ impl PlacedCamera<'_> {
 }
 
 /// Rerun's pixel (0, 0) is the corner of the image, ours the centre of its first pixel.
-fn pinhole(intrinsics: &Intrinsics) -> Pinhole {
-    let Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    } = *intrinsics;
-    Pinhole::from_focal_length_and_resolution([fx as f32, fy as f32], [width as f32, height as f32])
-        .with_principal_point([cx as f32 + 0.5, cy as f32 + 0.5])
-        .with_image_plane_distance(IMAGE_PLANE_M)
+fn pinhole(camera: &Intrinsics) -> Pinhole {
+    let focal_lengths = [camera.fx as f32, camera.fy as f32];
+    Pinhole::from_focal_length_and_resolution(
+        focal_lengths,
+        [camera.width, camera.height].map(|side| side as f32),
+    )
+    .with_principal_point([camera.cx as f32 + 0.5, camera.cy as f32 + 0.5])
+    .with_image_plane_distance(IMAGE_PLANE_M)
 }
 
 /// Records a cloud in the colours of the reference photo, or in its grey values.
