@@ -32,7 +32,7 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             format!("{kept} matches; {ambiguous} failed the ratio test, {rivalled} were not unique")
         }
         Event::ProjectedCloud(event) => format!(
-            "{} of the cloud's {} points are in view of the reference",
+            "{} of the cloud's {} points are in the reference's view",
             event.in_view, event.points
         ),
         Event::DepthsLifted(event) => format!(
@@ -93,11 +93,11 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             let phase = event.surface.lattice.phase.name();
             match &event.best {
                 Some(best) => format!(
-                    "{phase}: the lowest cost is at {}",
+                    "{phase}: the least cost is at {}",
                     place(&best.reference_from_camera())
                 ),
                 None if event.surface.minimum().is_some() => {
-                    format!("{phase}: shown, not searched")
+                    format!("{phase}: shown, and not searched")
                 }
                 None => format!("{phase}: no hypothesis has a cost"),
             }

@@ -29,8 +29,9 @@ impl Terminal {
         let logger = env_logger::Builder::new()
             .filter_level(foreign)
             .filter_module("posescope", own)
-            // It logs errors if no Vulkan driver is installed, which the window reports in one line.
+            // They log errors if a driver is missing, which the window reports in one line.
             .filter_module("wgpu_hal::vulkan::instance", quieter)
+            .filter_module("wgpu_hal::gles::egl", quieter)
             .parse_default_env()
             .build();
         let level = logger.filter();

@@ -200,9 +200,9 @@ mod tests {
         ];
         let report = known.report(&rows);
         assert_eq!(report.still, 0);
-        assert!(report.fixed[0].starts_with("71 fb is right now; take it off "));
+        assert!(report.fixed[0].starts_with("71 fb no longer fails; remove "));
         assert!(report.fixed[0].ends_with("known.txt:2"));
-        assert!(report.other[0].starts_with("70 mi has D2, not D3 as in "));
+        assert!(report.other[0].starts_with("70 mi fails with D2 instead of D3 in "));
         assert_eq!((report.fixed.len(), report.other.len()), (1, 1));
     }
 

@@ -71,7 +71,10 @@ pub enum FolderError {
         is_run: bool,
     },
     /// The folder contains another run.
-    #[error("{}: the folder contains a run with other settings, `{there}` instead of `{here}`; name another with --out", path.display())]
+    #[error(
+        "{}: the folder contains a run with other settings, `{there}` instead of `{here}`; name another with --out",
+        path.display()
+    )]
     OtherRun {
         /// The folder.
         path: PathBuf,

@@ -165,7 +165,7 @@ mod tests {
             said("fb.ratio=0.5:1.2:0.1"),
             "`fb.ratio` takes 0.1 … 1, not `1.1`"
         );
-        assert!(said("gama=0.2:1:0.1").contains("`gama` is no degradation"));
+        assert!(said("gama=0.2:1:0.1").contains("`gama` is not a degradation"));
         assert!(said("fb.ratoi=0.2:1:0.1").contains("did you mean `fb.ratio`"));
         assert!(said("invert=0:1:1").contains("true | false"));
     }

@@ -446,7 +446,7 @@ mod tests {
         assert!(message("fb.ransack").contains("ransac"));
         assert!(message("xy.ransac").contains("`xy` is no method"));
         assert!(message("inlers < 10").contains("inliers"));
-        assert!(message("inliers < ten").contains("no number"));
+        assert!(message("inliers < ten").contains("`ten` is not a number"));
         assert!(message("").contains("fb.ransac"));
         assert!(message("fb.fusion").contains("belongs to no method"));
     }

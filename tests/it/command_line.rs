@@ -80,10 +80,10 @@ fn a_scene_is_opened_and_a_mistyped_command_gets_its_suggestion() {
     let sequence = SmallSequence::write();
     for (line, words) in [
         ("evla street", "did you mean `eval`?"),
-        ("nonsense", "no command, file or folder"),
+        ("nonsense", "not a command, file or folder"),
         (
             "sequences/42 --query 5 --limit 3",
-            "--limit is an option of `posescope eval`",
+            "--limit has no effect here; use it with `posescope eval`",
         ),
     ] {
         sequence.run(line).fails_with(2, words);
@@ -116,8 +116,8 @@ fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
     refused(
         sequence.path(),
         "
-        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name one
-        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name one
+        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
+        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
         ",
     );
     sequence

@@ -67,7 +67,7 @@ fn a_table_that_is_none_is_refused_in_one_line() {
     for (text, words) in [
         ("", "none found"),
         ("5 1 2 3\n", "gps.csv:1: a first line with the columns"),
-        ("name x y z\n", "a line per frame"),
+        ("name x y z\n", "one line per frame"),
         (
             "name x y z\n5 1 2\n",
             "gps.csv:2: 4 columns expected, 3 found",
@@ -111,7 +111,5 @@ fn an_evaluation_seeks_references_where_the_file_says_and_goes_on_with_the_same_
     let again = format!("{line} --resume");
     sequence.run(&again).ok();
     table(&sequence, "name x y z\n000005 0 0 6.9\n");
-    sequence
-        .run(&again)
-        .fails(2, "gps.csv ~ asked for otherwise");
+    sequence.run(&again).fails(2, "gps.csv ~ other settings");
 }

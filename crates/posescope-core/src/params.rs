@@ -257,7 +257,7 @@ mod tests {
         );
         assert_eq!(
             message(params.assign("fb.ratoi=0.7")),
-            "there is no parameter `fb.ratoi` (did you mean `fb.ratio`?); `posescope params` lists all"
+            "`fb.ratoi` is not a parameter (did you mean `fb.ratio`?); `posescope params` lists all"
         );
         assert_eq!(
             message(params.assign("fb.accept=never")),

@@ -96,7 +96,7 @@ mod tests {
         };
         assert_eq!(
             lacking(&small).as_deref(),
-            Some("8 buffers in a shader are needed, it has 4")
+            Some("8 buffers in a shader needed, 4 available")
         );
     }
 }

@@ -49,7 +49,7 @@ pub struct DoctorArgs {
     /// The scenes, as for `run`
     #[arg(value_name = "SCENE", required = true)]
     pub scenes: Vec<String>,
-    /// The format of the scenes, where their content does not tell
+    /// The format of the scenes [default: detected]
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
     /// Save a picture of the cloud of a frame on its photo, and of the route
@@ -64,7 +64,7 @@ pub struct DoctorArgs {
 pub struct IndexArgs {
     /// The scene, as for `run`
     pub scene: String,
-    /// The format of the scene, where its content does not tell
+    /// The format of the scene [default: detected]
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
     /// Index only every Nth frame

@@ -265,9 +265,9 @@ mod tests {
         assert!(error("error ~ 1").contains("is for words"));
         assert!(error("(error > 1").contains("`)` expected"));
         assert!(error("error > 1 error < 2").contains("`and` or `or` expected before `error`"));
-        assert!(error("code = 'D1").contains("expected at its end"));
-        assert!(error(&"(".repeat(9999)).contains("in each other"));
-        assert!(error(&"not ".repeat(9999)).contains("in each other"));
+        assert!(error("code = 'D1").contains("a closing ' expected"));
+        assert!(error(&"(".repeat(9999)).contains("nested parts"));
+        assert!(error(&"not ".repeat(9999)).contains("nested parts"));
     }
 
     #[test]

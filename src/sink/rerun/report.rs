@@ -37,12 +37,12 @@ pub(super) fn markdown(
     text += &costs_at_poses(results);
     let degraded = identity.degraded;
     if !degraded.is_none() {
-        text += &format!("The query photo was degraded: `{degraded}`.\n\n");
+        text += &format!("The photo of the query was degraded before: `{degraded}`.\n\n");
     }
     text += &changes(&identity.configuration);
     let Origin(origin) = origin;
     text += &format!(
-        "\nPositions are drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \
+        "\nThe world is drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \
          world coordinates. Axes: x right, y down, z forward.\n",
         origin.x, origin.y, origin.z
     );
@@ -98,7 +98,7 @@ fn errors(results: &[QueryResult]) -> String {
     let mut text = table.to_markdown();
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
-        text += &format!("\nDistance of the first reference from the truth: {error}.\n");
+        text += &format!("\nThe first reference itself, from the truth: {error}.\n");
     }
     text + "\n"
 }
@@ -200,7 +200,7 @@ fn changes(configuration: &str) -> String {
     if changes.is_empty() {
         return "## Parameters\n\nAll at their defaults.\n".to_owned();
     }
-    let mut text = "## Parameters\n\nAll at their defaults, except:\n\n".to_owned();
+    let mut text = "## Parameters\n\nAll at their defaults but these:\n\n".to_owned();
     for change in changes {
         text += &format!("- `{change}`\n");
     }

@@ -409,7 +409,7 @@ mod tests {
         let said = |text: &str| text.parse::<Degradation>().expect_err(text).to_string();
         assert_eq!(
             said("gama=0.4"),
-            "`gama` is no degradation; fog, blur, exposure, gamma, noise, invert expected"
+            "`gama` is not a degradation; fog, blur, exposure, gamma, noise, invert expected"
         );
         assert_eq!(said("gamma=0"), "`gamma` takes 0.05 … 10, not `0`");
         assert_eq!(said("blur=-1"), "`blur` takes 0 … 20 px, not `-1`");

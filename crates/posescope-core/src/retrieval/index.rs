@@ -143,7 +143,7 @@ impl Index {
         {
             Some((key, made)) => Err(IndexError::Stale {
                 path: self.path.clone(),
-                why: format!("it was made with {key} = {made}, not nothing"),
+                why: format!("it was built with {key} = {made}, which is not set now"),
             }),
             None => Ok(()),
         }
