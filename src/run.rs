@@ -22,8 +22,8 @@ pub use estimates_file::EstimatesFile;
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
 pub use inputs::inputs;
 pub use limit::Limit;
-pub use preset::{Preset, default_failure_radius_m, defaults};
-pub use protocol::{Protocol, ProtocolError, known};
+pub use preset::{Preset, default_failure_radius_m};
+pub use protocol::{Protocol, ProtocolError, defaults, known};
 pub use reference::Reference;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{

@@ -34,7 +34,7 @@ pub enum ExportError {
     Folder(#[from] FolderError),
     /// A query has several matching results.
     #[error(
-        "query {query} has several results; choose one with --where, for example 'method = {}'; results differ in \
+        "query {query} has several results; choose one, for example with --where 'method = {}'; results differ in \
          the fields method, fusion, radius, references and scene",
         methods.first().map_or("fb", |method| method.name())
     )]

@@ -5,9 +5,6 @@ use std::str::FromStr;
 
 use serde::Deserialize;
 
-use super::limit::Limit;
-use super::protocol::Protocol;
-use super::reference::Reference;
 use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;
@@ -27,22 +24,22 @@ pub enum Preset {
 /// The defaults of a preset in its file, which options override.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Defaults {
-    methods: Vec<Method>,
-    references: Selection,
-    fusions: Vec<Fusion>,
-    radii_m: Vec<f64>,
+pub(super) struct Defaults {
+    pub methods: Vec<Method>,
+    pub references: Selection,
+    pub fusions: Vec<Fusion>,
+    pub radii_m: Vec<f64>,
     /// The share of the frames that are queries.
-    share: f64,
+    pub share: f64,
     /// The prior \[m\] within which references are chosen; `None`: the uncertainty radius.
-    prior_m: Option<ByDataSet>,
-    failure_radius_m: ByDataSet,
+    pub prior_m: Option<ByDataSet>,
+    pub failure_radius_m: ByDataSet,
 }
 
 /// A number that depends on the paper's data set.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ByDataSet {
+pub(super) struct ByDataSet {
     /// For KITTI, and for any scene of another data set.
     kitti: f64,
     robotcar: f64,
@@ -50,7 +47,7 @@ struct ByDataSet {
 
 impl ByDataSet {
     /// The number for a scene of this name.
-    fn of_scene(self, name: &str) -> f64 {
+    pub fn of_scene(self, name: &str) -> f64 {
         if name.starts_with("robotcar") {
             self.robotcar
         } else {
@@ -84,7 +81,7 @@ impl Preset {
         Self::ALL[self as usize].1
     }
 
-    fn defaults(self) -> Defaults {
+    pub(super) fn defaults(self) -> Defaults {
         let defaults = toml::from_str(Self::ALL[self as usize].2);
         defaults.unwrap_or_else(|error| unreachable!("a test reads the file: {error}"))
     }
@@ -108,28 +105,6 @@ impl FromStr for Preset {
 
 posescope_core::serde_as_text!(Preset);
 
-/// The protocol of a preset, or without one of every frame against one random reference. `scene` is the name of
-/// the references' scene: the paper uses other numbers for RobotCar than for KITTI.
-pub fn defaults(preset: Option<Preset>, scene: &str) -> Protocol {
-    let Some(defaults) = preset.map(Preset::defaults) else {
-        return Protocol {
-            failure_radius_m: Some(default_failure_radius_m(scene)),
-            ..Protocol::default()
-        };
-    };
-    Protocol {
-        preset,
-        methods: defaults.methods,
-        references: vec![Reference::Chosen(defaults.references)],
-        fusions: defaults.fusions,
-        radii_m: defaults.radii_m,
-        limit: Some(Limit::Percent(100.0 * defaults.share)),
-        prior_m: defaults.prior_m.map(|prior| prior.of_scene(scene)),
-        failure_radius_m: Some(defaults.failure_radius_m.of_scene(scene)),
-        ..Protocol::default()
-    }
-}
-
 /// The translation error from which a pose counts as a failure \[m\], by the references' scene.
 pub fn default_failure_radius_m(scene: &str) -> f64 {
     let radius = ByDataSet {
@@ -137,33 +112,4 @@ pub fn default_failure_radius_m(scene: &str) -> f64 {
         robotcar: 20.0,
     };
     radius.of_scene(scene)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn presets_ask_what_the_experiments_of_the_paper_do() {
-        let of = |name: &str, scene: &str| {
-            let preset: Preset = name.parse().expect("a preset");
-            assert_eq!(preset.name(), name);
-            defaults(Some(preset), scene)
-        };
-        let single = of("single", "kitti/00");
-        assert_eq!(single.radii_m, [10.0, 15.0, 20.0, 25.0]);
-        assert_eq!(single.methods, [Method::FB, Method::PM, Method::MI]);
-        assert_eq!(single.limit, Some(Limit::Percent(10.0)));
-        let multi = of("multi", "kitti/00");
-        let five = Reference::Chosen(Selection::Random(5));
-        assert_eq!(multi.references, [five]);
-        assert_eq!(multi.fusions, Fusion::of_the_paper().collect::<Vec<_>>());
-        let large = |scene| {
-            let large = of("large", scene);
-            (large.prior_m, large.failure_radius_m)
-        };
-        assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
-        assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
-        assert!("small".parse::<Preset>().is_err());
-    }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::estimates_file::EstimatesFile;
 use super::limit::Limit;
-use super::preset::Preset;
+use super::preset::{Preset, default_failure_radius_m};
 use super::reference::Reference;
 use crate::diagnosis::Tolerance;
 use crate::estimator;
@@ -417,6 +417,28 @@ impl Protocol {
     }
 }
 
+/// The protocol of a preset, or without one of every frame against one random reference. `scene` is the name of
+/// the references' scene: the paper uses other numbers for RobotCar than for KITTI.
+pub fn defaults(preset: Option<Preset>, scene: &str) -> Protocol {
+    let Some(defaults) = preset.map(Preset::defaults) else {
+        return Protocol {
+            failure_radius_m: Some(default_failure_radius_m(scene)),
+            ..Protocol::default()
+        };
+    };
+    Protocol {
+        preset,
+        methods: defaults.methods,
+        references: vec![Reference::Chosen(defaults.references)],
+        fusions: defaults.fusions,
+        radii_m: defaults.radii_m,
+        limit: Some(Limit::Percent(100.0 * defaults.share)),
+        prior_m: defaults.prior_m.map(|prior| prior.of_scene(scene)),
+        failure_radius_m: Some(defaults.failure_radius_m.of_scene(scene)),
+        ..Protocol::default()
+    }
+}
+
 /// Checks that every method is built in or one of `others`.
 ///
 /// # Errors
@@ -499,5 +521,29 @@ mod tests {
             ..Protocol::default()
         };
         assert_eq!(mixed.checked(), Err(ProtocolError::References));
+    }
+
+    #[test]
+    fn presets_ask_what_the_experiments_of_the_paper_do() {
+        let of = |name: &str, scene: &str| {
+            let preset: Preset = name.parse().expect("a preset");
+            assert_eq!(preset.name(), name);
+            defaults(Some(preset), scene)
+        };
+        let single = of("single", "kitti/00");
+        assert_eq!(single.radii_m, [10.0, 15.0, 20.0, 25.0]);
+        assert_eq!(single.methods, [Method::FB, Method::PM, Method::MI]);
+        assert_eq!(single.limit, Some(Limit::Percent(10.0)));
+        let multi = of("multi", "kitti/00");
+        let five = Reference::Chosen(Selection::Random(5));
+        assert_eq!(multi.references, [five]);
+        assert_eq!(multi.fusions, Fusion::of_the_paper().collect::<Vec<_>>());
+        let large = |scene| {
+            let large = of("large", scene);
+            (large.prior_m, large.failure_radius_m)
+        };
+        assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
+        assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
+        assert!("small".parse::<Preset>().is_err());
     }
 }

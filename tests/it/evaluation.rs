@@ -244,7 +244,7 @@ fn gates_and_regressions_decide_the_exit_code() {
         2 | {EVAL} wrong --gate 'success > 1' | --help
         1 | {EVAL} bad --right 0.000001m,5deg --baseline good | broken since
         1 | compare good bad | queries broke
-        3 | compare good nowhere | no run here
+        3 | compare good nowhere | not a run folder
         "
     );
     refused(sequence.path(), &table);
@@ -289,7 +289,7 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
         "
         2 | results run --as tum | several results ~ --where 'method = fb'
         2 | results run --where 'method = mi' --as colmap | cameras.txt ~ --out
-        2 | results partly --where 'method = mi' --as kitti | kitti ~ frame 0 is none of the queries
+        2 | results partly --where 'method = mi' --as kitti | kitti ~ frame 0 is not a query
         ",
     );
     sequence

@@ -15,7 +15,7 @@ pub enum SceneError {
     },
     /// A folder of no known layout.
     #[error(
-        "{argument}: not recognised as any of the formats {known}; `posescope run --help` describes their files"
+        "{argument}: not recognised as any of the formats {known}; name one with --format, or see `posescope run --help`"
     )]
     NotRecognized {
         /// The scene argument.
