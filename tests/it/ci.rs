@@ -47,7 +47,7 @@ fn a_known_failure_turns_no_job_red_and_one_that_is_fixed_is_said() {
     write(&list, "2 fb R8\n");
     let said = eval(&sequence, &format!("{gated} --out other"));
     assert_eq!(said.code, Some(1));
-    has(&said.out, "2 fb has R2, not R8 as in");
+    has(&said.out, "2 fb fails with R2 instead of R8 in");
 
     write(&list, "2\n");
     let said = eval(&sequence, &format!("{gated} --out bad"));

@@ -95,7 +95,7 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
         "
         2 | {surface} --surface surface.txt | ends in .csv or .png
         2 | {line} --method mi --surface surface.csv | name them with --query and --reference
-        2 | {line} --method fb --surface surface.csv | searches no grid
+        2 | {line} --method fb --surface surface.csv | has no cost on a grid
         "
     );
     refused(sequence.path(), &table);
