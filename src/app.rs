@@ -22,6 +22,7 @@ mod headless;
 mod lecture;
 mod lesson;
 mod navigation;
+mod pictures;
 mod prober;
 mod proofs;
 mod queries;

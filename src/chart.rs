@@ -4,20 +4,20 @@ use maud::{Markup, PreEscaped, html};
 
 use crate::palette::Rgb;
 
-/// Size of what the axes enclose \[px\].
+/// The size of the plot area \[px\].
 const SIZE: (f64, f64) = (500.0, 300.0);
-/// What stands around it: left, above, right, below \[px\].
+/// The margins: left, top, right, bottom \[px\].
 const AROUND: [f64; 4] = [52.0, 24.0, 12.0, 44.0];
-/// Height of a line of the legend, and width of one of its entries \[px\].
+/// The height of a line and the width of an entry of the legend \[px\].
 const LEGEND: (f64, f64) = (18.0, 92.0);
 
-/// Marks between two axes.
+/// A chart with two axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
     pub title: String,
     pub x: Axis,
     pub y: Axis,
-    /// From the lowest to the uppermost.
+    /// From bottom to top.
     pub marks: Vec<Mark>,
     pub legend: Vec<(String, Rgb)>,
 }
@@ -32,21 +32,21 @@ pub(crate) struct Axis {
     length_px: Option<f64>,
 }
 
-/// A shape in the units of the axes.
+/// A coloured shape, in the units of the axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Mark {
     pub shape: Shape,
     pub color: Rgb,
-    /// What a pointer on it reads.
+    /// The tooltip.
     pub title: String,
-    /// The part of the page that it leads to.
+    /// The link target in the page.
     pub link: Option<String>,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
     Line(Vec<(f64, f64)>),
-    /// A dot; hollow where there is nothing to measure.
+    /// A dot, hollow for a result without a measurement.
     Dot {
         at: (f64, f64),
         filled: bool,
@@ -56,7 +56,7 @@ pub(crate) enum Shape {
         from: (f64, f64),
         to: (f64, f64),
     },
-    /// Words, moved by so many pixels.
+    /// Text, moved by `by` pixels.
     Words {
         at: (f64, f64),
         by: (f64, f64),
@@ -74,13 +74,13 @@ impl Mark {
         }
     }
 
-    /// Words in the middle of a place.
+    /// Text centred at a position.
     pub(crate) fn words(text: impl Into<String>, at: (f64, f64), by: (f64, f64)) -> Self {
         let text = text.into();
         Self::new(Shape::Words { at, by, text }, [0; 3])
     }
 
-    /// With what a pointer on it reads.
+    /// Sets the tooltip.
     pub(crate) fn titled(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
@@ -88,7 +88,7 @@ impl Mark {
 }
 
 impl Axis {
-    /// Numbers from one to another, with ticks at round ones.
+    /// A linear axis with ticks at round numbers.
     pub(crate) fn linear(label: impl Into<String>, from: f64, to: f64) -> Self {
         let to = if to > from { to } else { from + 1e-3 };
         let step = round_up((to - from) / 6.0);
@@ -109,12 +109,12 @@ impl Axis {
         }
     }
 
-    /// A share of the queries.
+    /// An axis from 0 to 100 %.
     pub(crate) fn percent(label: impl Into<String>) -> Self {
         Self::linear(label, 0.0, 100.0)
     }
 
-    /// Positive numbers by their logarithm, with ticks at powers of ten.
+    /// A logarithmic axis with ticks at powers of ten.
     pub(crate) fn log(label: impl Into<String>, from: f64, to: f64) -> Self {
         let powers = from.log10().ceil() as i32..=to.log10().floor() as i32;
         let ticks = powers.map(|power| 10_f64.powi(power));
@@ -125,7 +125,7 @@ impl Axis {
         }
     }
 
-    /// A place of width 1 for each name.
+    /// An axis with a slot of width 1 per name.
     pub(crate) fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
         let names = names.into_iter().enumerate();
         let ticks: Vec<_> = names.map(|(at, name)| (at as f64 + 0.5, name)).collect();
@@ -141,7 +141,7 @@ impl Axis {
         self
     }
 
-    /// The place of a number, from 0 to 1.
+    /// The position of a number on the axis, from 0 to 1.
     fn share(&self, value: f64) -> f64 {
         let scale = |value: f64| if self.is_log { value.log10() } else { value };
         let (from, to) = (scale(self.ends.0), scale(self.ends.1));
@@ -150,7 +150,7 @@ impl Axis {
 }
 
 impl Chart {
-    /// The chart as a part of a page.
+    /// The chart as part of a page.
     pub(crate) fn markup(&self) -> Markup {
         self.svg(false, 0.0)
     }
@@ -173,7 +173,7 @@ impl Chart {
         )
     }
 
-    /// With its title where it stands alone, this far down.
+    /// The SVG element; with title and offset if it stands alone.
     fn svg(&self, is_alone: bool, down: f64) -> Markup {
         let ((width, height), (inner, tall)) = (self.size(), self.inside());
         let (left, top) = (AROUND[0], AROUND[1]);
@@ -241,7 +241,7 @@ fn drawn(mark: &Mark, x: &dyn Fn(f64) -> String, y: &dyn Fn(f64) -> String) -> M
     }
 }
 
-/// Charts below each other as a file of their own.
+/// An SVG file with the charts below each other.
 pub(crate) fn file(charts: &[Chart]) -> String {
     let width = charts
         .iter()
@@ -266,7 +266,7 @@ pub(crate) fn file(charts: &[Chart]) -> String {
         + "\n"
 }
 
-/// A colour as markup says it.
+/// A colour in HTML notation.
 pub(crate) fn hex([r, g, b]: Rgb) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }

@@ -44,7 +44,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser as _};
 use args::{Arguments, Command};
 use failure::CliError;
 
-/// Parses the arguments, runs the command, says what went wrong in one line.
+/// Parses the arguments, runs the command and prints an error in one line.
 pub fn main() -> ExitCode {
     let matches = args::definition().get_matches();
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
@@ -94,7 +94,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
     }
 }
 
-/// `posescope SCENE` is `posescope view SCENE`. A word that is no scene may be a command with a typing error.
+/// `posescope SCENE` means `posescope view SCENE`. A word that is not a scene may be a misspelt command.
 fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
     let name = words.first().map(|word| word.to_string_lossy());
     let name = name.unwrap_or_default();
@@ -106,7 +106,7 @@ fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
     Ok(Arguments::parse_from(line.iter().chain(words)))
 }
 
-/// The error for a word that is neither a command nor a scene.
+/// The error message for a word that is neither a command nor a scene.
 fn no_command(name: &str) -> String {
     let command = Arguments::command();
     let commands = command
@@ -114,15 +114,15 @@ fn no_command(name: &str) -> String {
         .filter(|command| !command.is_hide_set());
     let names: Vec<&str> = commands.map(clap::Command::get_name).collect();
     match posescope::text::similar(name, names.iter().copied()) {
-        Some(known) => format!("`{name}` is no command; did you mean `{known}`?"),
+        Some(known) => format!("`{name}` is not a command; did you mean `{known}`?"),
         None => format!(
-            "`{name}` is no command, file or folder; the commands are {}",
+            "`{name}` is not a command, file or folder; the commands are {}",
             names.join(", ")
         ),
     }
 }
 
-/// Restricts parallel work to a number of threads.
+/// Limits parallel work to a number of threads.
 fn use_threads(threads: Option<NonZeroUsize>) -> Result<(), CliError> {
     let Some(threads) = threads else {
         return Ok(());

@@ -1,8 +1,8 @@
-//! Checking a scene: what is there and what is missing, whether its numbers can be what they say they are,
-//! and which of the usual mistakes would explain what does not fit.
+//! Checks a scene: what it contains and lacks, whether its numbers are plausible, and which of the usual
+//! mistakes would explain a misfit.
 //!
-//! A mistake is tried by reading the scene otherwise. It is named where points then fall on the photos
-//! better than in what the scene says, by more than their differences from frame to frame can explain.
+//! A mistake is tested by reading the scene as if the mistake had been made. It is reported if cloud and photos
+//! then fit better than as stated, by more than the variation between frames can explain.
 
 mod agreement;
 mod inventory;
@@ -21,34 +21,34 @@ pub use trial::{Agreement, Finding};
 
 use trial::Sample;
 
-/// What was found.
+/// The findings on a scene.
 pub struct Examination {
-    /// What is there.
+    /// The contents of the scene.
     pub inventory: Inventory,
-    /// What is hardly right in it.
+    /// Implausible things in it.
     pub remarks: Vec<Remark>,
-    /// How well the scene fits its own photos; `None` where nothing can be compared.
+    /// How well the scene fits its own photos; `None` if nothing can be compared.
     pub agreement: Option<Agreement>,
-    /// The mistake that explains what does not fit.
+    /// The mistake that explains the misfit.
     pub finding: Option<Finding>,
-    /// Frames that were compared.
+    /// The compared frames.
     pub compared: Vec<usize>,
-    /// The cloud of the first of them on its photo, and below it the way of the camera.
+    /// The cloud of the first compared frame on its photo, with the route of the camera below.
     pub picture: Option<RgbImage>,
 }
 
 impl Examination {
-    /// Whether the scene cannot work.
+    /// Whether the scene is unusable or contains a mistake.
     pub fn is_broken(&self) -> bool {
         let mut remarks = self.remarks.iter();
         self.finding.is_some() || remarks.any(|remark| matches!(remark, Remark::Broken(_)))
     }
 }
 
-/// Examines a scene. What is wrong with single files is a remark.
+/// Examines a scene. Errors of single files become remarks.
 ///
 /// # Errors
-/// Frames that are compared and cannot be read.
+/// A compared frame that cannot be read.
 pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
     let (inventory, remarks) = inventory::take(scene);
     let poses: Vec<Pose> = (0..scene.frames().len())
@@ -64,7 +64,7 @@ pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
     };
     let is_readable = |remark: &Remark| !matches!(remark, Remark::Broken(_));
     let has_clouds = !examination.inventory.clouds.is_empty();
-    // A cloud that is out of view may be in the wrong axes: that is looked at all the same.
+    // A cloud that is out of view may have the wrong axes, so it is still examined.
     if !has_clouds && !examination.remarks.iter().all(is_readable) {
         return Ok(examination);
     }

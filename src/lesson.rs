@@ -1,8 +1,8 @@
-//! Lessons: guided runs with words, questions and claims.
+//! Lessons: guided runs with text, questions and claims.
 //!
-//! A lesson is one Markdown file. Its header, TOML between lines of `+++`, says what is localised; each
-//! heading of the second level begins a page, whose own header, a code block called `page`, says which
-//! moment of the run it is about and what is asked there. `docs/lessons.md` has every field.
+//! A lesson is one Markdown file. Its header, TOML between lines of `+++`, defines the run. Each heading of the
+//! second level begins a page. The page's own header, a code block called `page`, defines the moment of the run and
+//! the question. `docs/lessons.md` lists all fields.
 
 mod file;
 mod moment;
@@ -23,42 +23,42 @@ pub use turner::PageTurner;
 
 use crate::measure::Condition;
 
-/// The lessons that posescope comes with, each `NUMBER-NAME.md`.
+/// The built-in lessons, each `NUMBER-NAME.md`.
 static LESSONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/assets/lessons");
 
-/// A guided run, or several.
+/// A lesson: guided runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lesson {
     /// The name on the command line.
     pub name: String,
     /// The title.
     pub title: String,
-    /// What it is about, in one line.
+    /// A summary in one line.
     pub about: String,
-    /// How long it takes \[min\].
+    /// Its duration \[min\].
     pub minutes: u32,
-    /// What is localised, by the names that pages call it by; the first is that of the first page.
+    /// The named settings that pages localise; the first is that of the first page.
     pub variants: Vec<(String, Setting)>,
-    /// What must be true of the results for the words to be.
+    /// Conditions on the results under which the text is true.
     pub claims: Vec<Claim>,
     /// The pages, at least one.
     pub pages: Vec<Page>,
 }
 
-/// Something that the words of a lesson rest on.
+/// A condition on the results under which the text of a lesson is true.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Claim {
-    /// The name of the setting that it is about.
+    /// The name of its setting.
     pub variant: String,
-    /// What some result of it meets.
+    /// A condition that at least one result of the setting meets.
     pub holds: Condition,
 }
 
 impl Lesson {
-    /// Every lesson that posescope comes with, in their order.
+    /// All built-in lessons in order.
     ///
     /// # Errors
-    /// One whose file is no lesson; a test reads them all.
+    /// A malformed file; a test reads them all.
     pub fn all() -> Result<Vec<Self>, LessonError> {
         let mut files: Vec<_> = LESSONS.files().collect();
         files.sort_by_key(|file| file.path());
@@ -72,7 +72,7 @@ impl Lesson {
     /// A lesson by its name, or from a file.
     ///
     /// # Errors
-    /// There is no such lesson, or the file is none.
+    /// There is no such lesson, or the file is malformed.
     pub fn open(name: &str) -> Result<Self, LessonError> {
         let path = Path::new(name);
         if path.is_file() {
@@ -92,8 +92,7 @@ impl Lesson {
         all.find(|lesson| lesson.name == name).ok_or(unknown)
     }
 
-    /// The pages by what they localise, in their order: the name of the setting, and the pages that
-    /// follow each other there.
+    /// Consecutive pages with the same setting, in order: the name of the setting, and the pages.
     pub fn groups(&self) -> Vec<(&str, Range<usize>)> {
         let mut groups: Vec<(&str, Range<usize>)> = Vec::new();
         for (index, page) in self.pages.iter().enumerate() {
@@ -105,7 +104,7 @@ impl Lesson {
         groups
     }
 
-    /// What a page's run localises.
+    /// The setting of this name; the first one if there is none.
     pub fn setting(&self, variant: &str) -> &Setting {
         let found = self.variants.iter().find(|(name, _)| name == variant);
         found.map_or(&self.variants[0].1, |(_, setting)| setting)

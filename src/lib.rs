@@ -1,7 +1,7 @@
 //! See why a camera pose estimate fails.
 //!
 //! One query photo and a reference tuple (a photo with known pose and the LiDAR cloud registered
-//! with it) go in; the query's pose comes out, and on the way the estimator tells every decision as
+//! with it) go in; the query's pose comes out. On the way, the estimator emits every decision as
 //! a stream of typed events.
 //!
 //! ```text
@@ -9,7 +9,7 @@
 //!                       │ events
 //!                       ├→ nothing              headless
 //!                       ├→ a Rerun recording
-//!                       └→ whoever implements trace::Sink
+//!                       └→ your implementation of trace::Sink
 //! ```
 
 // The README's code is a doctest.

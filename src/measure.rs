@@ -1,4 +1,4 @@
-//! Measures of many results: tables, plots, gates, comparisons, exports.
+//! Evaluates the results of many queries: tables, plots, gates, comparisons, exports.
 
 mod chance;
 mod diff;
@@ -31,7 +31,7 @@ pub use diff::{Change, Difference, RunComparison};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
 pub use gate::{Gate, GateResult};
-pub use known::{KnownError, KnownFailures, KnownReport};
+pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
 pub use migration::{Migration, migrations, verdict_name};
 pub use overview::{Bar, Overview};

@@ -1,4 +1,4 @@
-//! Decisions in words, for logs.
+//! Sentences for decisions, for logs.
 
 use crate::event::{
     CandidatesJudged, Event, MinimumAssessed, Moment, ReferencesFused, ReferencesRanked, Side,

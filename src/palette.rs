@@ -1,5 +1,6 @@
-//! The colours of the window, of recordings, plots and reports: each means one thing everywhere. They stay apart
-//! for colour-blind eyes (after Okabe and Ito), and a name, label or shape always says the same.
+//! The colours of the window, recordings, plots and reports. Each has one meaning everywhere. They are
+//! distinguishable for colour-blind readers (after Okabe and Ito), and a name, label or shape always carries the
+//! same information.
 
 use crate::diagnosis::Grade;
 use crate::estimator;
@@ -11,22 +12,20 @@ pub type Rgb = [u8; 3];
 
 /// A reference.
 pub const REFERENCE: Rgb = [0x00, 0x72, 0xB2];
-/// A reference on a map of costs, whose dark end hides blue.
-pub const REFERENCE_ON_COSTS: Rgb = [0xFF; 3];
-/// An estimate, and what is wrong.
+/// An estimate, and wrong results.
 pub const ESTIMATE: Rgb = [0xE4, 0x57, 0x2E];
-/// The truth, and what is right.
+/// The truth, and right results.
 pub const TRUTH: Rgb = [0x1F, 0xB5, 0x8A];
-/// A result without a pose, and one that is not measured.
+/// A result without a pose or without a measured error.
 pub const NO_POSE: Rgb = [0x80; 3];
-/// What is not decided yet.
+/// Undecided matches and references.
 pub const UNDECIDED: Rgb = [0xCC, 0x79, 0xA7];
 /// What is selected or can be clicked, and nothing else.
 pub const ACCENT: Rgb = [0x8F, 0x8C, 0xF0];
-/// Where a picture shows nothing.
+/// Empty parts of a picture.
 pub const NOTHING: Rgb = [0x18, 0x18, 0x18];
 
-/// A position whose view covers too little to be compared.
+/// A position whose view covers too little to be eligible.
 pub const INELIGIBLE: Rgb = [70; 3];
 
 /// The colour of a state, by its position in [`FeatureState::NAMES`].
@@ -38,7 +37,7 @@ pub const STATES: [Rgb; FeatureState::NAMES.len()] = [
     TRUTH,
 ];
 
-/// The colours of methods, in the order of the registry; those after the paper's take turns.
+/// The colours of methods, in the order of the registry; those after the paper's repeat.
 const METHODS: [Rgb; 6] = [
     [0x56, 0xB4, 0xE9],
     [0xE6, 0x9F, 0x00],
@@ -48,7 +47,7 @@ const METHODS: [Rgb; 6] = [
     [0x8D, 0xD3, 0xC7],
 ];
 
-/// The colours of verdicts in bars. Pale enough for black letters; neighbours differ in lightness.
+/// The colours of verdicts in bars, pale enough for black text; neighbours differ in lightness.
 const VERDICTS: [Rgb; 6] = [
     [0x8C, 0xC5, 0xE3],
     [0xF0, 0xC5, 0x71],
@@ -58,7 +57,7 @@ const VERDICTS: [Rgb; 6] = [
     [0xB0, 0x9C, 0xD8],
 ];
 
-/// The colour of a method. Other systems come after all of ours.
+/// The colour of a method. Other systems come after all built-in methods.
 pub fn method(method: Method) -> Rgb {
     let place = estimator::methods().position(|known| known == method);
     let place = place.unwrap_or_else(|| estimator::all().len());
@@ -83,31 +82,30 @@ pub fn verdict(number: usize) -> Rgb {
     VERDICTS[number % VERDICTS.len()]
 }
 
-/// A shade that can be read as text on a light ground.
+/// A shade that is readable as text on a light background.
 pub fn dark(color: Rgb) -> Rgb {
     mix(color, [0; 3], 0.4)
 }
 
-/// A tint that can be read as text on a dark ground.
+/// A tint that is readable as text on a dark background.
 pub fn light(color: Rgb) -> Rgb {
     mix(color, [255; 3], 0.5)
 }
 
-/// Viridis, for costs and shares: from dark blue (0) over green to yellow (1).
+/// Viridis, for costs and shares: dark blue (0), green, yellow (1).
 pub fn viridis(value: f64) -> Rgb {
     on(colorous::VIRIDIS, value)
 }
 
-/// Turbo, for depths and heights: from dark blue (0) over green to dark red (1).
+/// Turbo, for depths and heights: dark blue (0), green, dark red (1).
 pub fn turbo(value: f64) -> Rgb {
     on(colorous::TURBO, value)
 }
 
-/// The nearest and the farthest depth that have colours of their own \[m\].
+/// The range of depths with distinct colours \[m\].
 const DEPTH_RANGE_M: (f64, f64) = (2.0, 80.0);
 
-/// The place of a depth \[m\] among the colours of depths, 0 … 1: by its logarithm, because a metre
-/// means less far away.
+/// The position of a depth \[m\] on the colour scale, 0 … 1, by logarithm.
 pub fn depth_share(depth_m: f64) -> f64 {
     let (near, far) = DEPTH_RANGE_M;
     (depth_m.clamp(near, far) / near).ln() / (far / near).ln()
@@ -121,13 +119,13 @@ pub fn depth(depth_m: f64) -> Rgb {
 /// The ends of [`diverging`].
 const DIVERGING: [Rgb; 2] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00]];
 
-/// From blue (−1) over white (0) to vermilion (1).
+/// Blue (−1), white (0), vermilion (1).
 pub fn diverging(value: f64) -> Rgb {
     let end = DIVERGING[usize::from(value >= 0.0)];
     mix([255; 3], end, value.abs().min(1.0))
 }
 
-/// The colour at a place 0 … 1 of a gradient; black for NaN.
+/// The colour at a position 0 … 1 of a gradient; black for NaN.
 fn on(gradient: colorous::Gradient, value: f64) -> Rgb {
     if value.is_nan() {
         return [0; 3];

@@ -1,31 +1,26 @@
-//! What recordings and the window show of photos, synthetic views and histograms, as pictures.
+//! Pictures of photos, synthetic views and histograms, for recordings, reports and the window.
 
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 
 use crate::cost::Explanation;
 use crate::cost::IntensityPair;
 use crate::cost::JointHistogram;
-#[cfg(feature = "app")]
-use crate::cost::PhotometricWeights;
 use crate::grid::ScoredLattice;
 use crate::image::Photo;
 use crate::palette;
 use crate::render::Comparison;
 use crate::render::{SplattedPixel, SyntheticView};
 
-/// Differences from −64 to 64 grey values have colours of their own; greater ones look like these.
+/// The range of differences with distinct colours \[grey values\].
 pub(crate) const RESIDUAL_RANGE: f64 = 64.0;
 
-/// Contributions to mutual information from −2 to 2 nat have colours of their own.
-#[cfg(feature = "app")]
-const CONTRIBUTION_RANGE: f64 = 2.0;
-/// Side of the tiles that speak for one of two poses \[px\]: single pixels of two views hardly ever meet.
+/// The side of the tiles of [`preference`] \[px\]; two views rarely cover the same single pixels.
 const TILE: u32 = 24;
 
-/// The grey of a pixel that the photometric cost ignored, and of one that it counted.
+/// The grey values of pixels that the photometric cost ignored and counted.
 pub(crate) const WEIGHT_GRAYS: [u8; 2] = [90, 255];
 
-/// A photo, in colour where it has any.
+/// A photo, in colour if it has any.
 pub(crate) fn photo(photo: &Photo) -> DynamicImage {
     match &photo.color {
         Some(color) => DynamicImage::ImageRgb8(color.clone()),
@@ -33,12 +28,12 @@ pub(crate) fn photo(photo: &Photo) -> DynamicImage {
     }
 }
 
-/// Both photos on one canvas, the query above the reference, with the row at which the reference
-/// begins. In colour where one of them is.
+/// Both photos on one canvas, the query above the reference, and the first row of the reference. In colour if one
+/// of them is.
 ///
-/// Above each other, because photos of cars are wide: beside each other they would be 2482 pixels
-/// wide for KITTI, and half as large in the same view. A camera that moves ahead also shifts
-/// features more sideways than up, so that true matches are nearly upright lines.
+/// They are stacked because car photos are wide: side by side they would be 2482 pixels wide for KITTI, and half
+/// as large in the same view. A camera that moves forward also shifts features more sideways than vertically, so
+/// true matches are nearly vertical lines.
 pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (DynamicImage, u32) {
     let top = query.gray.height() + 4;
     let canvas = match (&query.color, &reference.color) {
@@ -90,69 +85,8 @@ pub(crate) fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
     })
 }
 
-/// How far grey values differ: at most one pixel in fifty differs more. A power of two, so that views that
-/// are alike have the same.
-#[cfg(feature = "app")]
-pub(crate) fn residual_range(pairs: &[IntensityPair]) -> f64 {
-    const BEYOND: f64 = 0.02;
-    let differences = pairs.iter().map(|pair| (pair.query - pair.synthetic).abs());
-    let mut differences: Vec<f32> = differences.collect();
-    let within = (differences.len() as f64 * (1.0 - BEYOND)) as usize;
-    let Some(within) = within.checked_sub(1) else {
-        return RESIDUAL_RANGE;
-    };
-    let (_, most, _) = differences.select_nth_unstable_by(within, f32::total_cmp);
-    let most = f64::from(*most);
-    let ranges = [16.0, 32.0, 64.0, 128.0];
-    ranges
-        .into_iter()
-        .find(|range| *range >= most)
-        .unwrap_or(256.0)
-}
-
-/// Query minus synthetic view in colours that end at a difference of this many grey values: blue where the query
-/// is darker, orange where it is brighter.
-#[cfg(feature = "app")]
-pub(crate) fn residual_within(
-    view: &SyntheticView,
-    pairs: &[IntensityPair],
-    range: f64,
-) -> RgbImage {
-    let values = pairs
-        .iter()
-        .map(|pair| palette::diverging(f64::from(pair.query - pair.synthetic) / range));
-    in_color(view, Painter::new(view).paint(palette::NOTHING, values))
-}
-
-/// Which pixels the photometric cost counted: white; those it ignored: grey.
-#[cfg(feature = "app")]
-pub(crate) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
-    let values = weights
-        .counted
-        .iter()
-        .map(|&counted| WEIGHT_GRAYS[usize::from(counted)]);
-    in_gray(view, Painter::new(view).paint(0, values))
-}
-
-/// What each pixel says about mutual information, in −2 … 2 nat: orange where the pair of grey values
-/// is more frequent than chance would have it, blue where it is rarer.
-#[cfg(feature = "app")]
-pub(crate) fn contributions(
-    view: &SyntheticView,
-    pairs: &[IntensityPair],
-    histogram: &JointHistogram,
-) -> RgbImage {
-    let pointwise = histogram.pointwise();
-    let values = pairs
-        .iter()
-        .map(|pair| pointwise[histogram.cell(pair)] / CONTRIBUTION_RANGE)
-        .map(palette::diverging);
-    in_color(view, Painter::new(view).paint(palette::NOTHING, values))
-}
-
-/// Which parts of the query speak for one of two poses, tile by tile: orange for the first, blue for the
-/// second, the stronger the more of the difference of the costs comes from there. `None` where one of the
-/// poses has no cost.
+/// Which of two poses each part of the query prefers, tile by tile: orange for the first, blue for the second. The
+/// opacity shows the contribution to the difference of the costs. `None` if one of the poses has no cost.
 pub(crate) fn preference(
     query: &GrayImage,
     first: &Comparison,
@@ -174,13 +108,13 @@ pub(crate) fn preference(
             covered[tile] = true;
         }
     }
-    // A tile that only one of them covers says nothing of how well either fits.
+    // A tile that only one view covers is no comparison.
     for (tile, balance) in balance.iter_mut().enumerate() {
         if !(covered[0][tile] && covered[1][tile]) {
             *balance = 0.0;
         }
     }
-    // The colour of the strongest tile is full; a few of those that cover most would leave the others pale.
+    // The strongest tile has the full colour; the square root keeps weaker ones visible.
     let most = balance
         .iter()
         .fold(0.0_f64, |most, tile| most.max(tile.abs()));
@@ -188,7 +122,7 @@ pub(crate) fn preference(
         let share = balance[tile(y * width + x)] / most.max(f64::MIN_POSITIVE);
         let color = palette::diverging(share.signum() * share.abs().sqrt());
         let ground = query.get_pixel(x, y).0[0];
-        // Where nothing speaks for either, the query is seen as it is.
+        // Neutral tiles show the query unchanged.
         let opacity = 0.75 * share.abs().sqrt();
         Rgb(color.map(|value| {
             let mixed = f64::from(value) * opacity + f64::from(ground) * (1.0 - opacity);
@@ -197,8 +131,8 @@ pub(crate) fn preference(
     }))
 }
 
-/// What each covered pixel contributes to the fit; over all pixels it adds up to what the cost is made of:
-/// mutual information \[nat\], or less the mean squared difference \[grey values²\].
+/// The contribution of each covered pixel to the fit. The sum is mutual information \[nat\], or the negative mean
+/// squared difference \[grey values²\].
 fn evidence(comparison: &Comparison) -> Option<Vec<f64>> {
     let pairs = &comparison.pairs;
     Some(match comparison.explanation.as_ref()? {
@@ -220,36 +154,8 @@ fn evidence(comparison: &Comparison) -> Option<Vec<f64>> {
     })
 }
 
-/// The covered pixels in the colours of their depths over the darkened query. Their uncovered
-/// neighbours take a shade of it, so that the few are seen in a small picture.
-#[cfg(feature = "app")]
-pub(crate) fn coverage(query: &GrayImage, view: &SyntheticView) -> RgbImage {
-    let color = |pixel: &SplattedPixel| palette::depth(f64::from(pixel.depth));
-    let place = |pixel: &SplattedPixel| (pixel.index % view.width, pixel.index / view.width);
-    let ground = |x: u32, y: u32| query.get_pixel(x, y).0[0] / 3;
-    let (width, height) = query.dimensions();
-    let mut picture = RgbImage::from_fn(width, height, |x, y| Rgb([ground(x, y); 3]));
-    for pixel in &view.pixels {
-        let (x, y) = place(pixel);
-        for row in y.saturating_sub(1)..(y + 2).min(height) {
-            for column in x.saturating_sub(1)..(x + 2).min(width) {
-                let below = ground(column, row);
-                let shade = color(pixel).map(|value| value / 2 + below / 2);
-                picture.put_pixel(column, row, Rgb(shade));
-            }
-        }
-    }
-    for pixel in &view.pixels {
-        let (x, y) = place(pixel);
-        if let Some(here) = picture.get_pixel_mut_checked(x, y) {
-            *here = Rgb(color(pixel));
-        }
-    }
-    picture
-}
-
-/// The cost of each position around the reference, its front up: yellow the least, dark blue the greatest.
-/// Positions whose views cover too little to be compared are grey, those without a score black.
+/// The cost of each position around the reference, forward up: yellow is lowest, dark blue highest. Positions that
+/// cover too little to be eligible are grey, those without a score black.
 pub fn surface(surface: &ScoredLattice) -> RgbImage {
     let lattice = &surface.lattice;
     let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
@@ -270,10 +176,10 @@ pub fn surface(surface: &ScoredLattice) -> RgbImage {
     })
 }
 
-/// How often grey values meet: the synthetic view's to the right, the query's upwards.
+/// The joint histogram of grey values: synthetic view to the right, query upwards.
 ///
-/// The colour is ln(1 + count) against that of all pairs in one cell, the same range for every view;
-/// with the counts themselves a few cells would be all that can be seen.
+/// The colour is ln(1 + count), relative to all pairs in one cell. The range is the same for every view; with
+/// linear counts only a few cells would be visible.
 pub(crate) fn joint_histogram(histogram: &JointHistogram) -> RgbImage {
     let side = histogram.bins as u32;
     let all: f64 = histogram.counts.iter().copied().map(f64::from).sum();
@@ -286,18 +192,17 @@ pub(crate) fn joint_histogram(histogram: &JointHistogram) -> RgbImage {
 
 /// Paints pictures of a view's covered pixels.
 ///
-/// A view covers a few per cent of the image, and would all but vanish in a small panel. So every
-/// covered pixel also lends its value to uncovered neighbours, the nearest surface in front; the
-/// covered pixels themselves stay exact.
+/// A view covers only a few per cent of the image, which is hardly visible in a small panel. Every covered pixel
+/// therefore also colours its uncovered neighbours, nearest surface first; covered pixels stay exact.
 pub(crate) struct Painter<'a> {
     pub(crate) view: &'a SyntheticView,
-    /// Places of the covered pixels in the view's list, the nearest last.
+    /// The positions of the covered pixels in the view's list, the nearest last.
     order: Vec<usize>,
 }
 
 impl<'a> Painter<'a> {
     pub(crate) fn new(view: &'a SyntheticView) -> Self {
-        // Positive numbers are ordered like their bits.
+        // Positive floats sort like their bits.
         let farthest_first =
             |(place, pixel): (usize, &SplattedPixel)| (!pixel.depth.to_bits(), place as u32);
         let mut order: Vec<(u32, u32)> =
@@ -307,7 +212,7 @@ impl<'a> Painter<'a> {
         Self { view, order }
     }
 
-    /// A picture of values, one for each covered pixel, row by row.
+    /// A picture of values, one per covered pixel, row by row.
     pub(crate) fn paint<V: Copy>(&self, background: V, values: impl Iterator<Item = V>) -> Vec<V> {
         let SyntheticView {
             width,
@@ -341,14 +246,8 @@ impl<'a> Painter<'a> {
     }
 }
 
-fn in_gray(view: &SyntheticView, values: Vec<u8>) -> GrayImage {
+pub(crate) fn in_gray(view: &SyntheticView, values: Vec<u8>) -> GrayImage {
     GrayImage::from_raw(view.width, view.height, values).expect("a value for each pixel")
-}
-
-#[cfg(feature = "app")]
-fn in_color(view: &SyntheticView, colors: Vec<palette::Rgb>) -> RgbImage {
-    let values = colors.into_flattened();
-    RgbImage::from_raw(view.width, view.height, values).expect("a colour for each pixel")
 }
 
 fn gray(value: f32) -> u8 {
@@ -373,71 +272,6 @@ mod tests {
         };
         let values = view.pixels.iter().map(|pixel| gray(pixel.intensity));
         assert_eq!(Painter::new(&view).paint(0, values), [50, 50, 50, 70, 70]);
-    }
-
-    #[cfg(feature = "app")]
-    #[test]
-    fn residuals_have_colours_up_to_the_range_that_they_have() {
-        let pairs = |most: f32| -> Vec<IntensityPair> {
-            (0..=100)
-                .map(|at| IntensityPair {
-                    query: most * at as f32 / 100.0,
-                    synthetic: 0.0,
-                })
-                .collect()
-        };
-        let ranges = [10.0, 30.0, 100.0, 250.0].map(|most| residual_range(&pairs(most)));
-        assert_eq!(ranges, [16.0, 32.0, 128.0, 256.0]);
-        // One odd pixel of a hundred changes nothing.
-        let mut odd = pairs(30.0);
-        odd[7].query = 255.0;
-        assert_eq!(residual_range(&odd), 32.0);
-        assert_eq!(residual_range(&[]), RESIDUAL_RANGE);
-    }
-
-    #[cfg(feature = "app")]
-    fn view(width: u32, height: u32, indices: &[u32]) -> SyntheticView {
-        let pixels = indices.iter().map(|&index| SplattedPixel {
-            index,
-            depth: 10.0,
-            intensity: 50.0,
-        });
-        SyntheticView {
-            width,
-            height,
-            pixels: pixels.collect(),
-        }
-    }
-
-    #[cfg(feature = "app")]
-    #[test]
-    fn coverage_marks_the_covered_pixels_and_shades_their_neighbours() {
-        let query = GrayImage::from_pixel(6, 2, Luma([90]));
-        let picture = coverage(&query, &view(6, 2, &[6, 7]));
-        let color = palette::depth(10.0);
-        let is = |wanted: [u8; 3]| picture.pixels().filter(|p| p.0 == wanted).count();
-        assert_eq!(picture.get_pixel(0, 1).0, color);
-        assert_eq!(picture.get_pixel(1, 1).0, color);
-        let shade = color.map(|value| value / 2 + 15);
-        assert_eq!([is(color), is(shade), is([30; 3])], [2, 4, 6]);
-        // A view of another size than the query marks what both have.
-        assert_eq!(coverage(&query, &view(100, 1, &[99])).dimensions(), (6, 2));
-    }
-
-    #[cfg(feature = "app")]
-    #[test]
-    fn a_frequent_pair_of_grey_values_contributes_and_a_rare_one_takes_away() {
-        let pair = |query, synthetic| IntensityPair { query, synthetic };
-        // Bright meets bright and dark meets dark, but for one pixel.
-        let mut pairs = vec![pair(250.0, 250.0); 40];
-        pairs.extend(vec![pair(5.0, 5.0); 40]);
-        pairs.push(pair(5.0, 250.0));
-        let histogram = JointHistogram::of(&pairs, 16);
-        let indices: Vec<u32> = (0..81).map(|i| 3 * i + 1).collect();
-        let picture = contributions(&view(243, 1, &indices), &pairs, &histogram);
-        let [first, last] = [1, 241].map(|x| picture.get_pixel(x, 0).0);
-        assert!(first[0] > first[2], "more than chance: {first:?}");
-        assert!(last[2] > last[0], "less than chance: {last:?}");
     }
 
     #[test]

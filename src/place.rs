@@ -1,8 +1,8 @@
-//! Where a camera is, in words that views, log and recordings share: without signs, with the sides named.
+//! The place of a camera as text, for views, logs and recordings: sides are named instead of signs.
 
 use crate::geometry::Pose;
 
-/// A camera's place in the reference camera's frame, in words.
+/// The place of a camera in the reference camera's frame.
 pub(crate) fn place(reference_from_camera: &Pose) -> String {
     let along = |value: f64, positive: &str, negative: &str| {
         let word = if value <= -0.005 { negative } else { positive };
@@ -15,7 +15,7 @@ pub(crate) fn place(reference_from_camera: &Pose) -> String {
         along(shift.x, "right", "left"),
         along(shift.z, "ahead", "behind"),
     ];
-    // The search leaves the height alone; a camera in hand may have another.
+    // The search keeps the height fixed; a hand-held camera may have another.
     if shift.y.abs() >= 0.005 {
         words.push(along(-shift.y, "up", "down"));
     }

@@ -1,4 +1,4 @@
-//! How a number or a word is compared with another: the signs of gates, conditions and breakpoints.
+//! Comparisons of numbers and text in gates, conditions and breakpoints.
 
 use std::fmt;
 use std::str::FromStr;
@@ -20,11 +20,11 @@ pub enum Relation {
     Above,
     /// `>=`.
     AtLeast,
-    /// `~`: the left word contains the right one. No number contains another.
+    /// `~`: the left text contains the right one. Never true for numbers.
     Contains,
 }
 
-/// Longer signs first: a sign must not be taken for the start of another.
+/// Longer signs first: `<=` must not be parsed as `<`.
 const SIGNS: [(&str, Relation); 8] = [
     ("!=", Relation::IsNot),
     ("<=", Relation::AtMost),
@@ -55,12 +55,12 @@ impl Relation {
         Some((text[..at].trim(), relation, right.trim()))
     }
 
-    /// Whether a number stands in this relation to another; a number that is NaN only in `!=`.
+    /// Whether the relation holds between two numbers. For NaN only `!=` holds.
     pub fn holds(self, left: f64, right: f64) -> bool {
         self.holds_between(&left, &right)
     }
 
-    /// Whether a word stands in this relation to another.
+    /// Whether the relation holds between two texts.
     pub fn holds_for_words(self, left: &str, right: &str) -> bool {
         match self {
             Self::Contains => left.contains(right),

@@ -1,6 +1,6 @@
 //! `report.html`: a run in one file that a browser opens, without a network or a server.
 //!
-//! It follows from the run folder, and from its scenes where they can be opened: those have the photos.
+//! It is made from the run folder, and from its scenes if they can be opened, which have the photos.
 
 mod page;
 mod pictures;
@@ -24,17 +24,16 @@ use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_nam
 use crate::table::Table;
 use pictures::{DrawnProof, Witness, thumbnail};
 
-/// Pictures of so many failures, where nobody says how many.
+/// The default number of failures with a picture.
 pub const PICTURES: usize = 24;
 
-/// Queries that have a photo in the report, at most: more would make it too large to be sent around, and take
-/// longer than the run itself.
+/// The most queries with a photo in the report: more would make it too large to send, and take longer than the run.
 const MOST_PHOTOS: usize = 500;
 
 /// The name of the file in a run folder.
 pub const REPORT: &str = "report.html";
 
-/// All that the page tells of a run.
+/// The content of the page.
 struct RunReport {
     run: RunFile,
     /// Parameters that are not at their defaults.
@@ -44,41 +43,40 @@ struct RunReport {
     tables: Vec<Table>,
     gates: Vec<GateResult>,
     charts: Vec<Chart>,
-    /// Thumbnails of the queries, by the class that shows them.
+    /// Thumbnails of the queries, by the number of their CSS class.
     thumbnails: BTreeMap<usize, String>,
-    /// What is missing, and why.
+    /// Notes on missing parts.
     notes: Vec<String>,
     baseline: Option<Baseline>,
 }
 
-/// The run that this one is held against.
+/// The run that this one is compared with.
 struct Baseline {
-    /// Its folder, as it was named.
+    /// Its folder, as given.
     name: String,
     comparison: RunComparison,
     tables: Vec<Table>,
 }
 
-/// A result, and what the page makes of it.
+/// A result with its parts of the page.
 struct ReportedResult {
-    /// Its place among the results of the run.
+    /// Its position among the results of the run.
     number: usize,
     /// The number of its query.
     query: usize,
     result: QueryResult,
-    /// The recording that was kept, seen from the run folder.
+    /// Its recording, relative to the run folder.
     recording: Option<String>,
-    /// What happened to it since the baseline.
+    /// Its change since the baseline.
     change: Option<Change>,
     proof: Option<DrawnProof>,
 }
 
-/// Writes the report of a run into its folder or to `out`, held against a baseline if there is one, with
-/// pictures of at most so many failures.
+/// Writes the report of a run into its folder or to `out`, compared with a baseline if given, and with pictures of
+/// at most `pictures` failures.
 ///
 /// # Errors
-/// A run that cannot be read, or a file that cannot be written. A scene that cannot be opened is a note in
-/// the report.
+/// A run that cannot be read, or a file that cannot be written. A scene that cannot be opened becomes a note.
 pub fn write_html(
     folder: &Path,
     baseline: Option<&Path>,
@@ -107,26 +105,32 @@ impl RunReport {
         }
         let mut results = reported(folder, &run, &measured.results);
         let baseline = match baseline {
-            Some(before) => Some(held_against(before, &measured.results, &mut results)?),
+            Some(before) => Some(compared_with(before, &measured.results, &mut results)?),
             None => None,
         };
         let mut thumbnails = BTreeMap::new();
-        let asked = &run.protocol;
-        let scenes = Scenes::open(&run.scenes, &asked.query_scene, asked.format.as_deref());
-        match scenes.and_then(|scenes| scenes.as_asked(asked)) {
+        let protocol = &run.protocol;
+        let scenes = Scenes::open(
+            &run.scenes,
+            &protocol.query_scene,
+            protocol.format.as_deref(),
+        );
+        match scenes.and_then(|scenes| scenes.with_protocol(protocol)) {
             Ok(scenes) => {
                 thumbnails = self::thumbnails(&run, &scenes, &results);
                 let queries = results.iter().map(|one| one.query + 1).max();
                 if let Some(queries) = queries.filter(|queries| *queries > MOST_PHOTOS) {
                     notes.push(format!(
-                        "The first {MOST_PHOTOS} of {queries} queries have photos"
+                        "Only the first {MOST_PHOTOS} of {queries} queries have photos"
                     ));
                 }
                 draw_failures(&run, &scenes, &params, &mut results, pictures);
                 let failures = results.iter().filter(|one| one.result.grade.is_failure());
                 let failures = failures.count();
                 if failures > pictures {
-                    notes.push(format!("{pictures} of {failures} failures have pictures"));
+                    notes.push(format!(
+                        "Only the first {pictures} of {failures} failures have pictures"
+                    ));
                 }
             }
             Err(error) => notes.push(format!("There are no photos: {error}")),
@@ -175,7 +179,7 @@ fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<Report
     results.collect()
 }
 
-fn held_against(
+fn compared_with(
     before: &Path,
     rows: &[QueryResult],
     results: &mut [ReportedResult],
@@ -184,7 +188,7 @@ fn held_against(
     let measured = RunResults::read(before)?;
     let comparison = RunComparison::of(&measured.results, rows, &RunComparison::TOLERANCE);
     for one in &comparison.differences {
-        // Rows and results are the same lines.
+        // Rows and results have the same order.
         let at = rows.iter().position(|row| *row == one.after);
         if let Some(result) = at.and_then(|at| results.get_mut(at)) {
             result.change = Some(one.change);
@@ -197,7 +201,7 @@ fn held_against(
     })
 }
 
-/// The photo of each query, as the methods saw it; one that cannot be read is missing.
+/// The photo of each query as the methods saw it; unreadable photos are left out.
 fn thumbnails(
     run: &RunFile,
     scenes: &Scenes,
@@ -217,7 +221,7 @@ fn thumbnails(
     painted.collect()
 }
 
-/// Localises the first failures once more and draws what is told.
+/// Localises the first failures again and draws their proofs.
 fn draw_failures(
     run: &RunFile,
     scenes: &Scenes,

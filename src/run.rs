@@ -1,11 +1,10 @@
-//! Experiments over many queries, and the folders that their results go to.
+//! Runs over many queries: protocols, presets and run folders.
 
 #[cfg(feature = "cli")]
 mod arguments;
 mod draw;
 mod estimates_file;
 mod execute;
-mod experiment;
 mod inputs;
 mod limit;
 mod preset;
@@ -21,11 +20,10 @@ pub use arguments::{degradations, method, positive, probability};
 pub use draw::{Draw, DrawError};
 pub use estimates_file::EstimatesFile;
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
-pub use experiment::Experiment;
 pub use inputs::inputs;
 pub use limit::Limit;
-pub use preset::{ByDataSet, Preset, default_failure_radius_m, defaults};
-pub use protocol::{Protocol, ProtocolError, known};
+pub use preset::{Preset, default_failure_radius_m};
+pub use protocol::{Protocol, ProtocolError, defaults, known};
 pub use reference::Reference;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{

@@ -1,6 +1,6 @@
-//! Scene formats. What a scene is says [`Scene`].
+//! Scene formats. See [`Scene`] for what a scene is.
 //!
-//! A scene that changes another in some respects takes the rest from it by [`inner_scene!`](crate::inner_scene).
+//! A scene that wraps another one forwards the unchanged methods with [`inner_scene!`](crate::inner_scene).
 //!
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
@@ -43,7 +43,7 @@ pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
-/// Every format, in the order in which they are asked.
+/// Every format, in the order in which they are tried.
 pub const ALL: &[Entry] = &[
     street::ENTRY,
     kitti::ENTRY,
@@ -55,10 +55,10 @@ pub const ALL: &[Entry] = &[
     described::ENTRY,
 ];
 
-/// Opens a scene; `format` overrides what its content says.
+/// Opens a scene. Its format is detected from its content; `format` overrides that.
 ///
 /// # Errors
-/// [`SceneError`] names the file, the place in it and what was expected.
+/// [`SceneError`] names the file, the line and what was expected.
 pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, SceneError> {
     let known = || {
         let names: Vec<&str> = ALL.iter().map(|entry| entry.name).collect();

@@ -1,8 +1,8 @@
-//! A run that somebody drives: an estimator on a thread of its own that can be paused, stepped,
-//! broken into and stopped.
+//! An interactive run: an estimator on its own thread that can be paused, stepped, stopped at breakpoints and
+//! cancelled.
 //!
-//! The estimators know nothing of this. An observer of the run, which is one more
-//! [`Sink`](crate::trace::Sink), holds the thread back between two events.
+//! The estimators know nothing of this. An observer of the run, another [`Sink`](crate::trace::Sink), blocks the
+//! thread between two events.
 
 mod breakpoint;
 mod index_file;
@@ -29,7 +29,7 @@ pub use task::{Task, TaskScenes, command_line};
 use message::{Message, Outbox};
 use pausing::{Command, Control, PausingObserver};
 
-/// A run on its own thread, and what it has told so far.
+/// A run on its own thread, and its events so far.
 ///
 /// Dropping a session cancels its run and does not wait for the thread.
 pub struct Session {
@@ -39,8 +39,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts a job. `wake` is called on the worker's thread whenever there is something new, often;
-    /// it must not block.
+    /// Starts a job. `wake` is called on the worker's thread after every message. It is called often and must not
+    /// block.
     pub fn start(
         job: Job,
         mode: RunMode,
@@ -63,7 +63,7 @@ impl Session {
         }
     }
 
-    /// Takes in what the worker told since the last call. Whether there was anything.
+    /// Takes the worker's messages since the last call. Returns whether there were any.
     pub fn drain(&mut self) -> bool {
         let mut is_new = false;
         while let Ok(change) = self.inbox.try_recv() {
@@ -73,7 +73,7 @@ impl Session {
         is_new
     }
 
-    /// What the run has told so far.
+    /// The run so far.
     pub fn run(&self) -> &Run {
         &self.run
     }
@@ -96,7 +96,7 @@ impl Session {
         )
     }
 
-    /// Goes on in another way; a paused run goes on at once, a running one pauses soon.
+    /// Changes the mode: a paused run continues at once, a running one pauses soon.
     pub fn set_mode(&self, mode: RunMode) {
         self.control.send(Command::Go(mode));
     }
@@ -106,8 +106,8 @@ impl Session {
         self.control.send(Command::Breakpoints(breakpoints));
     }
 
-    /// Asks the run to stop, and does not wait for it. It says [`RunState::Cancelled`] when it has:
-    /// an estimator looks up after 256 hypotheses, one trial or one pass over an image.
+    /// Cancels the run without waiting for it. The state becomes [`RunState::Cancelled`] when it has stopped: an
+    /// estimator checks after 256 hypotheses, one trial or one pass over an image.
     pub fn cancel(&self) {
         self.control.send(Command::Cancel);
     }

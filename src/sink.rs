@@ -1,4 +1,4 @@
-//! Sinks for the events of a run: recordings, progress bars, several at once.
+//! Sinks for the events of a run: recordings, JSON lines, progress bars.
 
 mod events;
 #[cfg(feature = "cli")]

@@ -1,22 +1,22 @@
-//! Tables of text, for terminals of any width, pipes, Markdown, CSV and LaTeX.
+//! Text tables, for terminals of any width, pipes, Markdown, CSV and LaTeX.
 
-/// How the cells of a column stand.
+/// The alignment of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     /// Words.
     Left,
     /// Numbers.
     Right,
-    /// Sentences. In a narrow terminal they wrap below their row.
+    /// Sentences, which wrap below their row in a narrow terminal.
     Note,
 }
 
 /// Cells of text under a header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
-    /// A name that can be part of a file's name.
+    /// A name for file names.
     pub name: String,
-    /// What the table shows.
+    /// The caption.
     pub caption: String,
     /// One cell per column.
     pub header: Vec<String>,
@@ -24,12 +24,12 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
     /// One per column. Only the last can be [`Align::Note`].
     pub align: Vec<Align>,
-    /// How many cells at the front several rows have in common.
+    /// How many leading cells consecutive rows share.
     pub shared: usize,
 }
 
 impl Table {
-    /// A table without rows: the first column words, the others numbers.
+    /// A table without rows: the first column is text, the others are numbers.
     pub fn new(
         name: impl Into<String>,
         caption: impl Into<String>,
@@ -50,8 +50,8 @@ impl Table {
         }
     }
 
-    /// A table without name and caption that has words in all columns but those that `right` names, and
-    /// sentences in the last.
+    /// A table without name and caption. Columns in `right` are numbers, the last one is sentences, the others are
+    /// text.
     pub fn with_notes<const N: usize>(header: [&str; N], right: &[usize], shared: usize) -> Self {
         let align = (0..N).map(|at| match at {
             at if at + 1 == N => Align::Note,
@@ -65,17 +65,17 @@ impl Table {
         }
     }
 
-    /// Adds a row; cells that are missing stay empty.
+    /// Adds a row; missing cells are empty.
     pub fn push(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
         let mut row: Vec<String> = cells.into_iter().map(Into::into).collect();
         row.resize(self.header.len(), String::new());
         self.rows.push(row);
     }
 
-    /// For a terminal of this width, or for a pipe, where lines have any length.
+    /// The table for a terminal of this width, or for a pipe, where lines may have any length.
     ///
-    /// A row that does not fit is arranged otherwise. Sentences wrap below it, and what rows share stands
-    /// above them. A table without sentences is turned: a line per column.
+    /// If a row does not fit, the layout changes: sentences wrap below their rows, and shared cells are above
+    /// them. A table without sentences is transposed.
     pub fn to_text(&self, width: Option<usize>) -> String {
         let limit = width.unwrap_or(usize::MAX);
         let caption = match self.caption.as_str() {
@@ -131,11 +131,11 @@ impl Table {
         text
     }
 
-    /// A line per column, and beside each other as many rows as fit, below what they share.
+    /// The transposed table: a line per column, in blocks of as many rows as fit, below their shared cells.
     fn turned(&self, width: usize) -> String {
         let from = self.shared;
         let labels = self.header.iter().skip(from).enumerate();
-        // The names of rows need none themselves.
+        // The first column has the names of the rows and needs no label.
         let labels: Vec<&str> = labels
             .map(|(at, label)| if at == 0 { "" } else { label.as_str() })
             .collect();
@@ -176,7 +176,7 @@ impl Table {
         text
     }
 
-    /// With the caption above.
+    /// As Markdown, with the caption above.
     pub fn to_markdown(&self) -> String {
         let line = |cells: &[String]| {
             let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
@@ -198,7 +198,7 @@ impl Table {
         text
     }
 
-    /// With the header as first record.
+    /// As CSV, with the header as first record.
     pub fn to_csv(&self) -> String {
         let record = |cells: &[String]| {
             let cells: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
@@ -207,7 +207,7 @@ impl Table {
         self.all().map(record).collect()
     }
 
-    /// A `table` environment with rules of `booktabs`.
+    /// As LaTeX: a `table` environment with `booktabs` rules.
     pub fn to_latex(&self) -> String {
         let line = |cells: &[String]| {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
@@ -232,7 +232,7 @@ impl Table {
     }
 }
 
-/// A line for each row. Sentences are not filled up.
+/// The aligned lines of rows. Sentences are not padded.
 fn aligned(rows: &[&[String]], align: &[Align]) -> Vec<String> {
     let width = |at: usize| rows.iter().map(|row| length(&row[at])).max().unwrap_or(0);
     let widths: Vec<usize> = (0..align.len()).map(width).collect();
@@ -248,8 +248,8 @@ fn aligned(rows: &[&[String]], align: &[Align]) -> Vec<String> {
     rows.iter().map(line).collect()
 }
 
-/// A paragraph in lines of at most this many characters; those after the first start with `indent`. The
-/// first keeps its own indentation. A word that is longer than a line stays whole.
+/// Wraps a paragraph at this many characters. The first line keeps its indentation, the others start with
+/// `indent`. Words longer than a line are not split.
 pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> String {
     let words = paragraph.trim_start();
     let mut line = paragraph[..paragraph.len() - words.len()].to_owned();
@@ -275,7 +275,7 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// A field of a record, after RFC 4180.
+/// A CSV field, quoted as in RFC 4180.
 fn quoted(cell: &str) -> String {
     if cell.contains(['"', ',', '\n', '\r']) {
         format!("\"{}\"", cell.replace('"', "\"\""))
@@ -284,7 +284,7 @@ fn quoted(cell: &str) -> String {
     }
 }
 
-/// Text as LaTeX sets it.
+/// Text escaped for LaTeX.
 fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for character in text.chars() {

@@ -1,4 +1,4 @@
-//! The arguments.
+//! The command-line arguments.
 
 mod eval;
 mod given;
@@ -46,15 +46,15 @@ pub struct Arguments {
     pub everywhere: Everywhere,
 }
 
-/// The commands by what they are for. A test holds the list complete.
+/// The commands, grouped by purpose. A test checks that the list is complete.
 const HELP: &str = "\
 {about}
 
 {usage-heading} {usage}
 
-Without arguments it localises a query of the built-in street, prints the results, saves
-recordings/demo.rrd, and opens the window where there is a display. With a SCENE or a RUN it does
-what `view` does.
+Without arguments, posescope localises a query of the built-in street, prints the results, saves
+recordings/demo.rrd and opens the window if there is a display. With a SCENE or a RUN it does the
+same as `view`.
 
 Localise:
   run        Localise a query, or several, and print why each result is right or wrong
@@ -66,7 +66,7 @@ Look at runs:
   compare    Show what changed between two runs; exit code 1 if a query broke
 
 Prepare data:
-  doctor     Check scenes: what is there, and the usual mistakes
+  doctor     Check scenes: list their contents and find the usual mistakes
   index      Build the retrieval index for --reference retrieve:K
   synth      Write the built-in street as a KITTI, TUM, COLMAP or scene.toml data set
 
@@ -95,7 +95,7 @@ pub enum Command {
     Results(Box<ResultsArgs>),
     /// Show what changed between two runs; exit code 1 if a query broke
     Compare(CompareArgs),
-    /// Check scenes: what is there, and the usual mistakes; exit code 3 if a scene cannot work
+    /// Check scenes: list their contents and find the usual mistakes; exit code 3 if a scene is unusable
     Doctor(DoctorArgs),
     /// Build the retrieval index for --reference retrieve:K
     Index(IndexArgs),
@@ -111,12 +111,12 @@ pub enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// A scene or a run, which the window opens
+    /// A scene or a run to open in the window
     #[command(external_subcommand)]
     Open(Vec<OsString>),
 }
 
-/// The command line, with the options hidden in `run` and `view` that only many queries have.
+/// The command line. `run` and `view` hide the options that only apply to many queries.
 pub fn definition() -> clap::Command {
     let single = |command: clap::Command| {
         ["limit", "preset"]
@@ -131,11 +131,11 @@ pub fn definition() -> clap::Command {
     command
 }
 
-/// Options of every command.
+/// Options of all commands.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Everywhere")]
 pub struct Everywhere {
-    /// Print errors only
+    /// Print only errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
     /// Print more; twice for debugging
@@ -144,16 +144,16 @@ pub struct Everywhere {
     /// Number of threads; results do not depend on it [default: one per core]
     #[arg(long, global = true, value_name = "N", hide_short_help = true)]
     pub threads: Option<NonZeroUsize>,
-    /// Where hypotheses are scored; results do not depend on it
+    /// The processor that scores hypotheses; results do not depend on it
     #[arg(long, global = true, value_name = "WHERE", value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
     pub compute: Compute,
 }
 
-/// Which parameters differ from their defaults.
+/// Changes to the parameters' defaults.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ConfigArgs {
-    /// Read parameters from a TOML file with a table for each group
+    /// Read parameters from a TOML file with one table per group
     #[arg(long, value_name = "FILE.toml")]
     #[arg(help_heading = "Methods", hide_short_help = true)]
     pub config: Option<PathBuf>,
@@ -168,7 +168,7 @@ impl ConfigArgs {
         self.over(Params::default())
     }
 
-    /// These parameters with what the arguments change.
+    /// These parameters with the changes of the arguments.
     pub fn over(&self, mut params: Params) -> Result<Params, CliError> {
         if let Some(path) = &self.config {
             let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;

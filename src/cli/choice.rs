@@ -1,4 +1,4 @@
-//! Choosing references by their looks, with a bar.
+//! The progress of choosing references by their appearance.
 
 use posescope::event::KindSet;
 use posescope::localize::{LocalizeObserver, NoObserver};
@@ -7,10 +7,10 @@ use posescope::trace::{Cancelled, Record, Sink};
 use super::interrupt::Interrupt;
 use super::terminal::Terminal;
 
-/// From so many candidates on an index is worth its time.
+/// From this number of candidates, an index is worth building.
 const MANY: usize = 100;
 
-/// A bar over the candidates, and once a word on what is quicker where there are many.
+/// A progress bar over the candidates. With many candidates it also recommends an index, once.
 pub struct ChoiceProgress<'a> {
     terminal: &'a Terminal,
     interrupt: &'a Interrupt,
@@ -57,7 +57,7 @@ impl LocalizeObserver for ChoiceProgress<'_> {
             && !std::mem::replace(&mut self.has_advised, true)
         {
             eprintln!(
-                "Comparing the query with {candidates} photos; an index is quicker: `posescope index {scene}`, then \
+                "Comparing the query with {candidates} photos. An index is faster: run `posescope index {scene}`, then use \
                  --reference retrieve:1"
             );
         }

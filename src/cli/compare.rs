@@ -1,4 +1,4 @@
-//! `posescope compare`: what changed from one run to another.
+//! `posescope compare`: the changes between two runs.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> 
     );
     if comparison.common == 0 {
         return Err(CliError::Usage(format!(
-            "{} and {} have no result in common: scenes, queries, methods and settings differ",
+            "{} and {} have no result in common; compare runs of the same scenes, queries, methods and settings",
             args.before.display(),
             args.after.display()
         )));

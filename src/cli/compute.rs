@@ -5,12 +5,12 @@ use super::failure::CliError;
 /// Where the hypotheses of a search are scored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Compute {
-    /// On a graphics card where there is one and the search is large, or else on the processor
+    /// A graphics card if there is one and the search is large, otherwise the processor
     #[default]
     Auto,
-    /// On the processor
+    /// The processor
     Cpu,
-    /// On a graphics card, or software that plays one; without either, exit code 5
+    /// A graphics card or a software emulation of one; exit code 5 if there is neither
     Gpu,
 }
 
@@ -28,11 +28,11 @@ pub fn with(
     let gpu = match compute {
         Compute::Cpu => return command(),
         Compute::Auto => Arc::new(Gpu::if_any()),
-        Compute::Gpu => Arc::new(Gpu::asked_for()?),
+        Compute::Gpu => Arc::new(Gpu::requested()?),
     };
     use_device(Arc::clone(&gpu) as Arc<dyn Device>);
     command()?;
-    // Whoever asked for the card is not to believe that it did what the processor did instead.
+    // With `--compute gpu`, report that the processor had to take over.
     match gpu.complaint() {
         Some(why) if compute == Compute::Gpu || matches!(why, GpuError::Disagrees(_)) => {
             Err(why.into())

@@ -1,4 +1,4 @@
-//! What the program does where nothing is named.
+//! The defaults of the program.
 
 /// The scene of the demonstration.
 pub const SCENE: &str = "street";

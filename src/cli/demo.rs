@@ -8,7 +8,7 @@ use super::failure::CliError;
 use super::run;
 use super::terminal::Terminal;
 
-/// What to look at, and what to type next. The query at night is one that PM gets wrong.
+/// How to read the table, and what to type next. PM gets the query at night wrong.
 const NEXT: &str = "\
 The column `grade` says whether a pose is within 1 m and 5° of the truth (● right, ▲ wrong, × no pose).
 Next:

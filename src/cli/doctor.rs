@@ -1,4 +1,4 @@
-//! `posescope doctor`: whether a scene can work, and which of the usual mistakes is in it.
+//! `posescope doctor`: whether a scene is usable, and which of the usual mistakes it contains.
 
 use posescope::doctor::{Agreement, Examination, Remark, examine};
 use posescope::measure::paper_scene;
@@ -11,12 +11,12 @@ use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
 
-/// Examines every scene. The error is of the first that cannot work.
+/// Examines every scene. The error is that of the first unusable scene.
 pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
     let files = args.picture.iter().chain(&args.save);
     if args.scenes.len() > 1 && files.count() > 0 {
         return Err(CliError::Usage(
-            "--picture and --save are of one scene".to_owned(),
+            "--picture and --save take one scene; name one only".to_owned(),
         ));
     }
     let mut broken = None;
@@ -33,7 +33,7 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
 }
 
-/// Prints what a scene has, and returns why it cannot work.
+/// Prints the findings on a scene, and returns why it is unusable.
 fn examine_scene(
     args: &DoctorArgs,
     argument: &str,
@@ -57,7 +57,7 @@ fn examine_scene(
     Ok(found.is_broken().then(|| verdict(scene.as_ref(), &found)))
 }
 
-/// In one line, why it cannot work.
+/// Why a scene is unusable, in one line.
 fn verdict(scene: &dyn Scene, found: &Examination) -> String {
     let name = scene.name();
     if let Some(finding) = &found.finding {
@@ -67,7 +67,7 @@ fn verdict(scene: &dyn Scene, found: &Examination) -> String {
         Remark::Broken(why) => Some(why.as_str()),
         Remark::Odd(_) => None,
     });
-    format!("{name}: {}", broken.unwrap_or("it cannot work"))
+    format!("{name}: {}", broken.unwrap_or("the scene is unusable"))
 }
 
 fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> String {
@@ -99,11 +99,11 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
         line("way", &words);
     }
     if let Some([images, length_km, spacing_m]) = paper_scene(scene.name()) {
-        let words = format!("{images} images, {length_km} km, {spacing_m} m from image to image");
+        let words = format!("{images} images, {length_km} km, {spacing_m} m between images");
         line("paper", &words);
     }
     for (frame, points, depth) in &there.clouds {
-        let depth = depth.map_or("nothing in view".to_owned(), |depth| {
+        let depth = depth.map_or("no point in view".to_owned(), |depth| {
             format!("median depth in view {depth:.1} m")
         });
         line("cloud", &format!("{frame}: {points} points, {depth}"));
@@ -121,12 +121,15 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
         Some(finding) => {
             line("mistake", finding.mistake.about());
             line("remedy", &finding.remedy);
-            line("then", &numbers(&finding.otherwise));
+            line("after", &numbers(&finding.otherwise));
         }
         None if found.agreement.is_some() => {
-            line("mistakes", "none of the usual ones fits the photos better");
+            line("mistakes", "none of the usual ones found");
         }
-        None => line("mistakes", "nothing could be compared with the photos"),
+        None => line(
+            "mistakes",
+            "not checked: no frame has a photo, a pose and a cloud",
+        ),
     }
     text
 }
@@ -135,7 +138,7 @@ fn numbers(agreement: &Agreement) -> String {
     let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.2}"));
     let carried = agreement.carried.map(f64::tanh);
     format!(
-        "photo to photo {} (correlation), depth edges on image edges {} (log)",
+        "grey values between photos correlate by {}, depth edges on image edges {} (log ratio); higher is better",
         number(carried),
         number(agreement.edges)
     )

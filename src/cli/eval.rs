@@ -1,4 +1,4 @@
-//! `posescope eval`: an experiment over many queries, into a run folder.
+//! `posescope eval`: localises many queries into a run folder.
 
 mod again;
 mod step_summary;
@@ -16,8 +16,8 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::report::{PICTURES, write_html};
 use posescope::run::{
-    Draw, Execution, Experiment, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair,
-    Scenes, Sweep, defaults, inputs, known, merge,
+    Draw, Execution, Preset, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair, Scenes,
+    Sweep, defaults, inputs, known, merge,
 };
 use posescope::scene::Retriever;
 use posescope::session::command_line;
@@ -38,11 +38,11 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
         failures::merge(&args.parts, &args.out, args.judging.kept_failures(), &run)?;
         return finish(&args.judging, None, &args.out, &run, terminal);
     }
-    let asked = args.protocol.over(Protocol::default())?;
+    let protocol = args.protocol.over(Protocol::default())?;
     let gated: Vec<Method> = args.judging.gate.iter().map(Gate::method).collect();
-    let others: Vec<Method> = asked.estimates.iter().map(|file| file.method).collect();
+    let others: Vec<Method> = protocol.estimates.iter().map(|file| file.method).collect();
     known(&gated, &others)?;
-    // Before anything is run for a list that cannot be read.
+    // An unreadable list fails before anything is run.
     known_failures(&args.judging)?;
     if let Some(before) = &args.rerun_failed
         && !again::has_failed(before)?
@@ -51,7 +51,7 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
         return Ok(());
     }
     let out = args.out.clone();
-    let folder = out.unwrap_or_else(|| default_folder(args, &asked));
+    let folder = out.unwrap_or_else(|| default_folder(args, &protocol));
     if let Some(sweep) = &args.sweep {
         return sweep::sweep(args, sweep, &folder, terminal);
     }
@@ -60,18 +60,18 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     finish(&args.judging, again, &folder, &run, terminal)
 }
 
-/// What is asked, and of which scenes.
-struct Asked {
+/// A run that is about to start.
+struct PlannedRun {
     run: RunFile,
     scenes: Scenes,
     params: Params,
 }
 
-/// Beside each other below `runs`, named after what is asked.
-fn default_folder(args: &EvalArgs, asked: &Protocol) -> PathBuf {
+/// A folder below `runs`, named after scenes and options.
+fn default_folder(args: &EvalArgs, protocol: &Protocol) -> PathBuf {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let mut name: String = args.scenes.join("-").chars().map(plain).collect();
-    if let Some(preset) = asked.preset {
+    if let Some(preset) = protocol.preset {
         name = format!("{name}-{preset}").to_lowercase();
     }
     if let Some(failed) = &args.rerun_failed {
@@ -93,19 +93,19 @@ fn execute(
     folder: &Path,
     terminal: &Terminal,
 ) -> Result<RunFile, CliError> {
-    let Asked {
+    let PlannedRun {
         run,
         scenes,
         params,
     } = match &args.rerun_failed {
-        Some(before) => again::asked(args, before)?,
-        None => asked(args, swept)?,
+        Some(before) => again::plan(args, before)?,
+        None => plan(args, swept)?,
     };
-    let scenes = scenes.as_asked(&run.protocol)?;
+    let scenes = scenes.with_protocol(&run.protocol)?;
     let indices = indices(&run, &scenes, &params)?;
     if let Some(path) = args.events.as_ref().filter(|path| path.starts_with(folder)) {
         return Err(CliError::Usage(format!(
-            "--events {}: a file outside of the run folder expected",
+            "--events {}: a file outside the run folder expected; the folder may hold nothing but the run",
             path.display()
         )));
     }
@@ -142,31 +142,30 @@ fn execute(
     };
     let outcome = execution.run_remaining(&mut run_folder, &mut observer);
     bar.finish_and_clear();
-    let told = observer.close();
+    let closed = observer.close();
     match outcome {
         Err(RunError::Cancelled(_)) if interrupt.is_raised() => {
             let (done, all) = (run_folder.done(), run.items().count());
             Err(CliError::Interrupted(format!(
-                "{done} of {all} queries are done; go on with: {}",
+                "{done} of {all} queries are done; continue with: {}",
                 resuming()
             )))
         }
         outcome => {
             outcome?;
-            told?;
+            closed?;
             Ok(run)
         }
     }
 }
 
-/// What is asked, with everything filled in that was left open, at one value of a sweep.
-fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliError> {
+/// The run that the arguments ask for, with all defaults filled in, at one value of a sweep.
+fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, CliError> {
     let mut params = args.config.resolve()?;
     let given = args.protocol.over(Protocol::default())?;
     let scenes = Scenes::open(&args.scenes, &given.query_scene, given.format.as_deref())?;
     let first = scenes.references.first();
     let defaults = defaults(given.preset, first.map_or("", |scene| scene.name()));
-    let defaults = defaults.map_err(|error| CliError::Usage(error.to_string()))?;
     let mut protocol = args.protocol.over(defaults)?;
     if protocol.is_by_hand() {
         return Err(CliError::Usage(
@@ -176,8 +175,8 @@ fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliErr
         ));
     }
     let has_several = protocol.selection().count() > 1;
-    // The large experiment fuses as a run without a preset does.
-    let has_own_fusions = protocol.preset.is_some_and(|one| one != Experiment::Large);
+    // The large experiment has the fusion of a run without preset.
+    let has_own_fusions = protocol.preset.is_some_and(|one| one != Preset::Large);
     if has_several && !args.protocol.has("fusions") && !has_own_fusions {
         protocol.fusions = Fusion::all().filter(|f| f.name == "r-wavg").collect();
     }
@@ -200,7 +199,7 @@ fn asked(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<Asked, CliErr
         pairs,
         params: written(&params),
     };
-    Ok(Asked {
+    Ok(PlannedRun {
         run,
         scenes,
         params,
@@ -212,7 +211,7 @@ fn written(params: &Params) -> toml::Table {
     table.unwrap_or_else(|error| unreachable!("we wrote it ourselves: {error}"))
 }
 
-/// The command line that goes on with this run.
+/// The command line that continues this run.
 fn resuming() -> String {
     let mut words: Vec<String> = std::env::args().skip(1).collect();
     if !words.iter().any(|word| word == "--resume") {
@@ -221,7 +220,7 @@ fn resuming() -> String {
     command_line(&words)
 }
 
-/// Ranked references need an index of each scene.
+/// The indexes that ranked references need, one per scene.
 fn indices(
     run: &RunFile,
     scenes: &Scenes,
@@ -233,7 +232,7 @@ fn indices(
     let (files, scenes) = (&run.protocol.index, &scenes.references);
     if !files.is_empty() && files.len() != scenes.len() {
         return Err(CliError::Usage(format!(
-            "--index is given {} times for {} scenes; each needs its own, in the same order",
+            "--index is given {} times for {} scenes; give one per scene, in the same order",
             files.len(),
             scenes.len()
         )));
@@ -249,7 +248,7 @@ fn indices(
         .collect()
 }
 
-/// Every scene with itself, or every scene of references with every one of queries.
+/// Every scene with itself, or every scene of references with every scene of queries.
 fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
     let mut pairs = Vec::new();
     for (index, references) in scenes.references.iter().enumerate() {
@@ -268,7 +267,7 @@ fn known_failures(args: &JudgingArgs) -> Result<KnownFailures, CliError> {
     }
 }
 
-/// A run with what follows from its results, and why it is not good enough.
+/// The report of a run, and why it fails.
 struct Judged {
     report: Report,
     known: KnownFailures,
@@ -276,7 +275,7 @@ struct Judged {
 }
 
 impl Judged {
-    /// Writes what follows from the results, and holds the gates against them.
+    /// Writes the reports and checks the gates.
     fn of(
         args: &JudgingArgs,
         again: Option<&Path>,
@@ -298,7 +297,7 @@ impl Judged {
     }
 }
 
-/// Writes what follows from the results, shows it, and says whether it is good enough.
+/// Writes and prints the reports, and fails if the run is not good enough.
 fn finish(
     args: &JudgingArgs,
     again: Option<&Path>,
@@ -334,7 +333,7 @@ fn finish(
     good_unless(&failures)
 }
 
-/// The error of a run that is not good enough for these reasons.
+/// An error if there are failures.
 fn good_unless(failures: &[String]) -> Result<(), CliError> {
     if failures.is_empty() {
         return Ok(());
@@ -343,7 +342,7 @@ fn good_unless(failures: &[String]) -> Result<(), CliError> {
 }
 
 fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
-    // The overview of an experiment has a line for every combination.
+    // The summary of an experiment has a line for every combination: too long for a terminal.
     let skipped = usize::from(run.protocol.preset.is_some());
     for figures in report.tables.iter().skip(skipped) {
         output::print(&table::figures(figures, width))?;
@@ -358,7 +357,7 @@ fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliE
     Ok(())
 }
 
-/// What changed since the run before; `only_again` leaves out of it what was not asked again.
+/// The changes since an earlier run; `only_again` restricts them to the repeated queries.
 fn against(before: &Path, folder: &Path, only_again: bool) -> Result<RunComparison, CliError> {
     let (mut rows_before, rows) = (read_rows(before)?, read_rows(folder)?);
     if only_again {

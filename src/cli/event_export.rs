@@ -1,4 +1,4 @@
-//! Writing every event of a run.
+//! The file of `--events`.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
@@ -11,26 +11,26 @@ use posescope::trace::Record;
 
 use super::failure::CliError;
 
-/// A file of events, into which queries come whole: one that is interrupted in a run that goes on later is
-/// told once.
+/// A file of events that gets whole queries only: a query that is interrupted and repeated on resuming is
+/// written once.
 pub struct EventExport {
     path: PathBuf,
     file: File,
     scenes: SceneNames,
-    /// What was told of the query at work.
+    /// The events of the current query.
     lines: Vec<u8>,
     broken: Option<io::Error>,
 }
 
 impl EventExport {
-    /// Opens the file before anything is computed; what it had is gone.
+    /// Opens an empty file, before anything is computed.
     pub fn to(path: &Path) -> Result<Self, CliError> {
         let export = Self::after(path)?;
         export.clear()?;
         Ok(export)
     }
 
-    /// Goes on behind what the file has.
+    /// Appends to the file.
     pub fn after(path: &Path) -> Result<Self, CliError> {
         let file = OpenOptions::new().create(true).append(true).open(path);
         Ok(Self {
@@ -42,7 +42,7 @@ impl EventExport {
         })
     }
 
-    /// What the file had is gone. A file that cannot be cut, a pipe say, has nothing before it is written.
+    /// Empties the file. A file that cannot be truncated, such as a pipe, is empty already.
     pub fn clear(&self) -> Result<(), CliError> {
         let is_file = |meta: fs::Metadata| meta.is_file();
         if self.file.metadata().is_ok_and(is_file) {
@@ -52,12 +52,12 @@ impl EventExport {
         }
     }
 
-    /// What comes is of frames of these scenes.
+    /// Sets the scenes of the following events.
     pub fn name_scenes(&mut self, scenes: SceneNames) {
         self.scenes = scenes;
     }
 
-    /// Takes an event. The first error is kept, and nothing is taken after it.
+    /// Adds an event. After the first error, which is kept, events are ignored.
     pub fn accept(&mut self, record: &Record, problem: &Problem, method: Method) {
         if self.broken.is_none() {
             let written = write_event(&mut self.lines, &self.scenes, problem, method, record);
@@ -65,15 +65,15 @@ impl EventExport {
         }
     }
 
-    /// The query at work is done: what was told of it is written.
+    /// Writes the events of the current query, which is done.
     pub fn end_query(&mut self) {
-        let told = std::mem::take(&mut self.lines);
+        let lines = std::mem::take(&mut self.lines);
         if self.broken.is_none() {
-            self.broken = self.file.write_all(&told).err();
+            self.broken = self.file.write_all(&lines).err();
         }
     }
 
-    /// Says whether all of it has arrived. A query that is not done is left out.
+    /// The first error, if any. A query that is not done is left out.
     pub fn close(self) -> Result<(), CliError> {
         match self.broken {
             Some(error) => Err(CliError::io(self.path)(error)),

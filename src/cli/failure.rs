@@ -8,7 +8,6 @@ use image::ImageError;
 use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::ChoiceError;
-use posescope::measure::KnownError;
 use posescope::run::{DrawError, FolderError, ProtocolError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::session::JobError;
@@ -19,14 +18,14 @@ const DONE: u8 = 0;
 const NOT_GOOD_ENOUGH: u8 = 1;
 const USAGE: u8 = 2;
 const BAD_DATA: u8 = 3;
-/// There is no graphics card that was asked for, or it failed.
+/// The requested graphics card is missing or failed.
 const NO_GPU: u8 = 5;
-/// What shells say of a process that Ctrl-C ended.
+/// The shells' exit code of a process that Ctrl-C ended.
 const INTERRUPTED: u8 = 130;
 /// The exit code of a panic.
 pub const INTERNAL: u8 = 4;
 
-/// Anything that ends a command early, as one line.
+/// An error that ends a command. It prints as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
     #[error("{0}")]
@@ -50,8 +49,6 @@ pub enum CliError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error(transparent)]
-    Known(#[from] KnownError),
-    #[error(transparent)]
     Draw(#[from] DrawError),
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -65,26 +62,28 @@ pub enum CliError {
     #[error(transparent)]
     Gpu(#[from] posescope_gpu::GpuError),
     #[cfg(not(feature = "gpu"))]
-    #[error("this program was built without the feature `gpu`, which --compute gpu needs")]
+    #[error(
+        "--compute gpu needs a posescope that is built with the feature `gpu`; use --compute cpu"
+    )]
     NoGpu,
-    /// There is nothing to draw with, or no room for the picture.
+    /// There is no adapter to draw with, or the picture cannot be saved.
     #[cfg(feature = "app")]
     #[error("{0}")]
     Picture(String),
-    /// A gate or a comparison says no.
+    /// A gate or a comparison failed.
     #[error("{0}")]
     NotGoodEnough(String),
-    /// A scene that cannot work, or has a mistake in it.
+    /// A scene is unusable or contains a mistake.
     #[error("{0}")]
     Unhealthy(String),
-    /// Somebody pressed Ctrl-C; what was done until then is kept.
+    /// The user pressed Ctrl-C; finished work is kept.
     #[error("stopped by Ctrl-C; {0}")]
     Interrupted(String),
-    /// A breakpoint ended the run: what was asked for.
+    /// A breakpoint ended the run, as requested.
     #[error("{0}")]
     Stopped(#[from] Cancelled),
-    /// Whoever read our stdout, such as `head`, has seen enough: not an error.
-    #[error("nobody reads the output any more")]
+    /// The reader of our stdout, such as `head`, closed it: not an error.
+    #[error("the output was closed (broken pipe)")]
     ReaderGone,
 }
 
@@ -126,7 +125,7 @@ impl CliError {
             #[cfg(not(feature = "gpu"))]
             Self::NoGpu => NO_GPU,
             Self::Interrupted(_) => INTERRUPTED,
-            // What is left cannot be read or written.
+            // All others are about files that cannot be read or written.
             _ => BAD_DATA,
         })
     }
@@ -143,7 +142,7 @@ impl From<RunError> for CliError {
     }
 }
 
-/// A panic is a bug of ours: it is told in one line that says where, and ends with its own code.
+/// Reports a panic, which is a bug, in one line with its location.
 pub fn report_panics_in_one_line() {
     std::panic::set_hook(Box::new(|panic| {
         let message = panic

@@ -1,5 +1,5 @@
-//! What a run leaves beside its results: recordings of the queries that failed,
-//! `failures/QUERY-METHOD.rrd`, and events where they are asked for.
+//! What a run writes besides its results: recordings of the failed queries,
+//! `failures/QUERY-METHOD.rrd`, and events if requested.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -20,13 +20,13 @@ use super::failure::CliError;
 use super::interrupt::Interrupt;
 use super::observer::CliObserver;
 
-/// Observes a run: a progress bar, recordings of the first failures, and every event where they are asked for.
+/// Observes a run: shows progress, records the first failures and writes events if requested.
 ///
-/// A failure is localised once more to be recorded: most queries succeed, and recording each of them
-/// would cost more than repeating a few.
+/// A failed query is localised again to be recorded. Most queries succeed, so this costs less than recording
+/// every query.
 pub struct FailureRecordings<'a> {
     folder: PathBuf,
-    /// Failures that are still to be recorded.
+    /// How many more failures to record.
     left: usize,
     missed: usize,
     params: &'a Params,
@@ -37,7 +37,7 @@ pub struct FailureRecordings<'a> {
 }
 
 impl<'a> FailureRecordings<'a> {
-    /// For a run that begins, or goes on after the queries that are done.
+    /// For a new or a resumed run.
     pub fn new(
         kept: usize,
         folder: &RunFolder,
@@ -64,9 +64,9 @@ impl<'a> FailureRecordings<'a> {
         })
     }
 
-    /// Says what was not recorded, and whether the events have arrived.
+    /// Reports unrecorded failures, and an error of the events file.
     pub fn close(self) -> Result<(), CliError> {
-        tell_missed(self.missed);
+        warn_of_missed(self.missed);
         self.observer.events.map_or(Ok(()), EventExport::close)
     }
 
@@ -81,7 +81,7 @@ impl<'a> FailureRecordings<'a> {
             ..Identity::of(references, queries, self.params, self.protocol)
         };
         let mut recorder = Recorder::open(&Targets::file(path), &identity, &[query.method])?;
-        // A panic was told as the query's result; here it only ends the recording.
+        // The query's result reports the panic already; here it only ends the recording.
         let localized = catch_unwind(AssertUnwindSafe(|| {
             query.localizer.localize(
                 query.item.index,
@@ -99,7 +99,7 @@ impl<'a> FailureRecordings<'a> {
     }
 }
 
-/// Brings the recordings of the first failures of the whole run together from those of its parts.
+/// Copies the recordings of the first failures of the whole run from the folders of its parts.
 pub fn merge(
     parts: &[PathBuf],
     target: &Path,
@@ -109,7 +109,7 @@ pub fn merge(
     let folder = target.join(FAILURES);
     fs::create_dir_all(&folder).map_err(FolderError::io(&folder))?;
     let failures = failures(target, run)?;
-    tell_missed(failures.len().saturating_sub(kept));
+    warn_of_missed(failures.len().saturating_sub(kept));
     for name in failures.iter().take(kept) {
         let file = format!("{name}.rrd");
         let sources = parts.iter().map(|part| part.join(FAILURES).join(&file));
@@ -131,7 +131,7 @@ fn failures(folder: &Path, run: &RunFile) -> Result<Vec<String>, FolderError> {
             && let Some(pair) = run.pair_of(&result)
         {
             let name = recording_name(pair, &result.query, result.method, several_pairs);
-            // The results of a method on a query stand behind each other.
+            // The results of one method and query are consecutive.
             if names.last() != Some(&name) {
                 names.push(name);
             }
@@ -193,8 +193,8 @@ impl RunObserver for FailureRecordings<'_> {
     }
 }
 
-fn tell_missed(missed: usize) {
+fn warn_of_missed(missed: usize) {
     if missed > 0 {
-        log::warn!("{missed} failures were not recorded; --keep-failures records more");
+        log::warn!("{missed} failures were not recorded; raise --keep-failures to record more");
     }
 }

@@ -11,7 +11,7 @@ use super::args::IndexArgs;
 use super::failure::CliError;
 use super::terminal::Terminal;
 
-/// Runs the command. An index that is there and what is asked for is left as it is.
+/// Runs the command. An index that is up to date is kept.
 pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     let params = args.config.resolve()?;
     let scene = scene::open(&args.scene, args.format.as_deref())?;
@@ -30,16 +30,16 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         let there = Index::open(&path, params.retrieval.checks);
         match there.and_then(|index| index.check_request(&request)) {
             Ok(()) => {
-                terminal.say(|| format!("{}: up to date; --force builds it again", path.display()));
+                terminal.say(|| format!("{}: up to date; --force rebuilds it", path.display()));
                 return Ok(());
             }
             Err(IndexError::NotFound { .. }) => {}
-            // Ours, so it may be replaced; anything else may be dear to somebody.
+            // An index may be overwritten; any other file may be valuable.
             Err(
                 error @ (IndexError::Stale { .. }
                 | IndexError::Damaged { .. }
                 | IndexError::Version { .. }),
-            ) => terminal.say(|| format!("{error}; building it again")),
+            ) => terminal.say(|| format!("{error}; rebuilding it")),
             Err(error) => return Err(CliError::Usage(format!("{error}; --force replaces it"))),
         }
     }
@@ -54,9 +54,10 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     let summary = built.map_err(|error| match error {
         BuildError::Frame(error) => CliError::Scene(error),
         BuildError::Io { path, source } => CliError::Io { path, source },
-        BuildError::TooFewDescriptors { .. } => {
-            CliError::Usage(format!("{}: {error}; see --set index.words", scene.name()))
-        }
+        BuildError::TooFewDescriptors { .. } => CliError::Usage(format!(
+            "{}: {error}; lower --set index.words",
+            scene.name()
+        )),
     })?;
     terminal.say(|| {
         format!(
@@ -75,7 +76,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The frames that are not to be indexed: those that are named, and the queries of runs.
+/// The frames to leave out: the named ones, and the queries of runs.
 fn left_out(scene: &dyn Scene, named: &[String]) -> Result<BTreeSet<usize>, CliError> {
     let mut frames = BTreeSet::new();
     for name in named {

@@ -1,4 +1,4 @@
-//! Ctrl-C: the first ends a command where it can be ended well, the second at once.
+//! Ctrl-C: the first ends a command cleanly, the second kills it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,24 +7,23 @@ use posescope::trace::Cancelled;
 use signal_hook::consts::SIGINT;
 use signal_hook::flag;
 
-/// Whether somebody pressed Ctrl-C.
+/// Whether Ctrl-C was pressed.
 #[derive(Clone, Debug)]
 pub struct Interrupt {
     raised: Arc<AtomicBool>,
-    /// Lowered by a trace once it has looked up.
+    /// Lowered by a trace once it has checked.
     attention: Arc<AtomicBool>,
 }
 
 impl Interrupt {
-    /// From here on Ctrl-C is a wish. Where the system does not let us hear of it, it ends the process as
-    /// it would otherwise.
+    /// Handles Ctrl-C from now on. If the system refuses the handler, Ctrl-C kills the process as usual.
     pub fn listen() -> Self {
         let [raised, attention] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let heard = flag::register_conditional_default(SIGINT, Arc::clone(&raised))
             .and_then(|_| flag::register(SIGINT, Arc::clone(&raised)))
             .and_then(|_| flag::register(SIGINT, Arc::clone(&attention)));
         if let Err(error) = heard {
-            log::info!("Ctrl-C ends the process at once: {error}");
+            log::info!("Ctrl-C kills the process: {error}");
         }
         Self { raised, attention }
     }
@@ -33,17 +32,17 @@ impl Interrupt {
         self.raised.load(Ordering::Relaxed)
     }
 
-    /// The next one ends the process: there is nothing left that a wish could end.
+    /// The next Ctrl-C kills the process: there is nothing left to end cleanly.
     pub fn release(&self) {
         self.raised.store(true, Ordering::Relaxed);
     }
 
-    /// What a trace looks at between its steps.
+    /// The flag that a trace checks between its steps.
     pub fn attention(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.attention)
     }
 
-    /// Ends what looks up, once it was pressed.
+    /// Cancels the caller once Ctrl-C was pressed.
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.is_raised() {
             Err(Cancelled)

@@ -1,4 +1,4 @@
-//! `posescope lesson`: the lessons, in the window and as recordings.
+//! `posescope lesson`: lessons in the window and as recordings.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,7 +19,7 @@ use super::observer::CliObserver;
 use super::output;
 use super::terminal::Terminal;
 
-/// Lists the lessons, or goes through one.
+/// Lists the lessons, or starts one.
 pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
     let Some(name) = &args.name else {
         return list(terminal);
@@ -54,12 +54,12 @@ fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
     }
 }
 
-/// Without a window in the program there is the recording.
+/// A program without the window records the lesson instead.
 #[cfg(not(feature = "app"))]
 fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
     save_instead(
         &lesson,
-        &"this posescope is built without its window",
+        &"this posescope is built without the window",
         terminal,
     )
 }
@@ -77,7 +77,7 @@ fn save_instead(
     save(lesson, &path, terminal)
 }
 
-/// Localises what the pages are about, one setting after the other, and records both.
+/// Localises the settings of the pages one after the other, and records runs and pages.
 fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let interrupt = Interrupt::listen();
     let groups = lesson.groups();
@@ -109,7 +109,7 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
     interrupt.release();
     observer.recorder.map_or(Ok(()), Recorder::close)?;
     if is_interrupted {
-        let words = "the recording has what was told until then";
+        let words = "the recording contains everything until then";
         return Err(CliError::Interrupted(words.to_owned()));
     }
     outcome?;
@@ -117,7 +117,7 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
     Ok(())
 }
 
-/// How many results there are going to be.
+/// The expected number of results.
 fn estimates(setting: &OpenSetting) -> u64 {
     let references = setting.references.len().max(1);
     (references * setting.task.protocol.methods.len()) as u64
@@ -132,12 +132,12 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
         references: protocol.named_references().map(str::to_owned).collect(),
         ..Identity::of(references, queries, &first.task.params, protocol)
     };
-    let asked = settings
+    let requested = settings
         .iter()
         .flat_map(|setting| &setting.task.protocol.methods);
-    // In the order in which they run.
+    // In the order in which the methods run.
     let methods: Vec<Method> = estimator::methods()
-        .filter(|method| asked.clone().any(|asked| asked == method))
+        .filter(|method| requested.clone().any(|one| one == method))
         .collect();
     Ok(Recorder::open(&Targets::file(path), &identity, &methods)?.with_pages())
 }

@@ -1,4 +1,4 @@
-//! Writing the matches of the feature-based method, in the form that `--matches` reads.
+//! Writes the matches of the feature-based method, in the format that `--matches` reads.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use posescope::trace::Record;
 
 use super::failure::CliError;
 
-/// Writes a file for each pair, as soon as it is matched.
+/// Writes one file per pair, as soon as the pair is matched.
 pub struct MatchExport {
     folder: PathBuf,
     query: Option<Arc<Features>>,
@@ -21,7 +21,7 @@ pub struct MatchExport {
 }
 
 impl MatchExport {
-    /// Into this folder, which is made.
+    /// Writes into this folder, which is created.
     pub fn to(folder: &Path) -> Result<Self, CliError> {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
         Ok(Self {
@@ -37,7 +37,7 @@ impl MatchExport {
         KindSet::of(&[Kind::FeaturesDetected, Kind::MatchesDecided])
     }
 
-    /// Takes in what was told of a problem. The first error is kept, and nothing is written after it.
+    /// Takes an event of a problem. After the first error, which is kept, nothing is written.
     pub fn accept(&mut self, record: &Record, problem: &Problem) {
         match &record.event {
             Event::FeaturesDetected(detected) => {
@@ -66,7 +66,7 @@ impl MatchExport {
         }
     }
 
-    /// How many files were written.
+    /// The number of files written.
     pub fn close(self) -> Result<usize, CliError> {
         match self.broken {
             Some(error) => Err(error),

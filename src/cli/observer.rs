@@ -1,4 +1,4 @@
-//! The observer of the command line's queries: a progress bar, and perhaps a recording.
+//! The observer of the command line's queries: progress, recording, exports.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -19,28 +19,28 @@ use super::event_export::EventExport;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 
-/// A bar that moves on with every method that is done, and a recorder.
+/// Advances a progress bar with every finished method, and feeds recorder and exports.
 pub struct CliObserver {
     pub recorder: Option<Recorder>,
-    /// Writes matches, if that is asked for.
+    /// Writes matches if requested.
     pub export: Option<MatchExport>,
-    /// The pages of a lesson, which are recorded where they belong.
+    /// The pages of a lesson, each recorded at its moment.
     pub pages: Option<PageTurner>,
-    /// Writes events, if that is asked for.
+    /// Writes events if requested.
     pub events: Option<EventExport>,
-    /// Ends the run at a breakpoint, if there are any.
+    /// Ends the run at a breakpoint, if one is set.
     pub stop: Option<StopAtBreakpoint>,
     interrupt: Interrupt,
     bar: indicatif::ProgressBar,
     progress: Option<Progress>,
     /// Query and reference of each problem.
     tasks: Vec<String>,
-    /// When the explanation at work began.
+    /// The start of the current explanation.
     explaining_since: Instant,
     problems: Vec<Problem>,
-    /// The problem at work.
+    /// The current problem.
     problem: usize,
-    /// The method at work.
+    /// The current method.
     method: Option<Method>,
 }
 
@@ -67,7 +67,7 @@ impl CliObserver {
         }
     }
 
-    /// Records the pages of a lesson that are about the end of the run.
+    /// Records the remaining pages of a lesson, which show the end of the run.
     pub fn turn_last_pages(&mut self) {
         if let (Some(pages), Some(recorder)) = (self.pages.take(), &mut self.recorder) {
             for page in pages.rest() {

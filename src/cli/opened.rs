@@ -1,4 +1,4 @@
-//! The scenes that a command line names, and those of its queries.
+//! The scenes and queries of a command line, opened.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use posescope::session::{Task, TaskScenes};
 use super::args::TaskArgs;
 use super::failure::CliError;
 
-/// A task with its scenes and the queries that were named.
+/// A task with its scenes and the named queries.
 pub struct OpenedTask {
     pub task: Task,
     pub scenes: TaskScenes,
@@ -18,20 +18,20 @@ pub struct OpenedTask {
     pub queries: Vec<usize>,
 }
 
-/// Opens what the arguments name. A query that is no frame of its scene but a file is a photo of its own;
-/// either all are frames or all are photos.
+/// Opens the scenes and queries of the arguments. A query that is a file and not a frame of its scene is a
+/// loose photo; either all queries are frames or all are photos.
 pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTask, CliError> {
     let mut task = args.task(scene)?;
     let mut first: Option<Arc<dyn Scene>> = None;
     if args.camera.is_none() && queries.iter().any(|query| Path::new(query).is_file()) {
-        // What is called as a frame is that frame.
+        // A name of a frame always means the frame.
         let named = task.query_scene().unwrap_or(scene);
         let opened = posescope::scene::open(named, task.protocol.format.as_deref())?;
         let is_loose = |query: &&String| opened.find(query).is_err();
         let loose = queries.iter().filter(is_loose).count();
         if loose > 0 && loose < queries.len() {
             return Err(CliError::Usage(
-                "some queries are frames and others are photos; localise them in separate runs"
+                "some queries are frames, others are photo files; localise them in separate runs"
                     .to_owned(),
             ));
         }
@@ -43,7 +43,8 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
     if args.camera.is_some() || task.photos.is_some() {
         if task.query_scene().is_some() {
             return Err(CliError::Usage(
-                "--query names photo files, so --query-scene cannot be used".to_owned(),
+                "--query names photo files; leave out --query-scene, which is for frames"
+                    .to_owned(),
             ));
         }
         for query in queries {

@@ -1,4 +1,4 @@
-//! Results as JSON, written as they come: a killed run keeps what it had.
+//! Results as JSON, written one by one: a killed run keeps its finished results.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -16,7 +16,7 @@ pub struct JsonLines {
 }
 
 impl JsonLines {
-    /// Opens the output before anything is computed, so that a wrong path costs no time.
+    /// Opens the output before anything is computed: a wrong path fails at once.
     pub fn create(path: &Path) -> Result<Self, CliError> {
         let writer: Box<dyn Write> = if is_stdout(path) {
             Box::new(io::stdout())
@@ -29,14 +29,14 @@ impl JsonLines {
         })
     }
 
-    /// Writes one result and makes sure that it has arrived.
+    /// Writes one result and flushes it.
     pub fn write(&mut self, result: &QueryResult) -> Result<(), CliError> {
         let line = serde_json::to_string(result)
             .map_err(|error| CliError::io(&self.path)(error.into()))?;
         self.write_line(&line)
     }
 
-    /// Writes one object that is text already.
+    /// Writes one object that is serialised already.
     pub fn write_line(&mut self, line: &str) -> Result<(), CliError> {
         print_to(&mut self.writer, &line, &self.path)
     }

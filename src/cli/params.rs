@@ -8,10 +8,10 @@ use super::failure::CliError;
 use super::output;
 use super::terminal::Terminal;
 
-/// Prints all parameters; those that differ from their default are marked.
+/// Prints all parameters, with the default of those that differ from it.
 pub fn print(config: &ConfigArgs, terminal: &Terminal) -> Result<(), CliError> {
     let params = config.resolve()?;
-    let header = ["parameter", "value", "unit", "range, and meaning"];
+    let header = ["parameter", "value", "unit", "range and meaning"];
     let mut table = Table::with_notes(header, &[], 0);
     for (row, default) in params.list().into_iter().zip(Params::default().list()) {
         let value = if row.value == default.value {

@@ -1,4 +1,4 @@
-//! `posescope results`: the results of a run, filtered, sorted and in other forms.
+//! `posescope results`: lists, filters and exports the results of a run.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use super::failure::CliError;
 use super::output::{self, JsonLines};
 use super::terminal::Terminal;
 
-/// The fields that a terminal shows.
+/// The fields shown in a terminal by default.
 const COLUMNS: [&str; 8] = [
     "query",
     "reference",
@@ -33,15 +33,15 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
     if let Some(plot) = args.plot {
         return draw(args, plot, terminal);
     }
-    let form = match args.form {
-        Form::Html => {
-            let path = write_html(&args.run, None, PICTURES, args.out.as_deref())?;
-            terminal.say(|| format!("Report: {}", path.display()));
-            return Ok(());
-        }
-        Form::Poses(format) => return poses(args, &run, format, terminal),
-        form => form,
-    };
+    let form = args.form;
+    if form == Form::Html {
+        let path = write_html(&args.run, None, PICTURES, args.out.as_deref())?;
+        terminal.say(|| format!("Report: {}", path.display()));
+        return Ok(());
+    }
+    if let Some(format) = form.poses() {
+        return poses(args, &run, format, terminal);
+    }
     let mut results = read_rows(&args.run)?;
     if let Some(right) = args.right {
         let graded = results.into_iter().map(|result| result.graded(right));
@@ -51,7 +51,7 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
     let chosen = select(&all, args.condition.as_ref(), args.sort);
     let shown = &chosen[..chosen.len().min(args.rows.unwrap_or(usize::MAX))];
     if form == Form::Json {
-        // The run's own bytes.
+        // The lines of the run folder as they are.
         let lines: Vec<String> = result_lines(&args.run)?.collect::<Result<_, _>>()?;
         let stdout = PathBuf::from("-");
         let mut output = JsonLines::create(args.out.as_ref().unwrap_or(&stdout))?;
@@ -69,7 +69,8 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
         };
         if tables.is_empty() {
             return Err(CliError::Usage(
-                "the run has nothing to show in this table".to_owned(),
+                "the run has no results for this table; --table summary shows what it has"
+                    .to_owned(),
             ));
         }
         let width = terminal.width().filter(|_| args.out.is_none());
@@ -87,14 +88,14 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
         let of_those = if shown == met {
             String::new()
         } else {
-            format!(" of {met} that meet it,")
+            format!(" of {met} that meet the condition,")
         };
         format!("{shown}{of_those} of {all} results")
     });
     Ok(())
 }
 
-/// A row for each result: the columns that were named, by default a few for the terminal and all in files.
+/// One row per result, with the named columns; by default a few in a terminal, all in files.
 fn row_table<'a>(
     args: &ResultsArgs,
     form: Form,
@@ -118,7 +119,7 @@ fn row_table<'a>(
 fn draw(args: &ResultsArgs, plot: Plot, terminal: &Terminal) -> Result<(), CliError> {
     let svg = plot
         .svg(&RunResults::read(&args.run)?)
-        .ok_or_else(|| CliError::Usage("the run has too few results for this plot: verdicts and causes need the truth and failures, success needs \
+        .ok_or_else(|| CliError::Usage("the run has too few results for this plot: verdicts and causes need ground truth and failures, success needs \
              several radii, numbers of references or scenes, basin and margin a method with a cost"
                 .to_owned()))?;
     write(&svg, args.out.as_deref())?;
@@ -128,7 +129,7 @@ fn draw(args: &ResultsArgs, plot: Plot, terminal: &Terminal) -> Result<(), CliEr
     Ok(())
 }
 
-/// Writes the poses of the results that are chosen, one for each query.
+/// Writes the poses of the chosen results, one per query.
 fn poses(
     args: &ResultsArgs,
     run: &RunFile,
@@ -147,7 +148,7 @@ fn poses(
         (_, None) => {
             let names: Vec<&str> = files.iter().map(|file| file.name).collect();
             return Err(CliError::Usage(format!(
-                "this form has several files ({}); name a folder with --out",
+                "this format has several files ({}); name a folder with --out",
                 names.join(", ")
             )));
         }
@@ -159,7 +160,7 @@ fn poses(
         }
     }
     if left_out > 0 {
-        terminal.say(|| format!("{left_out} queries without a pose are left out"));
+        terminal.say(|| format!("{left_out} queries have no pose and are left out"));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `posescope run`: queries × references × methods, each told to the recording.
+//! `posescope run`: localises queries and prints the results.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -26,7 +26,7 @@ use super::story::story;
 use super::table;
 use super::terminal::Terminal;
 
-/// What is asked of every query.
+/// How every query is localised.
 struct Plan<'a> {
     args: &'a RunArgs,
     task: &'a Task,
@@ -68,7 +68,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let mut progress = ChoiceProgress::new(terminal, &interrupt, index_for);
     let tasks = match plan.queries(wanted, &mut progress) {
         Err(CliError::Choice(ChoiceError::Cancelled(_))) if interrupt.is_raised() => {
-            return Err(CliError::Interrupted("no query is done".to_owned()));
+            return Err(CliError::Interrupted("no query is finished".to_owned()));
         }
         tasks => tasks?,
     };
@@ -117,7 +117,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
                 written
             },
         );
-        // Of a query that was stopped, what was told until then.
+        // A stopped query keeps its events so far.
         if let Some(events) = &mut observer.events {
             events.end_query();
         }
@@ -125,17 +125,17 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     });
     bar.finish_and_clear();
 
-    // Whatever went wrong, what was computed is shown and the recording is closed.
+    // After an error, finished results are still shown and the recording is closed.
     let shown = plan.show(&results, terminal);
     let reached = observer.stop.as_ref().and_then(StopAtBreakpoint::reached);
     if let Some(breakpoint) = reached {
         terminal.say(|| format!("Stopped at {breakpoint}"));
     }
     let is_interrupted = interrupt.is_raised();
-    // Only the files are left to close: the next Ctrl-C ends the process.
+    // Only files are left to close: the next Ctrl-C kills the process.
     interrupt.release();
     let closed = observer.recorder.map_or(Ok(()), Recorder::close);
-    let told = observer.events.map_or(Ok(()), EventExport::close);
+    let exported = observer.events.map_or(Ok(()), EventExport::close);
     match outcome {
         Err(CliError::Stopped(_)) if is_interrupted => {
             closed?;
@@ -149,7 +149,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         Err(error) => return Err(error),
     }
     closed?;
-    told?;
+    exported?;
     if let (Some(export), Some(folder)) = (observer.export, &args.export_matches) {
         let written = export.close()?;
         terminal.say(|| format!("Matches: {} ({written} pairs)", folder.display()));
@@ -162,7 +162,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
 }
 
 impl Plan<'_> {
-    /// Matches can be written only where some are found.
+    /// Only FB has matches to write.
     fn check_features(&self) -> Result<(), CliError> {
         let mut methods = self.task.protocol.methods.iter().copied();
         let has_features = |method: Method| {
@@ -173,7 +173,8 @@ impl Plan<'_> {
             Ok(())
         } else {
             Err(CliError::Usage(
-                "--export-matches writes the matches of fb; --method fb expected".to_owned(),
+                "--export-matches writes the matches of fb, which does not run; add --method fb"
+                    .to_owned(),
             ))
         }
     }
@@ -247,8 +248,8 @@ impl Plan<'_> {
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
             return Err(CliError::NoReference(format!(
-                "{}: no frame with pose and scan within {} m of query {name}; \
-                 raise --radius or --prior, or name one with --reference",
+                "{}: no frame with a pose and a cloud within {} m of query {name}; \
+                 raise --radius or --prior, or name a frame with --reference",
                 self.localizer.references().name(),
                 self.task.reach_m()
             )));

@@ -1,12 +1,12 @@
-//! What stands below the table: why poses are wrong or missing, and what would have helped.
+//! The text below the table of results: why poses are wrong or missing, and what would have helped.
 
 use std::time::Duration;
 
 use posescope::localize::QueryResult;
 use posescope::table::wrapped;
 
-/// The verdicts of all results in sentences, in lines of at most `width` characters, if they have a limit;
-/// nothing where all is well.
+/// The verdicts of all results in sentences, wrapped at `width` characters if given; empty if there is no
+/// verdict.
 pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> String {
     let mut text = String::new();
     let lines = |paragraph: String| wrapped(&paragraph, width.unwrap_or(usize::MAX), "    ");
@@ -14,7 +14,7 @@ pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> Strin
         let Some(verdict) = result.verdict() else {
             continue;
         };
-        // Where each of several references gives a pose, the sentence says whose it is.
+        // With several references, the sentence names the one that gave the pose.
         let is_same = |other: &QueryResult| {
             other.query == result.query && other.method_name() == result.method_name()
         };

@@ -36,7 +36,7 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     let named: Vec<&str> = task.protocol.named_references().collect();
     let (&[query], &[reference]) = (queries.as_slice(), named.as_slice()) else {
         return Err(CliError::Usage(
-            "a surface has one query and one reference; name them with --query and --reference"
+            "--surface needs exactly one query and one reference; name them with --query and --reference"
                 .to_owned(),
         ));
     };
@@ -53,7 +53,7 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
         yaw_step_deg: task.params.surface.yaw_step_deg,
         ..task.params.grid.clone()
     };
-    // Before the work, not after it.
+    // A wrong folder fails before the work.
     if let Some(folder) = out.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
@@ -78,12 +78,16 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     Ok(())
 }
 
-/// The method whose cost is shown: mi, or the one that was named.
+/// The method whose cost is shown: mi, or the named one.
 fn method(is_named: bool, methods: &[Method]) -> Result<Method, CliError> {
     let method = match (is_named, methods) {
         (false, _) => Method::MI,
         (true, [one]) => *one,
-        (true, _) => return Err(CliError::Usage("a surface is of one method".to_owned())),
+        (true, _) => {
+            return Err(CliError::Usage(
+                "--surface needs exactly one method; name one with --method".to_owned(),
+            ));
+        }
     };
     let entry = estimator::find(method);
     match entry.map(|entry| &entry.parts) {
@@ -94,7 +98,7 @@ fn method(is_named: bool, methods: &[Method]) -> Result<Method, CliError> {
 
 fn no_cost(method: Method) -> CliError {
     CliError::Usage(format!(
-        "{method} searches no grid of one cost; pm, mi or nid expected"
+        "--surface: {method} has no cost on a grid; use --method pm, mi or nid"
     ))
 }
 
@@ -105,7 +109,7 @@ fn too_large(error: &LatticeTooLarge) -> CliError {
         ("surface.step", "a smaller --radius")
     };
     CliError::Usage(format!(
-        "{step}: {:.0} of them, at most {MOST_CELLS} are scored; take a larger step or {less}",
+        "{step}: {:.0} cells, at most {MOST_CELLS} can be scored; use a larger step or {less}",
         error.cells
     ))
 }
@@ -132,28 +136,28 @@ fn fill(
 
 type Writer = fn(&DenseSurface, &Path) -> Result<(), CliError>;
 
-/// What writes a file of this name.
+/// The writer for a file name.
 fn writer(out: &Path) -> Result<Writer, CliError> {
     match out.extension().and_then(|ending| ending.to_str()) {
         Some("csv") => Ok(write_csv),
         Some("png") => Ok(write_png),
         _ => Err(CliError::Usage(format!(
-            "--surface {}: a name that ends in .csv or .png expected",
+            "--surface {}: a file name that ends in .csv or .png expected",
             out.display()
         ))),
     }
 }
 
-/// The pose of least cost, in words.
+/// The pose of lowest cost as text.
 fn described(surface: &DenseSurface, problem: &Problem, truth: Option<&Pose>) -> String {
     let least = surface
         .minimum()
         .and_then(|(at, score)| Some((at, score.cost?)));
     let Some((offset, cost)) = least else {
-        return "no hypothesis has a cost".to_owned();
+        return "no hypothesis covers enough to have a cost; lower grid.coverage_floor".to_owned();
     };
     let mut text = format!(
-        "least cost {cost:.6} at {:.2} m right, {:.2} m forward, {:.1}° to the left",
+        "lowest cost {cost:.6} at {:.2} m right, {:.2} m forward, {:.1}° to the left",
         offset.right_m,
         offset.forward_m,
         offset.yaw_rad.to_degrees()
@@ -166,7 +170,7 @@ fn described(surface: &DenseSurface, problem: &Problem, truth: Option<&Pose>) ->
     text
 }
 
-/// The cheapest hypothesis at each position that has one, with its cost; by cell.
+/// The hypothesis of lowest cost at each position that has one, by cell.
 fn costs(surface: &DenseSurface) -> impl Iterator<Item = (usize, Offset, f64, u32)> + '_ {
     let cells = 0..surface.cheapest().lattice.cells();
     cells.filter_map(|cell| {

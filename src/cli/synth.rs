@@ -1,4 +1,4 @@
-//! `posescope synth`: the street on disk, in the layout of a data set.
+//! `posescope synth`: writes the street to disk in the layout of a data set.
 
 use std::fs;
 use std::path::Path;
@@ -17,12 +17,17 @@ pub fn synth(args: &SynthArgs, terminal: &Terminal) -> Result<(), CliError> {
     let layout = LAYOUTS
         .iter()
         .find(|layout| layout.name == args.layout)
-        .ok_or_else(|| CliError::Usage(format!("there is no layout `{}`", args.layout)))?;
+        .ok_or_else(|| {
+            CliError::Usage(format!(
+                "there is no layout `{}`; --help lists them",
+                args.layout
+            ))
+        })?;
     let streets = streets(args)?;
     if !args.force && holds_anything(&args.folder)? {
         return Err(CliError::Usage(format!(
-            "{}: the folder is not empty; --force writes there all the same, replacing sequences \
-             of the same names",
+            "{}: the folder is not empty; name another, or write there with --force, which replaces sequences \
+             of the same name",
             args.folder.display()
         )));
     }
@@ -44,7 +49,7 @@ pub fn synth(args: &SynthArgs, terminal: &Terminal) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The wanted traversals in the order of the registry, each once.
+/// The requested traversals in the order of the registry, each once.
 fn streets(args: &SynthArgs) -> Result<Vec<(&'static str, Street)>, SceneError> {
     Street::conditions()
         .filter(|name| args.condition.is_empty() || args.condition.iter().any(|c| c == name))
@@ -60,8 +65,7 @@ fn holds_anything(folder: &Path) -> Result<bool, CliError> {
     }
 }
 
-/// Writes one traversal. Frames are made past the cache: a whole traversal would only push out
-/// what is used again.
+/// Writes one traversal. It bypasses the frame cache, which a whole traversal would only flush.
 fn write(
     street: &Street,
     name: &str,

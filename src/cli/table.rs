@@ -1,4 +1,4 @@
-//! Tables as a terminal or a pipe shows them.
+//! Tables for terminals and pipes.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use posescope::geometry::PoseError;
 use posescope::localize::QueryResult;
 use posescope::table::Table;
 
-/// One row per query, reference and method, for lines of at most `width` characters, if they have a limit.
+/// One row per query, reference and method, in lines of at most `width` characters if given.
 pub fn results(results: &[(QueryResult, Duration)], width: Option<usize>) -> String {
     let header = [
         "query",
@@ -18,9 +18,9 @@ pub fn results(results: &[(QueryResult, Duration)], width: Option<usize>) -> Str
         "rotation",
         "max Euler",
         "time",
-        "verdict, or evidence",
+        "verdict or evidence",
     ];
-    // Of a query against the same references, only the method differs.
+    // Rows of the same query and references differ only in the method.
     let mut table = Table::with_notes(header, &[2, 5, 6, 7, 8], 3);
     for (result, time) in results {
         let part = |part: fn(&PoseError) -> String| result.error.as_ref().map(part);
@@ -41,7 +41,7 @@ pub fn results(results: &[(QueryResult, Duration)], width: Option<usize>) -> Str
     table.to_text(width)
 }
 
-/// A table of figures for a terminal of this width. Without a width, for a pipe, it is Markdown.
+/// A table for a terminal of this width, or without a width, for a pipe, as Markdown.
 pub fn figures(table: &Table, width: Option<usize>) -> String {
     match width {
         Some(_) => table.to_text(width),

@@ -14,7 +14,7 @@ pub struct Terminal {
 }
 
 impl Terminal {
-    /// Sets up logging, so that a message does not tear a progress bar apart.
+    /// Sets up logging such that messages do not break progress bars.
     pub fn new(everywhere: &Everywhere) -> Self {
         let (own, foreign) = match (everywhere.quiet, everywhere.verbose) {
             (true, _) => (LevelFilter::Error, LevelFilter::Off),
@@ -29,13 +29,14 @@ impl Terminal {
         let logger = env_logger::Builder::new()
             .filter_level(foreign)
             .filter_module("posescope", own)
-            // It shouts where no Vulkan driver is installed, which the window says in one line.
+            // They log errors if a driver is missing, which the window reports in one line.
             .filter_module("wgpu_hal::vulkan::instance", quieter)
+            .filter_module("wgpu_hal::gles::egl", quieter)
             .parse_default_env()
             .build();
         let level = logger.filter();
         let bars = MultiProgress::new();
-        // A second initialisation happens only where the library's user has set a logger already.
+        // Fails only if the caller has set a logger already.
         if LogWrapper::new(bars.clone(), logger).try_init().is_ok() {
             log::set_max_level(level);
         }
@@ -45,30 +46,30 @@ impl Terminal {
         }
     }
 
-    /// Prints a message on stderr, unless only errors are wanted.
+    /// Prints a message on stderr unless `--quiet` is given.
     pub fn say(&self, message: impl FnOnce() -> String) {
         if !self.is_quiet() {
             eprintln!("{}", message());
         }
     }
 
-    /// Whether only errors and asked-for results are printed.
+    /// Whether only errors and requested results are printed.
     pub fn is_quiet(&self) -> bool {
         self.quiet
     }
 
-    /// How many characters fit a line of results: as `COLUMNS` says, or the terminal; `None` in a pipe.
+    /// The width of a line of results in characters: `COLUMNS`, or that of the terminal; `None` in a pipe.
     pub fn width(&self) -> Option<usize> {
-        /// Narrower lines would be of no use.
+        /// Narrower lines are unreadable.
         const LEAST: usize = 40;
         let columns = std::env::var("COLUMNS").ok();
-        let asked = columns.and_then(|columns| columns.parse::<usize>().ok());
+        let requested = columns.and_then(|columns| columns.parse::<usize>().ok());
         let terminal = || terminal_size::terminal_size_of(std::io::stdout());
-        let width = asked.or_else(|| Some(usize::from(terminal()?.0.0)));
+        let width = requested.or_else(|| Some(usize::from(terminal()?.0.0)));
         width.map(|width| width.max(LEAST))
     }
 
-    /// A bar over `steps` steps; it hides itself where stderr is no terminal.
+    /// A progress bar over `steps` steps, hidden if stderr is not a terminal.
     pub fn bar(&self, steps: u64) -> ProgressBar {
         if self.quiet {
             return ProgressBar::hidden();

@@ -1,4 +1,4 @@
-//! `posescope view`: the window; without a display, the same run as a recording.
+//! `posescope view`: the window, or without a display a recording of the same run.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use super::opened::{self, OpenedTask};
 use super::run;
 use super::terminal::Terminal;
 
-/// Opens the window, or says why not and does the headless job.
+/// Opens the window, or without a display records the run.
 pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
     let (setup, results) = setup(args, mode)?;
     let headless = setup.clone();
@@ -29,7 +29,7 @@ pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), C
     }
 }
 
-/// Makes a recording of the same run.
+/// Records the same run.
 fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Result<(), CliError> {
     let query = setup.query_name();
     let recording = setup.folder.join(format!("{query}.rrd"));
@@ -49,14 +49,14 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
     }
 }
 
-/// What the window is opened on, and the results that are known already.
+/// The setup of the window, and the results that are known already.
 pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), CliError> {
     let folder = Path::new(&args.scene);
     let (mut setup, results) = if folder.join("run.toml").is_file() {
         of_a_run(args, folder)?
     } else if args.before.is_some() {
         return Err(CliError::Usage(format!(
-            "--before compares two runs, and {} is not the folder of a run",
+            "--before compares two runs, but {} is not a run folder; name one instead of a scene",
             args.scene
         )));
     } else {
@@ -66,14 +66,14 @@ pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), Cl
     Ok((setup, results))
 }
 
-/// The results of a run folder that are about a pair of scenes, and a line about those that are not.
+/// The results of a run folder for a pair of scenes. Prints how many results belong to other scenes.
 fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Results, CliError> {
     let (results, elsewhere) = app::results_of_run(folder, pair, queries)?;
     if elsewhere > 0 {
         let (references, queries) = (&pair.scene, &pair.query_scene);
         eprintln!(
-            "posescope: {}: {elsewhere} results are not shown, because they are not about queries of \
-             {queries} and references of {references}",
+            "posescope: {}: {elsewhere} results of other scenes are not shown; the window shows queries of \
+             {queries} with references of {references}",
             folder.display()
         );
     }
@@ -110,7 +110,7 @@ fn setup_of(task: Task, scenes: TaskScenes, offered: Vec<usize>, chosen: Vec<usi
     }
 }
 
-/// The query that was named, the demonstration's, or the first that has a reference.
+/// Starts with the named query, that of the demonstration, or the first that has a reference.
 fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<(), CliError> {
     let has_reference = |setup: &Setup, query| {
         setup.task.protocol.is_by_hand() || !setup.candidates(query).is_empty()
@@ -135,15 +135,15 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
         return Ok(());
     }
     Err(CliError::NoReference(format!(
-        "{}: no frame with pose and scan within {} m of query {}; raise --radius or --prior, or \
-         name one with --reference",
+        "{}: no frame with a pose and a cloud within {} m of query {}; raise --radius or --prior, or \
+         name a frame with --reference",
         args.scene,
         setup.task.reach_m(),
         setup.query_name()
     )))
 }
 
-/// A run has queries of its own.
+/// Refuses options that change the queries, which a run folder determines.
 fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
     args.task.refuse_many_queries()?;
     let given = [
@@ -152,13 +152,13 @@ fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
     ];
     match given.iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => Err(CliError::Usage(format!(
-            "{option} does not go with a run folder, which has its own queries; name a scene instead"
+            "{option} cannot be used with a run folder, which has its own queries; name a scene instead"
         ))),
         None => Ok(()),
     }
 }
 
-/// The queries of a run, with its results; the first failure is looked at first.
+/// The queries of a run with its results, starting at the first failure.
 fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), CliError> {
     let file = read_run(folder)?;
     let Some(pair) = file.pairs.first() else {
@@ -185,7 +185,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         Some(argument) => scene::open(argument, format)?.into(),
         None => Arc::clone(&references),
     };
-    let queries = protocol.as_asked(queries, references.as_ref())?;
+    let queries = protocol.prepared_queries(queries, references.as_ref())?;
     let params = file.params().map_err(|source| CliError::Config {
         path: folder.join("run.toml"),
         source,

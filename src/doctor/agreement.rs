@@ -1,32 +1,30 @@
-//! How well clouds, photos, cameras and poses fit together: two numbers that any reading of a scene can be
-//! held to.
+//! Two measures of how well clouds, photos, cameras and poses fit together, for any reading of a scene.
 //!
 //! - *Edges*: depth edges of a cloud should fall on edges of its photo (Levinson and Thrun, *Automatic
-//!   Online Calibration of Cameras and Lasers*, RSS 2013). It sees what is wrong within a frame.
-//! - *Carried values*: grey values that points take from their own photo should be found where the pose of
-//!   another frame puts the points. It sees what is wrong with poses, scale and depth.
+//!   Online Calibration of Cameras and Lasers*, RSS 2013). Finds errors within a frame.
+//! - *Carried values*: points should have the same grey values in their own photo and where the pose of another
+//!   frame projects them. Finds errors of poses, scale and depth.
 
 use image::{GrayImage, ImageBuffer, Luma, Primitive};
 use nalgebra::{Point2, Point3};
 
 use crate::camera::Intrinsics;
 
-/// Points in view below which nothing is said.
+/// The fewest points in view for a measurement.
 const FEWEST_POINTS: usize = 150;
 
-/// The strength of image edges, fading with the distance from them, so that an edge which is missed by a
-/// few pixels still attracts.
+/// The strength of image edges. It fades with the distance, so edges a few pixels away still count.
 pub(super) type EdgeMap = ImageBuffer<Luma<f32>, Vec<f32>>;
 
-/// Looks for edges in a photo.
+/// Finds the edges of a photo.
 pub(super) fn edge_map(photo: &GrayImage) -> EdgeMap {
-    /// What is left of an edge one pixel away.
+    /// The share of an edge's strength one pixel away.
     const FADING: f32 = 0.80;
-    /// Share of an edge's own pixel, so that the ridge stays sharp.
+    /// The weight of the unfaded edge, which keeps the ridge sharp.
     const SHARP: f32 = 1.0 / 3.0;
-    /// Differences beyond this are edges like any other [grey values].
+    /// Stronger edges count as this much [grey values].
     const STRONGEST: f32 = 60.0;
-    /// The neighbours that a pass over the rows has seen before a pixel.
+    /// The neighbours that a pass in row order visits before a pixel.
     const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     let values = photo.as_raw();
@@ -68,7 +66,7 @@ pub(super) fn edge_map(photo: &GrayImage) -> EdgeMap {
     EdgeMap::from_raw(photo.width(), photo.height(), strength.collect()).unwrap_or_default()
 }
 
-/// The value of an image between the centres of four pixels, by bilinear interpolation.
+/// The bilinearly interpolated value of an image.
 fn value<T: Primitive + Into<f64>>(
     image: &ImageBuffer<Luma<T>, Vec<T>>,
     pixel: &Point2<f64>,
@@ -86,7 +84,7 @@ fn value<T: Primitive + Into<f64>>(
     })
 }
 
-/// A point as a camera sees it.
+/// A point in a camera's image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub(super) pixel: Point2<f64>,
@@ -94,8 +92,8 @@ pub(super) struct Seen {
     pub(super) depth: f64,
 }
 
-/// The logarithm of how much stronger image edges are at depth edges than at other points; `None` where
-/// too little is in view.
+/// The logarithm of the ratio of image-edge strength at depth edges to that at all points; `None` if too few
+/// points are in view.
 pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
     let inside: Vec<(Seen, f64)> = seen
         .iter()
@@ -118,9 +116,9 @@ pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
     Some((at_edges / weight_sum / mean).max(1e-3).ln())
 }
 
-/// How far each point stands out before what is beside it, 0 … 1.
+/// How far each point is in front of its neighbours, as a share of its depth, 0 … 1.
 fn depth_edges(width: usize, height: usize, inside: &[(Seen, f64)]) -> Vec<f64> {
-    /// Cells are such that a scan of 64 beams has a point in most of them.
+    /// The cell size at which a scan of 64 beams has a point in most cells.
     const CELLS_ACROSS: usize = 250;
     const NEIGHBOURS: [(isize, isize); 6] = [(-1, 0), (1, 0), (-2, 0), (2, 0), (0, -1), (0, -2)];
     let cell = (width / CELLS_ACROSS).max(1);
@@ -139,7 +137,7 @@ fn depth_edges(width: usize, height: usize, inside: &[(Seen, f64)]) -> Vec<f64> 
         .iter()
         .map(|(seen, _)| {
             let (x, y) = place(seen);
-            // What is hidden by the same cell's nearest point has no edge to show.
+            // Points behind the nearest one of their cell are hidden.
             if seen.depth > 1.05 * nearest[y * columns + x] {
                 return 0.0;
             }
@@ -154,8 +152,8 @@ fn depth_edges(width: usize, height: usize, inside: &[(Seen, f64)]) -> Vec<f64> 
         .collect()
 }
 
-/// The correlation of the grey values of points in two photos, as Fisher's z; `None` where fewer points are
-/// in view of both than `least`.
+/// The correlation of the points' grey values in two photos, as Fisher's z; `None` if fewer than `least`
+/// points are in view of both.
 pub(super) fn carried_agreement(
     from: (&GrayImage, &[Option<Seen>]),
     to: (&GrayImage, &[Option<Seen>]),
@@ -190,16 +188,16 @@ pub(super) fn carried_agreement(
         .then(|| correlation.clamp(-0.999, 0.999).atanh())
 }
 
-/// Where a camera sees a point, through a lens that bends by `k1` more than the camera says.
+/// Projects a point with an additional radial distortion `k1`.
 pub(super) fn project(camera: &Intrinsics, k1: f64, point: &Point3<f64>) -> Option<Seen> {
-    /// Nearer points are those of the vehicle itself \[m\].
+    /// Nearer points cannot be projected \[m\].
     const NEAREST_M: f64 = 1e-6;
     if point.z <= NEAREST_M {
         return None;
     }
     let (x, y) = (point.x / point.z, point.y / point.z);
     let bent = 1.0 + k1 * (x * x + y * y);
-    // Beyond the fold of the polynomial a point would be seen twice.
+    // Beyond the fold of the polynomial, a point would be projected twice.
     let is_folded = 1.0 + 3.0 * k1 * (x * x + y * y) <= 0.0;
     (!is_folded).then(|| Seen {
         pixel: Point2::new(

@@ -1,15 +1,14 @@
-//! What a scene has, and whether its numbers can be what they say they are.
+//! The contents of a scene, and whether its numbers are plausible.
 
 use crate::geometry::Pose;
 use crate::scene::Scene;
 
-/// Clouds that are looked at.
+/// How many clouds are examined.
 const CLOUDS: usize = 3;
-/// Median depths beyond which a cloud is hardly in metres \[m\]; a map of a table has 0.3, one of a valley
-/// 200.
+/// Plausible median depths of a cloud \[m\]: the map of a table has 0.3, that of a valley 200.
 const DEPTHS_M: (f64, f64) = (0.1, 400.0);
 
-/// What is there.
+/// The contents of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inventory {
     /// Frames in all.
@@ -22,24 +21,24 @@ pub struct Inventory {
     pub with_time: usize,
     /// Sizes of photos and their fields of view.
     pub cameras: Vec<String>,
-    /// How long the way from pose to pose is \[m\].
+    /// The length of the route from pose to pose \[m\].
     pub way_m: f64,
     /// Least, median and greatest step from frame to frame \[m\].
     pub steps_m: Option<[f64; 3]>,
-    /// Points of the clouds that were looked at, and their median depth before the camera \[m\].
+    /// The examined clouds: frame, number of points, and median depth in view \[m\].
     pub clouds: Vec<(String, usize, Option<f64>)>,
 }
 
-/// Something that is hardly right, in words.
+/// Something implausible, as a sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remark {
-    /// Nothing can be localised with it.
+    /// The scene is unusable.
     Broken(String),
-    /// It may be meant so.
+    /// It may be intended.
     Odd(String),
 }
 
-/// Looks at all that a scene says without comparing it with its photos.
+/// Examines everything but the fit with the photos.
 pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     let mut remarks = Vec::new();
     let frames = scene.frames();
@@ -64,7 +63,7 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
             _ => "no frame has both a pose and a cloud",
         };
         remarks.push(Remark::Broken(format!(
-            "{missing}: nothing can be localised against this scene; its photos can be queries of another \
+            "{missing}: the scene has no references, but its photos can be queries of another scene \
              (--query-scene)"
         )));
     }
@@ -82,7 +81,7 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     (inventory, remarks)
 }
 
-/// As many of `count` positions as are wanted, evenly from the first to the last.
+/// Up to `wanted` of `count` positions, evenly from the first to the last.
 fn spread(count: usize, wanted: usize) -> impl Iterator<Item = usize> {
     let taken = wanted.min(count);
     let steps = taken.saturating_sub(1).max(1);
@@ -122,12 +121,14 @@ fn steps(poses: &[Option<Pose>], inventory: &mut Inventory, remarks: &mut Vec<Re
     let median = steps[steps.len() / 2];
     inventory.steps_m = Some([steps[0], median, steps[steps.len() - 1]]);
     if inventory.way_m == 0.0 {
-        remarks.push(Remark::Broken("all poses are at the same place".to_owned()));
+        remarks.push(Remark::Broken(
+            "all poses have the same position; check the file of poses".to_owned(),
+        ));
     }
     if steps[steps.len() - 1] > 50.0 * median.max(0.1) && steps.len() > 10 {
         remarks.push(Remark::Odd(format!(
-            "the greatest step from frame to frame is {:.1} m and the median {median:.2} m: is a pose \
-             missing or wrong?",
+            "the greatest step between frames is {:.1} m, the median {median:.2} m; a pose may be missing or \
+             wrong",
             steps[steps.len() - 1]
         )));
     }
@@ -139,7 +140,7 @@ fn times(scene: &dyn Scene, remarks: &mut Vec<Remark>) {
         .collect();
     if let Some(back) = times.windows(2).position(|two| two[1] <= two[0]) {
         remarks.push(Remark::Odd(format!(
-            "times do not grow: {} s after {} s",
+            "times do not increase: {} s follows {} s",
             times[back + 1],
             times[back]
         )));
@@ -168,14 +169,14 @@ fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &m
     let median = depths.get(depths.len() / 2).copied();
     if cloud.is_empty() || depths.is_empty() {
         remarks.push(Remark::Broken(format!(
-            "none of the {} points of the cloud of {name} is in view of its camera: the frame of the cloud \
-             is not that of the camera",
+            "none of the {} points of the cloud of frame {name} is in view of its camera; check the coordinate \
+             frame of the cloud",
             cloud.len()
         )));
     }
     if let Some(median) = median.filter(|depth| !(DEPTHS_M.0..DEPTHS_M.1).contains(depth)) {
         remarks.push(Remark::Odd(format!(
-            "the median depth of the cloud of {name} is {median:.3} m: hardly metres"
+            "the median depth of the cloud of frame {name} is {median:.3} m; is the unit metres?"
         )));
     }
     inventory.clouds.push((name.clone(), cloud.len(), median));

@@ -1,4 +1,4 @@
-//! A cloud on its photo.
+//! A picture of a cloud on its photo.
 
 use image::{Rgb, imageops};
 use nalgebra::Point2;
@@ -7,7 +7,7 @@ use super::agreement::Seen;
 use crate::image::{GrayImage, RgbImage};
 use crate::palette;
 
-/// The photo, darkened, with the points on it: near ones red, far ones blue.
+/// The darkened photo with the points on it, near ones red, far ones blue.
 pub(super) fn cloud_on(photo: &GrayImage, seen: &[Seen]) -> RgbImage {
     let mut canvas = image::DynamicImage::ImageLuma8(imageops::brighten(photo, -30)).into_rgb8();
     let mut depths: Vec<f64> = seen.iter().map(|seen| seen.depth).collect();
@@ -25,7 +25,7 @@ pub(super) fn cloud_on(photo: &GrayImage, seen: &[Seen]) -> RgbImage {
     canvas
 }
 
-/// A square around a pixel, as far as it is in the picture.
+/// Draws a square around a pixel, clipped to the picture.
 pub(super) fn dot(canvas: &mut RgbImage, at: Point2<i64>, radius: i64, color: palette::Rgb) {
     for (x, y) in (-radius..=radius).flat_map(|y| (-radius..=radius).map(move |x| (x, y))) {
         if let (Ok(x), Ok(y)) = (u32::try_from(at.x + x), u32::try_from(at.y + y))

@@ -1,97 +1,95 @@
-//! Other readings of a scene: what its numbers would mean if the usual mistake had been made.
+//! Other readings of a scene: the meaning of its numbers if a usual mistake was made.
 
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
-/// A mistake that scenes are written or read with.
+/// A usual mistake in writing or reading a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Mistake {
-    /// Poses take world points to the camera, and are read as taking camera points to the world.
+    /// Poses are camera from world, but are read as world from camera.
     InversePose,
-    /// The axes of poses are those of a vehicle: forward, left, up.
+    /// Poses use the axes of a vehicle: forward, left, up.
     PoseAxes,
-    /// The axes of clouds are those of a scanner: forward, left, up.
+    /// Clouds use the axes of a scanner: forward, left, up.
     CloudAxes,
-    /// Camera parameters are those of another camera.
+    /// The camera parameters belong to another camera.
     WrongCamera,
     /// Clouds, or poses, are in millimetres.
     Millimetres,
-    /// Quaternions have their scalar first and are read as having it last, or the other way round.
+    /// Quaternions are written scalar first and read scalar last, or vice versa.
     QuaternionOrder,
     /// Each cloud belongs to the frame before or after.
     CloudOfNeighbour,
-    /// Angles are in degrees and are read as radians, or the other way round.
+    /// Angles are written in degrees and read as radians, or vice versa.
     Degrees,
-    /// Poses and clouds are those of the other camera of a stereo pair.
+    /// Poses and clouds belong to the other camera of a stereo pair.
     OtherStereoCamera,
     /// Clouds are mirrored.
     MirroredCloud,
     /// Poses are in reverse order.
     ReversedPoses,
-    /// The distortion was taken out of photos that had none.
+    /// The photos were undistorted although they had no distortion.
     UndistortedTwice,
 }
 
 impl Mistake {
-    /// What is wrong, in a phrase.
+    /// The mistake in a phrase.
     pub fn about(self) -> &'static str {
         match self {
-            Self::InversePose => "the poses are inverted (world to camera, not camera to world)",
+            Self::InversePose => {
+                "the poses are inverted: world to camera instead of camera to world"
+            }
             Self::PoseAxes => {
-                "the axes of the poses are forward, left, up, not right, down, forward"
+                "the poses use the axes forward, left, up instead of right, down, forward"
             }
             Self::CloudAxes => {
-                "the clouds are in the axes of a scanner (forward, left, up), not right, down, forward"
+                "the clouds use the axes forward, left, up of a scanner instead of right, down, forward"
             }
             Self::WrongCamera => "the camera parameters are those of another camera",
-            Self::Millimetres => {
-                "lengths of poses and clouds are not in the same unit (millimetres?)"
-            }
-            Self::QuaternionOrder => "the quaternions are in the other order (w first or last)",
+            Self::Millimetres => "poses and clouds use different units of length (millimetres?)",
+            Self::QuaternionOrder => "the quaternions have the other order (w first or last)",
             Self::CloudOfNeighbour => "the clouds are one frame off",
-            Self::Degrees => {
-                "angles of the poses are in degrees read as radians, or the other way round"
-            }
+            Self::Degrees => "the poses' angles are in degrees but read as radians, or vice versa",
             Self::OtherStereoCamera => {
-                "poses and clouds are those of the other camera of a stereo pair"
+                "poses and clouds belong to the other camera of a stereo pair"
             }
             Self::MirroredCloud => "the clouds are mirrored",
             Self::ReversedPoses => "the poses are in reverse order",
             Self::UndistortedTwice => {
-                "the photos are bent: undistorted twice, or with another lens's parameters"
+                "the photos are distorted: undistorted twice, or with the parameters of another lens"
             }
         }
     }
 }
 
-/// One way to read a scene: as it says, or as a mistake would have it.
+/// A way to read a scene, as if a mistake had been made.
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
     pub(super) mistake: Mistake,
-    /// How it is to be put right, in words.
+    /// How to correct it.
     pub(super) remedy: String,
     pub(super) change: Change,
 }
 
-/// What is read otherwise.
+/// The change to the stated numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Change {
     /// The pose of each frame.
     Pose(fn(&Pose) -> Pose),
-    /// Whole trajectories, where one pose does not tell: the frame and all poses.
+    /// The pose of a frame, from the whole trajectory.
     Poses(fn(usize, &[Option<Pose>]) -> Option<Pose>),
     /// The points of each cloud.
     Points(fn(&Point3<f64>) -> Point3<f64>),
-    /// The cloud of a frame so many further on.
+    /// The cloud of the frame at this offset.
     Neighbour(isize),
-    /// Clouds and poses moved along the camera's own x axis \[m\].
+    /// Poses and clouds shifted along the camera's x axis \[m\].
     Aside(f64),
-    /// Focal length times so much, centre moved \[px\].
+    /// A scaled focal length and a shifted principal point \[px\].
     Camera { times: f64, right: f64, down: f64 },
-    /// A lens that bends by so much more (k1).
+    /// An additional radial distortion k1.
     Lens(f64),
 }
 
@@ -121,7 +119,7 @@ impl Change {
         }
     }
 
-    /// The camera, and how much more its lens bends.
+    /// The camera, and its additional radial distortion k1.
     pub(super) fn camera(&self, stated: &Intrinsics) -> (Intrinsics, f64) {
         match *self {
             Self::Camera { times, right, down } => {
@@ -156,17 +154,17 @@ pub(super) fn readings() -> Vec<Reading> {
         ),
         reading(
             M::PoseAxes,
-            "turn the axes of each pose to right, down, forward",
+            "rotate the axes of each pose to right, down, forward",
             Change::Pose(|pose| pose * flu_from_rdf()),
         ),
         reading(
             M::PoseAxes,
-            "turn the axes of world and poses to right, down, forward",
+            "rotate the axes of world and poses to right, down, forward",
             Change::Pose(|pose| flu_from_rdf().inverse() * pose * flu_from_rdf()),
         ),
         reading(
             M::CloudAxes,
-            "turn the axes of each cloud to right, down, forward",
+            "rotate the axes of each cloud to right, down, forward",
             Change::Points(|p| Point3::new(-p.y, -p.z, p.x)),
         ),
         reading(
@@ -191,26 +189,26 @@ pub(super) fn readings() -> Vec<Reading> {
         ),
         reading(
             M::QuaternionOrder,
-            "read quaternions as w x y z, of world to camera",
+            "read quaternions as w x y z, world to camera",
             Change::Pose(|pose| {
                 with_rotation(&pose.inverse(), |[x, y, z, w]| [y, z, w, x]).inverse()
             }),
         ),
         reading(
             M::QuaternionOrder,
-            "read quaternions as x y z w, of world to camera",
+            "read quaternions as x y z w, world to camera",
             Change::Pose(|pose| {
                 with_rotation(&pose.inverse(), |[x, y, z, w]| [w, x, y, z]).inverse()
             }),
         ),
         reading(
             M::CloudOfNeighbour,
-            "take the cloud of the frame before",
+            "use the cloud of the previous frame",
             Change::Neighbour(-1),
         ),
         reading(
             M::CloudOfNeighbour,
-            "take the cloud of the frame after",
+            "use the cloud of the next frame",
             Change::Neighbour(1),
         ),
         reading(
@@ -225,17 +223,17 @@ pub(super) fn readings() -> Vec<Reading> {
         ),
         reading(
             M::MirroredCloud,
-            "turn the sign of the axis that points to the side",
+            "negate the sideways axis of the clouds",
             Change::Points(|p| Point3::new(-p.x, p.y, p.z)),
         ),
         reading(
             M::MirroredCloud,
-            "turn the sign of the axis that points up or down",
+            "negate the vertical axis of the clouds",
             Change::Points(|p| Point3::new(p.x, -p.y, p.z)),
         ),
         reading(
             M::ReversedPoses,
-            "turn the order of the poses round",
+            "reverse the order of the poses",
             Change::Poses(|frame, poses| {
                 poses
                     .get(poses.len().checked_sub(frame + 1)?)
@@ -256,7 +254,7 @@ fn flu_from_rdf() -> Pose {
     )
 }
 
-/// The same position, its quaternion's parts in another order.
+/// The same position, with the quaternion's components reordered.
 fn with_rotation(pose: &Pose, order: fn([f64; 4]) -> [f64; 4]) -> Pose {
     let q = pose.rotation.coords;
     let [x, y, z, w] = order([q.x, q.y, q.z, q.w]);
@@ -264,7 +262,7 @@ fn with_rotation(pose: &Pose, order: fn([f64; 4]) -> [f64; 4]) -> Pose {
     Pose::from_parts(pose.translation, rotation)
 }
 
-/// Yaw about the camera's y axis, pitch about x, roll about z, in the order in which vehicles say them.
+/// Yaw about the camera's y axis, pitch about x, roll about z, in the order usual for vehicles.
 fn angles(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let m = rotation.to_rotation_matrix();
     // R = Ry(yaw) Rx(pitch) Rz(roll).
@@ -280,17 +278,17 @@ fn from_angles([yaw, pitch, roll]: [f64; 3]) -> UnitQuaternion<f64> {
         * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll)
 }
 
-/// Radians that were taken for degrees: all angles are too small.
+/// Radians that were read as degrees: all angles are too small.
 fn angles_in_radians(pose: &Pose) -> Pose {
     let turned = angles(&pose.rotation).map(f64::to_degrees);
     Pose::from_parts(pose.translation, from_angles(turned))
 }
 
-/// Degrees that were taken for radians: all angles are too large, and whole turns of them are lost. The
-/// turns are those with which the camera looks where it goes.
+/// Degrees that were read as radians: all angles are too large, and whole turns are lost. They are restored
+/// such that the camera looks along its route.
 fn angles_in_degrees(frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {
     use std::f64::consts::{PI, TAU};
-    /// Turns of 360 radians' worth of degrees, to either side.
+    /// Lost turns to either side.
     const TURNS: i32 = 29;
     let stated = poses.get(frame).copied().flatten()?;
     let at = |frame: Option<usize>| {
@@ -298,7 +296,7 @@ fn angles_in_degrees(frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {
         Some(pose.translation.vector)
     };
     let here = stated.translation.vector;
-    // In a bend the way through both neighbours is the tangent; at the ends half a turn is missing.
+    // In a bend, the line through both neighbours is the tangent.
     let (next, last) = (at(frame.checked_add(1)), at(frame.checked_sub(1)));
     let way = match (next, last) {
         (None, None) => return None,
@@ -306,7 +304,7 @@ fn angles_in_degrees(frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {
     };
     let heading = way.x.atan2(way.z);
     let [yaw, pitch, roll] = angles(&stated.rotation);
-    // Two triples of angles are the same rotation.
+    // Two triples of angles give the same rotation.
     let readings = [[yaw, pitch, roll], [yaw + PI, PI - pitch, roll + PI]];
     let off = |angles: &[f64; 3]| {
         let turn = (angles[0] - heading).rem_euclid(TAU);

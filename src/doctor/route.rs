@@ -1,4 +1,4 @@
-//! The way of the camera, seen from above.
+//! The route of the camera, seen from above.
 
 use image::{Rgb, imageops};
 use nalgebra::{Point2, Vector3};
@@ -8,17 +8,17 @@ use crate::geometry::Pose;
 use crate::image::RgbImage;
 use crate::palette;
 
-/// What stands around the way \[px\].
+/// The margin around the route \[px\].
 const MARGIN_PX: f64 = 20.0;
-/// The width of a map without a photo \[px\].
+/// The width of a picture without a photo \[px\].
 const WIDTH: u32 = 620;
 
-/// Where the camera was \[m\]: to the right of its first pose, and ahead of it. `None` for fewer than two poses.
+/// The camera's positions \[m\], right and ahead of its first pose. `None` for fewer than two poses.
 fn places(poses: &[Pose]) -> Option<Vec<Point2<f64>>> {
     let [start, _, ..] = poses else {
         return None;
     };
-    // The axes of the world are arbitrary; the cameras know what is down.
+    // The axes of the world are arbitrary, so "down" comes from the cameras.
     let down: Vector3<f64> = poses.iter().map(|pose| pose.rotation * Vector3::y()).sum();
     let down = down.try_normalize(1e-9)?;
     let right = start.rotation * Vector3::x();
@@ -31,7 +31,7 @@ fn places(poses: &[Pose]) -> Option<Vec<Point2<f64>>> {
     Some(poses.iter().map(place).collect())
 }
 
-/// The way below a picture, or alone: its start green, its end vermilion.
+/// Draws the route below a picture, or alone: its start green, its end vermilion.
 pub(super) fn below(picture: Option<RgbImage>, poses: &[Pose]) -> Option<RgbImage> {
     let Some(places) = places(poses) else {
         return picture;

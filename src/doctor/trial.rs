@@ -1,4 +1,4 @@
-//! Holding a scene, as it says and in other readings, to its own photos.
+//! Compares a scene, as stated and in other readings, with its own photos.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -12,31 +12,31 @@ use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 use crate::scene::{Scene, SceneError};
 
-/// Frames that are looked at, each with those after it.
+/// How many frames are compared, each with its partners.
 const ANCHORS: usize = 8;
-/// Where the frames are that an anchor's points are carried to, the first two that there are.
+/// The offsets of an anchor's partners; the first two that exist are used.
 const PARTNERS: [isize; 4] = [1, 3, -1, -3];
 const CARRIED_TO: usize = 2;
-/// Points of a cloud that are looked at; edges want a dense one.
+/// The most points of a cloud; edges need a dense one.
 const MOST_POINTS: usize = 40_000;
-/// One point of so many is carried to other frames.
+/// Every how many points one is carried to other frames.
 const CARRIED: usize = 4;
 
-/// What must be gained by another reading, on average over frames, as a share of what can be gained.
+/// The least mean gain of another reading over the frames.
 const TELLING_GAIN: f64 = 0.04;
-/// Frames that a number is searched with at least.
+/// The fewest frames that a reading with a free number is fitted to.
 const FEWEST_FRAMES: usize = 4;
-/// What must be gained in standard errors of the mean.
+/// The least mean gain in standard errors of the mean.
 const CERTAIN: f64 = 2.5;
 
-/// What photos are held to.
+/// A photo with its edges and its camera.
 struct Sight {
     gray: GrayImage,
     edges: EdgeMap,
     camera: Intrinsics,
 }
 
-/// The frames that are looked at, with all poses.
+/// The compared frames, with all poses.
 pub(super) struct Sample {
     poses: Vec<Option<Pose>>,
     sights: BTreeMap<usize, Sight>,
@@ -44,25 +44,25 @@ pub(super) struct Sample {
     anchors: Vec<usize>,
 }
 
-/// A reading that agrees better than what the scene says.
+/// A reading that fits better than the scene as stated.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The mistake.
     pub mistake: Mistake,
-    /// How it is to be put right.
+    /// How to correct it.
     pub remedy: String,
-    /// Agreement of the scene as it says.
+    /// The agreement of the scene as stated.
     pub stated: Agreement,
-    /// Agreement in the other reading.
+    /// The agreement in the other reading.
     pub otherwise: Agreement,
 }
 
-/// How well a reading fits the photos, on average; higher is better.
+/// How well a reading fits the photos on average; higher is better.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
-    /// Logarithm of the strength of image edges at depth edges beside that at other points.
+    /// Logarithm of the ratio of image-edge strength at depth edges to that at all points.
     pub edges: Option<f64>,
-    /// Correlation of grey values that points carry from photo to photo, as Fisher's z.
+    /// Correlation of the points' grey values between photos, as Fisher's z.
     pub carried: Option<f64>,
 }
 
@@ -79,7 +79,7 @@ fn mean_of(scores: &[Agreement]) -> Agreement {
     }
 }
 
-/// What is worth more: a unit of Fisher's z or of the logarithm of edges.
+/// One number for both measures; missing edges count slightly against a reading.
 fn worth(score: &Agreement, weigh_edges: f64) -> f64 {
     score.carried.unwrap_or(0.0) + weigh_edges * score.edges.unwrap_or(-0.2)
 }
@@ -127,7 +127,7 @@ impl Sample {
         Ok(sample)
     }
 
-    /// Whether anything can be compared at all.
+    /// Whether there is nothing to compare.
     pub(super) fn is_empty(&self) -> bool {
         self.anchors.is_empty()
     }
@@ -136,7 +136,7 @@ impl Sample {
         &self.anchors
     }
 
-    /// Points of a frame's cloud as its camera sees them, and its photo.
+    /// A frame's photo, and the points of its cloud in the photo.
     pub(super) fn seen(&self, anchor: usize) -> Option<(&GrayImage, Vec<Seen>)> {
         let sight = self.sights.get(&anchor)?;
         let points = self.clouds.get(&anchor)?;
@@ -171,7 +171,7 @@ impl Sample {
             .count();
         let carried_points: Vec<&Point3<f64>> = points.iter().step_by(CARRIED).collect();
         let seen: Vec<Option<Seen>> = seen.into_iter().step_by(CARRIED).collect();
-        // Where hardly anything is in view, what agrees does so by chance.
+        // With few points in view, agreement is chance.
         let least = in_view / CARRIED / 20;
         let carried = partners(anchor, self.poses.len()).filter_map(|partner| {
             let other = self.sights.get(&partner)?;
@@ -183,7 +183,7 @@ impl Sample {
                 .map(|point| project(&camera, k1, &(partner_from_anchor * **point)))
                 .collect();
             let agreement = carried_agreement((&sight.gray, &seen), (&other.gray, &there), least);
-            // Points that are not in view of the next frame agree with nothing.
+            // Points that are out of view of the partner do not agree.
             Some(agreement.unwrap_or(0.0))
         });
         Agreement {
@@ -192,7 +192,7 @@ impl Sample {
         }
     }
 
-    /// The reading that fits better than what the scene says, if there is one.
+    /// The reading that fits better than the scene as stated, if any.
     pub(super) fn diagnose(&self) -> (Agreement, Option<Finding>) {
         let stated = self.scores(&Change::Pose(|pose| *pose));
         let mut best: Option<(f64, Reading, Agreement)> = None;
@@ -220,7 +220,7 @@ impl Sample {
         (stated, finding)
     }
 
-    /// The readings with a number in them, each with the number that fits best.
+    /// The readings with a free number, each with the number that fits best.
     fn searched(&self) -> Vec<Reading> {
         let mut found = Vec::new();
         let aside: Vec<f64> = (-20..=20).map(|step| 0.05 * f64::from(step)).collect();
@@ -230,7 +230,7 @@ impl Sample {
             found.push(Reading {
                 mistake: Mistake::OtherStereoCamera,
                 remedy: format!(
-                    "move camera and clouds by {right_m:.2} m along the camera's x axis"
+                    "shift poses and clouds by {right_m:.2} m along the camera's x axis"
                 ),
                 change: Change::Aside(right_m),
             });
@@ -244,14 +244,14 @@ impl Sample {
         {
             found.push(Reading {
                 mistake: Mistake::UndistortedTwice,
-                remedy: format!("a lens with k1 = {k1:.2} more fits the photos"),
+                remedy: format!("add {k1:.2} to the distortion k1, which fits the photos better"),
                 change: Change::Lens(k1),
             });
         }
         found
     }
 
-    /// The value whose reading fits best.
+    /// The value that fits best.
     fn best_of(&self, values: &[f64], change: &dyn Fn(f64) -> Change) -> Option<f64> {
         let scored = values.iter().map(|&value| {
             let mean = mean_of(&self.scores(&change(value)));
@@ -261,7 +261,7 @@ impl Sample {
         Some(best.0)
     }
 
-    /// Focal length and centre, by turns.
+    /// Fits focal length and principal point alternately.
     fn best_camera(&self) -> Option<Reading> {
         let first = self.sights.values().next()?.camera;
         let step = f64::from(first.width) / 120.0;
@@ -279,8 +279,8 @@ impl Sample {
         (moved_px > LEAST_PX).then(|| Reading {
             mistake: Mistake::WrongCamera,
             remedy: format!(
-                "a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of \
-                 ({:.0}, {:.0}) fit the photos",
+                "use a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of \
+                 ({:.0}, {:.0}), which fit the photos better",
                 first.fx * times,
                 first.fx,
                 first.cx + right,
@@ -292,7 +292,7 @@ impl Sample {
         })
     }
 
-    /// How far a bend moves pixels at the left and right rim.
+    /// How far a distortion moves pixels at the left and right edge.
     fn bends_by_px(&self, k1: f64) -> f64 {
         let Some(sight) = self.sights.values().next() else {
             return 0.0;
@@ -310,16 +310,16 @@ fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usize> {
     frames.filter(move |&frame| frame < count).take(CARRIED_TO)
 }
 
-/// A camera that is moved less than this is the stated one \[m\].
+/// Smaller shifts of a camera are ignored \[m\].
 const LEAST_ASIDE_M: f64 = 0.12;
-/// A camera whose pixels move less than this is the stated one \[px\].
+/// Smaller shifts of pixels are ignored \[px\].
 const LEAST_PX: f64 = 8.0;
-/// Edges count as much as this where a mistake within a frame is looked for.
+/// The weight of edges for mistakes within a frame.
 const IN_FRAME: f64 = 1.0;
 
-/// What a reading gains, if that is telling.
+/// The gain of a reading, if it is significant.
 fn gain(stated: &[Agreement], other: &[Agreement], change: &Change) -> Option<f64> {
-    // A mistake in poses leaves the frames alone: their edges have no say.
+    // Mistakes in poses do not affect edges, which are within a frame.
     let weigh_edges = match change {
         Change::Pose(_) | Change::Poses(_) => 0.0,
         _ => IN_FRAME,
@@ -331,7 +331,7 @@ fn gain(stated: &[Agreement], other: &[Agreement], change: &Change) -> Option<f6
         .map(|(stated, other)| worth(other, weigh_edges) - worth(stated, weigh_edges))
         .collect();
     let count = gains.len() as f64;
-    // Where there are few frames, what fits two of them by chance must not pass for a mistake.
+    // With few frames, a chance fit of two must not count as a mistake.
     if gains.len() < FEWEST_FRAMES.min(stated.len()).max(2) || gains.len() * 2 < stated.len() {
         return None;
     }

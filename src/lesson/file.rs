@@ -12,15 +12,15 @@ use super::{Claim, Lesson};
 use crate::measure::Condition;
 use crate::method::Method;
 
-/// Why there is no lesson.
+/// Why a lesson cannot be opened.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LessonError {
-    /// No lesson of this name.
-    #[error("there is no lesson `{name}`, and no such file; there are {known}")]
+    /// There is no lesson with this name.
+    #[error("`{name}` is neither a lesson nor a file; the lessons are {known}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// What there is.
+        /// The existing names.
         known: String,
     },
     /// The file cannot be read.
@@ -28,10 +28,10 @@ pub enum LessonError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         why: String,
     },
-    /// The file is no lesson.
+    /// The file is malformed.
     #[error("lesson {name}, line {line}: {why}")]
     Malformed {
         /// The lesson.
@@ -64,7 +64,7 @@ struct ClaimText {
     holds: String,
 }
 
-/// The header of a page; what it does not say is as on the page before.
+/// The header of a page; missing fields are those of the previous page.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct PageHeader {
@@ -96,7 +96,7 @@ struct Block {
     text: String,
 }
 
-/// A page as it stands in the file.
+/// The source of a page.
 struct Section {
     title: String,
     line: usize,
@@ -104,10 +104,10 @@ struct Section {
     text: String,
 }
 
-/// The name of the setting that a lesson begins with.
+/// The name of the first setting of a lesson.
 const FIRST: &str = "first";
 
-/// The views of a lesson that says nothing of them.
+/// The default views of a lesson.
 const SHOWN: [&str; 3] = ["images", "surface", "space"];
 
 impl Lesson {
@@ -133,7 +133,10 @@ impl Lesson {
             if variants.iter().any(|(name, _)| name == variant) {
                 Ok(variant.to_owned())
             } else {
-                Err(source.malformed(line, &format!("there is no variant `{variant}`")))
+                Err(source.malformed(
+                    line,
+                    &format!("a variant of the header expected, `{variant}` found"),
+                ))
             }
         };
         let mut claims = Vec::new();
@@ -150,7 +153,7 @@ impl Lesson {
         }
         if pages.is_empty() {
             let end = text.lines().count();
-            return Err(source.malformed(end, "a page, which begins with `## `, expected"));
+            return Err(source.malformed(end, "a page expected, which begins with `## `"));
         }
         Ok(Self {
             name: name.to_owned(),
@@ -214,9 +217,10 @@ impl Source<'_> {
                 "```page" if !is_code => match sections.last_mut() {
                     Some(page) if page.header.is_none() => page.header = Some(block_until("```")),
                     _ => {
-                        return Err(
-                            self.malformed(line, "a page has one header, below its heading")
-                        );
+                        return Err(self.malformed(
+                            line,
+                            "at most one header per page expected, below its heading",
+                        ));
                     }
                 },
                 heading if heading.starts_with("## ") && !is_code => sections.push(Section {
@@ -252,7 +256,7 @@ impl Source<'_> {
             (None, None) => FIRST.to_owned(),
         };
         let before = before.filter(|before| before.variant == variant);
-        // A question that was answered has left the run where its answer is.
+        // After an answered question, the run stays at the moment of the answer.
         let left = before.map(|page| match &page.question {
             Some(question) => &question.reveal,
             None => &page.at,
@@ -288,7 +292,7 @@ impl Source<'_> {
                 right: right - 1,
             },
             _ => {
-                let why = "a question has either `choices` with `right` counted from 1, or `place`";
+                let why = "either `choices` with `right`, counted from 1, or `place` expected in a question";
                 return Err(self.malformed(line, why));
             }
         };

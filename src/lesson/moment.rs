@@ -1,4 +1,4 @@
-//! A moment of a run, by what the estimators do there.
+//! A moment of a run, named by a stage or a breakpoint.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,22 +12,22 @@ use crate::trace::Record;
 /// (`mi.position_coarse`) or where a number crosses a bound (`trial >= 5`).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Moment {
-    /// Before anything is told.
+    /// The start of the run.
     Start,
     /// The end of the run.
     End,
     /// The end of a stage.
     After {
-        /// The estimator that it is a stage of; any without.
+        /// The estimator of the stage; `None` means any.
         method: Option<Method>,
         /// The stage's name.
         stage: &'static str,
     },
-    /// Where a breakpoint would stop.
+    /// The moment of a breakpoint.
     At(Breakpoint),
 }
 
-/// A text that names no moment.
+/// A text that is not a moment.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}`: `start`, `end`, `after STAGE` or a breakpoint expected; {why}")]
 pub struct MomentError {
@@ -51,14 +51,14 @@ impl FromStr for Moment {
         let Some(stage) = text.strip_prefix("after ") else {
             return text.parse().map(Self::At).map_err(|why| refused(&why));
         };
-        // A breakpoint at the stage knows what a stage is.
+        // The parser of breakpoints knows the stages.
         let breakpoint: Breakpoint = stage.parse().map_err(|why| refused(&why))?;
         match breakpoint.at() {
             BreakAt::Stage(name) => Ok(Self::After {
                 method: breakpoint.method(),
                 stage: name,
             }),
-            BreakAt::Crossing(_) => Err(refused(&"a comparison has no end")),
+            BreakAt::Crossing(_) => Err(refused(&"`after` needs a stage, not a comparison")),
         }
     }
 }
@@ -81,7 +81,7 @@ impl fmt::Display for Moment {
 posescope_core::serde_as_text!(Moment);
 
 impl Moment {
-    /// The record of this moment, if a run has come so far. A run's end is known to whoever drives it.
+    /// The record of this moment, if the run has reached it. `None` for [`Self::End`], which is no record.
     pub fn find(&self, run: &Run) -> Option<usize> {
         let mut watch = Watch::new(self.clone());
         run.records()
@@ -98,7 +98,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Waits for a moment from the first record of a run on.
+    /// Waits for a moment, starting at the first record of a run.
     pub fn new(moment: Moment) -> Self {
         let breakpoint = match &moment {
             Moment::At(breakpoint) => Some(breakpoint.clone()),
@@ -110,7 +110,7 @@ impl Watch {
         }
     }
 
-    /// Whether this record is the moment. Every record must be shown.
+    /// Whether this record is the moment. Must be called with every record.
     pub fn is_reached(&mut self, record: &Record) -> bool {
         match &self.moment {
             Moment::Start => true,

@@ -1,4 +1,4 @@
-//! A page of a lesson: words about one moment of a run.
+//! A page of a lesson: text about one moment of a run.
 
 use crate::method::Method;
 
@@ -9,49 +9,49 @@ use super::moment::Moment;
 pub struct Page {
     /// Its title.
     pub title: String,
-    /// Its words, in Markdown.
+    /// Its text, in Markdown.
     pub text: String,
-    /// What is localised: the name of a setting of the lesson.
+    /// The name of its setting.
     pub variant: String,
-    /// The moment of the run that it is about.
+    /// The moment of the run that it shows.
     pub at: Moment,
-    /// The views that are to be seen, by name, the largest first.
+    /// The names of the views to show, the largest first.
     pub show: Vec<String>,
-    /// With the methods beside each other, so many steps into each of them.
+    /// Show the methods in lockstep, this many steps into each.
     pub lockstep: Option<usize>,
-    /// What is asked, before anything of the answer is shown.
+    /// Its question, asked before the answer is shown.
     pub question: Option<Question>,
 }
 
-/// A question, and what is shown once it is answered.
+/// A question and its answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
     /// The question, in one sentence.
     pub ask: String,
-    /// What an answer is.
+    /// The kind of answer.
     pub answer: Answer,
-    /// The answer in words, in Markdown, told afterwards.
+    /// The explanation in Markdown, shown afterwards.
     pub because: String,
-    /// The moment that the run is shown at then.
+    /// The moment of the run to show then.
     pub reveal: Moment,
 }
 
-/// What an answer is.
+/// The kind of answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
     /// One of several choices.
     Choice {
         /// What can be chosen.
         choices: Vec<String>,
-        /// Position of the right one.
+        /// The position of the right choice.
         right: usize,
     },
-    /// A place on the map: where this method will put the query.
+    /// A place on the map: where this method puts the query.
     Place(Method),
 }
 
 impl Page {
-    /// The page as Markdown that stands alone: with its title, and the question without its answer.
+    /// The whole page as Markdown: title, text, and the question without its answer.
     pub fn markdown(&self, number: usize, pages: usize) -> String {
         let mut text = format!(
             "# {}\n\n*Page {number} of {pages}*\n\n{}\n",
@@ -69,7 +69,7 @@ impl Page {
         text
     }
 
-    /// The same once the question is answered; `None` where nothing is asked.
+    /// The page with the answer; `None` if there is no question.
     pub fn answered(&self, number: usize, pages: usize) -> Option<String> {
         let question = self.question.as_ref()?;
         let answer = match &question.answer {

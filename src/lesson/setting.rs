@@ -1,4 +1,4 @@
-//! What a lesson localises.
+//! The settings of a lesson.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,30 +12,30 @@ use crate::run::Protocol;
 use crate::scene::{FrameStore, Scene, SceneError};
 use crate::session::{IndexFile, Job, Task, TaskScenes};
 
-/// What is localised: the fields of a lesson's header and of its variants, which are the options of the
-/// command line by their names, with `scene`, `query` and `set`. What they leave out is as by default.
+/// The run of a lesson or of a variant: the options of the command line by name, with `scene`, `query` and `set`.
+/// Missing fields have their defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Setting(toml::Table);
 
-/// The fields as they stand in a file.
+/// The fields in a file, with their positions.
 pub(super) type Fields = BTreeMap<String, Spanned<toml::Value>>;
 
-/// A setting that cannot be followed.
+/// Why a setting is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingError {
-    /// A field that must be said.
-    #[error("the header says no `{0}`")]
+    /// A required field is missing.
+    #[error("`{0}` expected in the header, none found")]
     Missing(&'static str),
-    /// A field of another form.
-    #[error("`{0}` is a text in quotation marks")]
+    /// A field is not a text.
+    #[error("a text in quotation marks expected for `{0}`")]
     NoText(&'static str),
-    /// A field that there is not, or a value that it does not take.
+    /// An unknown field or an invalid value.
     #[error("{}", .0.message())]
     Field(#[from] toml::de::Error),
-    /// A parameter that there is not.
+    /// An unknown parameter or an invalid value.
     #[error(transparent)]
     Param(#[from] ParamError),
-    /// A scene or a frame that there is not.
+    /// A scene or a frame that cannot be opened.
     #[error(transparent)]
     Scene(#[from] SceneError),
 }
@@ -43,23 +43,23 @@ pub enum SettingError {
 /// A setting with its scenes opened.
 #[derive(Clone)]
 pub struct OpenSetting {
-    /// What is asked.
+    /// The task.
     pub task: Task,
     /// The scenes.
     pub scenes: TaskScenes,
     /// The query's position in its scene.
     pub query: usize,
-    /// The references' positions in theirs; none where they are to be chosen.
+    /// The references' positions in their scene; empty if they are chosen for the query.
     pub references: Vec<usize>,
 }
 
 impl OpenSetting {
-    /// The scenes by the names that the setting calls them.
+    /// The scenes by their names in the setting.
     pub fn named_scenes(&self) -> Vec<(String, Arc<dyn Scene>)> {
         named_scenes(&self.task, &self.scenes.references, &self.scenes.queries)
     }
 
-    /// The work of localising it, with these frames at hand.
+    /// The job that localises it, with this cache of frames.
     pub fn job(&self, frames: &Arc<FrameStore>) -> Job {
         Job {
             references: Arc::clone(&self.scenes.references),
@@ -73,8 +73,8 @@ impl OpenSetting {
     }
 }
 
-/// The scenes of a task by the names that it calls them. Where queries have no scene of their own, theirs
-/// is that of the references, perhaps with degraded photos, and has no name.
+/// The scenes of a task by their names in it. Queries without their own scene use that of the references, perhaps
+/// with degraded photos, and have no name.
 pub fn named_scenes(
     task: &Task,
     references: &Arc<dyn Scene>,
@@ -88,7 +88,7 @@ pub fn named_scenes(
 }
 
 impl Setting {
-    /// Checks each field by itself, so that an error comes with its place.
+    /// Checks each field alone, so an error has its position.
     pub(super) fn of(fields: &Fields) -> Result<Self, (usize, SettingError)> {
         let mut all = toml::Table::new();
         for (key, value) in fields {
@@ -103,17 +103,17 @@ impl Setting {
         Ok(Self(all))
     }
 
-    /// This setting where it says something, elsewhere `base`.
+    /// The fields of this setting, and those of `base` for the rest.
     pub(super) fn over(&self, base: &Self) -> Self {
         let mut table = base.0.clone();
         table.extend(self.0.clone());
         Self(table)
     }
 
-    /// What is asked of posescope.
+    /// The task of the setting.
     ///
     /// # Errors
-    /// No scene, or a parameter that there is not.
+    /// The scene is missing, or a field is invalid.
     pub fn task(&self) -> Result<Task, SettingError> {
         let scene = self.text("scene")?;
         self.task_of(scene.ok_or(SettingError::Missing("scene"))?)
@@ -145,7 +145,7 @@ impl Setting {
         }
     }
 
-    /// Opens the scenes and finds the frames. `opened` may have a scene by its name already.
+    /// Opens the scenes and finds the frames. `opened` returns a scene that is open already.
     ///
     /// # Errors
     /// [`SettingError`].

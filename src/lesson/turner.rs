@@ -7,8 +7,8 @@ use super::Lesson;
 use super::moment::Watch;
 use crate::trace::Record;
 
-/// Turns the pages while a run is told, for somebody who reads them afterwards: a page comes at its
-/// moment and not before the pages in front of it, and the answer to its question where that is shown.
+/// Emits the pages of a lesson during a run, for a recording. Each page comes at its moment, but not before earlier
+/// pages; the answer to its question comes at its own moment.
 #[derive(Clone, Debug)]
 pub struct PageTurner {
     waiting: VecDeque<WaitingPage>,
@@ -22,7 +22,7 @@ struct WaitingPage {
 }
 
 impl PageTurner {
-    /// Turns these pages of a lesson, which follow each other in one run.
+    /// The turner for consecutive pages of a lesson that share one run.
     pub fn new(lesson: &Lesson, pages: Range<usize>) -> Self {
         let all = lesson.pages.len();
         let mut waiting = VecDeque::new();
@@ -43,7 +43,7 @@ impl PageTurner {
         Self { waiting }
     }
 
-    /// The pages that come with a record, as Markdown. Every record must be shown.
+    /// The pages that come with a record, as Markdown. Must be called with every record.
     pub fn turn(&mut self, record: &Record) -> Vec<String> {
         for page in &mut self.waiting {
             page.has_come |= page.watch.is_reached(record);
@@ -55,7 +55,7 @@ impl PageTurner {
         turned
     }
 
-    /// The pages that are left when the run is over.
+    /// The remaining pages when the run is over.
     pub fn rest(self) -> impl Iterator<Item = String> {
         self.waiting.into_iter().map(|page| page.text)
     }

@@ -1,4 +1,4 @@
-//! What success means if chance has it too.
+//! The success rate of chance, as a baseline.
 
 use std::f64::consts::PI;
 
@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 pub struct Chance {
     /// With the pose of the reference as the answer.
     pub reference_pose: f64,
-    /// With a position of the uncertainty disc drawn at random.
+    /// With a random position in the uncertainty disc as the answer.
     pub random_pose: f64,
 }
 
 impl Chance {
-    /// What chance would reach on queries of which the distance from the reference and the uncertainty
-    /// radius are given \[m\]; `None` where one of either is not known.
+    /// The success rate of chance, from each query's distance to the reference and uncertainty radius \[m\]. `None` if
+    /// any of them is unknown.
     pub fn of(
         queries: impl Iterator<Item = (Option<f64>, Option<f64>)>,
         failure_radius_m: f64,
@@ -34,8 +34,8 @@ impl Chance {
     }
 }
 
-/// The share of a disc of radius `disc_m` that lies within `limit_m` of a point `away_m` from its
-/// centre: the area that two circles have in common over that of the disc.
+/// The share of a disc of radius `disc_m` within `limit_m` of a point at a distance `away_m` from its centre: the
+/// area of the intersection of two circles over that of the disc.
 fn share_within(disc_m: f64, limit_m: f64, away_m: f64) -> f64 {
     let (r, s, d) = (disc_m, limit_m, away_m);
     if d >= r + s {

@@ -1,4 +1,4 @@
-//! Two runs side by side, query by query.
+//! Compares two runs, query by query.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,13 @@ use crate::table::Table;
 /// What happened to a query from one run to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Change {
-    /// It was not wrong or missing, and is now: a regression.
+    /// It became a failure: a regression.
     Broken,
-    /// It was wrong or missing, and is no longer.
+    /// It is no longer a failure.
     Fixed,
-    /// It fails in neither, and its error grew by more than the tolerance.
+    /// It fails in neither run, and its error grew by more than the tolerance.
     Worse,
-    /// It fails in neither, and its error shrank by more than the tolerance.
+    /// It fails in neither run, and its error shrank by more than the tolerance.
     Better,
 }
 
@@ -33,7 +33,7 @@ impl Change {
     }
 }
 
-/// A query and method of which the runs differ.
+/// A query and method with different results in two runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// What happened to the query.
@@ -42,7 +42,7 @@ pub struct Difference {
     pub before: QueryResult,
     /// The result in the second run.
     pub after: QueryResult,
-    /// What the result is worth in the first and in the second run.
+    /// The grades in the first and in the second run.
     pub grades: [Grade; 2],
 }
 
@@ -51,24 +51,24 @@ pub struct Difference {
 pub struct RunComparison {
     /// By change, then in the order of the first run.
     pub differences: Vec<Difference>,
-    /// What the primary verdicts became that are others now, the most frequent first.
+    /// The changes of primary verdicts, the most frequent first.
     pub migrations: Vec<Migration>,
-    /// Results that both have.
+    /// The number of results in both runs.
     pub common: usize,
-    /// Results that only the first run has.
+    /// The number of results only in the first run.
     pub only_before: usize,
-    /// Results that only the second run has.
+    /// The number of results only in the second run.
     pub only_after: usize,
 }
 
 impl RunComparison {
-    /// Changes of a pose's error up to this are not worth mentioning, unless the user says otherwise.
+    /// The default tolerance: smaller changes of a pose's error are ignored.
     pub const TOLERANCE: Tolerance = Tolerance {
         translation_m: 0.1,
         rotation_deg: 0.5,
     };
 
-    /// Compares two runs. Changes of an error up to the tolerance are none.
+    /// Compares two runs. Changes of an error up to the tolerance are ignored.
     pub fn of(before: &[QueryResult], after: &[QueryResult], tolerance: &Tolerance) -> Self {
         let key = |row: &QueryResult| format!("{:?}/{}/{}", Group::of(row), row.query, row.method);
         let mut others: BTreeMap<String, &QueryResult> =
@@ -100,13 +100,13 @@ impl RunComparison {
         comparison
     }
 
-    /// How many queries changed in this way.
+    /// The number of queries with this change.
     pub fn count(&self, change: Change) -> usize {
         let changes = self.differences.iter();
         changes.filter(|one| one.change == change).count()
     }
 
-    /// In a sentence, how many results changed and which verdicts became others.
+    /// A sentence with the numbers of changed results and verdicts.
     pub fn summary(&self) -> String {
         let counts = [Change::Broken, Change::Fixed, Change::Worse, Change::Better];
         let counts = counts.map(|change| format!("{} {}", self.count(change), change.name()));
@@ -179,7 +179,7 @@ fn change(
     let (before, after) = (before.error?, after.error?);
     let metres = after.translation_m - before.translation_m;
     let degrees = after.rotation_deg - before.rotation_deg;
-    // Where one error grows and the other shrinks, the bad news counts.
+    // If one error grows and the other shrinks, the result is worse.
     if metres > tolerance.translation_m || degrees > tolerance.rotation_deg {
         Some(Change::Worse)
     } else if metres < -tolerance.translation_m || degrees < -tolerance.rotation_deg {

@@ -1,8 +1,7 @@
-//! The poses of a run in formats of other programs.
+//! Exports the poses of a run in formats of other programs.
 //!
-//! A run holds poses `world_from_camera` with x right, y down, z forward. A query without a pose is
-//! left out where the format can do without, and refuses the format where it cannot: no pose is
-//! invented.
+//! A run contains poses `world_from_camera` with x right, y down, z forward. Queries without a pose are left out.
+//! A format that cannot leave them out is refused: poses are never invented.
 
 use std::path::Path;
 
@@ -27,32 +26,16 @@ pub enum Format {
     Vloc,
 }
 
-impl Format {
-    /// All formats by their names.
-    pub const ALL: [(&'static str, Self); 4] = [
-        ("tum", Self::Tum),
-        ("kitti", Self::Kitti),
-        ("colmap", Self::Colmap),
-        ("vloc", Self::Vloc),
-    ];
-
-    /// The format of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        let found = Self::ALL.iter().find(|(known, _)| *known == name);
-        found.map(|(_, format)| *format)
-    }
-}
-
 /// Why a run cannot be exported in a format.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The run cannot be read.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// It is not clear what to export.
+    /// A query has several matching results.
     #[error(
-        "query {query} has several results; choose one of them, as in --where 'method = {}'; the fields that tell \
-         results apart are method, fusion, radius, references and scene",
+        "query {query} has several results; choose one, for example with --where 'method = {}'; results differ in \
+         the fields method, fusion, radius, references and scene",
         methods.first().map_or("fb", |method| method.name())
     )]
     Ambiguous {
@@ -62,33 +45,33 @@ pub enum ExportError {
         methods: Vec<Method>,
     },
     /// No result is left to export.
-    #[error("the run has no such results")]
+    #[error("no result of the run meets the condition; change --where")]
     Nothing,
     /// The format cannot hold a missing pose.
     #[error(
-        "kitti has a line for each frame and cannot leave out a pose: {missing}; write tum, vloc or colmap instead"
+        "kitti has one line per frame and cannot leave out a pose: {missing}; use --as tum, vloc or colmap"
     )]
     Gap {
         /// What is missing.
         missing: String,
     },
-    /// The format wants a time that the scene does not know.
-    #[error("tum: the frames of {scene} have no times; kitti, vloc and colmap need none")]
+    /// The format needs times, and the scene has none.
+    #[error("tum needs times, and the frames of {scene} have none; use --as kitti, vloc or colmap")]
     NoTime {
         /// The scene of the queries.
         scene: String,
     },
 }
 
-/// Which results are meant.
+/// Chooses the results to export.
 type Choice<'a> = &'a dyn Fn(&QueryResult) -> bool;
 
 /// A file of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExportedFile {
-    /// Its name, where an export has several.
+    /// Its name, if an export has several files.
     pub name: &'static str,
-    /// What is in it.
+    /// Its content.
     pub text: String,
 }
 
@@ -107,7 +90,7 @@ struct Localized<'a> {
     pose: Option<Pose>,
 }
 
-/// Exports the results of a run that `takes` chooses: with a pose format, one for each query.
+/// Exports the results of a run that `takes` chooses, at most one per query.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -194,7 +177,7 @@ fn kitti(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     for (line, Localized { item, pose }) in localized.iter().enumerate() {
         let gap = |missing: String| ExportError::Gap { missing };
         if item.query.parse() != Ok(line) {
-            return Err(gap(format!("frame {line} is none of the queries")));
+            return Err(gap(format!("frame {line} is not a query")));
         }
         let Some(pose) = pose else {
             return Err(gap(format!("query {} has no pose", item.query)));

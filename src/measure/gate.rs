@@ -1,4 +1,4 @@
-//! Gates: conditions that the figures of a run must meet.
+//! Gates: conditions on the figures of a run.
 
 use std::str::FromStr;
 
@@ -10,18 +10,18 @@ use crate::method::Method;
 use crate::relation::Relation;
 use crate::table::Table;
 
-/// What a gate looks at.
+/// The figure of a gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Metric {
     /// One of [`FIGURES`].
     Figure(&'static str),
-    /// Share of the queries within limits.
+    /// The share of the queries within these limits.
     Recall(Tolerance),
-    /// Share of the queries with this primary verdict.
+    /// The share of the queries with this primary verdict.
     Share(Code),
 }
 
-/// What [`Measures::figure`] knows and a gate can look at.
+/// The names of [`Measures::figure`] that gates may use.
 const FIGURES: [&str; 8] = [
     "right",
     "success",
@@ -35,7 +35,7 @@ const FIGURES: [&str; 8] = [
 
 /// A condition such as `success@mi >= 0.9`, `recall@0.5m,5deg@fb >= 0.8` or `share(D3)@mi <= 0.05`.
 ///
-/// It holds where it holds in every group of the run: for each scene, setting and fusion.
+/// It must hold in every group of the run: for each scene, setting and fusion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gate {
     text: String,
@@ -45,19 +45,19 @@ pub struct Gate {
     limit: f64,
 }
 
-/// Whether a gate holds, and what decided it.
+/// The outcome of a gate, and the figure that decided it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GateResult {
-    /// The gate as it was given.
+    /// The text of the gate.
     pub gate: String,
-    /// Whether it holds everywhere.
+    /// Whether it holds in every group.
     pub passed: bool,
-    /// The worst figure and where it was found.
+    /// The worst figure and its group.
     pub found: String,
 }
 
 impl GateResult {
-    /// The gates of a run with what they found.
+    /// A table of gates and their outcomes.
     pub fn table(gates: &[Self]) -> Table {
         let mut table = Table::with_notes(["gate", "", "found"], &[], 0);
         table.name = "Gates".to_owned();
@@ -79,9 +79,9 @@ impl FromStr for Gate {
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || {
             format!(
-                "`{text}`: METRIC@METHOD >= NUMBER expected, where METRIC is right, success, \
+                "`{text}`: METRIC@METHOD >= NUMBER expected. METRIC is right, success, \
                  recall@0.5m,5deg, median_m, median_deg, rmse_m, rmse_deg, share(CODE) of a verdict, \
-                 median(confidence) or median(time) in seconds, and the comparison >=, >, <= or <"
+                 median(confidence) or median(time) in seconds; the comparison is >=, >, <= or <"
             )
         };
         let (left, relation, right) = Relation::split(text).ok_or_else(expected)?;
@@ -117,18 +117,18 @@ fn metric_of(text: &str) -> Option<Metric> {
 }
 
 impl Gate {
-    /// The method that it looks at.
+    /// Its method.
     pub fn method(&self) -> Method {
         self.method
     }
 
-    /// Holds it against the figures of a run. A figure that does not exist passes no gate.
+    /// Checks the gate on the figures of a run. A missing figure fails it.
     pub fn check(&self, measures: &[Measures]) -> GateResult {
         let of_method = measures.iter().filter(|one| one.method == self.method);
         let mut worst: Option<(f64, Option<f64>, String)> = None;
         for one in of_method {
             let value = self.value(one);
-            // How far on the good side; what is missing is on the worst.
+            // The distance to the limit, positive if the gate holds; missing figures are worst.
             let margin = value.map_or(f64::NEG_INFINITY, |value| match self.relation {
                 Relation::AtLeast | Relation::Above => value - self.limit,
                 _ => self.limit - value,
@@ -141,7 +141,7 @@ impl Gate {
             return self.result(false, format!("the run has no results of {}", self.method));
         };
         let passed = value.is_some_and(|value| self.relation.holds(value, self.limit));
-        let found = value.map_or("no figure".to_owned(), |value| format!("{value:.4}"));
+        let found = value.map_or("no value".to_owned(), |value| format!("{value:.4}"));
         self.result(passed, format!("{found} ({group})"))
     }
 

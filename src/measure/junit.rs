@@ -1,4 +1,4 @@
-//! `junit.xml`: one case per query and method, for the test report of a CI service.
+//! `junit.xml`: one test case per query and method, for the test report of a CI service.
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
@@ -8,17 +8,17 @@ use super::metrics::Group;
 use crate::fusion::Fusion;
 use crate::localize::{QueryResult, Setting};
 
-/// The report as XML. It holds no clock.
+/// The report as XML, without timestamps.
 ///
 /// # Errors
-/// What cannot be said in XML.
+/// A text that cannot be written as XML.
 pub fn junit(
     results: &[QueryResult],
     gate_results: &[GateResult],
     known: &KnownFailures,
 ) -> Result<String, quick_junit::SerializeError> {
     let mut report = Report::new("posescope");
-    // Results come by query; a suite holds those of a method.
+    // Results are ordered by query; a suite has those of one method.
     let mut suites: Vec<TestSuite> = Vec::new();
     for row in results {
         let name = format!("{} {}", Group::of(row).scenes(), row.method);

@@ -1,14 +1,13 @@
-//! Failures that are known: a list beside the code, so that a job is red for news only.
+//! Known failures: a list in the repository, so a CI job fails only for new failures.
 
 use std::path::{Path, PathBuf};
 
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::method::Method;
-use crate::run::is_called;
+use crate::run::{FolderError, is_called};
 
-/// A list of queries that are known to fail: `QUERY METHOD` or `QUERY METHOD CODE` a line, with comments
-/// behind `#`.
+/// A list of queries that are known to fail: `QUERY METHOD` or `QUERY METHOD CODE` per line, with comments after `#`.
 #[derive(Clone, Debug, Default)]
 pub struct KnownFailures {
     path: PathBuf,
@@ -22,46 +21,23 @@ struct KnownFailure {
     number: usize,
     query: String,
     method: Method,
-    /// With a code, the query may fail for this reason alone.
+    /// With a code, only failures with this primary verdict are known.
     code: Option<Code>,
 }
 
-/// Why the list cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum KnownError {
-    /// The system says no.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What it says.
-        source: std::io::Error,
-    },
-    /// A line that is none.
-    #[error("{}:{line}: {message}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What was expected.
-        message: String,
-    },
-}
-
-/// What became of the known failures in a run.
+/// The known failures in a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KnownReport {
-    /// Results that failed as the list says.
+    /// The number of known failures that still fail.
     pub still: usize,
-    /// What is right now and can be taken off the list, a line each.
+    /// Entries that no longer fail, one line each.
     pub fixed: Vec<String>,
-    /// What failed with another code than the list says, a line each.
+    /// Entries that failed with another code, one line each.
     pub other: Vec<String>,
 }
 
 impl KnownReport {
-    /// How many failures of the run are known, and what is new about the list, a line each.
+    /// The report in lines: the number of known failures, and changed entries.
     pub fn lines(&self) -> Vec<String> {
         let still = match self.still {
             0 => None,
@@ -77,12 +53,9 @@ impl KnownFailures {
     /// Reads the list.
     ///
     /// # Errors
-    /// [`KnownError`] with file and line.
-    pub fn read(path: &Path) -> Result<Self, KnownError> {
-        let text = std::fs::read_to_string(path).map_err(|source| KnownError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
+    /// A file that cannot be read, or a malformed line.
+    pub fn read(path: &Path) -> Result<Self, FolderError> {
+        let text = std::fs::read_to_string(path).map_err(FolderError::io(path))?;
         let mut lines = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let words: Vec<&str> = line
@@ -91,7 +64,7 @@ impl KnownFailures {
                 .unwrap_or_default()
                 .split_whitespace()
                 .collect();
-            let wrong = |message: String| KnownError::Line {
+            let error = |message: String| FolderError::Damaged {
                 path: path.to_owned(),
                 line: index + 1,
                 message,
@@ -104,15 +77,15 @@ impl KnownFailures {
                     let count = words.len();
                     let message =
                         format!("QUERY METHOD or QUERY METHOD CODE expected, {count} words found");
-                    return Err(wrong(message));
+                    return Err(error(message));
                 }
             };
             lines.push(KnownFailure {
                 number: index + 1,
                 query: query.to_owned(),
-                method: Method::called(method).map_err(|error| wrong(error.to_string()))?,
+                method: Method::called(method).map_err(|why| error(why.to_string()))?,
                 code: match code {
-                    Some(code) => Some(code.parse().map_err(|error| wrong(format!("{error}")))?),
+                    Some(code) => Some(code.parse().map_err(|why| error(format!("{why}")))?),
                     None => None,
                 },
             });
@@ -123,14 +96,14 @@ impl KnownFailures {
         })
     }
 
-    /// Whether the result is wrong in a way that the list knows.
+    /// Whether the result is a known failure.
     pub fn has(&self, row: &QueryResult) -> bool {
         is_wrong(row) && self.of(row).any(|line| line.allows(row))
     }
 
-    /// What became of the list in a run.
+    /// The report on the list for a run.
     pub fn report(&self, rows: &[QueryResult]) -> KnownReport {
-        let wrong = |row: &&QueryResult| is_wrong(row);
+        let fails = |row: &&QueryResult| is_wrong(row);
         let known = |row: &&QueryResult| self.has(row);
         let mut report = KnownReport {
             still: rows.iter().filter(known).count(),
@@ -145,17 +118,17 @@ impl KnownFailures {
                 code,
             } = line;
             let place = format!("{}:{number}", self.path.display());
-            if !of_line.is_empty() && !of_line.iter().any(&wrong) {
+            if !of_line.is_empty() && !of_line.iter().any(&fails) {
                 let was = code.map_or(String::new(), |code| format!(" ({code})"));
-                let words = format!("{query} {method}{was} is right now; take it off {place}");
+                let words = format!("{query} {method}{was} no longer fails; remove {place}");
                 report.fixed.push(words);
             }
-            let other = of_line.iter().copied().filter(wrong);
+            let other = of_line.iter().copied().filter(fails);
             let other = other.filter(|row| !known(row));
             let other = other.filter_map(|row| row.diagnosis.first());
             for (found, code) in other.zip(code.iter().cycle()) {
                 let words = format!(
-                    "{query} {method} has {}, not {code} as in {place}",
+                    "{query} {method} fails with {} instead of {code} in {place}",
                     found.code
                 );
                 report.other.push(words);
@@ -180,7 +153,7 @@ impl KnownFailure {
     }
 }
 
-/// Whether a result is wrong, missing, or has a verdict that says what is wrong.
+/// Whether a result is wrong or missing, or has a failure verdict.
 fn is_wrong(row: &QueryResult) -> bool {
     let primary = row.diagnosis.first();
     row.grade.is_failure() || primary.is_some_and(|finding| finding.code.is_failure())
@@ -191,7 +164,7 @@ mod tests {
     use super::super::metrics::tests::{finding, row};
     use super::*;
 
-    fn read(text: &str) -> Result<KnownFailures, KnownError> {
+    fn read(text: &str) -> Result<KnownFailures, FolderError> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("known.txt");
         std::fs::write(&path, text).expect("writable");
@@ -227,9 +200,9 @@ mod tests {
         ];
         let report = known.report(&rows);
         assert_eq!(report.still, 0);
-        assert!(report.fixed[0].starts_with("71 fb is right now; take it off "));
+        assert!(report.fixed[0].starts_with("71 fb no longer fails; remove "));
         assert!(report.fixed[0].ends_with("known.txt:2"));
-        assert!(report.other[0].starts_with("70 mi has D2, not D3 as in "));
+        assert!(report.other[0].starts_with("70 mi fails with D2 instead of D3 in "));
         assert_eq!((report.fixed.len(), report.other.len()), (1, 1));
     }
 

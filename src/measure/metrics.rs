@@ -1,10 +1,9 @@
-//! What the results of many queries amount to.
+//! The figures of many queries.
 //!
-//! A *success* is the paper's: a pose within the failure radius of the run. *Right* is a
-//! pose within the tolerance of `--right`. Medians and RMSE are over successes, and once more over queries that
-//! all methods report as solved, whatever the error, as in the paper: its medians exceed any failure
-//! radius. Their rotation is the greatest Euler angle, as there.
-//! In the recall, which goes by the rotation angle, a failure has an infinite error.
+//! A *success* is defined as in the paper: a pose within the failure radius of the run. A *right* pose is within
+//! the tolerance `--right`. Medians and RMSE are over successes, and also, as in the paper, over queries that all
+//! methods report as solved, whatever the error. Their rotation is the greatest Euler angle, as in the paper. The
+//! recall uses the rotation angle, and counts a failure as an infinite error.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,29 +19,29 @@ use crate::method::Method;
 /// The limits of the recall: metres and degrees.
 pub const RECALL_LIMITS: [(f64, f64); 3] = [(0.25, 2.0), (0.5, 5.0), (5.0, 10.0)];
 
-/// The paper's success: there is a pose and, where the truth is known, it is nearer than the failure
-/// radius (section 4.2). An error that is no number is not near.
+/// The paper's success (section 4.2): there is a pose, and its error is below the failure radius if the truth is
+/// known. An error of NaN is not below.
 pub(super) fn is_success(result: &QueryResult, failure_radius_m: f64) -> bool {
     let is_near = |error: &PoseError| error.translation_m < failure_radius_m;
     result.status == Status::Ok && result.error.as_ref().is_none_or(is_near)
 }
 
-/// Results that differ in query and method alone.
+/// A group of results that differ only in query and method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Group {
     /// The references' scene.
     pub scene: String,
-    /// The queries' scene, where it is another one.
+    /// The queries' scene, if it is another one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub query_scene: Option<String>,
-    /// What the experiment varied.
+    /// The setting of the experiment.
     pub setting: Option<Setting>,
     /// The fusion.
     pub fusion: Option<Fusion>,
 }
 
 impl Group {
-    /// What is measured together with this result.
+    /// The group of a result.
     pub fn of(result: &QueryResult) -> Self {
         Self {
             scene: result.scene.clone(),
@@ -52,7 +51,7 @@ impl Group {
         }
     }
 
-    /// The scenes: those of the references and, where they differ, of the queries.
+    /// The scenes of references and, if different, of queries.
     pub fn scenes(&self) -> String {
         match &self.query_scene {
             Some(queries) => format!("{} ← {queries}", self.scene),
@@ -77,7 +76,7 @@ impl std::fmt::Display for Group {
 /// Median and root mean square of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// How many errors there are.
+    /// The number of errors.
     pub count: usize,
     /// Median translation error \[m\].
     pub median_m: Option<f64>,
@@ -103,7 +102,7 @@ impl Spread {
     }
 }
 
-/// The median; of an even number of values the mean of the two in the middle.
+/// The median; for an even number of values, the mean of the middle two.
 pub(super) fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -122,52 +121,52 @@ fn rmse(values: &[f64]) -> Option<f64> {
     Some((squares / values.len() as f64).sqrt())
 }
 
-/// What a method made of the queries of a group.
+/// The figures of a method on a group.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
-    /// What the queries have in common.
+    /// The group.
     #[serde(flatten)]
     pub group: Group,
     /// The method.
     pub method: Method,
-    /// How many queries were asked.
+    /// The number of queries.
     pub queries: usize,
-    /// How many queries have a pose: the method itself reports them as solved, whatever the error.
+    /// The number of queries with a pose: the method reports them as solved, whatever the error.
     pub poses: usize,
-    /// How many of these do not lie on the rim of a direct method's grid, where a search has not
-    /// converged within its range (paper, section 4.2).
+    /// The number of poses that are not on the edge of a direct method's grid, where the search has not converged
+    /// within its range (paper, section 4.2).
     #[serde(default)]
     pub off_rim: usize,
-    /// How many queries had no reference; they count as failures.
+    /// The number of queries without a reference; they count as failures.
     #[serde(default)]
     pub without_reference: usize,
-    /// How many queries have a right pose, within the tolerance of the run.
+    /// The number of queries with a right pose, within the tolerance of the run.
     #[serde(default)]
     pub right: usize,
-    /// How many queries have a pose within the failure radius.
+    /// The number of queries with a pose within the failure radius.
     pub successes: usize,
     /// Successes over queries.
     pub success_rate: f64,
     /// Errors of the successes.
     pub of_successes: Spread,
-    /// The same over queries that every method of the run reports as solved, whatever the errors.
+    /// Errors of the queries that every method reports as solved, whatever the errors.
     pub of_common: Spread,
-    /// Shares of the queries within [`RECALL_LIMITS`], with failures counted as infinite; nothing
-    /// where the truth is not known.
+    /// Shares of the queries within [`RECALL_LIMITS`], with failures counted as infinite; `None` if the truth is
+    /// unknown.
     pub recall: Option<[f64; 3]>,
-    /// How often each primary verdict was given.
+    /// The count of each primary verdict.
     #[serde(default)]
     pub verdicts: BTreeMap<Code, usize>,
-    /// What chance alone would reach; nothing where the truth is not known.
+    /// The success rate of chance; `None` if the truth is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chance: Option<Chance>,
-    /// Median probability of being within 1 m, over the poses that have one.
+    /// Median probability of being within 1 m, over poses with a confidence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub median_confidence: Option<f64>,
-    /// Median time of the method \[s\]; a summary holds no clock.
+    /// Median time of the method \[s\]; not in summaries, which contain no times.
     #[serde(skip)]
     pub median_s: Option<f64>,
-    /// Every error, failures as infinite, for limits of one's own; nothing without truth.
+    /// All errors, failures as infinite, for custom limits; `None` if the truth is unknown.
     #[serde(skip)]
     pub errors: Option<Vec<(f64, f64)>>,
 }
@@ -224,7 +223,7 @@ fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
 }
 
-/// Measures all groups of a run, in the order in which they and their methods first appear.
+/// The figures of all groups and methods of a run, in the order of their first results.
 pub fn measure<'a>(
     results: impl IntoIterator<Item = &'a QueryResult>,
     failure_radius_m: f64,
@@ -271,7 +270,7 @@ fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) ->
             |wanted: &dyn Fn(&QueryResult) -> bool| rows.iter().filter(|row| wanted(row)).count();
         let confidences = rows.iter().filter_map(|row| row.confidence.as_ref());
         let confidences: Vec<f64> = confidences.map(|one| one.probability).collect();
-        // A pose without an error is one whose truth is not known.
+        // A pose without an error means that the truth is unknown.
         let has_truth = rows
             .iter()
             .all(|row| row.error.is_some() || row.status == Status::Failed);

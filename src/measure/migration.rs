@@ -1,4 +1,4 @@
-//! What primary verdicts became from one run to another.
+//! Changes of primary verdicts between two runs.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -6,24 +6,24 @@ use std::collections::BTreeMap;
 use crate::diagnosis::Code;
 use crate::method::Method;
 
-/// What a result is called in which nothing was found.
+/// The name for results without a verdict.
 const NOTHING_FOUND: &str = "ok";
 
-/// So many results of a method had one primary verdict and have another, or the same.
+/// The number of a method's results that changed from one primary verdict to another, or kept it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Migration {
     /// The method.
     pub method: Method,
-    /// The code in the first run, `ok` where nothing was found.
+    /// The code in the first run, `ok` without a verdict.
     pub before: String,
     /// The code in the second run.
     pub after: String,
-    /// How many results.
+    /// The number of results.
     pub count: usize,
 }
 
 impl Migration {
-    /// Whether the verdict is another one.
+    /// Whether the verdict changed.
     pub fn is_change(&self) -> bool {
         self.before != self.after
     }
@@ -34,8 +34,7 @@ pub fn verdict_name(primary: Option<Code>) -> &'static str {
     primary.map_or(NOTHING_FOUND, Code::name)
 }
 
-/// Counts what became of the results that two runs have in common, by their methods and primary
-/// verdicts; the most frequent first.
+/// Counts the changes of common results by method and primary verdicts, the most frequent first.
 pub fn migrations(common: impl IntoIterator<Item = (Method, [Option<Code>; 2])>) -> Vec<Migration> {
     let mut counts: BTreeMap<(Method, &str, &str), usize> = BTreeMap::new();
     for (method, [before, after]) in common {

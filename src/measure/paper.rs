@@ -1,4 +1,4 @@
-//! The figures that the paper reports, to stand beside ours.
+//! The figures of the paper, for comparison with ours.
 //!
 //! Fu, Pertuz, Matas, Kämäräinen, *Performance Analysis and Robustification of Single-query 6-DoF
 //! Camera Pose Estimation*, CVIU 2019, tables 1 to 6. In table 6 the rows are taken as references and
@@ -9,9 +9,8 @@ use std::sync::LazyLock;
 use super::metrics::Group;
 use crate::table::Table;
 
-/// A line of `table,scene,query_scene,method,radius_m,references,fusion,measure,value`. The query's scene is
-/// empty where it is that of the references. Other empty fields match any value: tables 5 and 6 are of
-/// `r-wavg` with five references.
+/// A line of `table,scene,query_scene,method,radius_m,references,fusion,measure,value`. An empty query scene means
+/// that of the references. Other empty fields match any value.
 struct Figure {
     fields: Vec<&'static str>,
 }
@@ -23,9 +22,8 @@ static ALL: LazyLock<Vec<Figure>> = LazyLock::new(|| {
     whole.map(|fields| Figure { fields }).collect()
 });
 
-/// The figure of the first of these tables that has it for results of this group and method, as the paper
-/// writes it. `measure` is `median_m`, `median_deg`, `rmse_m`, `rmse_deg`, `success_percent`, `common` or
-/// `common_percent`.
+/// The paper's figure for a group and method, from the first of these tables that has it. `measure` is `median_m`,
+/// `median_deg`, `rmse_m`, `rmse_deg`, `success_percent`, `common` or `common_percent`.
 pub fn figure(tables: &[u8], group: &Group, method: &str, measure: &str) -> Option<&'static str> {
     let setting = group.setting;
     let keys = [
@@ -52,8 +50,8 @@ pub fn figure(tables: &[u8], group: &Group, method: &str, measure: &str) -> Opti
     })
 }
 
-/// What the paper's tables 1 and 2 say of a scene: number of images, length \[km\] and mean distance of
-/// consecutive images \[m\].
+/// A scene in the paper's tables 1 and 2: number of images, length \[km\] and mean distance of consecutive images
+/// \[m\].
 pub fn scene(name: &str) -> Option<[&'static str; 3]> {
     let find = |measure| {
         let of_scene = |figure: &&Figure| figure.fields[0] <= "2" && figure.fields[1] == name;
@@ -71,7 +69,7 @@ pub fn scenes(number: u8) -> Table {
         "scene",
         "images",
         "length (km)",
-        "mean distance of images (m)",
+        "mean distance between images (m)",
     ];
     let mut table = Table::new(format!("scenes-{number}"), "Scenes of the paper", header);
     let number = number.to_string();

@@ -12,11 +12,11 @@ use crate::localize::{CostReport, QueryResult, Status};
 use crate::method::Method;
 use crate::palette;
 
-/// Bins of distance in which bars stand.
+/// The number of distance bins.
 const BINS: f64 = 6.0;
-/// A bar is labelled where it is at least this long \[%\].
+/// The shortest bar with a label \[%\].
 const LABELLED_FROM: f64 = 5.0;
-/// What has no pose is drawn above the greatest error by this factor.
+/// Results without a pose are drawn above the greatest error by this factor.
 const ABOVE: f64 = 2.0;
 /// The width of a bar \[px\].
 const BAR_PX: f64 = 26.0;
@@ -30,24 +30,24 @@ pub enum Plot {
     Verdicts,
     /// Success rate over what an experiment varies.
     Success,
-    /// Share of queries within an error.
+    /// Share of the queries within an error.
     Recall,
     /// Primary failure verdicts over the distance of the reference.
     Causes,
-    /// From how far around the truth the search finds it.
+    /// The radius around the truth from which the search finds it.
     Basin,
-    /// What the cheapest minimum elsewhere costs more.
+    /// The cost margin of the best minimum elsewhere.
     Margin,
 }
 
 impl Plot {
-    /// The plot of a run as an SVG file; `None` where there is nothing to draw.
+    /// The plot of a run as an SVG file; `None` if there is nothing to draw.
     pub fn svg(self, run: &RunResults) -> Option<String> {
         let charts = self.charts(run);
         (!charts.is_empty()).then(|| chart::file(&charts))
     }
 
-    /// A chart for each pair of scenes, and of causes for each method.
+    /// One chart per pair of scenes; for causes, also per method.
     pub(crate) fn charts(self, run: &RunResults) -> Vec<Chart> {
         match self {
             Self::Errors => errors(&run.results).into_iter().collect(),
@@ -93,7 +93,7 @@ impl Plot {
             }
             Self::Recall => {
                 let axis = "translation error (m), failures infinite";
-                let title = titled("Share of queries within an error");
+                let title = titled("Share of the queries within an error");
                 lines(title, axis, &methods, |method| recall(method, &measures))
             }
             Self::Causes => {
@@ -108,13 +108,13 @@ impl Plot {
                 of_method.collect()
             }
             Self::Basin => of_costs(
-                "From how far around the truth the search finds it",
+                "Radius around the truth from which the search finds it",
                 "radius of the truth's basin, at least (m)",
                 |cost| cost.basin_m,
             ),
             Self::Margin => of_costs(
-                "What the cheapest minimum elsewhere costs more",
-                "best minimum elsewhere over that at the truth, at least (% of the cost at the result)",
+                "Cost margin of the best minimum elsewhere",
+                "best minimum elsewhere above that at the truth, at least (% of the cost at the result)",
                 |cost| Some(100.0 * cost.basin_margin? / cost.best),
             ),
         }
@@ -138,7 +138,7 @@ fn legend(methods: impl IntoIterator<Item = Method>) -> Vec<(String, palette::Rg
         .collect()
 }
 
-/// A line for each method, in per cent of the queries, all as long as the longest. None without a point.
+/// One line per method, in per cent of the queries. Methods without points are left out.
 fn lines(
     title: String,
     x_axis: &str,
@@ -151,7 +151,7 @@ fn lines(
     chart.into_iter().collect()
 }
 
-/// A line for each method over numbers.
+/// One line per method.
 pub(super) fn curves(
     title: String,
     x_axis: &str,
@@ -180,7 +180,7 @@ pub(super) fn curves(
     })
 }
 
-/// Steps over the error, for the last group alone: the largest radius, or the most references.
+/// Steps over the error, for the last group only: the largest radius, or the most references.
 fn recall(method: Method, measures: &[&Measures]) -> Vec<(f64, f64)> {
     let longest = measures
         .iter()
@@ -205,8 +205,8 @@ fn recall(method: Method, measures: &[&Measures]) -> Vec<(f64, f64)> {
     steps
 }
 
-/// A figure of the costs of a method, where the basin of the truth is known. A truth without a minimum has no
-/// margin, and counts as the least of all.
+/// A figure of a method's costs, for results with a known basin of the truth. A truth without a minimum has no
+/// margin, and counts as minus infinity.
 fn costs(
     results: &[&QueryResult],
     method: Method,
@@ -220,7 +220,7 @@ fn costs(
         .collect()
 }
 
-/// The share of the values that are at least x, in steps from the least to the greatest.
+/// The share of the values that are at least x, in steps in ascending order.
 fn at_least(mut values: Vec<f64>) -> Vec<(f64, f64)> {
     let all = values.len() as f64;
     values.retain(|value| value.is_finite());
@@ -245,7 +245,7 @@ fn setting(one: &Measures) -> String {
     })
 }
 
-/// Scenes without what they have in common with others of their kind: `night` of `street:night`.
+/// Short names of the scenes: `night` for `street:night`.
 fn brief_scenes(one: &Measures) -> String {
     let brief = |scene: &str| {
         scene
@@ -261,8 +261,8 @@ fn brief_scenes(one: &Measures) -> String {
     }
 }
 
-/// Success rates as bars: a group for each name, a bar for each method; of several fusions those of r-wavg.
-/// `None` where there is only one group.
+/// Success rates as bars: one group per name, one bar per method, and only r-wavg of several fusions. `None` if
+/// there is only one group.
 fn success(
     title: String,
     axis: &str,
@@ -310,15 +310,15 @@ fn success(
     })
 }
 
-/// The primary verdicts of the results in one bin of distance.
+/// The primary verdicts in one distance bin.
 #[derive(Debug, Default, PartialEq)]
 struct Bin {
     queries: usize,
     verdicts: BTreeMap<Code, usize>,
 }
 
-/// Bars of the shares of queries by primary failure verdict, each over a bin of the distance between
-/// reference and truth; `None` where no distance is known, or nothing went wrong.
+/// Stacked bars of primary failure verdicts over the distance between reference and truth. `None` if no distance
+/// is known or there is no failure.
 fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Chart> {
     let (width_m, bins) = binned(method, results)?;
     let mut codes: Vec<Code> = bins
@@ -368,7 +368,7 @@ fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Cha
     })
 }
 
-/// The part of a bar that is of one verdict.
+/// The part of a bar for one verdict.
 fn verdict(
     rank: usize,
     code: Code,
@@ -386,7 +386,7 @@ fn verdict(
     (count > 0).then(|| bar.titled(title))
 }
 
-/// The width of a bin \[m\] and the bins from 0 on.
+/// The width of a bin \[m\], and the bins starting at 0.
 fn binned(method: Method, results: &[&QueryResult]) -> Option<(f64, Vec<Bin>)> {
     let of_method = results.iter().filter(|result| result.method == method);
     let known = of_method.filter_map(|result| {
@@ -412,8 +412,8 @@ fn binned(method: Method, results: &[&QueryResult]) -> Option<(f64, Vec<Bin>)> {
     Some((width_m, bins))
 }
 
-/// Every result's error over the distance of its reference, both where they are known. What has no pose
-/// lies on the upper border. Points lead to their rows in the report.
+/// The error over the distance of the reference, for results where both are known. Results without a pose are on
+/// the upper border. Points link to their rows in the report.
 fn errors(results: &[QueryResult]) -> Option<Chart> {
     let known = results.iter().enumerate().filter_map(|(number, result)| {
         let start = result.initial_error?.translation_m;
@@ -440,7 +440,7 @@ fn errors(results: &[QueryResult]) -> Option<Chart> {
         }
     });
     Some(Chart {
-        title: "Error over the distance of the reference; without a pose above".to_owned(),
+        title: "Error over the distance of the reference; results without a pose on top".to_owned(),
         x: Axis::linear("distance of the reference (m)", 0.0, 1.05 * farthest),
         y: Axis::log("error (m)", 0.8 * least, 1.2 * top),
         marks: marks.collect(),
@@ -448,7 +448,7 @@ fn errors(results: &[QueryResult]) -> Option<Chart> {
     })
 }
 
-/// A bar for each method and condition: the shares of its queries by primary verdict.
+/// One stacked bar per method and condition: the shares of its queries by primary verdict.
 fn verdicts(measures: &[Measures]) -> Option<Chart> {
     let codes = measures.iter().flat_map(|one| one.verdicts.keys());
     let codes: std::collections::BTreeSet<Code> = codes.copied().collect();

@@ -1,5 +1,4 @@
-//! What a finished run comes to: `summary.json` and `junit.xml`. Both follow from `run.toml` and
-//! `results.jsonl` and can be written again.
+//! The reports of a finished run: `summary.json` and `junit.xml`. Both are derived from `run.toml` and `results.jsonl`.
 
 use std::fs;
 use std::path::Path;
@@ -29,19 +28,19 @@ const SUMMARY: &str = "summary.json";
 pub struct Report {
     /// The figures by group and method.
     pub measures: Vec<Measures>,
-    /// What became of the gates.
+    /// The outcomes of the gates.
     pub gate_results: Vec<GateResult>,
-    /// What became of failures that are known.
+    /// The known failures.
     pub known: KnownReport,
     /// The tables, the summary first.
     pub tables: Vec<Table>,
 }
 
-/// Rows of a list on the page of a job, which is no log.
+/// The most rows of a list on the page of a CI job.
 const ROWS: usize = 10;
 
 impl Report {
-    /// For the page of a job: gates, figures, known failures, and what is broken since a baseline.
+    /// The summary for the page of a CI job: gates, figures, known failures, and failures since a baseline.
     pub fn markdown(&self, since: Option<&RunComparison>) -> String {
         let mut text = String::new();
         if !self.gate_results.is_empty() {
@@ -77,7 +76,7 @@ impl Report {
     }
 }
 
-/// Names from elsewhere as text, which are no markup then.
+/// Escapes a name, so it is not read as markup.
 pub fn plain(text: &str) -> String {
     let text = text.replace(['\n', '\r', '`'], " ");
     text.replace('&', "&amp;").replace('<', "&lt;")
@@ -92,14 +91,14 @@ struct Summary<'a> {
     gates: &'a [GateResult],
 }
 
-/// What is read of a summary again.
+/// The part of a summary that is read back.
 #[derive(Deserialize)]
 struct GatesOfSummary {
     #[serde(default)]
     gates: Vec<GateResult>,
 }
 
-/// What became of the gates of a run, as its summary says; none where it has no summary.
+/// The outcomes of the gates in a run's summary; empty if it has no summary.
 ///
 /// # Errors
 /// A summary that cannot be read.
@@ -121,10 +120,10 @@ pub fn read_gate_results(folder: &Path) -> Result<Vec<GateResult>, FolderError> 
     }
 }
 
-/// Measures a run and writes everything that follows from its results.
+/// Measures a run and writes its reports.
 ///
 /// # Errors
-/// When a result cannot be read or a file not be written.
+/// A result that cannot be read, or a file that cannot be written.
 pub fn write_report(
     folder: &Path,
     run: &RunFile,

@@ -1,4 +1,4 @@
-//! The results of a run and what they amount to: all that tables and plots need.
+//! The results of a run with their figures, for tables and plots.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ pub struct RunResults {
     pub results: Vec<QueryResult>,
     /// The figures by group and method.
     pub measures: Vec<Measures>,
-    /// The translation error from which on a pose counts as a failure \[m\].
+    /// The translation error from which a pose counts as a failure \[m\].
     pub failure_radius_m: f64,
 }
 
@@ -30,7 +30,7 @@ impl RunResults {
     /// Reads and measures the results of a run folder.
     ///
     /// # Errors
-    /// A folder without a run, or a line that is no result.
+    /// A folder without a run, or a line that is not a result.
     pub fn read(folder: &Path) -> Result<Self, FolderError> {
         let radius_m = read_run(folder)?.failure_radius_m();
         Ok(Self::of(read_rows(folder)?, radius_m))

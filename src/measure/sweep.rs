@@ -1,4 +1,4 @@
-//! How results follow a setting: a table and robustness curves over its values.
+//! The results of a sweep: a table, and curves over the values of the setting.
 
 use std::path::Path;
 
@@ -11,19 +11,19 @@ use crate::method::Method;
 use crate::run::{FolderError, Sweep};
 use crate::table::Table;
 
-/// The figures of one value of a sweep.
+/// The figures at one value of a sweep.
 #[derive(Clone, Debug)]
 pub struct SweptRun {
-    /// The value as it was set.
+    /// The value as text.
     pub value: String,
-    /// What the methods made of the queries.
+    /// The figures by group and method.
     pub measures: Vec<Measures>,
 }
 
-/// Writes `sweep.csv`, `success.svg` and `median.svg` into the folder that holds the runs of all values.
+/// Writes `sweep.csv`, `success.svg` and `median.svg` into the folder of all runs.
 ///
 /// # Errors
-/// When a file cannot be written.
+/// A file that cannot be written.
 pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Table, FolderError> {
     let table = table(sweep, runs);
     write(&folder.join("sweep.csv"), table.to_csv().as_bytes())?;
@@ -43,7 +43,7 @@ pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Ta
     Ok(table)
 }
 
-/// What is drawn over the values: its name in files, its axis, and how it is read off.
+/// A curve: its file name, its axis label, and its figure.
 type Curve = (&'static str, &'static str, fn(&Measures) -> Option<f64>);
 
 const CURVES: [Curve; 2] = [
@@ -55,7 +55,7 @@ const CURVES: [Curve; 2] = [
     }),
 ];
 
-/// The groups of all runs, in the order in which they first appear.
+/// The groups of all runs, in the order of their first figures.
 fn groups(runs: &[SweptRun]) -> Vec<&Group> {
     let mut groups: Vec<&Group> = Vec::new();
     for one in runs.iter().flat_map(|run| &run.measures) {
@@ -66,7 +66,7 @@ fn groups(runs: &[SweptRun]) -> Vec<&Group> {
     groups
 }
 
-/// A line per method, from the least value to the greatest. Where there is no figure it has no point.
+/// One line per method. Missing figures have no point.
 fn curves(
     runs: &[SweptRun],
     group: &Group,

@@ -1,4 +1,4 @@
-//! The tables of a run: a summary, its verdicts, and those of the paper with its figures beside ours.
+//! The tables of a run: summary, verdicts, and the paper's tables with its figures next to ours.
 //!
 //! Their shapes are data (`assets/tables.toml`), which [`Filling`] fills.
 
@@ -16,21 +16,21 @@ use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::table::Table;
 
-/// What stands where there is no figure.
+/// The cell of a missing figure.
 pub(super) const NOTHING: &str = "–";
 
-/// What readers must know of the paper's RMSE.
-const RMSE_FOOTNOTE: &str = "What the paper calls RMSE behaves like a median (its table 4 has 0.125 m and \
-    1.76° for FB with one reference, its table 3 a median of 0.13 m and 1.76°), so both of ours are given";
+/// A note on the paper's RMSE.
+const RMSE_FOOTNOTE: &str = "The paper's RMSE behaves like a median (0.125 m and 1.76° in its table 4 for FB with one \
+ reference, a median of 0.13 m and 1.76° in its table 3), so both of ours are given";
 
-/// A table, or a few that belong together.
+/// A table, or several related ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TableName {
-    /// A row for each result.
+    /// One row per result.
     Rows,
-    /// Every figure that is measured, a row for each group and method.
+    /// All figures, one row per group and method.
     Summary,
-    /// The primary verdicts, counted.
+    /// The shares of primary verdicts.
     Verdicts,
     /// The paper's scenes of KITTI.
     #[value(name = "paper:1")]
@@ -38,13 +38,13 @@ pub enum TableName {
     /// The paper's scenes of RobotCar.
     #[value(name = "paper:2")]
     Paper2,
-    /// Our figures beside the paper's with a single reference.
+    /// Our figures and the paper's with a single reference.
     #[value(name = "paper:3")]
     Paper3,
-    /// Our figures beside the paper's with several references.
+    /// Our figures and the paper's with several references.
     #[value(name = "paper:4")]
     Paper4,
-    /// Our figures beside the paper's within a large prior, on KITTI.
+    /// Our figures and the paper's within a large prior, on KITTI.
     #[value(name = "paper:5")]
     Paper5,
     /// The same on RobotCar.
@@ -53,7 +53,7 @@ pub enum TableName {
 }
 
 impl TableName {
-    /// The tables of a run; none where it has nothing to show in them.
+    /// The tables of a run; empty if it has no results for them.
     pub fn of(self, run: &RunResults) -> Vec<Table> {
         let papers = |number: u8| {
             let mut tables = shaped(&run.measures, |shape| shape.paper.contains(&number));
@@ -77,7 +77,7 @@ impl TableName {
     }
 }
 
-/// The tables that a run shows: summary, verdicts, and those of the paper's experiment that it repeats.
+/// The tables that a run prints: summary, verdicts, and those of its preset.
 pub fn tables(run: &RunResults, preset: Option<&str>) -> Vec<Table> {
     let mut tables = TableName::Summary.of(run);
     tables.extend(TableName::Verdicts.of(run));
@@ -92,12 +92,12 @@ pub fn tables(run: &RunResults, preset: Option<&str>) -> Vec<Table> {
     tables
 }
 
-/// The figures that fit the page of a job.
+/// The short table for the page of a CI job.
 pub(super) fn brief(measures: &[Measures]) -> Vec<Table> {
     shaped(measures, |shape| shape.name == "brief")
 }
 
-/// A row for each result with these fields, as `text` writes them.
+/// One row per result with these fields, formatted by `text`.
 pub fn rows<'a, 'f>(
     results: impl IntoIterator<Item = &'a QueryResult>,
     fields: impl IntoIterator<Item = &'f Field>,
@@ -118,7 +118,7 @@ struct Shapes {
     figures: BTreeMap<String, Figure>,
 }
 
-/// The shape of a table; `assets/tables.toml` says what its fields mean.
+/// The shape of a table; `assets/tables.toml` documents its fields.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Shape {
@@ -143,7 +143,7 @@ struct Shape {
     several: bool,
 }
 
-/// Where the paper's figures stand.
+/// The position of the paper's figures.
 #[derive(Clone, Copy, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 enum Beside {
@@ -152,11 +152,11 @@ enum Beside {
     Nowhere,
     /// In lines below ours.
     Below,
-    /// In columns behind ours.
+    /// In columns after ours.
     Behind,
 }
 
-/// What figures differ in.
+/// A dimension in which figures differ.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Dimension {
@@ -204,7 +204,7 @@ impl Dimension {
     }
 }
 
-/// What a figure is called and how it is written.
+/// The heading and the format of a figure.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Figure {
@@ -219,7 +219,7 @@ struct Figure {
 static SHAPES: LazyLock<Result<Shapes, toml::de::Error>> =
     LazyLock::new(|| toml::from_str(include_str!("../../assets/tables.toml")));
 
-/// The tables of the shapes that are wanted.
+/// The tables of the wanted shapes.
 fn shaped(measures: &[Measures], is_wanted: impl Fn(&Shape) -> bool) -> Vec<Table> {
     // A test reads the file.
     let Ok(shapes) = &*SHAPES else {
@@ -250,7 +250,7 @@ fn shaped(measures: &[Measures], is_wanted: impl Fn(&Shape) -> bool) -> Vec<Tabl
     tables
 }
 
-/// The different values of some dimensions: by the first, then by the next, each in the order of the figures.
+/// The distinct values of some dimensions, ordered by the first, then the next, each in the order of the figures.
 fn keys(measures: &[&Measures], dimensions: &[Dimension]) -> Vec<Vec<String>> {
     let mut keys: Vec<(Vec<usize>, Vec<String>)> = Vec::new();
     let mut seen: Vec<Vec<String>> = vec![Vec::new(); dimensions.len()];
@@ -277,16 +277,16 @@ fn keys(measures: &[&Measures], dimensions: &[Dimension]) -> Vec<Vec<String>> {
     keys.into_iter().map(|(_, key)| key).collect()
 }
 
-/// Figures that fill a shape: those of a pair of scenes, or of all.
+/// Fills a shape with the figures of a pair of scenes, or of all.
 struct Filling<'a> {
     shape: &'a Shape,
     figures: &'a BTreeMap<String, Figure>,
     measures: &'a [&'a Measures],
-    /// The different values of what is across; one without a name where nothing is.
+    /// The distinct values of the dimensions across; one without a name if there are none.
     columns: Vec<Vec<String>>,
 }
 
-/// A line of a table: what it is called, and its figures.
+/// A line of a table: its names and its figures.
 struct Line<'a> {
     names: Vec<String>,
     label: &'a str,
@@ -315,7 +315,7 @@ impl<'a> Filling<'a> {
         paper::figure(tables, &one.group, one.method.name(), measure).map(str::to_owned)
     }
 
-    /// These figures in every column, of a row or of the first.
+    /// The named figures in every column, of a row or, without one, of the first match.
     fn cells(
         &self,
         row: Option<&[String]>,
@@ -338,7 +338,7 @@ impl<'a> Filling<'a> {
         cells
     }
 
-    /// A line of ours and, where the paper stands below, of the paper's.
+    /// A line of our figures, followed by one of the paper's if it is shown below.
     fn lines(
         &self,
         names: Vec<String>,
@@ -441,7 +441,7 @@ impl<'a> Filling<'a> {
     }
 }
 
-/// Why poses are wrong or missing: one line per group and method, one column for each primary verdict.
+/// The causes of failures: one line per group and method, one column per primary verdict.
 fn verdicts(measures: &[Measures]) -> Option<Table> {
     let codes = measures.iter().flat_map(|one| one.verdicts.keys());
     let codes: std::collections::BTreeSet<_> = codes.copied().collect();
@@ -453,7 +453,7 @@ fn verdicts(measures: &[Measures]) -> Option<Table> {
         .map(|code| format!("{code} {}", code.title()))
         .collect();
     let caption = format!(
-        "Shares of the queries by primary verdict. {}.",
+        "Shares of the queries by primary verdict: {}.",
         meanings.join("; ")
     );
     let head = ["", "method", "queries"].map(str::to_owned);
@@ -475,11 +475,11 @@ fn verdicts(measures: &[Measures]) -> Option<Table> {
     Some(table)
 }
 
-/// How many points more of the queries the hybrid localises than each other method, as the mean over all
-/// pairs of scenes, ours and the paper's: the averages of its abstract. `None` without a hybrid.
+/// The hybrid's lead in success rate over each other method in percentage points, as the mean over all pairs of
+/// scenes, for us and for the paper (the averages in its abstract). `None` without a hybrid.
 fn advantage(measures: &[Measures]) -> Option<Table> {
     let header = ["HY over", "pairs of scenes", "points", "points (paper)"];
-    let caption = "How many points more of the queries the hybrid localises, on average over the pairs of scenes";
+    let caption = "The hybrid's lead in success rate, in percentage points, averaged over the pairs of scenes";
     let mut table = Table::new("advantage", caption, header);
     let hybrids: Vec<&Measures> = measures
         .iter()
@@ -517,7 +517,7 @@ fn advantage(measures: &[Measures]) -> Option<Table> {
     (!hybrids.is_empty() && !table.rows.is_empty()).then_some(table)
 }
 
-/// A name without what a file's name had better not have.
+/// A name that is safe as part of a file name.
 pub(super) fn slug(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
     words

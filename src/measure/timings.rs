@@ -1,4 +1,4 @@
-//! How long results took: `timings.jsonl`, which stands beside them line by line.
+//! The times of results: `timings.jsonl`, which corresponds to them line by line.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use super::metrics::{Group, Measures, median};
 use crate::localize::QueryResult;
 use crate::run::FolderError;
 
-/// How long each method took \[s\]; nothing in a folder without timings, or with those of other results.
+/// The time of each result \[s\]; `None` if its line is missing or belongs to another result.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -23,7 +23,7 @@ pub fn read(folder: &Path, results: &[QueryResult]) -> Result<Vec<Option<f64>>, 
     Ok(times.collect())
 }
 
-/// Adds the median times to figures.
+/// Adds median times to figures.
 pub fn add_medians<'a>(
     measures: &mut [Measures],
     timed: impl Iterator<Item = (&'a QueryResult, Option<f64>)> + Clone,
@@ -37,7 +37,7 @@ pub fn add_medians<'a>(
     }
 }
 
-/// The milliseconds under the method's own name: the whole of it.
+/// The total time of the method, which is stored under its own name in milliseconds.
 fn seconds(result: &QueryResult, line: &str) -> Option<f64> {
     let timing: serde_json::Value = serde_json::from_str(line).ok()?;
     let is_its = timing["query"] == result.query && timing["method"] == result.method.name();

@@ -1,4 +1,4 @@
-//! Triage: the results of a run that meet a condition, in an order.
+//! Triage: selects and sorts the results of a run.
 
 mod condition;
 mod field;
@@ -9,12 +9,12 @@ pub use field::{Field, Value};
 use crate::localize::QueryResult;
 use crate::text::UnknownWord;
 
-/// What to sort by.
+/// The sort order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Order {
     /// The field.
     pub field: &'static Field,
-    /// Whether the greatest comes first.
+    /// Whether the greatest value comes first.
     pub descending: bool,
 }
 
@@ -31,8 +31,7 @@ impl std::str::FromStr for Order {
     }
 }
 
-/// Positions of the results that meet a condition, in an order; without one in their own. What a result
-/// does not have comes last.
+/// The positions of the results that meet a condition, sorted if an order is given. Missing values come last.
 pub fn select(
     results: &[&QueryResult],
     condition: Option<&Condition>,

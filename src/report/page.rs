@@ -1,4 +1,4 @@
-//! The page itself. Whatever comes from elsewhere (names, paths, reasons) is escaped where it is put in.
+//! The page. External text (names, paths, reasons) is escaped on insertion.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -14,8 +14,7 @@ use crate::table::{Align, Table};
 const STYLE: &str = include_str!("../../assets/report/report.css");
 const SCRIPT: &str = include_str!("../../assets/report/report.js");
 
-/// Rerun's viewer in the browser, of the version that writes our recordings; it reads the recording at the
-/// address behind it.
+/// Rerun's web viewer in the version of our recordings. It reads the recording at the URL appended to this one.
 const WEB_VIEWER: &str = "https://app.rerun.io/version/0.36.3/?url=";
 
 pub(super) fn page(report: &RunReport) -> String {
@@ -43,7 +42,7 @@ pub(super) fn page(report: &RunReport) -> String {
                     }
                 }
                 main {
-                    (asked(report))
+                    (request(report))
                     (gates(report))
                     @if let Some(baseline) = &report.baseline { (changes(report, baseline)) }
                     section aria-labelledby="figures" {
@@ -61,7 +60,7 @@ pub(super) fn page(report: &RunReport) -> String {
     .into_string()
 }
 
-/// The colours of words, for light and dark pages.
+/// The text colours, for light and dark pages.
 fn colors() -> String {
     let of = |shade: fn(palette::Rgb) -> palette::Rgb| {
         let [right, wrong, none] = [palette::TRUTH, palette::ESTIMATE, palette::NO_POSE];
@@ -83,7 +82,7 @@ fn title(run: &RunFile) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// A class for each query's photo, which all of its results share. Our own data URIs hold no markup.
+/// One CSS class per query photo, shared by its results. Our own data URIs contain no markup.
 fn thumbnails(report: &RunReport) -> String {
     let photos = report.thumbnails.iter();
     photos
@@ -91,7 +90,7 @@ fn thumbnails(report: &RunReport) -> String {
         .collect()
 }
 
-fn asked(report: &RunReport) -> Markup {
+fn request(report: &RunReport) -> Markup {
     let (run, protocol) = (&report.run, &report.run.protocol);
     html! {
         section aria-labelledby="asked" {
@@ -127,7 +126,7 @@ fn gates(report: &RunReport) -> Markup {
     }
 }
 
-/// A table with words that mean good or bad in their colours.
+/// A table, with good and bad words coloured.
 fn table(table: &Table) -> Markup {
     let class = |at: usize| match table.align.get(at) {
         Some(Align::Right) => Some("number"),
@@ -175,7 +174,7 @@ fn plots(report: &RunReport) -> Markup {
     html! {
         section aria-labelledby="plots" {
             h2 id="plots" { "Plots" }
-            @if report.charts.is_empty() { p { "Without a known truth there is nothing to draw." } }
+            @if report.charts.is_empty() { p { "There are no plots, because the ground truth is unknown." } }
             div.plots {
                 @for chart in &report.charts {
                     figure.plot { (chart.markup()) figcaption { (chart.title) } }
@@ -185,7 +184,7 @@ fn plots(report: &RunReport) -> Markup {
     }
 }
 
-/// The columns of the table of results; what is wide is left out on a phone.
+/// The columns of the table of results with their classes; wide ones are hidden on a phone.
 const COLUMNS: [(&str, &str); 12] = [
     ("photo", ""),
     ("query", ""),
@@ -234,7 +233,7 @@ fn results(report: &RunReport) -> Markup {
             p id="count" role="status" { (report.results.len()) " results" }
             div.scroll tabindex="0" role="region" aria-label="All results" {
                 table id="results" {
-                    caption { "A line for each result; a verdict leads to what is known of the failure" }
+                    caption { "One row per result; a verdict links to the details of the failure" }
                     thead {
                         tr {
                             @for (name, class) in &columns {
@@ -354,7 +353,7 @@ fn failures(report: &RunReport) -> Markup {
             p {
                 "The green plus is the truth, the vermilion diamond the result, the white ring the reference."
                 @if failures.iter().any(|one| one.recording.is_some()) {
-                    " Recordings lie in the folder of the run, where the lines that open them are typed."
+                    " Recordings are in the run folder; type the commands that open them there."
                 }
             }
             @for one in &failures { (failure(report, one)) }
@@ -371,7 +370,7 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
             dl {
                 dt { "References" } dd { (result.references.join(", ")) }
                 @if let Some(error) = &result.error { dt { "Error" } dd { (error) } }
-                @if let Some(error) = &result.initial_error { dt { "Reference, from the truth" } dd { (error) } }
+                @if let Some(error) = &result.initial_error { dt { "Reference, distance from the truth" } dd { (error) } }
                 @if let Some(counts) = &result.counts {
                     dt { "Features" }
                     dd {
@@ -389,12 +388,12 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
                         (format!(", covering {:.1} % of the photo", 100.0 * cost.coverage_best))
                     }
                 }
-                dt { "Again" } dd { code { (again(&report.run, one)) } }
+                dt { "Repeat" } dd { code { (again(&report.run, one)) } }
                 @if let Some(recording) = &one.recording {
                     dt { "Recording" }
                     dd {
                         code { "rerun " (recording) } " "
-                        // The script makes it a link where the page comes from a server.
+                        // The script makes it a link if a server delivers the page.
                         a hidden data-viewer=(WEB_VIEWER) data-recording=(recording) { "in Rerun's web viewer" }
                     }
                 }
@@ -404,7 +403,7 @@ fn failure(report: &RunReport, one: &ReportedResult) -> Markup {
     }
 }
 
-/// The command line that localises the query again, as the run did.
+/// The command line that repeats the query as in the run.
 fn again(run: &RunFile, one: &ReportedResult) -> String {
     let result = &one.result;
     let place = run.pairs.iter().find(|pair| pair.scene == result.scene);
@@ -427,7 +426,7 @@ fn again(run: &RunFile, one: &ReportedResult) -> String {
         .truncate(usize::from(result.query_scene.is_some()));
     let task = Task {
         protocol,
-        // A run of another version is repeated with what this one knows.
+        // A run of another version is repeated with the parameters that this one knows.
         params: run.params().unwrap_or_default(),
         ..Task::of(scene.cloned().unwrap_or_else(|| result.scene.clone()))
     };

@@ -1,4 +1,4 @@
-//! Photos and proofs of a run as data URIs: thumbnails of its queries, and what proves its failures.
+//! Photos and proofs as data URIs: thumbnails of queries, and pictures that prove failures.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -17,7 +17,7 @@ use crate::proof::{self, ProofCase, ProofPicture};
 use crate::trace::{Cancelled, Record, Sink};
 
 const THUMBNAIL_WIDTH: u32 = 120;
-/// Width of a proof \[px\]: its words are read at this size.
+/// The width of a proof \[px\], at which its text is readable.
 const PROOF_WIDTH: u32 = 960;
 
 /// A small copy of a photo.
@@ -41,7 +41,7 @@ fn jpeg(picture: &DynamicImage, width: u32, quality: u8) -> Option<String> {
     Some(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
 }
 
-/// Keeps what a proof needs of a query.
+/// Collects the records for a proof of a query.
 #[derive(Default)]
 pub(super) struct Witness {
     history: History,
@@ -64,17 +64,17 @@ impl LocalizeObserver for Witness {
     }
 }
 
-/// What proves a failure.
+/// The picture that proves a failure.
 #[derive(Clone, Debug)]
 pub(super) struct DrawnProof {
     /// The picture as a data URI.
     pub(super) picture: String,
-    /// What it shows, panel by panel.
+    /// Its description, panel by panel.
     pub(super) words: String,
 }
 
 impl Witness {
-    /// Draws what proves the result.
+    /// Draws the proof of the result.
     pub(super) fn proof(
         &self,
         truth: Option<&Pose>,

@@ -1,4 +1,4 @@
-//! What the options of a protocol take.
+//! Parsers of the options of a protocol.
 
 use crate::describe::Domain;
 use crate::estimator;
@@ -6,15 +6,15 @@ use crate::image::Degradation;
 use crate::method::Method;
 use crate::text::UnknownWord;
 
-/// A method of ours, or a name that another system may go by.
+/// Our own method, or a name for another system.
 ///
 /// # Errors
-/// No such name.
+/// The text is no possible name.
 pub fn method(name: &str) -> Result<Method, String> {
     Method::called(name).map_err(|_| {
         let known = estimator::methods().map(Method::name);
         let error = UnknownWord::among(name, "method", known);
-        format!("{error}, or a name that --estimates gives")
+        format!("{error}, or a name defined by --estimates")
     })
 }
 
@@ -42,8 +42,8 @@ pub fn probability(text: &str) -> Result<f64, String> {
 
 /// The help of `--degrade`: every step with its range.
 pub fn degradations() -> String {
-    let mut text = "Degrade the photos of the queries first, as in gamma=0.4,noise=8,invert. References stay \
-                    as they are. The steps are taken in this order, whatever the order of their names:"
+    let mut text = "Degrade the query photos first, for example gamma=0.4,noise=8,invert. References stay \
+                    unchanged. The steps are applied in this order, whatever the order of the names:"
         .to_owned();
     for step in Degradation::default().steps() {
         let range = match step.domain {

@@ -1,4 +1,4 @@
-//! Which frames of a scene are queries.
+//! Draws the queries of a run from the frames of a scene.
 
 use std::collections::BTreeSet;
 
@@ -10,12 +10,12 @@ use super::limit::Limit;
 use super::scene_pair::{ScenePair, cameras_of, times_of};
 use crate::scene::{Scene, SceneError};
 
-/// Which frames become queries.
+/// How the queries of a scene are chosen.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw<'a> {
-    /// How many of the frames with a known pose; without a limit all.
+    /// How many of the frames with a known pose are drawn; all without a limit.
     pub limit: Option<Limit>,
-    /// Only these of those drawn; all, if none is named.
+    /// Only these of the drawn frames; all if empty.
     pub only: &'a [String],
     /// The seed of the choice.
     pub seed: u64,
@@ -24,14 +24,18 @@ pub struct Draw<'a> {
 /// Why there are no queries.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
-    /// Errors could not be measured, nor references be found.
-    #[error("{scene}: no frame has a known pose")]
+    /// Without poses, errors cannot be measured and references cannot be found.
+    #[error(
+        "{scene}: no frame has a known pose, so there are no queries; `posescope doctor` says what is missing"
+    )]
     NoPose {
         /// The scene.
         scene: String,
     },
-    /// It exists, but is not one of the queries.
-    #[error("{scene}: frame {frame} is not among the {drawn} queries drawn")]
+    /// The frame exists but was not drawn.
+    #[error(
+        "{scene}: frame {frame} is not among the {drawn} drawn queries; raise --limit or change --seed"
+    )]
     NotDrawn {
         /// The scene.
         scene: String,
@@ -46,7 +50,7 @@ pub enum DrawError {
 }
 
 impl Draw<'_> {
-    /// Pairs a scene of references, the one at `scene_index`, with one of queries.
+    /// Pairs a scene of references, at position `scene_index`, with a scene of queries.
     ///
     /// # Errors
     /// [`DrawError`].
@@ -72,7 +76,7 @@ impl Draw<'_> {
                 })
             })
             .collect::<Result<_, DrawError>>()?;
-        let asked: Vec<usize> = drawn
+        let chosen: Vec<usize> = drawn
             .iter()
             .copied()
             .filter(|frame| wanted.is_empty() || wanted.contains(frame))
@@ -82,8 +86,8 @@ impl Draw<'_> {
             let names = frames.map(|&frame| queries.frames()[frame].clone());
             names.collect::<Vec<_>>()
         };
-        let (camera, cameras) = cameras_of(queries, &asked);
-        // Where every frame is a query, all the others are its references.
+        let (camera, cameras) = cameras_of(queries, &chosen);
+        // If every frame is a query, all other frames may be its references.
         let left_out = match self.limit {
             Some(Limit::Percent(percent)) if percent < 100.0 => &drawn[..],
             _ => &[],
@@ -95,12 +99,12 @@ impl Draw<'_> {
             camera,
             cameras,
             drawn: names(left_out),
-            queries: names(&asked),
-            times_s: times_of(queries, &asked),
+            queries: names(&chosen),
+            times_s: times_of(queries, &chosen),
         })
     }
 
-    /// In the order of the scene. Which ones depends on the seed and the scene's name.
+    /// The drawn frames in the order of the scene. The seed and the scene's name determine them.
     fn frames(&self, scene: &dyn Scene) -> Result<Vec<usize>, DrawError> {
         let mut frames: Vec<usize> = (0..scene.frames().len())
             .filter(|&frame| scene.pose(frame).is_some())

@@ -1,4 +1,4 @@
-//! What other systems answered, as a command line names it.
+//! The argument of `--estimates`: poses of another system.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::method::Method;
 
-/// A file of poses, and the name of the method that they go by: `superglue=poses.txt`.
+/// A file of poses and the method name of their system: `superglue=poses.txt`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EstimatesFile {
     /// The name.
@@ -26,7 +26,7 @@ impl FromStr for EstimatesFile {
         let ours = crate::estimator::methods().find(|method| method.name() == name);
         if let Some(method) = ours {
             return Err(format!(
-                "{method} is a method of ours; another name expected"
+                "{method} is a built-in method; choose another name for these poses"
             ));
         }
         Ok(Self {

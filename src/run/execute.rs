@@ -1,4 +1,4 @@
-//! Going through the queries of a run.
+//! Localises the queries of a run.
 
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,15 +21,15 @@ use crate::trace::Cancelled;
 
 /// The scenes of a run, opened.
 pub struct Scenes {
-    /// The scenes of references, in the order of [`RunFile::scenes`].
+    /// The scenes of the references, in the order of [`RunFile::scenes`].
     pub references: Vec<Arc<dyn Scene>>,
-    /// The scenes of queries, in the order of [`Protocol::query_scene`]; none where each scene has its own,
-    /// unless their photos are degraded.
+    /// The scenes of the queries, in the order of [`Protocol::query_scene`]. Empty if queries and references come
+    /// from the same scene and no photo is degraded.
     pub queries: Vec<Arc<dyn Scene>>,
 }
 
 impl Scenes {
-    /// Opens the scenes of references and those of queries.
+    /// Opens the scenes of references and of queries.
     ///
     /// # Errors
     /// A scene that cannot be read.
@@ -50,12 +50,12 @@ impl Scenes {
         })
     }
 
-    /// The same scenes as the protocol asks about their queries: sought where it says, and with their
-    /// photos degraded. Latitudes and longitudes are tied to the first scene of references.
+    /// The same scenes with the protocol's rough positions and degradations of the queries. Latitudes and
+    /// longitudes are tied to the first scene of references.
     ///
     /// # Errors
-    /// The errors of [`Protocol::as_asked`].
-    pub fn as_asked(self, protocol: &Protocol) -> Result<Self, SceneError> {
+    /// The errors of [`Protocol::prepared_queries`].
+    pub fn with_protocol(self, protocol: &Protocol) -> Result<Self, SceneError> {
         let Self {
             mut references,
             mut queries,
@@ -67,7 +67,7 @@ impl Scenes {
             });
         };
         if queries.is_empty() && !protocol.degrade.is_none() {
-            // References keep their photos as they were taken.
+            // The photos of references are never degraded.
             queries.clone_from(&references);
         }
         let of_queries = if queries.is_empty() {
@@ -76,7 +76,7 @@ impl Scenes {
             &mut queries
         };
         for scene in of_queries {
-            *scene = protocol.as_asked(Arc::clone(scene), first.as_ref())?;
+            *scene = protocol.prepared_queries(Arc::clone(scene), first.as_ref())?;
         }
         Ok(Self {
             references,
@@ -84,7 +84,7 @@ impl Scenes {
         })
     }
 
-    /// The scene that a pair takes its queries from.
+    /// The scene of a pair's queries.
     pub fn of_queries(&self, pair: &ScenePair) -> &dyn Scene {
         self.queries
             .iter()
@@ -103,7 +103,7 @@ pub enum RunError {
     /// References cannot be chosen.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
-    /// Somebody who watches asked it to stop.
+    /// The observer cancelled the run.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// The folder cannot be written.
@@ -111,13 +111,13 @@ pub enum RunError {
     Folder(#[from] FolderError),
 }
 
-/// A query that a method failed on, by its own report or by the error of its pose.
+/// A query for which a method has no pose or a wrong one.
 pub struct FailedQuery<'a> {
     /// The localizer of its scenes.
     pub localizer: &'a Localizer<'a>,
-    /// Its place in the plan.
+    /// The query's item in the plan.
     pub item: RunItem<'a>,
-    /// Its position in its scene.
+    /// The query's position in its scene.
     pub frame: usize,
     /// The method.
     pub method: Method,
@@ -132,7 +132,7 @@ pub trait RunObserver {
         let _ = item;
     }
 
-    /// The observer that the next query is localised under.
+    /// The observer of the next query.
     fn query_observer(&mut self) -> &mut dyn LocalizeObserver;
 
     /// A method failed on a query whose results are about to be written.
@@ -150,7 +150,7 @@ pub trait RunObserver {
     }
 }
 
-/// What a run needs besides its description.
+/// A run with its opened scenes and indexes.
 pub struct Execution<'a> {
     /// The run.
     pub run: &'a RunFile,
@@ -158,17 +158,17 @@ pub struct Execution<'a> {
     pub scenes: &'a Scenes,
     /// Its parameters, as in the description.
     pub params: &'a Params,
-    /// What [`Selection::Retrieved`](crate::localize::Selection::Retrieved) asks, by the position
-    /// of the references' scene.
+    /// The indexes for [`Selection::Retrieved`](crate::localize::Selection::Retrieved), by the position of the
+    /// references' scene.
     pub indices: &'a [Box<dyn Ranking>],
 }
 
 impl Execution<'_> {
-    /// Localises the queries of the run that are not done yet, and appends their results. A query
-    /// that panics has failed results; the others go on.
+    /// Localises the remaining queries of the run and appends their results. A query that panics gets failed
+    /// results, and the run continues.
     ///
     /// # Errors
-    /// [`RunError`]. What was done until then is in the folder.
+    /// [`RunError`]. Finished queries are in the folder.
     pub fn run_remaining(
         &self,
         folder: &mut RunFolder,
@@ -176,7 +176,7 @@ impl Execution<'_> {
     ) -> Result<(), RunError> {
         let items: Vec<RunItem<'_>> = self.run.items().collect();
         let mut rest = items.get(folder.done()..).unwrap_or_default();
-        // One localizer per pair of scenes, whose features are kept as long.
+        // One localizer per pair of scenes, which caches its features.
         while let Some(first) = rest.first() {
             let same = |item: &&RunItem<'_>| std::ptr::eq(item.pair, first.pair);
             let (now, later) = rest.split_at(rest.iter().take_while(same).count());
@@ -198,7 +198,7 @@ impl Execution<'_> {
         Ok(())
     }
 
-    /// Frames of the references' scene that are queries themselves.
+    /// Frames of the references' scene that are queries, and must not be references.
     fn left_out(
         &self,
         pair: &ScenePair,
@@ -240,7 +240,7 @@ impl Execution<'_> {
         match localized {
             Ok(requests) => {
                 let requests = requests?;
-                self.tell_failures(item, localizer, frame, &requests, &results, observer)?;
+                self.report_failures(item, localizer, frame, &requests, &results, observer)?;
             }
             Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
         }
@@ -285,7 +285,7 @@ impl Execution<'_> {
     }
 
     /// One call per method that failed in any of the requests.
-    fn tell_failures(
+    fn report_failures(
         &self,
         item: &RunItem<'_>,
         localizer: &Localizer<'_>,
@@ -313,7 +313,7 @@ impl Execution<'_> {
         Ok(())
     }
 
-    /// The results of a query that cannot even be begun.
+    /// The results of a query whose localisation panicked.
     fn broken(&self, item: &RunItem<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
         let failure = Failure::Internal {
             message: message.to_owned(),

@@ -1,4 +1,4 @@
-//! What a run reads besides its scenes, by content: whoever goes on with the run must read the same.
+//! Hashes of a run's input files besides its scenes: a resumed run must read the same content.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -10,10 +10,10 @@ use xxhash_rust::xxh3::Xxh3;
 use super::protocol::Protocol;
 use super::run_folder::FolderError;
 
-/// A line for each file or folder that the protocol names: what it is, and a hash of what it holds.
+/// One entry per file or folder of the protocol: its path and a hash of its content.
 ///
 /// # Errors
-/// One that cannot be read.
+/// A file that cannot be read.
 pub fn inputs(protocol: &Protocol) -> Result<BTreeMap<String, String>, FolderError> {
     let estimates = protocol.estimates.iter().map(|file| &file.path);
     let others = protocol.matches.iter().chain(&protocol.gps);
@@ -23,8 +23,7 @@ pub fn inputs(protocol: &Protocol) -> Result<BTreeMap<String, String>, FolderErr
         .collect()
 }
 
-/// A hash of a file, or of the files of a folder with their names. The folder of a COLMAP model holds
-/// what is read of it.
+/// A hash of a file, or of the files of a folder with their names.
 fn content(path: &Path) -> Result<String, FolderError> {
     let mut sum = Xxh3::new();
     for file in files(path).map_err(FolderError::io(path))? {
@@ -34,7 +33,7 @@ fn content(path: &Path) -> Result<String, FolderError> {
     Ok(format!("{:032x}", sum.digest128()))
 }
 
-/// The file itself, or those of the folder in the order of their names.
+/// The file itself, or the files of the folder in the order of their names.
 fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);

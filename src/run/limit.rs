@@ -1,4 +1,4 @@
-//! How many queries a run has.
+//! The argument of `--limit`: how many queries a run has.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,10 +6,9 @@ use std::str::FromStr;
 /// `40`, or `10%` of the frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limit {
-    /// At most this many queries. All other frames may be their references.
+    /// At most this many queries. All other frames, drawn ones too, may be their references.
     Count(usize),
-    /// This share of the frames, in percent, above 0 and up to 100. The frames that are drawn are no
-    /// references.
+    /// This share of the frames in percent, above 0 and up to 100. Drawn frames are not used as references.
     Percent(f64),
 }
 

@@ -1,50 +1,48 @@
-//! Presets: the paper's experiments as files, for any scene.
+//! Presets: the paper's experiments, for any scene.
+
+use std::fmt;
+use std::str::FromStr;
 
 use serde::Deserialize;
 
-use super::experiment::Experiment;
-use super::limit::Limit;
-use super::protocol::Protocol;
-use super::reference::Reference;
 use crate::fusion::Fusion;
 use crate::localize::Selection;
 use crate::method::Method;
 use crate::text::UnknownWord;
 
-/// What an experiment asks where the user says nothing else.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// One of the experiments of the paper's section 4.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// One random reference within 10, 15, 20 and 25 m (section 4.3, table 3).
+    Single,
+    /// One to five references, four fusions (section 4.4, table 4).
+    Multi,
+    /// References from retrieval within a large prior (section 4.5, tables 5 and 6).
+    Large,
+}
+
+/// The defaults of a preset in its file, which options override.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Preset {
-    /// What it is about, in a few words.
-    pub title: String,
-    /// The tables of the paper that it fills.
-    pub tables: Vec<u8>,
-    /// The methods.
+pub(super) struct Defaults {
     pub methods: Vec<Method>,
-    /// How references are chosen.
     pub references: Selection,
-    /// Numbers of references; each gives results.
-    pub counts: Vec<usize>,
-    /// How the poses of several references are fused.
     pub fusions: Vec<Fusion>,
-    /// Uncertainty radii \[m\]; each gives results.
     pub radii_m: Vec<f64>,
-    /// Share of the frames that are queries.
+    /// The share of the frames that are queries.
     pub share: f64,
-    /// How far around the known position references are chosen \[m\]; `None` within the uncertainty radius.
+    /// The prior \[m\] within which references are chosen; `None`: the uncertainty radius.
     pub prior_m: Option<ByDataSet>,
-    /// The translation error from which on a pose counts as a failure \[m\].
     pub failure_radius_m: ByDataSet,
 }
 
-/// A number that the paper chose for each of its data sets.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+/// A number that depends on the paper's data set.
+#[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ByDataSet {
+pub(super) struct ByDataSet {
     /// For KITTI, and for any scene of another data set.
-    pub kitti: f64,
-    /// For RobotCar.
-    pub robotcar: f64,
+    kitti: f64,
+    robotcar: f64,
 }
 
 impl ByDataSet {
@@ -59,90 +57,59 @@ impl ByDataSet {
 }
 
 impl Preset {
-    /// Every preset: its name and its file.
-    pub const ALL: [(&'static str, &'static str); 3] = [
-        ("single", include_str!("../../assets/presets/single.toml")),
-        ("multi", include_str!("../../assets/presets/multi.toml")),
-        ("large", include_str!("../../assets/presets/large.toml")),
+    /// All presets with their names and files.
+    const ALL: [(Self, &'static str, &'static str); 3] = [
+        (
+            Self::Single,
+            "single",
+            include_str!("../../assets/presets/single.toml"),
+        ),
+        (
+            Self::Multi,
+            "multi",
+            include_str!("../../assets/presets/multi.toml"),
+        ),
+        (
+            Self::Large,
+            "large",
+            include_str!("../../assets/presets/large.toml"),
+        ),
     ];
 
-    /// The preset of a name.
-    ///
-    /// # Errors
-    /// The names of all presets.
-    pub fn named(name: &str) -> Result<Self, UnknownWord> {
-        let unknown = || UnknownWord::among(name, "preset", Self::ALL.map(|(name, _)| name));
-        let file = Self::ALL.iter().find(|(known, _)| *known == name);
-        let (_, file) = file.ok_or_else(unknown)?;
-        // A test reads the files.
-        toml::from_str(file).map_err(|_| unknown())
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+
+    pub(super) fn defaults(self) -> Defaults {
+        let defaults = toml::from_str(Self::ALL[self as usize].2);
+        defaults.unwrap_or_else(|error| unreachable!("a test reads the file: {error}"))
     }
 }
 
-/// The protocol of an experiment, or without one: every frame against one reference. `scene` is the name of
-/// the references' scene; the paper asked other things of RobotCar than of KITTI.
-///
-/// # Errors
-/// A preset that cannot be read; a test reads them all.
-pub fn defaults(experiment: Option<Experiment>, scene: &str) -> Result<Protocol, UnknownWord> {
-    let Some(experiment) = experiment else {
-        return Ok(Protocol {
-            failure_radius_m: Some(default_failure_radius_m(scene)),
-            ..Protocol::default()
-        });
-    };
-    let preset = Preset::named(experiment.name())?;
-    Ok(Protocol {
-        preset: Some(experiment),
-        methods: preset.methods,
-        references: vec![Reference::Chosen(preset.references)],
-        fusions: preset.fusions,
-        radii_m: preset.radii_m,
-        limit: Some(Limit::Percent(100.0 * preset.share)),
-        prior_m: preset.prior_m.map(|prior| prior.of_scene(scene)),
-        failure_radius_m: Some(preset.failure_radius_m.of_scene(scene)),
-        ..Protocol::default()
-    })
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
 }
 
-/// The translation error from which on a pose counts as a failure \[m\], by the references' scene.
+impl FromStr for Preset {
+    type Err = UnknownWord;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWord> {
+        let found = Self::ALL.into_iter().find(|(_, known, _)| *known == name);
+        let unknown = || UnknownWord::among(name, "preset", Self::ALL.map(|(_, name, _)| name));
+        found.map(|(preset, ..)| preset).ok_or_else(unknown)
+    }
+}
+
+posescope_core::serde_as_text!(Preset);
+
+/// The translation error from which a pose counts as a failure \[m\], by the references' scene.
 pub fn default_failure_radius_m(scene: &str) -> f64 {
     let radius = ByDataSet {
         kitti: 10.0,
         robotcar: 20.0,
     };
     radius.of_scene(scene)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn presets_ask_what_the_experiments_of_the_paper_do() {
-        let of = |name: &str, scene: &str| {
-            let experiment: Experiment = name.parse().expect("an experiment");
-            defaults(Some(experiment), scene).expect("a preset")
-        };
-        let single = of("single", "kitti/00");
-        assert_eq!(single.radii_m, [10.0, 15.0, 20.0, 25.0]);
-        assert_eq!(single.methods, [Method::FB, Method::PM, Method::MI]);
-        assert_eq!(single.limit, Some(Limit::Percent(10.0)));
-        let multi = of("multi", "kitti/00");
-        let five = Reference::Chosen(Selection::Random(5));
-        assert_eq!(multi.references, [five]);
-        assert_eq!(multi.fusions, Fusion::of_the_paper().collect::<Vec<_>>());
-        let large = |scene| {
-            let large = of("large", scene);
-            (large.prior_m, large.failure_radius_m)
-        };
-        assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
-        assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
-        for experiment in Experiment::ALL {
-            let preset = Preset::named(experiment.name()).expect("a preset");
-            let most = preset.counts.last().copied();
-            assert_eq!(most, Some(preset.references.count()), "{experiment}");
-        }
-        assert!(Preset::named("small").is_err());
-    }
 }

@@ -1,4 +1,4 @@
-//! How queries are localised, whichever they are.
+//! How queries are localised.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,8 +6,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::estimates_file::EstimatesFile;
-use super::experiment::Experiment;
 use super::limit::Limit;
+use super::preset::{Preset, default_failure_radius_m};
 use super::reference::Reference;
 use crate::diagnosis::Tolerance;
 use crate::estimator;
@@ -19,47 +19,37 @@ use crate::method::Method;
 use crate::scene::{MatchFolder, Scene, SceneError, degraded, located, read_estimates};
 use crate::text::UnknownWord;
 
-/// How each query is localised. This one struct is the options of the command line, the table
-/// `[protocol]` of `run.toml`, the header of a lesson and what the window asks. Its keys in files are the
-/// names of the options, and the doc comments are their help.
+/// How each query is localised. This one struct defines the options of the command line, the table
+/// `[protocol]` of `run.toml`, the header of a lesson and the requests of the window. Its keys in files are the
+/// names of the options, and its doc comments are their help.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Protocol {
-    /// Take the queries from another scene in the same world frame
+    /// Take the queries from another scene with the same world frame
     ///
-    /// Repeatable in `eval`: every scene of references is paired with every one of queries.
-    #[cfg_attr(
-        feature = "cli",
-        arg(long, help_heading = "Queries", value_name = "SCENE")
-    )]
+    /// `eval` takes several; it pairs every scene of references with every scene of queries.
+    #[cfg_attr(feature = "cli", arg(long, help_heading = "Queries", value_name = "SCENE"))]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub query_scene: Vec<String>,
     /// Rough positions of the queries
     ///
-    /// A table with the columns `name x y z` in the world of the scene, or `name latitude longitude` with at
-    /// least three frames of known pose among its lines.
+    /// A table with the columns `name x y z` in the scene's world frame, or `name latitude longitude`. The latter
+    /// must also list at least three frames with a known pose.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Queries",
-            value_name = "FILE",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Queries", value_name = "FILE", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gps: Option<PathBuf>,
-    /// Draw 40 queries, or a tenth of the frames
+    /// Draw this many queries, or this share of the frames
     ///
-    /// The seed draws them. Of a share, none of the drawn frames is a reference; of a number, each may be one.
-    #[cfg_attr(
-        feature = "cli",
-        arg(long, help_heading = "Queries", value_name = "40|10%")
-    )]
+    /// --seed determines the draw. Frames drawn by a percentage are not used as references; frames drawn by a
+    /// number may be.
+    #[cfg_attr(feature = "cli", arg(long, help_heading = "Queries", value_name = "40|10%"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<Limit>,
-    /// Degrade the photos of the queries first, as in gamma=0.4,noise=8,invert; --help lists the steps
+    /// Degrade the query photos first, for example gamma=0.4,noise=8,invert; --help lists the steps
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -75,24 +65,21 @@ pub struct Protocol {
     pub degrade: Degradation,
     /// A frame, or random:K, nearest:K, matches:K, retrieve:K [default: random:1]
     ///
-    /// Frames with a known pose and a cloud; repeatable. Or how to choose K of the frames around the query's
-    /// known position: at random, the nearest, those with the most feature matches, or the best in the
-    /// index. matches:K and retrieve:K search all frames where the position is unknown. The default for photos
-    /// without --gps is matches:1.
+    /// A frame needs a known pose and a cloud; repeatable. The other forms choose K frames near the query's known
+    /// position: at random, the nearest, those with the most feature matches, or the best of the retrieval index.
+    /// If the position is unknown, matches:K and retrieve:K search all frames. The default for photos without
+    /// --gps is matches:1.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long = "reference",
-            help_heading = "References",
-            value_name = "FRAME|HOW:K"
-        )
+        arg(long = "reference", help_heading = "References", value_name = "FRAME|HOW:K")
     )]
     #[serde(rename = "reference")]
     pub references: Vec<Reference>,
-    /// The uncertainty radius: how many metres from the reference to search [default: 15]
+    /// The uncertainty radius: how far from the reference to search, in metres [default: 15]
     ///
-    /// The disc around the reference that the direct methods search, and how far away references are chosen.
-    /// `eval` takes several and runs one after the other.
+    /// The direct methods search a disc around the reference that is twice as wide as this. Their time grows with
+    /// the square of the radius: 30 takes four times as long as 15. References are chosen within the same distance
+    /// of the query, unless --prior is given. `eval` takes several radii and runs each.
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -105,7 +92,7 @@ pub struct Protocol {
     )]
     #[serde(rename = "radius")]
     pub radii_m: Vec<f64>,
-    /// Choose references within this many metres of the query [default: the radius]
+    /// Choose references within this distance of the query, in metres [default: the radius]
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -117,36 +104,26 @@ pub struct Protocol {
     )]
     #[serde(rename = "prior", skip_serializing_if = "Option::is_none")]
     pub prior_m: Option<f64>,
-    /// The index for retrieve:K [default: where `posescope index` puts it]
+    /// The retrieval index for retrieve:K [default: the file that `posescope index` writes]
     ///
-    /// `eval` takes one for each scene, in their order.
+    /// `eval` takes one per scene, in the same order.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "References",
-            value_name = "FILE",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "References", value_name = "FILE", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub index: Vec<PathBuf>,
-    // Before the methods, some of which it names.
-    /// Poses of another system, as a method of this name; repeatable
+    // Parsed before the methods, which may use its names.
+    /// Evaluate the poses of another system as a method of this name; repeatable
     ///
-    /// FILE is TUM, KITTI, COLMAP's images.txt or lines of `name qw qx qy qz x y z`.
+    /// FILE is in TUM or KITTI format, COLMAP's images.txt, or lines of `name qw qx qy qz x y z`.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Methods",
-            value_name = "NAME=FILE",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Methods", value_name = "NAME=FILE", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub estimates: Vec<EstimatesFile>,
-    /// The methods; beyond the paper's: mi6, fb2, robust, nid [default: fb,pm,mi,hy]
+    /// The methods; mi6, fb2, robust and nid are not from the paper [default: fb,pm,mi,hy]
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -159,65 +136,50 @@ pub struct Protocol {
     )]
     #[serde(rename = "method")]
     pub methods: Vec<Method>,
-    /// maxf, avg, wavg, r-wavg or joint: one pose of all references
+    /// Fuse several references to one pose: maxf, avg, wavg, r-wavg or joint
     ///
-    /// The poses of all references are averaged, or, joint, all references are used at once (fb, pm, mi, nid,
-    /// hy). Without it each reference gives a pose; `eval` fuses several by r-wavg.
+    /// joint uses all references in one estimate (fb, pm, mi, nid, hy); the others combine the poses of the single
+    /// references. Without this option, each reference gives its own pose; `eval` fuses several by r-wavg.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long = "fusion",
-            help_heading = "Methods",
-            value_name = "HOW",
-            value_delimiter = ','
-        )
+        arg(long = "fusion", help_heading = "Methods", value_name = "HOW", value_delimiter = ',')
     )]
     #[serde(rename = "fusion", skip_serializing_if = "Vec::is_empty")]
     pub fusions: Vec<Fusion>,
-    /// Matches of another system, in place of those of fb
+    /// Use the matches of another system instead of those of fb
     ///
-    /// hloc's features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair.
+    /// DIR holds hloc's features and matches (.h5), or QUERY_REFERENCE_matches.npz or .txt for each pair.
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Methods",
-            value_name = "DIR",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Methods", value_name = "DIR", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub matches: Option<PathBuf>,
-    /// single, multi or large: the options of an experiment of the paper
+    /// Use the options of an experiment of the paper: single, multi or large
     ///
-    /// single: a random reference within 10, 15, 20 and 25 m. multi: 1 to 5 references and all fusions. large:
-    /// retrieve:5 within a prior of 200 m, RobotCar 50 m. All draw a tenth of the frames. Other options change
-    /// what they set.
+    /// single: one random reference within 10, 15, 20 and 25 m. multi: 1 to 5 references and all fusions. large:
+    /// retrieve:5 within a prior of 200 m (RobotCar 50 m). All draw a tenth of the frames as queries. Other options
+    /// override the preset.
     #[cfg_attr(
         feature = "cli",
         arg(long = "preset", help_heading = "Methods", value_name = "NAME")
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub preset: Option<Experiment>,
+    pub preset: Option<Preset>,
     /// The seed of every random choice [default: 0]
     #[cfg_attr(
         feature = "cli",
         arg(long, help_heading = "Methods", value_name = "N", required = false)
     )]
     pub seed: u64,
-    /// How far from the truth a right pose may be [default: 1m,5deg]
+    /// The largest error of a right pose [default: 1m,5deg]
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Judging",
-            value_name = "METRES,DEGREES",
-            required = false
-        )
+        arg(long, help_heading = "Judging", value_name = "METRES,DEGREES", required = false)
     )]
     #[serde(skip_serializing_if = "is_default")]
     pub right: Tolerance,
-    /// The paper's success: the metres from which a pose is a failure [default: 10, RobotCar 20]
+    /// The error in metres from which the paper counts a failure [default: 10, RobotCar 20]
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -230,9 +192,9 @@ pub struct Protocol {
     )]
     #[serde(rename = "failure-radius", skip_serializing_if = "Option::is_none")]
     pub failure_radius_m: Option<f64>,
-    /// Refuse poses that are less likely than this
+    /// Refuse poses with a lower probability than this
     ///
-    /// The probability is that of being within 1 m of the truth.
+    /// It is the probability of being within 1 m of the truth.
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -246,7 +208,7 @@ pub struct Protocol {
     pub min_confidence: Option<f64>,
     /// Try variations of each wrong result and report what helps
     ///
-    /// At most RUNS for each result, 12 by default.
+    /// At most RUNS variations per result, 12 if RUNS is left out.
     #[cfg_attr(
         feature = "cli",
         arg(
@@ -260,21 +222,16 @@ pub struct Protocol {
     )]
     #[serde(skip_serializing_if = "is_default")]
     pub explain: usize,
-    /// The format of the scenes, where their content does not tell
+    /// The format of the scenes [default: detected]
     #[cfg_attr(
         feature = "cli",
-        arg(
-            long,
-            help_heading = "Everywhere",
-            value_name = "NAME",
-            hide_short_help = true
-        )
+        arg(long, help_heading = "Everywhere", value_name = "NAME", hide_short_help = true)
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<String>,
 }
 
-/// For what is written only where it was asked for.
+/// Whether a field can be left out of a file.
 pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
@@ -306,31 +263,33 @@ impl Default for Protocol {
     }
 }
 
-/// Options whose values stand in one list, `fb,pm`; others are repeated.
+/// Options that take one list, `fb,pm`; others are repeated.
 const LISTS: [&str; 3] = ["method", "fusion", "radius"];
 
-/// A protocol that nothing can be localised by.
+/// Why a protocol is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProtocolError {
-    /// A method that is none of ours and that no file of poses brings.
-    #[error("{0}, or a name that --estimates gives")]
+    /// A method that is neither built in nor defined by `--estimates`.
+    #[error("{0}, or a name defined by --estimates")]
     UnknownMethod(UnknownWord),
-    /// Two files of poses by one name.
-    #[error("--estimates {0} is given twice")]
+    /// Two files of poses with the same name.
+    #[error("--estimates {0} is given twice; give each file its own name")]
     Twice(Method),
-    /// Frames and a way of choosing them.
-    #[error("--reference takes frames, or one of random:K, nearest:K, matches:K and retrieve:K")]
+    /// Both frames and a way of choosing them.
+    #[error(
+        "--reference takes either frames, or one of random:K, nearest:K, matches:K and retrieve:K"
+    )]
     References,
 }
 
 impl Protocol {
-    /// Runs that explain a wrong result, where their number is not given.
+    /// Variations of a wrong result by default.
     pub const EXPLAINING_RUNS: usize = 12;
 
-    /// The uncertainty radius where none is given \[m\].
+    /// The default uncertainty radius \[m\].
     pub const RADIUS_M: f64 = 15.0;
 
-    /// The protocol with its methods in the order of the registry, and behind them the other systems.
+    /// The protocol with its methods in the order of the registry, followed by the other systems.
     ///
     /// # Errors
     /// [`ProtocolError`].
@@ -349,12 +308,12 @@ impl Protocol {
         Ok(self)
     }
 
-    /// The uncertainty radius \[m\], the first of several.
+    /// The first uncertainty radius \[m\].
     pub fn radius_m(&self) -> f64 {
         self.radii_m.first().copied().unwrap_or(Self::RADIUS_M)
     }
 
-    /// How references are chosen; one at random where they are named.
+    /// How references are chosen; one at random if they are named.
     pub fn selection(&self) -> Selection {
         let chosen = self.references.iter().find_map(|one| match one {
             Reference::Chosen(selection) => Some(*selection),
@@ -387,13 +346,13 @@ impl Protocol {
         self.references = frames.iter().cloned().map(Reference::Frame).collect();
     }
 
-    /// The options that ask for this, each with its value: those that differ from the defaults.
+    /// The options that differ from the defaults, each with its value.
     pub fn options(&self) -> Vec<(String, String)> {
         let (own, default) = (table(self), table(&Self::default()));
-        let asked = own
+        let changed = own
             .into_iter()
             .filter(|(key, value)| default.get(key) != Some(value));
-        asked
+        changed
             .flat_map(|(key, value)| {
                 let values = match value {
                     toml::Value::Array(values) if LISTS.contains(&key.as_str()) => {
@@ -408,7 +367,7 @@ impl Protocol {
             .collect()
     }
 
-    /// A localizer that judges and accepts poses as this says.
+    /// The localizer with this protocol's tolerance, least confidence and explanations.
     pub fn configured<'a>(&self, localizer: Localizer<'a>) -> Localizer<'a> {
         localizer
             .with_tolerance(self.right)
@@ -416,10 +375,10 @@ impl Protocol {
             .explaining(self.explain)
     }
 
-    /// What other systems answered about the frames of the queries' scene.
+    /// The poses and matches of other systems for the queries' scene.
     ///
     /// # Errors
-    /// A file that cannot be read, or is of another scene.
+    /// A file that cannot be read or belongs to another scene.
     pub fn foreign(&self, queries: &dyn Scene) -> Result<Foreign, SceneError> {
         let mut foreign = Foreign::default();
         for EstimatesFile { method, path } in &self.estimates {
@@ -431,12 +390,11 @@ impl Protocol {
         Ok(foreign)
     }
 
-    /// The scene of queries as this asks about it: with the rough positions that were given, and with its
-    /// photos degraded.
+    /// The scene of the queries with the given rough positions and degraded photos.
     ///
     /// # Errors
     /// The errors of [`located`].
-    pub fn as_asked(
+    pub fn prepared_queries(
         &self,
         queries: Arc<dyn Scene>,
         references: &dyn Scene,
@@ -448,19 +406,40 @@ impl Protocol {
         Ok(self.degraded(&queries))
     }
 
-    /// The scene of queries with its photos degraded, in the place of any degradation before.
+    /// The scene of the queries with degraded photos; replaces an earlier degradation.
     pub fn degraded(&self, queries: &Arc<dyn Scene>) -> Arc<dyn Scene> {
         degraded(queries, self.degrade, self.seed)
     }
 
-    /// How far from a query's known position its references may be \[m\], with this uncertainty
-    /// radius \[m\].
+    /// How far from a query's known position references are chosen \[m\], given the uncertainty radius \[m\].
     pub fn reach_m(&self, radius_m: f64) -> f64 {
         self.prior_m.unwrap_or(radius_m)
     }
 }
 
-/// Every method is one of ours or goes by the name of given poses.
+/// The protocol of a preset, or without one of every frame against one random reference. `scene` is the name of
+/// the references' scene: the paper uses other numbers for RobotCar than for KITTI.
+pub fn defaults(preset: Option<Preset>, scene: &str) -> Protocol {
+    let Some(defaults) = preset.map(Preset::defaults) else {
+        return Protocol {
+            failure_radius_m: Some(default_failure_radius_m(scene)),
+            ..Protocol::default()
+        };
+    };
+    Protocol {
+        preset,
+        methods: defaults.methods,
+        references: vec![Reference::Chosen(defaults.references)],
+        fusions: defaults.fusions,
+        radii_m: defaults.radii_m,
+        limit: Some(Limit::Percent(100.0 * defaults.share)),
+        prior_m: defaults.prior_m.map(|prior| prior.of_scene(scene)),
+        failure_radius_m: Some(defaults.failure_radius_m.of_scene(scene)),
+        ..Protocol::default()
+    }
+}
+
+/// Checks that every method is built in or one of `others`.
 ///
 /// # Errors
 /// [`ProtocolError::UnknownMethod`].
@@ -478,13 +457,13 @@ pub fn known(methods: &[Method], others: &[Method]) -> Result<(), ProtocolError>
     }
 }
 
-/// The protocol as it is written in a file.
+/// The protocol as written in a file.
 fn table(protocol: &Protocol) -> toml::Table {
     let written = toml::Table::try_from(protocol);
     written.unwrap_or_else(|error| unreachable!("every field has a form in TOML: {error}"))
 }
 
-/// A value as it stands on a command line.
+/// A value as written on a command line.
 fn word(value: toml::Value) -> String {
     match value {
         toml::Value::String(text) => text,
@@ -507,7 +486,7 @@ mod tests {
 
     #[test]
     fn options_are_what_differs_from_the_defaults() {
-        let asked = Protocol {
+        let protocol = Protocol {
             methods: vec![Method::FB, Method::MI],
             radii_m: vec![12.5],
             references: ["62", "64"]
@@ -516,7 +495,7 @@ mod tests {
             min_confidence: Some(0.5),
             ..Protocol::default()
         };
-        let options = asked.options();
+        let options = protocol.options();
         let options: Vec<String> = options
             .iter()
             .map(|(key, value)| format!("{key} {value}"))
@@ -542,5 +521,29 @@ mod tests {
             ..Protocol::default()
         };
         assert_eq!(mixed.checked(), Err(ProtocolError::References));
+    }
+
+    #[test]
+    fn presets_ask_what_the_experiments_of_the_paper_do() {
+        let of = |name: &str, scene: &str| {
+            let preset: Preset = name.parse().expect("a preset");
+            assert_eq!(preset.name(), name);
+            defaults(Some(preset), scene)
+        };
+        let single = of("single", "kitti/00");
+        assert_eq!(single.radii_m, [10.0, 15.0, 20.0, 25.0]);
+        assert_eq!(single.methods, [Method::FB, Method::PM, Method::MI]);
+        assert_eq!(single.limit, Some(Limit::Percent(10.0)));
+        let multi = of("multi", "kitti/00");
+        let five = Reference::Chosen(Selection::Random(5));
+        assert_eq!(multi.references, [five]);
+        assert_eq!(multi.fusions, Fusion::of_the_paper().collect::<Vec<_>>());
+        let large = |scene| {
+            let large = of("large", scene);
+            (large.prior_m, large.failure_radius_m)
+        };
+        assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
+        assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
+        assert!("small".parse::<Preset>().is_err());
     }
 }

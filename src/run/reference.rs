@@ -1,4 +1,4 @@
-//! A reference as the command line names it.
+//! The argument of `--reference`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,7 +11,7 @@ use crate::text::UnknownWord;
 pub enum Reference {
     /// The frame of this name.
     Frame(String),
-    /// Frames that are chosen for each query.
+    /// Frames chosen for each query.
     Chosen(Selection),
 }
 

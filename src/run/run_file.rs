@@ -1,12 +1,11 @@
-//! `run.toml`: everything that an evaluation was asked, and over which queries.
+//! `run.toml`: the request of an evaluation and its queries.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::experiment::Experiment;
-use super::preset::default_failure_radius_m;
+use super::preset::{Preset, default_failure_radius_m};
 use super::protocol::{Protocol, known};
 use super::scene_pair::{QueryCamera, ScenePair};
 use crate::describe::ParamError;
@@ -14,10 +13,10 @@ use crate::localize::{QueryResult, References, Request, Setting};
 use crate::method::Method;
 use crate::params::Params;
 
-/// The version of the file's form.
+/// The version of the file format.
 pub const RUN_SCHEMA: &str = "posescope.run/1";
 
-/// One part of a run that is spread over several processes.
+/// One part of a run that is split over several processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// The number of the part, from 1.
@@ -27,7 +26,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Whether the part has the item at this place of the plan.
+    /// Whether the part contains the item at this position of the plan.
     pub fn has(self, item: usize) -> bool {
         item % self.of == self.number - 1
     }
@@ -54,41 +53,41 @@ impl std::str::FromStr for Shard {
 
 posescope_core::serde_as_text!(Shard);
 
-/// A run as its folder describes it. Threads are missing: results do not depend on them.
+/// The description of a run in its folder. Threads are missing: results do not depend on them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
-    /// The version of the form, [`RUN_SCHEMA`].
+    /// The version of the file format, [`RUN_SCHEMA`].
     pub schema: String,
     /// The version of posescope.
     pub version: String,
-    /// The scenes of the references, as arguments.
+    /// The scenes of the references, as given on the command line.
     pub scenes: Vec<String>,
     /// Which part of the run this is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
-    /// What was asked, with everything filled in that was left open.
+    /// How queries are localised, with all defaults filled in.
     pub protocol: Protocol,
-    /// What files and folders hold that the protocol names; see [`inputs`](super::inputs).
+    /// Hashes of the protocol's files and folders; see [`inputs`](super::inputs).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub inputs: BTreeMap<String, String>,
-    /// Scenes paired, with the queries.
+    /// The pairs of scenes, with the queries.
     #[serde(rename = "pair")]
     pub pairs: Vec<ScenePair>,
-    /// Every parameter of the estimators, as it was written: another version may have had others.
+    /// Every parameter of the estimators, as written: another version may have other parameters.
     pub params: toml::Table,
 }
 
-/// What is wrong with the text of a `run.toml`, and where.
+/// An error in the text of a `run.toml`.
 #[derive(Debug)]
 pub(super) struct RunFileError {
     /// The line, counted from 1.
     pub line: usize,
-    /// What is wrong, on one line.
+    /// The error, on one line.
     pub message: String,
 }
 
-/// Where the values stand that are checked once all are read.
+/// The positions of the values that are checked after reading.
 #[derive(Deserialize)]
 struct Places {
     schema: Spanned<String>,
@@ -108,7 +107,7 @@ struct ScenePairPlaces {
 }
 
 impl Places {
-    /// The first thing that is wrong, with its place \[bytes\].
+    /// The first invalid value: its position \[bytes\] and a message.
     fn error(&self, run: &RunFile) -> Option<(usize, String)> {
         if run.schema != RUN_SCHEMA {
             let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
@@ -121,7 +120,7 @@ impl Places {
             .as_ref()
             .map_or(0, |at| at.span().start);
         if protocol.methods.is_empty() {
-            return Some((at_methods, "a run has at least one method".to_owned()));
+            return Some((at_methods, "at least one method expected".to_owned()));
         }
         let others: Vec<Method> = protocol.estimates.iter().map(|file| file.method).collect();
         if let Err(error) = known(&protocol.methods, &others) {
@@ -134,23 +133,23 @@ impl Places {
                 .radius
                 .as_ref()
                 .map_or(0, |at| at.span().start);
-            return Some((at, "one positive radius or more expected".to_owned()));
+            return Some((at, "at least one radius above 0 expected".to_owned()));
         }
         let scenes = run.scenes.len();
         let mut pairs = self.pair.iter().map(|pair| &pair.scene_index);
         let outside = pairs.find(|index| *index.get_ref() >= scenes)?;
         let message = format!(
-            "scene_index {} names none of the {scenes} scenes, which are counted from 0",
+            "a scene_index below {scenes} expected, the number of scenes; {} found",
             outside.get_ref()
         );
         Some((outside.span().start, message))
     }
 }
 
-/// One query of a pair: what is done, written and spread as a whole.
+/// One query of a pair: the unit of work, of writing and of sharding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunItem<'a> {
-    /// Its place in the plan.
+    /// Its position in the plan.
     pub index: usize,
     /// Its scenes.
     pub pair: &'a ScenePair,
@@ -163,7 +162,7 @@ pub struct RunItem<'a> {
 }
 
 impl RunFile {
-    /// All items of the run in their order, those of other shards too.
+    /// All items of the run in order, including those of other shards.
     pub fn plan(&self) -> impl Iterator<Item = RunItem<'_>> {
         let queries = self.pairs.iter().flat_map(|pair| {
             let queries = pair.queries.iter().enumerate();
@@ -186,11 +185,11 @@ impl RunFile {
             .filter(|item| self.shard.is_none_or(|shard| shard.has(item.index)))
     }
 
-    /// What is asked of every query, still without references: by radius, then number of references.
+    /// The settings that every query is localised with: by radius, then by number of references.
     pub fn settings(&self) -> Vec<Setting> {
         let most_references = self.protocol.selection().count();
         let counts = match self.protocol.preset {
-            Some(Experiment::Multi) => 1..=most_references,
+            Some(Preset::Multi) => 1..=most_references,
             _ => most_references..=most_references,
         };
         let radii = self.protocol.radii_m.iter();
@@ -204,7 +203,7 @@ impl RunFile {
             .collect()
     }
 
-    /// The parameters of the estimators: those of the file over the defaults of this version.
+    /// The parameters of the estimators: those of the file override the defaults of this version.
     ///
     /// # Errors
     /// A parameter that this version does not have.
@@ -212,7 +211,7 @@ impl RunFile {
         self.params.to_string().parse()
     }
 
-    /// The translation error from which a pose is a failure, as the paper counts them \[m\].
+    /// The translation error from which the paper counts a pose as a failure \[m\].
     pub fn failure_radius_m(&self) -> f64 {
         let scene = self.pairs.first().map_or("", |pair| pair.scene.as_str());
         self.protocol
@@ -220,14 +219,14 @@ impl RunFile {
             .unwrap_or_else(|| default_failure_radius_m(scene))
     }
 
-    /// The scenes that a result is of.
+    /// The pair of scenes of a result.
     pub fn pair_of(&self, result: &QueryResult) -> Option<&ScenePair> {
         let queries = result.query_scene.as_ref().unwrap_or(&result.scene);
         let mut pairs = self.pairs.iter();
         pairs.find(|pair| pair.scene == result.scene && pair.query_scene == *queries)
     }
 
-    /// The request of a setting, with as many of the chosen references.
+    /// The request of a setting, with its number of the chosen references.
     pub fn request(&self, setting: Setting, chosen: &References) -> Request {
         let count = setting.references.min(chosen.frames.len());
         Request {
@@ -241,7 +240,7 @@ impl RunFile {
         }
     }
 
-    /// Results of each query.
+    /// The number of results per query.
     pub fn results_per_item(&self) -> usize {
         let protocol = &self.protocol;
         protocol.methods.len() * self.settings().len() * protocol.fusions.len().max(1)
@@ -265,7 +264,7 @@ impl RunFile {
         }
     }
 
-    /// The description of the same run in one piece.
+    /// The description of the same run without shards.
     pub fn whole(&self) -> Self {
         Self {
             shard: None,

@@ -1,7 +1,7 @@
-//! The folder of a run, written as the run goes.
+//! The folder of a run, written query by query.
 //!
-//! A query's results are appended together when all of them are there, so that a killed run loses at
-//! most the query in work. Whoever goes on cuts off what is incomplete and ends with the same bytes.
+//! A query's results are appended together once all are computed, so a killed run loses at most the current
+//! query. Resuming cuts off incomplete lines and ends with the same bytes.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
@@ -22,10 +22,10 @@ const RUN: &str = "run.toml";
 const RESULTS: &str = "results.jsonl";
 const TIMINGS: &str = "timings.jsonl";
 
-/// Where a run folder has recordings of failures.
+/// The folder of the failures' recordings, inside the run folder.
 pub const FAILURES: &str = "failures";
 
-/// The name of the recording of a failure: `QUERY-METHOD`, with the scenes before it where there are several pairs of them.
+/// The name of a failure's recording: `QUERY-METHOD`, preceded by the scenes if the run has several pairs.
 pub fn recording_name(
     pair: &ScenePair,
     query: &str,
@@ -58,11 +58,11 @@ pub enum FolderError {
         /// The error of the system.
         source: io::Error,
     },
-    /// Something else is in the place of a new run.
+    /// A new run needs an empty folder.
     #[error("{}: the folder is not empty{}", path.display(), if *.is_run {
-        "; --resume goes on with the run in it, another folder starts a new one"
+        "; continue its run with --resume, or name another folder with --out"
     } else {
-        ", and there is no run in it to go on with; name another with --out"
+        " and contains no run to resume; name another folder with --out"
     })]
     NotEmpty {
         /// The folder.
@@ -70,40 +70,43 @@ pub enum FolderError {
         /// Whether there is a run in it.
         is_run: bool,
     },
-    /// The folder holds another run.
-    #[error("{}: the run in it was asked for otherwise: `{there}` there, `{here}` here", path.display())]
+    /// The folder contains another run.
+    #[error(
+        "{}: the folder contains a run with other settings, `{there}` instead of `{here}`; name another with --out",
+        path.display()
+    )]
     OtherRun {
         /// The folder.
         path: PathBuf,
         /// The first line of its `run.toml` that differs.
         there: String,
-        /// What it would be.
+        /// The same line of the new run.
         here: String,
     },
-    /// A file is not what it should be.
+    /// A file is damaged.
     #[error("{}:{line}: {message}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The error.
         message: String,
     },
     /// There is no run.
-    #[error("{}: no run here (there is no {RUN})", path.display())]
+    #[error("{}: not a run folder, {RUN} is missing; `posescope eval` writes run folders", path.display())]
     NoRun {
         /// The folder.
         path: PathBuf,
     },
-    /// Somebody else writes there.
-    #[error("{}: another process is at work on this run", path.display())]
+    /// Another process writes to the folder.
+    #[error("{}: another process is writing to this run; wait until it ends", path.display())]
     InUse {
         /// The folder.
         path: PathBuf,
     },
     /// Not all queries are done.
-    #[error("{}: {done} of {items} queries are done; go on with --resume", path.display())]
+    #[error("{}: {done} of {items} queries are done; finish the run with --resume first", path.display())]
     Incomplete {
         /// The folder.
         path: PathBuf,
@@ -144,7 +147,7 @@ impl RunFolder {
     /// Starts a run in a new or empty folder.
     ///
     /// # Errors
-    /// [`FolderError::NotEmpty`], or what went wrong on the disk.
+    /// [`FolderError::NotEmpty`], or an error of the disk.
     pub fn create(path: &Path, run: &RunFile) -> Result<Self, FolderError> {
         if holds_anything(path)? {
             return Err(FolderError::NotEmpty {
@@ -159,10 +162,10 @@ impl RunFolder {
         Self::open(path)
     }
 
-    /// Goes on with the run in the folder, or starts it where the folder is new or empty.
+    /// Continues the run in the folder, or starts it if the folder is new or empty.
     ///
     /// # Errors
-    /// [`FolderError`]: another run, a damaged one, or one that is being written.
+    /// [`FolderError`]: another run, a damaged one, or one that is in use.
     pub fn resume(path: &Path, run: &RunFile) -> Result<Self, FolderError> {
         let results_per_item = run.results_per_item();
         if !holds_anything(path)? {
@@ -207,7 +210,7 @@ impl RunFolder {
             options.map_err(FolderError::io(file))
         };
         let results = open(RESULTS)?;
-        // A file system without locks cannot tell; then nobody asks it to.
+        // A file system without locks returns another error, which is ignored.
         if matches!(results.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(FolderError::InUse {
                 path: path.to_owned(),
@@ -234,7 +237,7 @@ impl RunFolder {
     /// Appends all results of the next query.
     ///
     /// # Errors
-    /// When the disk does not take them.
+    /// When they cannot be written.
     pub fn append(&mut self, results: &[(QueryResult, StageTimes)]) -> Result<(), FolderError> {
         let (mut lines, mut times) = (Vec::new(), Vec::new());
         for (result, stages) in results {
@@ -246,7 +249,7 @@ impl RunFolder {
             };
             push_line(&mut times, &timing).map_err(FolderError::io(&self.path))?;
         }
-        // Results last: a query with results has all that belongs to it.
+        // Results last: a query with results is complete.
         (self.timings.write_all(&times)).map_err(FolderError::io(self.path.join(TIMINGS)))?;
         (self.results.write_all(&lines)).map_err(FolderError::io(self.path.join(RESULTS)))?;
         self.done += 1;
@@ -272,7 +275,7 @@ impl RunFolder {
                     prefix.ends.push(end);
                     prefix.queries.push(head.query);
                 }
-                // What follows a torn line cannot be trusted either.
+                // Lines after a torn one cannot be trusted.
                 _ => return Ok(prefix),
             }
         }
@@ -299,13 +302,13 @@ impl RunFolder {
     }
 }
 
-/// What both kinds of line begin with.
+/// The common fields of both kinds of line.
 #[derive(serde::Deserialize)]
 struct Head {
     query: String,
 }
 
-/// The readable lines at the beginning of a file, by their ends \[bytes\].
+/// The complete lines at the beginning of a file: their ends \[bytes\] and queries.
 #[derive(Default)]
 struct Prefix {
     ends: Vec<u64>,
@@ -341,7 +344,7 @@ fn same_run(path: &Path, there: &str, here: &str) -> Result<(), FolderError> {
     })
 }
 
-/// Whether the folder exists and has more in it than files that nobody finished.
+/// Whether the folder contains anything but unfinished temporary files.
 fn holds_anything(path: &Path) -> Result<bool, FolderError> {
     let entries = match fs::read_dir(path) {
         Ok(entries) => entries,
@@ -357,7 +360,7 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
     Ok(false)
 }
 
-/// Removes files that a killed process did not finish.
+/// Removes temporary files of a killed process.
 fn sweep(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -371,7 +374,7 @@ fn sweep(folder: &Path) -> io::Result<()> {
 /// Reads the description of the run in a folder.
 ///
 /// # Errors
-/// [`FolderError::NoRun`], or what is wrong with the file.
+/// [`FolderError::NoRun`], or an error in the file.
 pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
     let path = folder.join(RUN);
     let text = match fs::read_to_string(&path) {
@@ -392,21 +395,20 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
     Ok(run)
 }
 
-/// The parameters of a run whose description may lack those that its version did not know or did
-/// not write: they had their defaults.
+/// The parameters of a run, with defaults for those that its version did not know or write.
 fn completed(params: toml::Table) -> toml::Table {
     let mut all = Params::default();
     match all.merge_toml(&params.to_string()) {
         Ok(()) => all.to_toml().parse().unwrap_or(params),
-        // Whoever uses them says what is wrong with them.
+        // The user of the parameters reports the error.
         Err(_) => params,
     }
 }
 
-/// Reads the lines of `results.jsonl` one by one, as far as `T` wants to know them.
+/// Reads the lines of `results.jsonl` one by one, as the fields of `T`.
 ///
 /// # Errors
-/// A line that is no result.
+/// A line that is not a result.
 pub fn read_results<T: DeserializeOwned>(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<T, FolderError>>, FolderError> {
@@ -422,7 +424,7 @@ pub fn read_results<T: DeserializeOwned>(
     }))
 }
 
-/// The lines of `results.jsonl` as they are, in the order of [`read_results`].
+/// The raw lines of `results.jsonl`, in the order of [`read_results`].
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -443,10 +445,10 @@ fn lines_of(
     Ok(BufReader::new(file).lines())
 }
 
-/// Writes the shards of a run into one folder, as if it had never been split.
+/// Merges the shards of a run into one folder, with the same content as an unsplit run.
 ///
 /// # Errors
-/// [`FolderError`]: parts of different runs, a part that is missing, twice there or not complete.
+/// [`FolderError`]: parts of different runs, or a missing, repeated or incomplete part.
 pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> {
     let mut runs = Vec::new();
     for path in shards {

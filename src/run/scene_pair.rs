@@ -1,11 +1,11 @@
-//! A pair of scenes as a run names it: whose frames are queries, with which cameras and when.
+//! A pair of scenes in `run.toml`: the queries with their cameras and times.
 
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Intrinsics;
 use crate::scene::Scene;
 
-/// A scene of references with one of queries, perhaps the same.
+/// A scene of references and a scene of queries, which may be the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScenePair {
     /// Position of the references' scene among the scenes.
@@ -14,16 +14,16 @@ pub struct ScenePair {
     pub scene: String,
     /// The name of the queries' scene.
     pub query_scene: String,
-    /// The camera of the queries; the first one's where they have several.
+    /// The camera of the queries; that of the first query if they differ.
     pub camera: QueryCamera,
-    /// The camera of each query, where they have several.
+    /// The camera of each query, if they differ.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<QueryCamera>,
-    /// Frames that were drawn as queries; where the scenes are the same, none is a reference.
+    /// The drawn frames; none is a reference if both scenes are the same.
     pub drawn: Vec<String>,
-    /// The queries: all that were drawn, or those of them that were named.
+    /// The queries: all drawn frames, or the named ones of them.
     pub queries: Vec<String>,
-    /// When they were taken \[s\], where that is known of all.
+    /// The times of the queries \[s\], if all are known.
     pub times_s: Vec<f64>,
 }
 
@@ -45,7 +45,7 @@ pub struct QueryCamera {
 }
 
 impl ScenePair {
-    /// The pair with those of its queries that are wanted.
+    /// The pair with some of its queries only.
     #[must_use]
     pub fn only(&self, is_wanted: impl Fn(&str) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.queries.len())
@@ -67,19 +67,19 @@ impl ScenePair {
     }
 }
 
-/// Whether a query goes by a name; numbers match whatever their leading zeros.
+/// Whether a query has a name; numbers match regardless of leading zeros.
 pub fn is_called(query: &str, name: &str) -> bool {
     let number = |text: &str| text.parse::<u64>().ok();
     query == name || number(query).is_some() && number(query) == number(name)
 }
 
-/// When the queries of a scene were taken, if that is known of all.
+/// The times of a scene's queries, if all are known.
 pub(super) fn times_of(scene: &dyn Scene, queries: &[usize]) -> Vec<f64> {
     let times: Option<Vec<f64>> = queries.iter().map(|&frame| scene.time_s(frame)).collect();
     times.unwrap_or_default()
 }
 
-/// The camera of the first of some frames, and that of each where they have several.
+/// The camera of the first frame, and those of all frames if they differ.
 pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (QueryCamera, Vec<QueryCamera>) {
     let camera = |frame: usize| QueryCamera::from(scene.intrinsics(frame));
     let first = camera(frames.first().copied().unwrap_or(0));
@@ -92,22 +92,14 @@ pub(super) fn cameras_of(scene: &dyn Scene, frames: &[usize]) -> (QueryCamera, V
 }
 
 impl From<Intrinsics> for QueryCamera {
-    fn from(intrinsics: Intrinsics) -> Self {
-        let Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = intrinsics;
+    fn from(camera: Intrinsics) -> Self {
         Self {
-            width,
-            height,
-            fx,
-            fy,
-            cx,
-            cy,
+            width: camera.width,
+            height: camera.height,
+            fx: camera.fx,
+            fy: camera.fy,
+            cx: camera.cx,
+            cy: camera.cy,
         }
     }
 }

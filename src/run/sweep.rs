@@ -1,4 +1,4 @@
-//! One setting at several values: `fb.ratio=0.5:0.9:0.05`, `gamma=0.2:1:0.1`.
+//! The argument of `--sweep`: one setting at several values, such as `fb.ratio=0.5:0.9:0.05`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,31 +7,31 @@ use crate::describe::ParamError;
 use crate::image::{Degradation, DegradationError};
 use crate::params::Params;
 
-/// Values at most: whoever asks for more has mistyped the step.
+/// The most values; more are probably a mistyped step.
 const MOST: f64 = 1000.0;
 
-/// A parameter or a step of the degradation, and the values that it is to take.
+/// A parameter or a step of the degradation, and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     key: String,
-    /// As they are written, with as many decimals as the first and the step need.
+    /// The values as text, with the decimals of the first value and the step.
     values: Vec<String>,
 }
 
-/// Why a sweep cannot be made.
+/// Why a sweep is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// It is not written as one.
+    /// The text has another form.
     #[error(
-        "`{0}`: KEY=FROM:TO:STEP expected, such as gamma=0.2:1:0.1 or fb.ratio=0.5:0.9:0.05, with FROM up \
-         to TO and a STEP above 0, 1000 values at most"
+        "`{0}`: KEY=FROM:TO:STEP expected, such as gamma=0.2:1:0.1 or fb.ratio=0.5:0.9:0.05, with FROM at most \
+         TO, a STEP above 0 and at most 1000 values"
     )]
     Form(String),
-    /// A value that the parameter does not take, or no such parameter.
+    /// An unknown parameter, or a value out of its range.
     #[error(transparent)]
     Param(#[from] ParamError),
-    /// A strength that a degradation does not take.
+    /// A strength out of a degradation's range.
     #[error(transparent)]
     Degradation(#[from] DegradationError),
 }
@@ -55,12 +55,12 @@ impl Sweep {
         row.map_or("", |row| row.about.unit)
     }
 
-    /// Whether it is a step of the degradation, and not a parameter.
+    /// Whether it is a step of the degradation instead of a parameter.
     pub fn is_degradation(&self) -> bool {
         !self.key.contains('.')
     }
 
-    /// Sets the swept setting to one of its values, which the sweep has checked.
+    /// Sets the swept setting to one of its values, which were checked on parsing.
     pub fn apply(&self, value: &str, degradation: &mut Degradation, params: &mut Params) {
         if let Err(error) = self.try_apply(value, degradation, params) {
             unreachable!("the sweep was checked: {error}");
@@ -81,7 +81,7 @@ impl Sweep {
         Ok(())
     }
 
-    /// Every value is one that its parameter takes.
+    /// Checks that all values are in the range of the setting.
     fn check(&self) -> Result<(), SweepError> {
         self.values.iter().try_for_each(|value| {
             self.try_apply(value, &mut Degradation::default(), &mut Params::default())
@@ -110,7 +110,7 @@ impl FromStr for Sweep {
             number.filter(|number| number.is_finite()).ok_or_else(wrong)
         };
         let (first, last, width) = (number(from)?, number(to)?, number(step)?);
-        // 0.9 is to be among 0.5 to 0.9 by 0.05, which no binary number is.
+        // 0.5 to 0.9 by 0.05 must include 0.9 in spite of rounding.
         let steps = ((last - first) / width + 1e-9).floor();
         if !(width > 0.0 && (0.0..MOST).contains(&steps)) {
             return Err(wrong());
@@ -165,7 +165,7 @@ mod tests {
             said("fb.ratio=0.5:1.2:0.1"),
             "`fb.ratio` takes 0.1 … 1, not `1.1`"
         );
-        assert!(said("gama=0.2:1:0.1").contains("`gama` is no degradation"));
+        assert!(said("gama=0.2:1:0.1").contains("`gama` is not a degradation"));
         assert!(said("fb.ratoi=0.2:1:0.1").contains("did you mean `fb.ratio`"));
         assert!(said("invert=0:1:1").contains("true | false"));
     }

@@ -1,8 +1,8 @@
-//! Scene arguments: a path, perhaps with a word that says how to read it, such as `street:night`.
+//! Scene arguments: a path with an optional word, such as `street:night`.
 
 use std::path::Path;
 
-/// Splits `PATH:WORD` where the word is one of these.
+/// Splits `PATH:WORD` if the word is one of these.
 pub(super) fn split_word<'a>(argument: &'a str, words: &[&str]) -> (&'a Path, Option<&'a str>) {
     match argument.rsplit_once(':') {
         Some((path, word)) if words.contains(&word) => (Path::new(path), Some(word)),

@@ -1,6 +1,6 @@
-//! Clouds of other programs: PLY, PCD, LAS, LAZ and XYZ text, told apart by their content.
+//! Cloud files: PLY, PCD, LAS, LAZ and XYZ text, detected by their content.
 //!
-//! No count in a header is believed before it is compared with the size of the file.
+//! Counts in headers are checked against the size of the file before anything is allocated.
 
 mod las;
 mod pcd;
@@ -15,24 +15,23 @@ use nalgebra::{Point3, Vector3};
 
 use super::SceneError;
 
-/// As many points as a cloud may have: 1.2 GB of them.
+/// The most points of a cloud, which take 1.2 GB.
 pub(super) const MOST_POINTS: usize = 100_000_000;
 
-/// A cloud in the frame that its file speaks of, which may be that of a map.
+/// A cloud in the frame of its file, which may be that of a map.
 ///
-/// Map coordinates do not fit `f32`: the points are relative to a local origin, which is subtracted
-/// when they are read.
+/// Map coordinates do not fit `f32`, so the points are stored relative to a local origin.
 #[derive(Debug, Default)]
 pub(super) struct MapCloud {
     /// The local origin \[m\].
     pub origin: Vector3<f64>,
-    /// The points from there \[m\].
+    /// The points relative to the origin \[m\].
     pub points: Vec<Point3<f32>>,
 }
 
 impl MapCloud {
-    /// Adds a point \[m\]. One without finite coordinates stands for a beam that did not return, and
-    /// is left out; the first point's whole metres are the local origin.
+    /// Adds a point \[m\]. A point without finite coordinates is a beam without return, and is skipped. The first
+    /// point, rounded to metres, is the local origin.
     fn add(&mut self, [x, y, z]: [f64; 3]) -> Result<(), String> {
         let point = Vector3::new(x, y, z);
         if !point.iter().all(|coordinate| coordinate.is_finite()) {
@@ -42,20 +41,22 @@ impl MapCloud {
             self.origin = point.map(f64::round);
         }
         if self.points.len() == MOST_POINTS {
-            return Err(format!("at most {MOST_POINTS} points expected"));
+            return Err(format!(
+                "at most {MOST_POINTS} points expected; split or thin the cloud"
+            ));
         }
         self.points.push(Point3::from(point - self.origin).cast());
         Ok(())
     }
 
-    /// The points in the frame that their file speaks of \[m\].
+    /// The points in the frame of their file \[m\].
     pub fn positions(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
         let from_origin = |point: &Point3<f32>| point.cast::<f64>() + self.origin;
         self.points.iter().map(from_origin)
     }
 }
 
-/// Reads a cloud, whatever format it has.
+/// Reads a cloud in any of the formats.
 pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let io = SceneError::io(path);
     let mut start = Vec::new();
@@ -74,25 +75,25 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     } else if start.contains(&0) {
         return Err(content(
             path,
-            "a cloud as PLY, PCD, LAS, LAZ or XYZ text expected",
+            "a cloud in PLY, PCD, LAS, LAZ or XYZ text format expected",
         ));
     } else {
         return xyz::read(path);
     };
     let cloud = read(path, size).map_err(|expected| content(path, &expected))?;
     if cloud.points.is_empty() {
-        return Err(content(path, "points expected, the cloud has none"));
+        return Err(content(path, "at least one point expected, none found"));
     }
     Ok(cloud)
 }
 
 fn content(path: &Path, expected: &str) -> SceneError {
-    // Some libraries say it in several lines.
+    // Some libraries have errors of several lines.
     let lines: Vec<&str> = expected.split_whitespace().collect();
     SceneError::expected(path, super::lines::excerpt_of(&lines.join(" "), 200))
 }
 
-/// Says that a header promises more than the file can hold.
+/// Refuses a header that announces more points than the file can hold.
 fn expect_room(points: u64, least_bytes: u64, size: u64) -> Result<(), String> {
     if points > size / least_bytes.max(1) {
         return Err(format!(

@@ -1,11 +1,10 @@
 //! COLMAP: a sparse model, text or binary, with its images.
 //!
-//! Images are undistorted when they are read. COLMAP's pixels have the centre of the first at
-//! (0.5, 0.5), ours at (0, 0). A model has no scale of its own: what is called metres is the model's
-//! unit.
+//! Images are undistorted when they are read. In COLMAP the centre of the first pixel is (0.5, 0.5), here (0, 0).
+//! A model has no absolute scale: its unit is called metres.
 //!
-//! The cloud of a frame is the points that it observes, and no others. A point in view that was not
-//! matched there is often one that something hides, which nothing tells of a cloud that is not dense.
+//! The cloud of a frame contains only the points that it observes. A point in view without an observation is often
+//! occluded, which cannot be detected in a sparse cloud.
 
 mod binary;
 mod camera;
@@ -26,14 +25,13 @@ use crate::cloud::Cloud;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "colmap",
-    about: "COLMAP: a folder with cameras, images and points3D as .bin or .txt, or one that has it \
-            in sparse/0, with the photos in images",
+    about: "COLMAP: a folder with cameras, images and points3D as .bin or .txt, in it or in sparse/0, \
+            and the photos in images",
     recognizes: |argument| model_folder(Path::new(argument)).is_some(),
     open: |argument| open(Path::new(argument)),
 };
 
-/// The folder of the model, and the end of its files' names. Where both are there the binary one is
-/// taken, as COLMAP does.
+/// The folder of the model, and the extension of its files. Like COLMAP, prefers the binary form.
 fn model_folder(folder: &Path) -> Option<(PathBuf, &'static str)> {
     let places = ["", "sparse/0", "sparse"].map(|place| folder.join(place));
     places.into_iter().find_map(|place| {
@@ -51,7 +49,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let Some((place, extension)) = model_folder(folder) else {
         return Err(SceneError::expected(
             folder,
-            "cameras and images as .bin or .txt expected, none found",
+            "cameras and images as .bin or .txt expected, here or in sparse/0, none found",
         ));
     };
     let listed_in = place.join(format!("images.{extension}"));
@@ -64,8 +62,8 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let photos = photo_folder(&place, &images).ok_or_else(|| {
         error(format!(
-            "the photos in a folder `images` beside the model or above it expected, such as {}; \
-             none found",
+            "the photos, such as {}, expected in a folder `images` in the model's folder or up to two levels \
+             above it, none found",
             images.first().map_or("", |image| &image.name)
         ))
     })?;
@@ -83,7 +81,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
         let photo = within(&photos, &image.name).map_err(error)?;
         let (intrinsics, develop) = cameras.get(&image.camera).ok_or_else(|| {
             error(format!(
-                "image {}: one of the cameras of the model expected, {} found",
+                "image {}: the id of a camera of the model expected, {} found",
                 image.name, image.camera
             ))
         })?;
@@ -99,7 +97,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     }
     if frames.len() < listed {
         log::warn!(
-            "{}: {} of the {listed} images of the model are not there",
+            "{}: {} of the model's {listed} images are missing and are skipped",
             photos.display(),
             listed - frames.len()
         );
@@ -114,7 +112,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
-/// What the scene is called: the folder that holds both model and photos.
+/// The name of the scene: that of the folder with both model and photos.
 fn scene_name(folder: &Path, photos: &Path) -> String {
     let photos = photos.canonicalize().unwrap_or_else(|_| photos.to_owned());
     let holds_photos = |folder: &&Path| photos.starts_with(folder);
@@ -122,20 +120,20 @@ fn scene_name(folder: &Path, photos: &Path) -> String {
     folder_name(common)
 }
 
-/// Where the photos are: `images` in the model's folder or up to two above it, or one of these itself.
+/// The folder of the photos: the model's folder, one of two above it, or `images` in one of these.
 fn photo_folder(model: &Path, images: &[ModelImage]) -> Option<PathBuf> {
     let model = model.canonicalize().ok()?;
     let places = model.ancestors().take(3);
     let places = places.flat_map(|folder| [folder.join("images"), folder.to_owned()]);
     let holds_any = |place: &PathBuf| {
         let paths = images.iter().flat_map(|i| within(place, &i.name));
-        // A whole project may have thousands: those that are not there are not looked for for long.
+        // A project may have thousands of images, so only some are searched.
         paths.take(100).any(|path| path.is_file())
     };
     places.into_iter().find(holds_any)
 }
 
-/// The images' names without folders and extensions, as far as that tells them apart.
+/// The images' names, without folders and extensions as long as they stay unique.
 fn frame_names(images: &[ModelImage]) -> Result<Vec<String>, String> {
     let flat = |name: &str| name.replace(['/', '\\'], "-");
     let without_extension = |name: &str| match name.rsplit_once('.') {
@@ -151,10 +149,10 @@ fn frame_names(images: &[ModelImage]) -> Result<Vec<String>, String> {
     let ways = briefest_first.into_iter();
     ways.map(|brief| images.iter().map(|image| brief(&image.name)).collect())
         .find(|names: &Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len())
-        .ok_or_else(|| "images of different names expected".to_owned())
+        .ok_or_else(|| "images with different names expected, two are the same".to_owned())
 }
 
-/// The points of the model by who observes them.
+/// The points of the model, with the frames that observe them.
 struct ObservedPoints {
     /// In the world's frame.
     points: Vec<[f64; 3]>,

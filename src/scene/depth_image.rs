@@ -11,21 +11,21 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 
-/// At most as many pixels of a depth image become points: about as many as a scan of 64 beams has in
-/// view of a camera. All 307,200 of a 640 × 480 image would make a search fifteen times as slow and
-/// add nothing, as a view is splatted with discs of several pixels.
+/// The most points from a depth image, about as many as a scan of 64 beams has in view. All 307,200 pixels of a
+/// 640 × 480 image would make a search fifteen times slower without gain: a view is splatted with discs of several
+/// pixels.
 const MOST_POINTS: u32 = 20_000;
 
 /// The depth images of a scene: 16-bit grey PNG.
 pub(super) struct DepthImages {
     /// The image of each frame, if it has one.
     pub images: Vec<Option<PathBuf>>,
-    /// What names the images, for frames without one.
+    /// The file that lists the images, for errors of frames without one.
     pub listed_in: PathBuf,
-    /// The camera that took them, and that of the photos from it. Without one they are registered with the
-    /// photos: pixel by pixel, seen by the same camera.
+    /// The depth camera, and the photos' camera from it. `None` if the depth images are registered with the photos,
+    /// pixel by pixel.
     pub beside: Option<(Intrinsics, Pose)>,
-    /// What a value of 1 means \[m\].
+    /// The depth of a value of 1 \[m\].
     pub unit_m: f64,
 }
 
@@ -65,7 +65,7 @@ impl Clouds for DepthImages {
     }
 }
 
-/// Every how many pixels along both axes a point is made.
+/// The step in pixels, along both axes, between points.
 pub(super) fn step((width, height): (u32, u32)) -> u32 {
     let pixels = f64::from(width) * f64::from(height);
     (pixels / f64::from(MOST_POINTS)).sqrt().ceil().max(1.0) as u32

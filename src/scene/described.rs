@@ -55,11 +55,11 @@ fn description_of(argument: &Path) -> PathBuf {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
-    /// What the scene is called in results; its folder otherwise.
+    /// The name of the scene in results; by default that of its folder.
     name: Option<Spanned<String>>,
-    /// The photos: a path whose last part may have stars.
+    /// The photos: a path whose last part may contain `*`.
     images: Spanned<String>,
-    /// The file with the poses, without which there are queries only.
+    /// The file with the poses. Without it, all frames are queries.
     poses: Option<Spanned<String>>,
     #[serde(default)]
     pose: PoseMeaning,
@@ -98,16 +98,16 @@ struct CameraDescription {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CloudsDescription {
-    /// The clouds: a path whose last part has a star in the place of the image's name.
+    /// The clouds: a path whose last part has `*` in place of the image's name.
     files: Spanned<String>,
-    /// The frame that they are in.
+    /// The coordinate frame of the clouds.
     #[serde(default)]
     frame: CloudFrame,
-    /// From the scanner's frame, a 3 × 4 matrix row by row.
+    /// From the scanner's frame: a 3 × 4 matrix, row by row.
     camera_from_cloud: Option<Spanned<[f64; 12]>>,
 }
 
-/// Which frame the clouds of single frames are in.
+/// The coordinate frame of clouds per frame.
 #[derive(Clone, Copy, Default, Deserialize, PartialEq)]
 #[serde(rename_all = "snake_case")]
 enum CloudFrame {
@@ -147,7 +147,7 @@ impl Source {
         let path = within(self.folder(), name.get_ref())
             .map_err(|expected| self.error(name, &expected))?;
         if !path.is_file() {
-            let expected = format!("a file expected, `{}` is none", path.display());
+            let expected = format!("an existing file expected, `{}` found", path.display());
             return Err(self.error(name, &expected));
         }
         Ok(path)
@@ -159,7 +159,10 @@ impl Source {
             .map_err(|expected| self.error(name, &expected))?;
         let files = pattern::files(&pattern)?;
         if files.is_empty() {
-            let expected = format!("files expected, `{}` names none", pattern.display());
+            let expected = format!(
+                "a pattern of existing files expected, no file matches `{}`",
+                pattern.display()
+            );
             return Err(self.error(name, &expected));
         }
         Ok(files)
@@ -206,7 +209,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
-/// The camera of all photos, as they are handed out.
+/// The camera of the undistorted photos.
 fn camera(
     source: &Source,
     described: &Spanned<CameraDescription>,
@@ -256,7 +259,7 @@ fn per_frame(
         return Err(source.error(
             &described.files,
             &format!(
-                "clouds named as their images are expected, such as `{}`; `{}` found",
+                "clouds with the names of their images expected, such as `{}`; `{}` found",
                 stem(&photos[0]),
                 stem(&files[0])
             ),
@@ -278,14 +281,14 @@ fn per_frame(
 }
 
 enum Place {
-    /// In one file for all, which is read when the first is asked for.
+    /// One file for all frames, read on first use.
     Map(OnceLock<MapBlocks>),
-    /// In a file each, with what takes them into the camera's frame: none if they are in the world's.
+    /// One file per frame, and the transform to the camera's frame; `None` if they are in the world's frame.
     PerFrame(Vec<Option<PathBuf>>, Option<Pose>),
 }
 
 struct DescribedClouds {
-    /// The file of the map, or the one that names the clouds.
+    /// The file of the map, or the one that lists the clouds.
     place: PathBuf,
     clouds: Place,
 }
@@ -311,7 +314,9 @@ impl Clouds for DescribedClouds {
         let world_from_camera = || {
             frame.world_from_camera.ok_or_else(|| {
                 let name = &frame.name;
-                let expected = format!("a pose of frame {name} in the world of its cloud expected");
+                let expected = format!(
+                    "a pose of frame {name} expected, since its cloud is in the world frame"
+                );
                 SceneError::expected(path, expected)
             })
         };

@@ -1,4 +1,4 @@
-//! The poses that another system found, in any of the texts of [`PoseText`] or a COLMAP model's folder.
+//! Reads the poses of another system: a file in one of the formats of [`PoseText`], or a COLMAP model's folder.
 
 use std::path::Path;
 
@@ -11,11 +11,11 @@ use super::trajectory::{SAME_MOMENT_S, associated};
 use super::{Scene, SceneError};
 use crate::geometry::Pose;
 
-/// Reads the poses of the frames of a scene, `world_from_camera`. Poses of what is no frame of the scene
-/// are left out, as long as some are of one.
+/// Reads the poses of a scene's frames, `world_from_camera`. Poses of unknown frames are skipped, as long as some
+/// are of known frames.
 ///
 /// # Errors
-/// A file that cannot be read, is none of the texts, has a frame twice, or is of other frames altogether.
+/// A file that cannot be read, has another format, has a frame twice, or has no frame of the scene.
 pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, SceneError> {
     let in_folder = path.join("images.txt");
     let file = TextFile::read(if path.is_dir() { &in_folder } else { path })?;
@@ -27,14 +27,14 @@ pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, Scene
     }
 }
 
-/// A frame has the pose of its moment.
+/// Associates poses and frames by time.
 fn by_time(
     file: &TextFile,
     mut samples: Vec<(f64, Pose)>,
     scene: &dyn Scene,
 ) -> Result<Estimates, SceneError> {
     samples.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // Frames without a time may be called by it.
+    // The name of a frame may be its time.
     let frames = scene.frames();
     let time = |frame: usize| {
         let named = || frames[frame].parse().ok();
@@ -58,8 +58,8 @@ fn by_time(
             [only] => only.to_string(),
         };
         return Err(file.error(format!(
-            "poses within {SAME_MOMENT_S} s of the frames of {} expected: their times are {}, those of \
-             the poses {}",
+            "poses within {SAME_MOMENT_S} s of the frames of {} expected: the frames' times are {}, the poses' \
+             times {}",
             scene.name(),
             range(&times),
             range(&moments)
@@ -79,8 +79,8 @@ fn by_line(file: &TextFile, poses: &PoseLines, scene: &dyn Scene) -> Result<Esti
         .collect();
     if estimates.is_empty() {
         return Err(file.error(format!(
-            "a line for each of the {} frames of {} expected, or for each number from 0 that their names \
-             end with; {} lines found, none of a frame",
+            "one line per frame expected ({} of {}), or one per number from 0 at the end of their names; \
+             {} lines found, none for a frame",
             frames.len(),
             scene.name(),
             poses.count()
@@ -89,7 +89,7 @@ fn by_line(file: &TextFile, poses: &PoseLines, scene: &dyn Scene) -> Result<Esti
     Ok(estimates)
 }
 
-/// Each frame is named once.
+/// Looks poses up by name; each frame may occur once.
 fn by_name(
     file: &TextFile,
     poses: Vec<NamedPose<'_>>,
@@ -110,7 +110,9 @@ fn by_name(
         };
         let frame = &scene.frames()[frame];
         if estimates.insert(frame.clone(), world_from_camera).is_some() {
-            return Err(line.error(format!("frame {frame} has a pose already")));
+            return Err(line.error(format!(
+                "one pose per frame expected, frame {frame} has one already"
+            )));
         }
     }
     if estimates.is_empty() {

@@ -1,4 +1,4 @@
-//! A scene whose photos are files. Its reader says what the frames are and where their clouds come from.
+//! A scene whose photos are files. The reader of a format provides frames and clouds.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,22 +10,22 @@ use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
 
-/// What the format of a scene knows of a frame.
+/// A frame of a scene.
 pub(super) struct Frame {
     /// Its name in results and recordings.
     pub name: String,
     pub photo: PathBuf,
     /// The camera of the developed photo.
     pub intrinsics: Intrinsics,
-    /// What makes the photo of the image in the file, if they differ.
+    /// Converts the image in the file to the photo, if they differ.
     pub develop: Option<Arc<dyn Develop>>,
     pub world_from_camera: Option<Pose>,
-    /// When the photo was taken \[s\], if that is known.
+    /// The time of the photo \[s\], if known.
     pub time_s: Option<f64>,
 }
 
 impl Frame {
-    /// A frame that is called as its photo is, without a pose and a time.
+    /// A frame with the name of its photo, without pose and time.
     pub fn new(photo: PathBuf, intrinsics: Intrinsics) -> Self {
         Self {
             name: stem(&photo),
@@ -38,32 +38,32 @@ impl Frame {
     }
 }
 
-/// Makes photos of the images in their files: takes out distortion, for example.
+/// Converts images in files to photos: removes distortion, for example.
 pub(super) trait Develop: Send + Sync {
     fn developed(&self, image: Photo) -> Photo;
 
-    /// The size of the image in the file \[px\], given that of the photo.
+    /// The size of the image in the file \[px\], from that of the photo.
     fn size_in_file(&self, photo: (u32, u32)) -> (u32, u32) {
         photo
     }
 }
 
-/// Where the clouds of a scene come from.
+/// The clouds of a scene.
 pub(super) trait Clouds: Send + Sync {
-    /// Whether a frame has one.
+    /// Whether a frame has a cloud.
     fn has(&self, index: usize) -> bool;
 
-    /// The path that an error names when a frame has no cloud.
+    /// The path in the error of a frame without a cloud.
     fn place<'a>(&'a self, _index: usize, frame: &'a Frame) -> &'a Path {
         &frame.photo
     }
 
-    /// What a frame without a cloud needs to have one, where that is more than the file at its place.
+    /// What a frame without a cloud lacks, if that is more than the file at its path.
     fn missing(&self) -> Option<&str> {
         None
     }
 
-    /// The cloud of a frame that has one, in the camera's frame \[m\].
+    /// Reads the cloud of a frame that has one, in the camera's frame \[m\].
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError>;
 }
 
@@ -75,7 +75,7 @@ pub(super) struct FileScene<C> {
 }
 
 impl<C: Clouds> FileScene<C> {
-    /// The frames in their order, with their clouds by position.
+    /// A scene of frames, with their clouds by position.
     pub fn new(name: String, frames: Vec<Frame>, clouds: C) -> Self {
         Self {
             name,
@@ -148,8 +148,8 @@ impl<C: Clouds> Scene for FileScene<C> {
         self.clouds.read(frame, &self.frames[frame])
     }
 
-    /// With the sizes of the photos' files: photos of the same size in bytes are hardly ever
-    /// different ones, and times change when data are copied.
+    /// Includes the sizes of the photos' files: different photos rarely have the same size in bytes. Modification times
+    /// change when data are copied.
     fn fingerprint(&self) -> u64 {
         let size = |frame: &Frame| std::fs::metadata(&frame.photo).map_or(0, |file| file.len());
         let sizes = self.frames.iter().map(size);

@@ -1,4 +1,4 @@
-//! The files of a scene's folder, and what they are called.
+//! The files of a scene's folder and their names.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use super::SceneError;
 
-/// What a folder holds, in the order of the names.
+/// The entries of a folder, in the order of their names.
 pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let io = SceneError::io(folder);
     let paths = std::fs::read_dir(folder).map_err(io)?;
@@ -17,7 +17,7 @@ pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
     Ok(paths)
 }
 
-/// The files of an extension whose stem is a number, by that number.
+/// The files with an extension and a number as stem, by that number.
 pub(super) fn numbered<N: FromStr + Ord>(
     folder: &Path,
     extension: &str,
@@ -37,30 +37,30 @@ pub(super) fn stem(path: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
-/// The name of a folder, also of one that is given as `.` or `..`.
+/// The name of a folder, even if it is given as `.` or `..`.
 pub(super) fn folder_name(folder: &Path) -> String {
     let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let name = folder.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
 }
 
-/// The path of a file that is named in a scene's own files, and lies in the scene's folder.
+/// The path of a file that a scene's files name, which must be inside the scene's folder.
 pub(super) fn within(folder: &Path, name: &str) -> Result<PathBuf, String> {
     let leaves = |part: Component<'_>| !matches!(part, Component::Normal(_) | Component::CurDir);
     let name = Path::new(name);
     if name.as_os_str().is_empty() || name.components().any(leaves) {
         return Err(format!(
-            "a file in the scene's folder expected, `{}` found",
+            "a file inside the scene's folder expected, `{}` found",
             name.display()
         ));
     }
     Ok(folder.join(name))
 }
 
-/// Warns that a scene has queries only, as it has none of what gives it poses.
+/// Warns that a scene has only queries because the file of its poses is missing.
 pub(super) fn warn_without_poses(place: &Path, missing: &str) {
     log::warn!(
-        "{}: no {missing}, so no frame can be a reference and nothing has an error",
+        "{}: no {missing}, so no frame can be a reference and errors cannot be measured",
         place.display()
     );
 }

@@ -1,14 +1,14 @@
-//! The frames of a scene, as the files of other programs may call them.
+//! The frames of a scene by the names that other programs may use.
 
 use std::collections::BTreeMap;
 
 use super::Scene;
 use super::lines::excerpt_of;
 
-/// The frames of a scene by what a file may call them.
+/// Looks frames up by the names in a file.
 pub(super) struct FrameNames<'a> {
     scene: &'a dyn Scene,
-    /// Names without folder and ending; `None` where several frames share one.
+    /// Names without folder and extension; `None` if several frames share one.
     stems: BTreeMap<&'a str, Option<usize>>,
 }
 
@@ -24,7 +24,7 @@ impl<'a> FrameNames<'a> {
         Self { scene, stems }
     }
 
-    /// The frame of a name: itself, or without the folder and the ending that a file's name has.
+    /// The frame with a name: as it is, or without folder and extension, or by number.
     pub fn find(&self, name: &str) -> Option<usize> {
         let frames = self.scene.frames();
         let whole = frames.iter().position(|frame| frame == name);
@@ -33,11 +33,10 @@ impl<'a> FrameNames<'a> {
         whole.or_else(by_stem).or_else(by_number)
     }
 
-    /// What is expected of a file that has something (`what`) of other frames only, one of which it calls
-    /// so.
+    /// The error of a file that has something (`what`) for unknown frames only, one of which it calls `called`.
     pub fn none_found(&self, what: &str, called: &str) -> String {
         format!(
-            "{what} of {} expected, which are called such as `{}`; here they are called such as `{}`",
+            "{what} of {} expected, with names like `{}`; the file has names like `{}`",
             self.scene.name(),
             self.scene.frames().first().map_or("", String::as_str),
             excerpt_of(called, 60)
@@ -45,7 +44,7 @@ impl<'a> FrameNames<'a> {
     }
 }
 
-/// A name without its folder and the ending of an image.
+/// A name without folder and image extension.
 fn stem(name: &str) -> &str {
     const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
     let base = name.rsplit(['/', '\\']).next().unwrap_or(name);

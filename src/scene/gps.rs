@@ -1,10 +1,9 @@
-//! Rough positions of queries, for the choice of their references where their poses are unknown or must
-//! not be used: a table with a line of column names and a line per frame, between commas or
-//! white space.
+//! Rough positions of queries, to choose references if poses are unknown or must not be used: a table with a header
+//! and one line per frame, separated by commas or white space.
 //!
-//! Either `name x y z`, in the world of the scene \[m\], or `name latitude longitude`, perhaps with
-//! `altitude`, in degrees and metres. The latter are tied to the world by those lines that name frames
-//! with a known pose.
+//! The columns are `name x y z`, in the scene's world frame \[m\], or `name latitude longitude` and optionally
+//! `altitude`, in degrees and metres. The latter are converted to the world frame by the lines of frames with a known
+//! pose.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,21 +15,20 @@ use super::frame_names::FrameNames;
 use super::lines::{Line, TextFile};
 use super::{Scene, SceneError};
 
-/// The radius of the earth at the equator \[m\], as KITTI's devkit takes it.
+/// The radius of the earth at the equator \[m\], as in KITTI's devkit.
 pub(super) const EARTH_RADIUS_M: f64 = 6_378_137.0;
 
-/// A scene, some of whose frames are sought elsewhere than at their pose.
+/// A scene with rough positions for some frames.
 struct Located {
     scene: Arc<dyn Scene>,
     positions: BTreeMap<usize, Point3<f64>>,
 }
 
-/// The scene of queries with the positions of a file. Latitudes and longitudes are tied to the world by
-/// the frames with a known pose that the file names too, of the queries' scene or that of the references.
+/// The scene of queries with the positions of a file. Latitudes and longitudes are converted to the world frame by
+/// frames of either scene that have a known pose and are in the file.
 ///
 /// # Errors
-/// A file that cannot be read, is no such table, names none of the queries, or cannot be tied to the
-/// world.
+/// A file that cannot be read, is not such a table, names none of the queries, or cannot be converted.
 pub fn located(
     queries: Arc<dyn Scene>,
     references: &dyn Scene,
@@ -53,7 +51,10 @@ pub fn located(
             Some(tie) => tie.of(row.place),
         };
         if positions.insert(frame, position).is_some() {
-            let expected = format!("frame {} has a position already", queries.frames()[frame]);
+            let expected = format!(
+                "one position per frame expected, frame {} has one already",
+                queries.frames()[frame]
+            );
             return Err(row.line.error(expected));
         }
     }
@@ -67,7 +68,7 @@ pub fn located(
     }))
 }
 
-/// What the numbers of a line are.
+/// The meaning of a line's numbers.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     /// x, y, z in the frame of the scene's poses \[m\].
@@ -104,8 +105,8 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
         }
         _ => {
             return Err(first.error(
-                "a first line with the columns `name x y z` or `name latitude longitude` \
-                 (and perhaps `altitude`) expected",
+                "a header with the columns `name x y z`, or `name latitude longitude` \
+                 and optionally `altitude`, expected",
             ));
         }
     };
@@ -132,13 +133,13 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
         rows.push(Row { line, name, place });
     }
     if rows.is_empty() {
-        Err(file.error("a line per frame below the names of columns expected"))
+        Err(file.error("one line per frame below the header expected, none found"))
     } else {
         Ok((kind, rows))
     }
 }
 
-/// What takes latitudes, longitudes and altitudes to a world.
+/// The conversion of latitudes, longitudes and altitudes to a world frame.
 struct Tie {
     origin: [f64; 3],
     world_from_local: Similarity3<f64>,
@@ -149,7 +150,7 @@ impl Tie {
         self.world_from_local * local(place, self.origin)
     }
 
-    /// Fits the similarity that takes places to the poses of the frames that have both.
+    /// Fits the similarity between places and poses of the frames that have both.
     fn fit(file: &TextFile, rows: &[Row<'_>], scenes: &[&dyn Scene]) -> Result<Self, SceneError> {
         let names = scenes.iter().map(|scene| (FrameNames::new(*scene), scene));
         let names: Vec<_> = names.collect();
@@ -165,8 +166,8 @@ impl Tie {
             .collect();
         let [(origin, _), _, _, ..] = ties[..] else {
             return Err(file.error(format!(
-                "3 frames with a known pose or more expected, which tie latitudes and longitudes to the \
-                 scene, {} found; or give x, y and z",
+                "at least 3 frames with a known pose expected, to convert latitudes and longitudes to the \
+                 scene, {} found; add such lines, or give x, y and z",
                 ties.len()
             )));
         };
@@ -175,7 +176,7 @@ impl Tie {
             .map(|(place, world)| (local(*place, origin).coords, *world))
             .collect();
         let world_from_local = similarity(&pairs).ok_or_else(|| {
-            file.error("frames with a known pose at different places expected, which tie the file to the scene")
+            file.error("frames with a known pose at different places expected, to convert latitudes and longitudes")
         })?;
         let squares = pairs.iter().map(|(from, to)| {
             let at = world_from_local * Point3::from(*from);
@@ -183,7 +184,7 @@ impl Tie {
         });
         let rms = (squares.sum::<f64>() / pairs.len() as f64).sqrt();
         log::info!(
-            "{} frames tie latitudes and longitudes to the scene, within {rms:.2} m (RMS) at a scale of {:.4}",
+            "latitudes and longitudes converted by {} frames, residual {rms:.2} m (RMS), scale {:.4}",
             pairs.len(),
             world_from_local.scaling()
         );
@@ -194,15 +195,15 @@ impl Tie {
     }
 }
 
-/// East and north of an origin, and altitude \[m\].
+/// Metres east and north of an origin, and the altitude.
 fn local([latitude, longitude, altitude]: [f64; 3], origin: [f64; 3]) -> Point3<f64> {
     let east = (longitude - origin[1]).to_radians() * origin[0].to_radians().cos();
     let north = (latitude - origin[0]).to_radians();
     Point3::new(EARTH_RADIUS_M * east, EARTH_RADIUS_M * north, altitude)
 }
 
-/// The similarity that takes the first of each pair nearest to the second, by least squares (Umeyama,
-/// PAMI 1991); none where all firsts or all seconds are in one place.
+/// The least-squares similarity from the first to the second of each pair (Umeyama, PAMI 1991). `None` if all first or
+/// all second points coincide.
 fn similarity(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Similarity3<f64>> {
     let count = pairs.len() as f64;
     let from = pairs.iter().map(|(from, _)| from).sum::<Vector3<f64>>() / count;

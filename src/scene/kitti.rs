@@ -24,11 +24,11 @@ pub(super) const ENTRY: Entry = Entry {
     open: |argument| open(Path::new(argument)),
 };
 
-/// The cameras, in the order in which one is chosen when the folder has several.
+/// The cameras in the order of preference.
 const CAMERAS: [&str; 4] = ["image_0", "image_2", "image_1", "image_3"];
 const CALIBRATION: &str = "calib.txt";
 
-/// Opens a sequence's folder, or one of its image folders for that camera. Frames may have gaps.
+/// Opens the folder of a sequence, or of one of its cameras. Frame numbers may have gaps.
 fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let camera = Camera::of_path(path, &CAMERAS);
     let (folder, images) = (camera.folder, camera.name()?);
@@ -75,7 +75,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
 }
 
-/// The camera from the Velodyne. `Tr` is taken as it is, which may be a rotation in few digits only.
+/// The camera from the Velodyne. `Tr` is not orthonormalised, although its rotation may have few digits.
 fn moved(camera0_from_velodyne: &Matrix3x4<f64>, camera_from_camera0: &Pose) -> Matrix3x4<f64> {
     let translation = camera_from_camera0.translation.vector;
     let zero = Vector3::zeros();
@@ -83,7 +83,7 @@ fn moved(camera0_from_velodyne: &Matrix3x4<f64>, camera_from_camera0: &Pose) -> 
         + Matrix3x4::from_columns(&[zero, zero, zero, translation])
 }
 
-/// Poses by frame number; none where the sequence has no pose file.
+/// Poses by frame number; `None` if the sequence has no pose file.
 fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Option<PoseLines>, SceneError> {
     let candidates = [
         folder.join("poses.txt"),
@@ -99,7 +99,7 @@ fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Option<PoseL
     Ok(Some(poses))
 }
 
-/// Times by frame number \[s\]; none where the sequence has no `times.txt`.
+/// Times by frame number \[s\]; empty if the sequence has no `times.txt`.
 fn read_times(path: &Path, last: usize) -> Result<Vec<f64>, SceneError> {
     if !path.is_file() {
         return Ok(Vec::new());
@@ -118,13 +118,13 @@ fn expect_rows(file: &TextFile, what: &str, found: usize, last: usize) -> Result
         return Ok(());
     }
     Err(file.error(format!(
-        "{what} up to frame {last} expected (line {}), {found} lines found",
+        "{what} up to frame {last} (line {}) expected, {found} lines found",
         last + 1
     )))
 }
 
 struct Scans {
-    /// Where the scan of each frame is or would be.
+    /// The path of each frame's scan, whether it exists or not.
     paths: Vec<PathBuf>,
     calibration: PathBuf,
     camera_from_velodyne: Option<Matrix3x4<f64>>,

@@ -1,4 +1,4 @@
-//! What the two layouts of KITTI have in common: cameras, labelled lines, projection matrices and scans.
+//! The common parts of both KITTI layouts: cameras, labelled lines, projection matrices and scans.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 
-/// A camera's folder of images below the folder of a drive.
+/// The folder of a camera's images in the folder of a drive.
 pub(super) struct Camera<'a> {
     /// The drive.
     pub folder: &'a Path,
@@ -21,8 +21,7 @@ pub(super) struct Camera<'a> {
 }
 
 impl<'a> Camera<'a> {
-    /// Splits the path of a drive or of one of its cameras. The cameras are known in the order in which
-    /// one is chosen.
+    /// Splits the path of a drive or of one of its cameras. `known` lists the cameras in the order of preference.
     pub fn of_path(path: &'a Path, known: &'a [&'static str]) -> Self {
         let last = path.file_name().and_then(|name| name.to_str());
         let named = known.iter().find(|camera| last == Some(camera)).copied();
@@ -37,7 +36,7 @@ impl<'a> Camera<'a> {
         }
     }
 
-    /// The camera's folder: the one that the path names, or the first that is there.
+    /// The camera's folder: the one in the path, or the first that exists.
     pub fn name(&self) -> Result<&'static str, SceneError> {
         let mut known = self.known.iter().copied();
         let found = || known.find(|camera| self.folder.join(camera).is_dir());
@@ -94,7 +93,7 @@ pub(super) fn split_projection(
     Ok((intrinsics, camera_from_camera0))
 }
 
-/// A scan: little-endian `f32` x, y, z, reflectance, its points taken to the camera's frame.
+/// Reads a scan (little-endian `f32` x, y, z, reflectance) and transforms its points to the camera's frame.
 pub(super) fn read_scan(
     path: &Path,
     camera_from_velodyne: impl Fn(Point3<f64>) -> Point3<f64>,

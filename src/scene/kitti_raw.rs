@@ -1,9 +1,8 @@
 //! KITTI raw data, synchronised and rectified: the folder of a drive with `image_00` … `image_03`,
 //! `velodyne_points` and `oxts`, and the calibration files of its day one folder up.
 //!
-//! Poses are those of the GPS/IMU, as the devkit makes them of its packets, in the frame of the
-//! rectified camera 0 at the first packet. Scans are corrected for the motion during the sweep unless
-//! the argument ends with `:uncorrected`.
+//! Poses come from the GPS/IMU packets, converted as in the devkit, in the frame of the rectified camera 0 at the
+//! first packet. Scans are corrected for the motion during the sweep unless the argument ends with `:uncorrected`.
 
 mod calibration;
 mod oxts;
@@ -29,7 +28,7 @@ use crate::geometry::Pose;
 pub(super) const ENTRY: Entry = Entry {
     name: "kitti-raw",
     about: "KITTI raw: a drive's folder DATE/DATE_drive_NNNN_sync, or one camera of it, …/image_02; \
-            with :uncorrected scans keep the distortion of the sweep",
+            :uncorrected keeps the distortion of the scans by motion",
     recognizes: |argument| {
         let (path, _) = split_word(argument, &[UNCORRECTED]);
         let drive = Camera::of_path(path, &CAMERAS).folder;
@@ -42,11 +41,10 @@ pub(super) const ENTRY: Entry = Entry {
     },
 };
 
-/// Leaves the scans as they are.
+/// The word that turns off the correction of scans.
 const UNCORRECTED: &str = "uncorrected";
 
-/// The cameras, in the order in which one is chosen when the drive has several: grey left, colour
-/// left, and those on the right.
+/// The cameras in the order of preference: grey left, colour left, grey right, colour right.
 const CAMERAS: [&str; 4] = ["image_00", "image_02", "image_01", "image_03"];
 
 /// The folder of the day, with the calibration.
@@ -74,8 +72,8 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
         return Err(SceneError::expected(
             first,
             format!(
-                "a rectified image of {}x{} pixels expected, as in the drives called _sync, \
-                 {width}x{height} found",
+                "a rectified image of {}x{} pixels expected, {width}x{height} found; use a drive \
+                 with a name that ends in _sync",
                 intrinsics.width, intrinsics.height
             ),
         ));
@@ -96,8 +94,8 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     let mut found = scans.of_frames.iter().flatten();
     if correct && found.any(|(_, sweep)| sweep.is_some()) {
         log::info!(
-            "{}: scans are corrected for the motion during the sweep; `:{UNCORRECTED}` after the \
-             path leaves them as they are",
+            "{}: scans are corrected for the motion during the sweep; append `:{UNCORRECTED}` to the \
+             path to turn this off",
             drive.display()
         );
     }
@@ -118,7 +116,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
 }
 
-/// The scans of frames, by position; none where the drive has no scans.
+/// The scans of the frames, by position; `None` for frames without a scan.
 fn scans<'a>(
     folder: &Path,
     frames: impl Iterator<Item = &'a usize>,
@@ -145,7 +143,7 @@ fn scans<'a>(
     Ok(frames.map(scan).collect())
 }
 
-/// A scan and how the car moved while it was taken, if it is to be corrected.
+/// A scan, and the motion of the car during it if it must be corrected.
 type Scan = (PathBuf, Option<Sweep>);
 
 struct Scans {

@@ -19,11 +19,11 @@ use super::folder::{entries, stem};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
-/// A drive: what is known of all its frames before any is made.
+/// A drive: the data of all frames that are known in advance.
 pub struct Drive {
     /// The camera of all photos.
     pub intrinsics: Intrinsics,
-    /// The frames' names, which are their numbers.
+    /// The names of the frames, which are their numbers.
     pub names: Vec<String>,
     /// `world_from_camera` of all frames, whether or not they are written.
     pub poses: Vec<Pose>,
@@ -35,53 +35,53 @@ pub struct Drive {
     pub scanner: Point3<f64>,
 }
 
-/// A frame with all that a layout may want of it.
+/// A frame with everything that a layout may need.
 pub struct Shot<'a> {
-    /// Its position in the drive.
+    /// The frame's position in the drive.
     pub index: usize,
     /// The photo.
     pub photo: &'a RgbImage,
     /// The scan: positions in the camera's frame \[m\], and reflectances.
     pub scan: &'a [(Point3<f32>, f32)],
-    /// The depth of the surface at a pixel \[m\]; none for the sky.
+    /// The depth of the surface at a pixel \[m\]; `None` for the sky.
     pub depth: &'a (dyn Fn(Point2<f64>) -> Option<f64> + Sync),
 }
 
-/// Writes the frames of one drive. Files are whole or not there; one that exists is replaced.
+/// Writes the frames of one drive. Files are written atomically and replace existing ones.
 pub trait DriveWriter: Send + Sync {
-    /// Writes a frame. Frames may come in any order, and at the same time.
+    /// Writes a frame. Called in any order and concurrently.
     ///
     /// # Errors
     /// [`SceneError::Io`] when the disk is full or a folder not writable, [`SceneError::Image`] when
     /// an image cannot be encoded.
     fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError>;
 
-    /// Writes what can only be written when all frames are known.
+    /// Writes the files that need all frames.
     ///
     /// # Errors
-    /// As for frames.
+    /// As for [`Self::frame`].
     fn finish(&self) -> Result<(), SceneError> {
         Ok(())
     }
 }
 
-/// What writes a drive, or why nothing can.
+/// A writer, or why none can be created.
 pub type CreateResult = Result<Box<dyn DriveWriter>, SceneError>;
 
-/// A layout's place in the registry.
+/// The entry of a layout in the registry.
 pub struct Layout {
     /// The name of the scene format that reads it.
     pub name: &'static str,
-    /// Where the drive of a name is, below the folder that everything is written to.
+    /// The folder of a drive with this name, below the target folder.
     pub place: fn(&str) -> String,
-    /// Makes the folders of a drive of this name, and writes what is known of all frames.
+    /// Creates the folders of a drive, and writes the data that are known in advance.
     pub create: fn(&Path, &str, Drive) -> CreateResult,
 }
 
 /// Every layout; the first is the default.
 pub const LAYOUTS: &[Layout] = &[kitti::LAYOUT, tum::LAYOUT, colmap::LAYOUT, toml::LAYOUT];
 
-/// The rotation from the axes of scanners and cars (x forward, y left, z up) to those of cameras.
+/// The rotation from the axes of scanners and vehicles (x forward, y left, z up) to those of cameras.
 const CAMERA_FROM_VELODYNE: Matrix3<f64> =
     Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
 
@@ -89,7 +89,7 @@ fn make_folder(folder: &Path) -> Result<(), SceneError> {
     fs::create_dir_all(folder).map_err(SceneError::io(folder))
 }
 
-/// Makes a folder for frames, and removes the frames (`NNNNNN.EXTENSION`) of an earlier drive.
+/// Creates a folder for frames, and removes the frames (`NNNNNN.EXTENSION`) of an earlier drive.
 fn make_frame_folder(folder: &Path, extension: &str) -> Result<(), SceneError> {
     make_folder(folder)?;
     for path in entries(folder)? {
@@ -118,8 +118,7 @@ where
     write(path, png.get_ref())
 }
 
-/// Writes the depths of all pixels, a value of 1 being `unit_m`; 0 where there is none, or one that no
-/// value can say.
+/// Writes the depths of all pixels in units of `unit_m`; 0 for pixels without a depth or beyond the range.
 fn write_depth(
     path: &Path,
     camera: &Intrinsics,
@@ -139,7 +138,7 @@ fn write_depth(
     write_image(path, &image)
 }
 
-/// Numbers with as many digits as they need to be read as they were.
+/// Numbers with enough digits to be read back exactly.
 fn joined<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> String {
     let words = numbers.into_iter().map(|number| format!("{number:e}"));
     words.collect::<Vec<_>>().join(" ")

@@ -1,4 +1,4 @@
-//! Lens distortion, taken out of a photo when it is read: everything else speaks of pinholes.
+//! Lens distortion, removed when a photo is read: everything else assumes pinhole cameras.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use super::file_scene::Develop;
 use crate::camera::Intrinsics;
 use crate::image::{GrayImage, Photo, RgbImage, cubic_interpolated};
 
-/// The first four coefficients of Brown and Conrady, as OpenCV and COLMAP order them. Zeros are a
+/// The first four coefficients of the Brown–Conrady model, in the order of OpenCV and COLMAP. Zeros are a
 /// pinhole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Distortion {
@@ -24,7 +24,7 @@ pub(super) struct Distortion {
 }
 
 impl Distortion {
-    /// Where a direction (x/z, y/z) is seen, as if through a pinhole.
+    /// The distorted image of a direction (x/z, y/z), in the same normalised coordinates.
     fn distorted(&self, at: Point2<f64>) -> Point2<f64> {
         let Self { k1, k2, p1, p2 } = *self;
         let (x, y) = (at.x, at.y);
@@ -36,15 +36,14 @@ impl Distortion {
         )
     }
 
-    /// Whether what lies farther out is seen farther out, up to a radius: beyond that the polynomial
-    /// folds the image over.
+    /// Whether the distortion is monotonic up to a radius. Where it is not, the polynomial folds the image.
     fn is_sound_within(&self, radius: f64) -> bool {
         let slope = |r: f64| 1.0 + r * r * (3.0 * self.k1 + 5.0 * r * r * self.k2);
         (0..=64).all(|i| slope(radius * f64::from(i) / 64.0) > 0.0)
     }
 }
 
-/// A camera with distortion, and the pinhole that its photos are made into.
+/// A camera with distortion, and the pinhole camera of its undistorted photos.
 #[derive(Clone, Debug)]
 pub(super) struct Lens {
     source: Intrinsics,
@@ -53,15 +52,14 @@ pub(super) struct Lens {
 }
 
 impl Lens {
-    /// The most that a photo is magnified, so that its distortion leaves no blank border.
+    /// The greatest magnification of a photo to avoid a blank border.
     const MOST_ZOOM: f64 = 2.0;
 
-    /// The pinhole has the size and the principal point of the photo, and its focal length, or a
-    /// greater one where the photo would have a blank border otherwise: a border is an edge that the
-    /// world does not have.
+    /// The pinhole camera has the photo's size and principal point. Its focal length is that of the photo, or a greater
+    /// one to avoid a blank border, which would be an edge that the world does not have.
     ///
     /// # Errors
-    /// What is wrong with the coefficients.
+    /// Why the coefficients are invalid.
     pub fn new(source: Intrinsics, distortion: Distortion) -> Result<Self, String> {
         let with_zoom = |zoom: f64| Self {
             source,
@@ -76,13 +74,13 @@ impl Lens {
         let widest = with_zoom(full);
         if !widest.has_no_blank() {
             return Err(format!(
-                "a lens whose photos can be undistorted expected, found {distortion:?}"
+                "a distortion that can be removed expected, {distortion:?} found"
             ));
         }
         if with_zoom(blank).has_no_blank() {
             return Ok(with_zoom(blank));
         }
-        // Down to a hundredth of a pixel at the border of any photo.
+        // Accurate to a hundredth of a pixel at the border.
         while full - blank > 1e-6 {
             let middle = f64::midpoint(blank, full);
             if with_zoom(middle).has_no_blank() {
@@ -94,7 +92,7 @@ impl Lens {
         Ok(with_zoom(full))
     }
 
-    /// Where a pixel of the undistorted photo is in the photo as it was taken.
+    /// The pixel of the original photo for one of the undistorted photo.
     fn source_pixel(&self, pixel: Point2<f64>) -> Point2<f64> {
         let direction = self.pinhole.unproject(&pixel, 1.0);
         let seen = self.distortion.distorted(direction.xy());
@@ -105,8 +103,7 @@ impl Lens {
         )
     }
 
-    /// Whether every pixel of the undistorted photo is in the photo as it was taken: those along the
-    /// border decide.
+    /// Whether every pixel of the undistorted photo is inside the original photo. Testing the border is enough.
     fn has_no_blank(&self) -> bool {
         let Intrinsics { width, height, .. } = self.source;
         let (right, bottom) = (f64::from(width) - 1.0, f64::from(height) - 1.0);
@@ -142,7 +139,7 @@ impl Lens {
 }
 
 impl Develop for Lens {
-    /// The photo as the pinhole would have taken it, by cubic convolution.
+    /// The undistorted photo, by cubic convolution.
     fn developed(&self, image: Photo) -> Photo {
         match &image.color {
             Some(color) => {
@@ -184,7 +181,7 @@ pub(super) fn pinhole(
     })
 }
 
-/// The camera of photos that a lens with distortion took, and what takes the distortion out of them.
+/// The camera of undistorted photos, and what undistorts them; `None` without distortion.
 pub(super) fn developed_camera(
     taken: Intrinsics,
     distortion: Distortion,

@@ -12,7 +12,7 @@ pub(super) struct TextFile {
     text: String,
 }
 
-/// A line of a [`TextFile`] that says something.
+/// A line of a [`TextFile`].
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
     path: &'a Path,
@@ -30,7 +30,7 @@ impl TextFile {
         })
     }
 
-    /// A text that is no file; errors name it as if it were one.
+    /// A text that is not from a file; errors use `name` in place of the file.
     pub fn from_text(name: &str, text: &str) -> Self {
         Self {
             path: name.into(),
@@ -40,10 +40,10 @@ impl TextFile {
 
     /// The lines that are neither empty nor comments (`#`).
     pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
-        self.all_lines().filter(Line::is_said)
+        self.all_lines().filter(Line::has_content)
     }
 
-    /// All lines, the empty ones and comments too.
+    /// All lines, including empty ones and comments.
     pub fn all_lines(&self) -> impl Iterator<Item = Line<'_>> {
         let lines = self.text.lines().enumerate();
         lines.map(|(index, text)| Line {
@@ -58,7 +58,7 @@ impl TextFile {
         SceneError::expected(&self.path, expected)
     }
 
-    /// The first `ROWS` lines as rows of numbers, such as a matrix that is a file of its own.
+    /// The first `ROWS` lines as rows of numbers, such as a matrix.
     pub fn rows<const ROWS: usize, const COLUMNS: usize>(
         &self,
     ) -> Result<[[f64; COLUMNS]; ROWS], SceneError> {
@@ -78,7 +78,7 @@ impl TextFile {
 
 impl<'a> Line<'a> {
     /// Whether the line is neither empty nor a comment (`#`).
-    pub fn is_said(&self) -> bool {
+    pub fn has_content(&self) -> bool {
         !self.text.is_empty() && !self.text.starts_with('#')
     }
 
@@ -86,7 +86,7 @@ impl<'a> Line<'a> {
         SceneError::line(self.path, self.number, expected)
     }
 
-    /// The words between white space or commas.
+    /// The words, separated by white space or commas.
     pub fn words(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         words(self.text)
     }
@@ -105,7 +105,7 @@ impl<'a> Line<'a> {
         number(word).map_err(|expected| self.error(expected))
     }
 
-    /// The pose that twelve numbers are, a 3 × 4 matrix row by row.
+    /// The pose of a line with a 3 × 4 matrix, row by row.
     pub fn matrix_pose(&self) -> Result<Pose, SceneError> {
         let matrix = Matrix3x4::from_row_slice(&self.numbers::<12>()?);
         pose_from_matrix(&matrix).map_err(|error| self.error(error.to_string()))
@@ -122,7 +122,7 @@ pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, Str
     let [x, y, z, w] = quaternion;
     let quaternion = Quaternion::new(w, x, y, z);
     let length = quaternion.norm();
-    // Files carry a few decimals; more than that away from length 1 is another convention.
+    // Rounding changes the length slightly; more means another convention.
     if !position.iter().all(|part| part.is_finite()) {
         return Err(format!("a finite position expected, {position:?} found"));
     }
@@ -169,12 +169,12 @@ fn number(word: &str) -> Result<f64, String> {
     Ok(number)
 }
 
-/// As much of a word as fits an error: a binary file that is read as text has long ones.
+/// A word, shortened for an error: a binary file read as text has long words.
 pub(super) fn excerpt(word: &str) -> String {
     excerpt_of(word, 40)
 }
 
-/// The first characters of a text, without any that a terminal would obey.
+/// The first characters of a text, without control characters.
 pub(super) fn excerpt_of(text: &str, most: usize) -> String {
     let printable = |c: char| if c.is_control() { '\u{fffd}' } else { c };
     let short: String = text.chars().take(most).map(printable).collect();

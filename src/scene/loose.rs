@@ -1,4 +1,4 @@
-//! Photos of no scene: files that are localised in one, each with a camera and without a pose.
+//! Loose photos: image files that do not belong to a scene. They have a camera, but no pose.
 
 mod camera;
 mod exif;
@@ -21,26 +21,25 @@ use super::{Scene, SceneError, photo_file};
 use crate::cloud::Cloud;
 use crate::image::Photo;
 
-/// What a command line says of loose photos.
+/// The loose photos of a command line.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoosePhotos {
     /// The files.
     pub paths: Vec<PathBuf>,
-    /// Their camera; without it, that which EXIF tells of each.
+    /// Their camera; by default that of each photo's EXIF data.
     pub camera: Option<CameraArgument>,
 }
 
 impl LoosePhotos {
-    /// What the photos' scene is called.
+    /// The name of the photos' scene.
     pub const NAME: &str = "photo";
 
-    /// What a photo is called in results, as photos of a scene are: by its file, without folder and
-    /// ending.
+    /// The name of a photo in results: that of its file, without folder and extension.
     pub fn name(path: &Path) -> String {
         stem(path)
     }
 
-    /// The file of the photo that is called so.
+    /// The file of the photo with this name.
     pub fn path_of(&self, name: &str) -> Option<&Path> {
         let mut paths = self.paths.iter();
         paths
@@ -51,8 +50,7 @@ impl LoosePhotos {
     /// Opens the photos as a scene without poses and clouds.
     ///
     /// # Errors
-    /// A file that is no photo, a camera that is not that of its size, or none that anything tells of;
-    /// and two files of the same name.
+    /// A file that is not an image, a camera for another image size, a missing camera, or two files with the same name.
     pub fn open(&self) -> Result<Arc<dyn Scene>, SceneError> {
         let mut names = BTreeSet::new();
         if let Some(twice) = self
@@ -61,8 +59,7 @@ impl LoosePhotos {
             .find(|path| !names.insert(Self::name(path)))
         {
             let name = Self::name(twice);
-            let expected =
-                format!("a name of its own expected, another photo is called {name} too");
+            let expected = format!("photos with different names expected, two are called {name}");
             return Err(SceneError::expected(twice, expected));
         }
         let frames = self.paths.iter().map(|path| self.frame(path));
@@ -79,13 +76,13 @@ impl LoosePhotos {
         let Some(camera) = &self.camera else {
             let (focal_px, how) = exif.focal_px(stored).ok_or_else(|| {
                 error(
-                    "a focal length in EXIF expected, none found; --camera fx,fy,cx,cy, a camera \
-                     line of COLMAP or its cameras.txt says what the camera is"
+                    "a focal length in EXIF expected, none found; give the camera as --camera \
+                     fx,fy,cx,cy, as a camera line of COLMAP or as its cameras.txt"
                         .to_owned(),
                 )
             })?;
             log::warn!(
-                "{}: a focal length of {focal_px:.0} px by EXIF ({how}), no distortion; --camera says more",
+                "{}: focal length {focal_px:.0} px from EXIF ({how}), no distortion; --camera overrides it",
                 path.display()
             );
             let turn = Turn(turned);
@@ -98,10 +95,10 @@ impl LoosePhotos {
                 ..Frame::new(path.to_owned(), intrinsics)
             });
         };
-        // A camera is calibrated on pixels as they are stored.
+        // Cameras are calibrated on the stored pixels.
         if turned != Orientation::NoTransforms {
             log::warn!(
-                "{}: EXIF says to turn this photo; it is taken as it is stored, as --camera is",
+                "{}: the EXIF orientation is ignored, since --camera refers to the stored image",
                 path.display()
             );
         }
@@ -115,7 +112,7 @@ impl LoosePhotos {
     }
 }
 
-/// Turns the image of a file so that up is up.
+/// Rotates the image of a file upright.
 struct Turn(Orientation);
 
 impl Develop for Turn {
@@ -141,7 +138,7 @@ impl Develop for Turn {
     }
 }
 
-/// Loose photos are queries only.
+/// Loose photos have no clouds.
 struct NoClouds;
 
 impl Clouds for NoClouds {
@@ -150,7 +147,7 @@ impl Clouds for NoClouds {
     }
 
     fn missing(&self) -> Option<&str> {
-        Some("a loose photo is a query only")
+        Some("loose photos are queries only")
     }
 
     fn read(&self, _index: usize, _frame: &Frame) -> Result<Cloud, SceneError> {

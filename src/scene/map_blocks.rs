@@ -1,5 +1,4 @@
-//! A map in blocks: the points of a cube of the world stand together, so that a camera looks at those
-//! cubes only that it may have in view.
+//! A map in blocks: points are stored by cubes of the world, so a camera only visits cubes that may be in view.
 
 use std::ops::Range;
 
@@ -10,13 +9,13 @@ use super::cloud_file::MapCloud;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
-/// The side of a block \[m\] where the map is one of metres: some thousand points of a dense map each.
-/// Smaller maps, such as those of an object or without a scale, have blocks of a part of their size.
+/// The side of a block \[m\]; a dense map has some thousand points in it. Smaller maps, such as that of an object or
+/// one without scale, have smaller blocks.
 const SIDE_M: f32 = 8.0;
-/// At least as many blocks along the longest axis.
+/// The least number of blocks along the longest axis.
 const LEAST_BLOCKS: f32 = 32.0;
 
-/// A map, its points sorted by block. It takes no more memory than the points but for some bytes a block.
+/// A map with its points sorted by block. It needs only a few bytes per block more than the points.
 pub(super) struct MapBlocks {
     origin: Vector3<f64>,
     points: Vec<Point3<f32>>,
@@ -25,7 +24,7 @@ pub(super) struct MapBlocks {
 
 struct Block {
     points: Range<usize>,
-    /// The middle of the points' bounding box, and how far from there the farthest corner is.
+    /// The centre of the points' bounding box, and its distance to the corners.
     middle: Point3<f32>,
     radius: f32,
 }
@@ -40,7 +39,7 @@ impl MapBlocks {
         let longest = extent.fold(0.0, f32::max);
         let side = SIDE_M.min(longest / LEAST_BLOCKS).max(f32::MIN_POSITIVE);
         let key = |point: &Point3<f32>| [0, 1, 2].map(|axis| (point[axis] / side).floor() as i32);
-        // By all coordinates, so that the order follows from the points on any number of threads.
+        // By all coordinates: the order must not depend on the number of threads.
         points.par_sort_unstable_by(|a, b| {
             let coordinates = || (0..3).map(|axis| a[axis].total_cmp(&b[axis]));
             let rest = coordinates().fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then);
@@ -70,7 +69,7 @@ impl MapBlocks {
         }
     }
 
-    /// The points of all blocks that a camera may have in view, in its frame \[m\].
+    /// The points of all blocks that may be in a camera's view, in its frame \[m\].
     pub fn around_view<'a>(
         &'a self,
         world_from_camera: &Pose,
@@ -81,7 +80,7 @@ impl MapBlocks {
         let sides = sides(camera);
         let is_near = move |block: &&Block| {
             let middle = camera_from_origin * block.middle.cast::<f64>();
-            // Points are rounded to f32.
+            // The margin covers rounding to f32.
             let radius = 1.001 * f64::from(block.radius) + 0.001;
             sides.iter().all(|side| side.dot(&middle.coords) >= -radius)
         };
@@ -91,7 +90,7 @@ impl MapBlocks {
     }
 }
 
-/// Normals, towards the inside, of the planes through the camera that bound its view, and of the image.
+/// The inward normals of the planes that bound a camera's view, and the viewing direction.
 fn sides(camera: &Intrinsics) -> [Vector3<f64>; 5] {
     let (left, right) = (-0.5 - camera.cx, f64::from(camera.width) - 0.5 - camera.cx);
     let (top, bottom) = (-0.5 - camera.cy, f64::from(camera.height) - 0.5 - camera.cy);

@@ -1,4 +1,4 @@
-//! Matches that another system found, in a folder: those of hloc, or a file for each pair.
+//! The matches of another system, in a folder: hloc's files, or one file per pair.
 //!
 //! | files | content |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | `QUERY_REFERENCE_matches.npz` | `keypoints0`, `keypoints1`, `matches`, as SuperGlue's and LightGlue's demonstrations write them |
 //! | `*.h5` | features and matches as hloc writes them |
 //!
-//! The centre of the top-left pixel is at (0, 0) in all of them. A pair may be there the other way round.
+//! The centre of the top-left pixel is at (0, 0) in all of them. The reference may also come first.
 
 mod hloc;
 mod npz;
@@ -23,17 +23,17 @@ use super::folder::entries;
 
 pub use self::text::write_matches;
 
-/// Keypoints of a photo at most: more than any photo of 8,000 × 8,000 pixels gives.
+/// The most keypoints of a photo, more than any photo of 8,000 × 8,000 pixels has.
 const MOST_KEYPOINTS: usize = 1 << 20;
 
-/// How a pair is stored: with the query first, or with the reference first.
+/// Which photo of a pair comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     QueryFirst,
     ReferenceFirst,
 }
 
-/// Keypoints of two photos by their positions \[px\], and the partner of each of the first.
+/// The keypoints of two photos \[px\], and the partner of each keypoint of the first.
 #[derive(Debug)]
 struct RawMatches {
     first: Vec<[f32; 2]>,
@@ -42,12 +42,12 @@ struct RawMatches {
 }
 
 impl RawMatches {
-    /// Checks that partners are there, and says so in terms of the file otherwise.
+    /// Checks counts, partners and positions; the error names the file.
     fn checked(self, path: &Path) -> Result<Self, SceneError> {
         let error = |expected: String| SceneError::expected(path, expected);
         if self.partners.len() != self.first.len() {
             return Err(error(format!(
-                "a partner or none for each of {} keypoints expected, {} found",
+                "one entry per keypoint ({}) expected, {} found",
                 self.first.len(),
                 self.partners.len()
             )));
@@ -61,7 +61,7 @@ impl RawMatches {
         let mut named = self.partners.iter().flatten();
         if let Some(beyond) = named.find(|&&partner| partner >= self.second.len()) {
             return Err(error(format!(
-                "matches with one of {} keypoints expected, number {beyond} found",
+                "the number of a keypoint below {} expected, {beyond} found",
                 self.second.len()
             )));
         }
@@ -72,7 +72,7 @@ impl RawMatches {
         Ok(self)
     }
 
-    /// As matches of the query with the reference.
+    /// The matches from the query to the reference.
     fn of_query(self, order: Order) -> FoundMatches {
         let Self {
             first,
@@ -101,10 +101,10 @@ pub struct MatchFolder {
 }
 
 impl MatchFolder {
-    /// Looks at what is in the folder; matches are read as they are asked for.
+    /// Lists the folder; matches are read on demand.
     ///
     /// # Errors
-    /// A folder that cannot be read or has no matches.
+    /// A folder that cannot be read or contains no matches.
     pub fn open(folder: &Path) -> Result<Self, SceneError> {
         let files = entries(folder)?;
         let has_ending =
@@ -167,10 +167,10 @@ impl MatchSource for MatchFolder {
     }
 }
 
-/// What the name of a pair's file ends with.
+/// The end of the name of a pair's file.
 const PAIR_ENDING: &str = "_matches";
 
-/// The name of a pair's file without its ending. A name that holds a folder keeps it, as hloc has it.
+/// The name of a pair's file without extension. Folders in frame names are kept with `-`, as in hloc.
 fn pair(first: &str, second: &str) -> String {
     let plain = |name: &str| name.replace(['/', '\\'], "-");
     format!("{}_{}{PAIR_ENDING}", plain(first), plain(second))

@@ -1,4 +1,4 @@
-//! Photos that are files.
+//! Photo files.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ pub(super) fn dimensions(path: &Path) -> Result<(u32, u32), SceneError> {
     image::image_dimensions(path).map_err(SceneError::image(path))
 }
 
-/// Reads a photo, which must be of this size \[px\].
+/// Reads a photo, which must have this size \[px\].
 pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Photo, SceneError> {
     let photo = Photo::read(path).map_err(SceneError::image(path))?;
     expect_size(path, photo.dimensions(), size)?;
     Ok(photo)
 }
 
-/// The error of an image that has another size than its camera.
+/// An error if an image has another size than its camera.
 pub(super) fn expect_size(
     path: &Path,
     found: (u32, u32),
@@ -29,7 +29,7 @@ pub(super) fn expect_size(
     Err(SceneError::expected(
         path,
         format!(
-            "{}x{} pixels expected, as its camera has, {}x{} found",
+            "{}x{} pixels expected by its camera, {}x{} found",
             expected.0, expected.1, found.0, found.1
         ),
     ))

@@ -1,4 +1,4 @@
-//! Texts of poses, told apart by their first line:
+//! Text files of poses. The first line determines the format:
 //!
 //! - TUM: `time x y z qx qy qz qw`, camera to world, in any order;
 //! - KITTI: twelve numbers of `[R|t]`, camera to world, a line per frame;
@@ -18,7 +18,7 @@ pub(super) enum PoseText<'a> {
     Named(Vec<NamedPose<'a>>),
 }
 
-/// A pose by the name of its image.
+/// A pose with the name of its image.
 pub(super) struct NamedPose<'a> {
     pub line: Line<'a>,
     pub name: String,
@@ -26,7 +26,7 @@ pub(super) struct NamedPose<'a> {
 }
 
 impl<'a> PoseText<'a> {
-    /// Reads a file. Poses by name are read only where there are names of frames to look them up in.
+    /// Reads a file. Poses by name are only read if `names` are given to look them up.
     pub fn read(file: &'a TextFile, names: Option<&FrameNames<'_>>) -> Result<Self, SceneError> {
         let Some(first) = file.lines().next() else {
             return Err(file.error("poses expected, none found"));
@@ -64,8 +64,8 @@ impl<'a> PoseText<'a> {
     }
 }
 
-/// Whether a line of eight words is a name and a pose rather than a time and a pose. A number may be
-/// both: the quaternion tells which, and where both are possible, a name of a frame wins.
+/// Whether a line of eight words begins with a name instead of a time. If its first word is a number, the quaternion
+/// decides; if both readings are possible, a frame of that name does.
 fn is_named(line: Line<'_>, names: &FrameNames<'_>) -> bool {
     let name = line.words().next().unwrap_or_default();
     match (timed(line).is_ok(), named(line).is_ok()) {
@@ -114,8 +114,8 @@ impl PoseLines {
         self.0.get(line).copied()
     }
 
-    /// The pose of one of so many frames. As many lines as frames are in the frames' order; otherwise a
-    /// line belongs to the frame whose name ends with its number.
+    /// The pose of a frame. If there are as many lines as frames, lines are in the order of the frames. Otherwise
+    /// the number at the end of the frame's name is the number of its line.
     pub fn of_frame(&self, index: usize, frames: usize, name: &str) -> Option<Pose> {
         if self.count() == frames {
             return self.get(index);

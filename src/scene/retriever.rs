@@ -1,4 +1,4 @@
-//! Retrieval in a scene: from photos to an index, and from a photo to the frames that resemble it.
+//! Retrieval in a scene: builds an index of its photos, and ranks frames by similarity to a photo.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use posescope_core::files::user_cache_folder;
 /// The extension of the files.
 const EXTENSION: &str = "posescope-index";
 
-/// What is asked of an index beside the parameters.
+/// The options of an index besides the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IndexOptions {
     /// Number of visual words.
@@ -31,17 +31,17 @@ pub struct IndexOptions {
     pub seed: u64,
 }
 
-/// Why there is no index to ask.
+/// Why there is no usable index.
 #[derive(Debug, thiserror::Error)]
 pub enum NoIndex {
     /// There is no cache directory, and no file was named.
     #[error(
-        "there is no cache directory for the retrieval index; name a file with --out of \
-         `posescope index`, and with --index"
+        "there is no cache directory for the retrieval index; write it with \
+         `posescope index … --out FILE` and use it with --index FILE"
     )]
     NoFolder,
-    /// The file is not there or cannot be used.
-    #[error("{source}; `{command}` builds it")]
+    /// The file is missing or cannot be used.
+    #[error("{source}; build it with `{command}`")]
     Unusable {
         /// What is wrong with it.
         source: IndexError,
@@ -58,9 +58,8 @@ pub struct Retriever {
 }
 
 impl Retriever {
-    /// Where the index of a scene is unless the user says otherwise: in the user's cache directory,
-    /// by the scene's name and the folder that the argument names. `None` where there is no such
-    /// directory or it is turned off.
+    /// The default file of a scene's index: in the user's cache directory, named after the scene and the folder of the
+    /// argument. `None` if there is no such directory or it is turned off.
     pub fn default_path(scene: &dyn Scene, argument: &str) -> Option<PathBuf> {
         let mut name = scene.name().replace(|c: char| !c.is_alphanumeric(), "-");
         if let Ok(folder) = Path::new(argument).canonicalize() {
@@ -71,14 +70,13 @@ impl Retriever {
         Some(folder.join(name).with_extension(EXTENSION))
     }
 
-    /// What the index of a scene is to hold.
+    /// The request for an index of a scene.
     pub fn request(scene: &dyn Scene, options: &IndexOptions, params: &Params) -> BuildRequest {
         Self::request_without(scene, options, &BTreeSet::new(), params)
     }
 
-    /// As [`Self::request`], without some frames: neither are they found, nor have their features a part
-    /// in the words or in how much a word says. Where queries are of the scene itself, an index with
-    /// their own photos knows more of them than one of another drive could.
+    /// As [`Self::request`], without some frames: they are not found, and do not contribute to the vocabulary and
+    /// the word weights. Use this for queries from the scene itself, which would otherwise find their own photos.
     pub fn request_without(
         scene: &dyn Scene,
         options: &IndexOptions,
@@ -116,7 +114,7 @@ impl Retriever {
     /// Builds an index of the scene's photos.
     ///
     /// # Errors
-    /// The errors of [`build`]; that of a frame when its photo cannot be read.
+    /// The errors of [`build`], or that of an unreadable photo.
     pub fn build(
         scene: &dyn Scene,
         path: &Path,
@@ -132,11 +130,10 @@ impl Retriever {
     /// Opens the index of a scene.
     ///
     /// # Errors
-    /// [`IndexError`] when there is none, it is damaged, or it is of other frames or features than
-    /// the scene and the parameters have now.
+    /// [`IndexError`] if it is missing, damaged, or built from other frames or features.
     pub fn open(path: &Path, scene: &dyn Scene, params: &Params) -> Result<Self, IndexError> {
         let index = Index::open(path, params.retrieval.checks)?;
-        // The vocabulary may be of any kind, but features of another kind have other words.
+        // Any vocabulary will do, but the features must be the same.
         let features = recipe(params, &["features"]);
         index.check(scene.name(), scene.fingerprint(), &features)?;
         Ok(Self {
@@ -146,8 +143,7 @@ impl Retriever {
         })
     }
 
-    /// Opens the index of the scene that `argument` names: the given file, or that of
-    /// [`Self::default_path`].
+    /// Opens the index of the scene `argument`: the given file, or that of [`Self::default_path`].
     ///
     /// # Errors
     /// [`NoIndex`], with the command that builds one.
@@ -170,9 +166,9 @@ impl Retriever {
         })
     }
 
-    /// The frames that resemble the query, of those that are allowed.
+    /// Ranks the allowed frames by similarity to the query.
     pub fn retrieve(&self, query: &Query, allowed: impl Fn(usize) -> bool) -> Retrieval {
-        // All of them, as FB asks for them: they are found once.
+        // The same features as for FB, so they are cached.
         let features = remembered(&query.photo.gray, &query.memo, &self.surf);
         let indexed = self.params.surf(&self.surf).max_keypoints;
         let features = features.value.strongest(indexed);

@@ -2,10 +2,10 @@
 //! scans of `lms_front`, `lms_rear` and `ldmrs`, visual odometry and GPS/INS; and the SDK's own folder with
 //! `models` and `extrinsics`.
 //!
-//! Photos are demosaiced and undistorted by the look-up table of their camera model. Poses are those of
-//! the GPS/INS where it calls its solution good. The cloud of a frame is made of the scans around it, moved
-//! by visual odometry where there is any, else by the INS. One frame in ten is kept, and none from before
-//! the car first moves or after it last stops (Fu et al., section 4.1), unless `:all` follows the path.
+//! Photos are demosaiced and undistorted by the look-up table of their camera model. Poses come from GPS/INS rows
+//! with a good solution. The cloud of a frame accumulates the scans around it, moved by visual odometry or else by
+//! the INS. As in the paper (section 4.1), one frame in ten is kept, and none before the car first moves or after
+//! it last stops; `:all` after the path keeps every frame.
 
 mod bayer;
 mod poses;
@@ -30,9 +30,9 @@ use crate::image::Photo;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "robotcar",
-    about: "Oxford RobotCar: a traversal's folder with stereo/centre or mono_rear, or one camera of it, \
-            and the SDK's models and extrinsics in it, beside it or in sdk or robotcar-dataset-sdk there; \
-            with :all every frame, not one in ten of those where the car moves",
+    about: "Oxford RobotCar: a traversal's folder with stereo/centre or mono_rear, or one camera of it. The \
+            SDK's models and extrinsics must be in it, next to it, or in sdk or robotcar-dataset-sdk there. \
+            :all keeps every frame instead of one in ten while the car moves",
     recognizes: |argument| {
         let (path, _) = split_word(argument, &[ALL]);
         let (traversal, _) = split_camera(path);
@@ -49,20 +49,20 @@ pub(super) const ENTRY: Entry = Entry {
 
 /// Keeps every frame.
 const ALL: &str = "all";
-/// Otherwise one frame in so many, as in the paper.
+/// One frame in this many is kept otherwise, as in the paper.
 const KEPT: usize = 10;
 /// Timestamps count microseconds.
 const PER_SECOND: f64 = 1e6;
 
 struct CameraKind {
-    /// The folder of its photos, in that of its rig.
+    /// The folder of its photos.
     folder: &'static str,
     model: &'static str,
     pattern: Pattern,
 }
 
-/// In the order in which one is chosen. The centre camera of the stereo rig pairs with the left one, at a
-/// wide baseline.
+/// The cameras in the order of preference. The SDK files the stereo rig's centre camera as the left one of the
+/// narrow pair.
 const CAMERAS: [CameraKind; 4] = [
     CameraKind {
         folder: "stereo/centre",
@@ -83,7 +83,7 @@ const fn mono(name: &'static str) -> CameraKind {
 }
 
 impl CameraKind {
-    /// What the times and the extrinsics of the camera are filed under.
+    /// The name of the camera's rig in files of times and extrinsics.
     fn rig(&self) -> &'static str {
         self.folder.split('/').next().unwrap_or_default()
     }
@@ -116,8 +116,8 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     let sdk = Sdk::find(&traversal).ok_or_else(|| {
         SceneError::expected(
             &traversal,
-            "the folders models and extrinsics of the SDK expected in the traversal's folder, beside \
-             it, or in sdk or robotcar-dataset-sdk there",
+            "the folders models and extrinsics of the SDK expected in the traversal's folder, next to \
+             it, or in sdk or robotcar-dataset-sdk there, none found",
         )
     })?;
     let ins = match traversal.join("gps/ins.csv") {
@@ -143,8 +143,8 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     let Some((_, first)) = photos.first() else {
         return Err(SceneError::expected(
             traversal.join(camera.folder),
-            "photos TIMESTAMP.png expected, one in ten while the car moves (or :all behind the path), \
-             none found",
+            "photos TIMESTAMP.png expected, none found among every tenth while the car moves; \
+             append :all to the path to keep all",
         ));
     };
     let model = sdk.camera_model(camera.model, photo_file::dimensions(first)?)?;
@@ -173,7 +173,7 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
 }
 
-/// The photos that are kept and are there, with their times \[µs\].
+/// The kept photos that exist, with their times \[µs\].
 fn photos(
     traversal: &Path,
     camera: &CameraKind,
@@ -201,7 +201,7 @@ fn photos(
     Ok(photos.filter(|(_, photo)| photo.is_file()).collect())
 }
 
-/// The times of all photos that were taken \[µs\], as the list says.
+/// The times of all photos in the list \[µs\].
 fn times(list: &Path) -> Result<BTreeSet<u64>, SceneError> {
     let file = TextFile::read(list)?;
     let time = |line: Line<'_>| {
@@ -212,7 +212,7 @@ fn times(list: &Path) -> Result<BTreeSet<u64>, SceneError> {
     file.lines().map(time).collect()
 }
 
-/// What stands between the image of a file and a pinhole's photo: one colour at each pixel, and the lens.
+/// Converts a raw image to a pinhole photo: demosaics and undistorts it.
 struct Sensor {
     pattern: Pattern,
     model: CameraModel,

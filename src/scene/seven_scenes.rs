@@ -1,10 +1,10 @@
 //! 7-Scenes: `frame-NNNNNN.color.png`, `.depth.png` and `.pose.txt` in the folders `seq-NN` of a
 //! scene, all in one world frame.
 //!
-//! As distributed, the data name no camera, and the depth images are those of the depth camera, whose
-//! frame the poses speak of. Its documented intrinsics hold then, and for the colour camera beside it
-//! the calibration of a Kinect that work on this data set commonly takes. A folder with a
-//! `camera-intrinsics.txt`, a 3 × 3 matrix, has depth images that are registered with the photos.
+//! As distributed, the data contain no intrinsics, and depth images and poses are those of the depth camera. The
+//! reader then uses the documented intrinsics of the depth camera, and for the colour camera the calibration of a
+//! Kinect that is common in work on this data set. In a folder with `camera-intrinsics.txt`, a 3 × 3 matrix, depth
+//! images are registered with the photos.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,8 +23,8 @@ use crate::geometry::{Pose, pose_from_matrix};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "7scenes",
-    about: "7-Scenes: a scene's folder of seq-NN folders (with :train or :test, its split), or one \
-            seq-NN of it",
+    about: "7-Scenes: a scene's folder with folders seq-NN (:train or :test selects a split), or one \
+            folder seq-NN",
     recognizes: |argument| {
         let (folder, _) = split_word(argument, &SPLITS);
         is_sequence(folder) || subfolders(folder).iter().any(|(_, path)| is_sequence(path))
@@ -37,7 +37,7 @@ pub(super) const ENTRY: Entry = Entry {
 
 const SPLITS: [&str; 2] = ["train", "test"];
 
-/// What a depth value of 1 means \[m\].
+/// The depth of a value of 1 \[m\].
 const UNIT_M: f64 = 0.001;
 const COLOR: Intrinsics = Intrinsics {
     fx: 525.0,
@@ -47,15 +47,14 @@ const COLOR: Intrinsics = Intrinsics {
     width: 640,
     height: 480,
 };
-/// The depth camera, as documented; its principal point is that of both.
+/// The depth camera, as documented; both cameras have its principal point.
 const DEPTH: Intrinsics = Intrinsics {
     fx: 585.0,
     fy: 585.0,
     ..COLOR
 };
 
-/// The colour camera of a Kinect from its depth camera, rotation and translation \[m\]: the calibration
-/// of LIRIS.
+/// The colour camera of a Kinect from its depth camera, rotation and translation \[m\]: the LIRIS calibration.
 const COLOR_FROM_DEPTH: (Matrix3<f64>, [f64; 3]) = (
     Matrix3::new(
         0.99996518,
@@ -92,7 +91,7 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     let unknown = frames.iter().filter(has_no_pose).count();
     if unknown > 0 {
         log::warn!(
-            "{}: {unknown} of {} frames have no pose",
+            "{}: {unknown} of {} frames have no pose, so they cannot be references",
             folder.display(),
             frames.len()
         );
@@ -108,8 +107,8 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
 
 type NamedPhoto = (String, PathBuf);
 
-/// The scene's name and its frames in order. Frames of a single sequence are called by their numbers,
-/// those of several by sequence and number.
+/// The scene's name and its frames in order. Frames are named by number, or with several sequences by sequence and
+/// number.
 fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<NamedPhoto>), SceneError> {
     if is_sequence(folder) {
         let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
@@ -135,7 +134,7 @@ fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<NamedPhoto
     if files.is_empty() {
         return Err(SceneError::expected(
             folder,
-            "folders seq-NN with frames frame-NNNNNN.color.png expected, none found",
+            "folders seq-NN with images frame-NNNNNN.color.png expected, none found",
         ));
     }
     Ok((name, files))
@@ -176,7 +175,7 @@ fn file_name(path: &Path) -> Option<&str> {
     path.file_name()?.to_str()
 }
 
-/// The number of a frame by its photo: `frame-000025.color.png` is that of `000025`.
+/// The number of a frame from its photo: `000025` for `frame-000025.color.png`.
 fn photo_number(path: &Path) -> Option<&str> {
     const KINDS: [&str; 3] = ["color.png", "color.jpg", "color.jpeg"];
     let (number, kind) = file_name(path)?.strip_prefix("frame-")?.split_once('.')?;
@@ -189,8 +188,7 @@ fn is_sequence(folder: &Path) -> bool {
     entries.iter().any(|path| photo_number(path).is_some())
 }
 
-/// The frames of a sequence in the order of their numbers. Of a photo in two formats the last by name is
-/// taken.
+/// The frames of a sequence in the order of their numbers. If a photo exists in two formats, the last by name is used.
 fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<NamedPhoto>, SceneError> {
     let mut by_number = BTreeMap::new();
     for photo in entries(folder)? {
@@ -202,8 +200,8 @@ fn frames_of(folder: &Path, prefix: &str) -> Result<Vec<NamedPhoto>, SceneError>
     Ok(by_number.into_values().collect())
 }
 
-/// A 4 × 4 matrix, camera to world; `None` where there is no file, or where it is of numbers that are
-/// none, as trackers write them that have lost the camera.
+/// Reads a 4 × 4 matrix, camera to world. `None` if there is no file, or if it contains NaN or infinity, which trackers
+/// write when they lose the camera.
 fn read_pose(path: &Path) -> Result<Option<Pose>, SceneError> {
     if !path.is_file() {
         return Ok(None);
@@ -222,13 +220,13 @@ fn read_pose(path: &Path) -> Result<Option<Pose>, SceneError> {
 
 struct Cameras {
     photo: Intrinsics,
-    /// The photos' camera from the one that the poses speak of.
+    /// The photos' camera from the camera of the poses.
     camera_from_posed: Pose,
     depth: Option<(Intrinsics, Pose)>,
 }
 
 impl Cameras {
-    /// Of the folder of a scene, or of a sequence in it.
+    /// The cameras of a scene's or a sequence's folder.
     fn of(folder: &Path, (width, height): (u32, u32)) -> Result<Self, SceneError> {
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let file = [Some(folder.as_path()), folder.parent()]
@@ -247,14 +245,14 @@ impl Cameras {
             return Err(SceneError::expected(
                 folder.join("camera-intrinsics.txt"),
                 format!(
-                    "a 3x3 matrix expected, as the images have {width}x{height} pixels and the \
-                     default is for 640x480"
+                    "a file with a 3x3 matrix expected, since the images have {width}x{height} pixels and the \
+                     default camera is for 640x480"
                 ),
             ));
         }
         log::info!(
-            "{}: no camera-intrinsics.txt; the documented depth camera and the usual colour camera \
-             of the data set hold",
+            "{}: no camera-intrinsics.txt; using the documented depth camera and the usual colour camera \
+             of the data set",
             folder.display()
         );
         let camera_from_depth = Pose::from_parts(

@@ -4,22 +4,20 @@ use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::geometry::Pose;
 
-/// How far apart in time two measurements of the same moment may be \[s\]; that of the benchmark's
-/// own tool for association.
+/// The greatest time difference of measurements of the same moment \[s\], as in the benchmark's association tool.
 pub(super) const SAME_MOMENT_S: f64 = 0.02;
-/// Times that are looked at for each: more than any camera takes in a moment, so that a file with one
-/// time in all lines is not compared line by line with another.
+/// The most candidates per time, more than any camera takes in a moment. It limits the work for a file with the same
+/// time in all lines.
 const MOST_CANDIDATES: usize = 64;
-/// Between poses this far apart in time, what lies between is interpolated \[s\]. Motion capture
-/// gives a pose every 10 ms, a tracked camera every 33 ms.
+/// The longest interval for interpolation \[s\]. Motion capture has a pose every 10 ms, a tracked camera every 33 ms.
 const INTERPOLATED_S: f64 = 0.1;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trajectory {
     samples: Vec<(f64, Pose)>,
-    /// Between poses this far apart in time, what lies between is interpolated.
+    /// The longest interval for interpolation.
     interpolated: f64,
-    /// How far from a pose in time it still holds.
+    /// The greatest time difference at which a pose still holds.
     same_moment: f64,
 }
 
@@ -29,7 +27,7 @@ impl Trajectory {
         Self::new(samples, INTERPOLATED_S, SAME_MOMENT_S)
     }
 
-    /// Poses by time, in any order and any unit. Of two poses at the same time the first counts.
+    /// Poses by time, in any order and any unit. The first of several poses at the same time is used.
     pub fn new(mut samples: Vec<(f64, Pose)>, interpolated: f64, same_moment: f64) -> Self {
         samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         samples.dedup_by_key(|(time, _)| *time);
@@ -40,8 +38,7 @@ impl Trajectory {
         }
     }
 
-    /// The pose at a time: that of a sample, between two samples where they are close, otherwise that of
-    /// the moment if there is one.
+    /// The pose at a time: interpolated between two close samples, otherwise that of the same moment, if any.
     pub fn at(&self, time: f64) -> Option<Pose> {
         let after = self.samples.partition_point(|(other, _)| *other < time);
         let next = self.samples.get(after);
@@ -65,7 +62,7 @@ impl Trajectory {
         &self.samples
     }
 
-    /// The trajectory of something that is fixed to what moves.
+    /// The trajectory of a part that is fixed to the moving body.
     pub fn of_part(mut self, body_from_part: &Pose) -> Self {
         for (_, pose) in &mut self.samples {
             *pose *= body_from_part;
@@ -73,16 +70,16 @@ impl Trajectory {
         self
     }
 
-    /// First and last time, unless there is no sample.
+    /// The first and the last time; `None` without samples.
     pub fn range(&self) -> Option<(f64, f64)> {
         Some((self.samples.first()?.0, self.samples.last()?.0))
     }
 }
 
-/// The pose a share of the way from one to another.
+/// Interpolates between two poses.
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
-    // Opposite rotations have no way between them that is the shortest; either will do.
+    // Opposite rotations have no shortest path; either will do.
     let rotation: UnitQuaternion<f64> = from
         .rotation
         .try_slerp(&to.rotation, share, 1e-9)
@@ -90,8 +87,8 @@ fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     Pose::from_parts(Translation3::from(position), rotation)
 }
 
-/// Which times of `others` are those of `times`, as positions: the closest pairs first, none more than
-/// [`SAME_MOMENT_S`] apart, each time in one pair at most. Both are in ascending order.
+/// Associates `times` with `others`: the position in `others` for each time. The closest pairs come first, none
+/// are more than [`SAME_MOMENT_S`] apart, and each time is used at most once. Both lists are in ascending order.
 pub(super) fn associated(times: &[f64], others: &[f64]) -> Vec<Option<usize>> {
     let mut pairs = Vec::new();
     for (index, time) in times.iter().enumerate() {

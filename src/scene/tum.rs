@@ -1,9 +1,9 @@
 //! TUM RGB-D: `rgb.txt` and `depth.txt` list the images by time, `groundtruth.txt` the poses of the
-//! camera. Images of the same moment belong together.
+//! camera. Images are associated by time.
 //!
-//! The layout names no camera. `calibration.txt` (`fx fy cx cy`, as ETH3D adds it) is one; without it
-//! the benchmark's own recommendation holds, the default calibration of its Kinect drivers, to which
-//! the depth images are registered.
+//! The camera is in `calibration.txt` (`fx fy cx cy`, an addition of ETH3D). Without it, the reader uses the
+//! benchmark's recommendation: the default calibration of the Kinect drivers, to which the depth images are
+//! registered.
 
 use std::path::{Path, PathBuf};
 
@@ -29,11 +29,10 @@ pub(super) const ENTRY: Entry = Entry {
     open: |argument| open(Path::new(argument)),
 };
 
-/// What a depth value of 1 means \[m\].
+/// The depth of a value of 1 \[m\].
 const UNIT_M: f64 = 1.0 / 5000.0;
 
-/// The default of the Kinect's drivers: fx, fy, cx, cy of 640 × 480 pixels, whose centres are at
-/// integers.
+/// The default of the Kinect drivers: fx, fy, cx, cy for 640 × 480 pixels, with pixel centres at integers.
 const KINECT: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
 const KINECT_SIZE: (u32, u32) = (640, 480);
 
@@ -73,7 +72,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
         return Err(SceneError::expected(
             truth,
             format!(
-                "poses at the times of rgb.txt expected, but these are between {first} and {last}"
+                "poses at the times of rgb.txt expected, but the poses are between {first} and {last}"
             ),
         ));
     }
@@ -115,13 +114,13 @@ fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, Scen
         return Err(SceneError::expected(
             path,
             format!(
-                "a file with fx fy cx cy expected, as the images have {width}x{height} pixels \
-                 and the default is for 640x480"
+                "a file with fx fy cx cy expected, since the images have {width}x{height} pixels \
+                 and the default camera is for 640x480"
             ),
         ));
     }
     log::info!(
-        "{}: no calibration.txt; the Kinect's default holds, f = 525, centre 319.5, 239.5",
+        "{}: no calibration.txt; using the Kinect's default, f = 525, centre 319.5, 239.5",
         folder.display()
     );
     pinhole(KINECT, KINECT_SIZE).map_err(|why| SceneError::expected(path, why))

@@ -1,5 +1,4 @@
-//! What a camera has in view of a cloud that is not its own: neither what is outside its image nor what
-//! something nearer hides.
+//! Restricts a map to the points in a camera's view: inside its image and not occluded.
 
 use nalgebra::Point3;
 
@@ -7,20 +6,20 @@ use super::depth_image;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 
-/// Nothing nearer than this is looked at \[m\]: the camera itself, or the person who carried it.
+/// Nearer points are ignored \[m\]: they are the camera itself or its carrier.
 const NEAREST_M: f64 = 0.1;
-/// How far around a point something nearer is sought \[squares of the image\]: twice the gaps between
-/// the lines of a scanner with 32 beams.
+/// The search range for occluders around a point \[cells\]: twice the gaps between the lines of a scanner with 32
+/// beams.
 const AROUND: isize = 6;
-/// What is nearer by less than this share of the depth is of the same surface, seen at a slant.
+/// Points with more than this share of a point's depth belong to the same slanted surface.
 const SAME_SURFACE: f32 = 0.9;
-/// In as many of the eight directions something nearer is beside a point that is hidden: one in view
-/// beside a post has it in three, between two posts in six.
+/// An occluded point has nearer points in at least this many of eight directions. A visible point next to a post
+/// has them in three, between two posts in six.
 const HIDDEN_IN: u32 = 7;
 
-/// The points, of those in a camera's frame \[m\], that it has in view: of those that fall into the same
-/// small square of the image the nearest, unless it is seen through the gaps of something nearer. The
-/// squares are such that a map of any density gives about as many points as a scan.
+/// The points in view, of points in the camera's frame \[m\]: the nearest point per small cell of the image, unless it
+/// is seen through the gaps of something nearer. The cell size gives about as many points as a scan, for maps of any
+/// density.
 pub(super) fn in_view(points: impl Iterator<Item = Point3<f64>>, camera: &Intrinsics) -> Cloud {
     let side = depth_image::step((camera.width, camera.height));
     let columns = camera.width.div_ceil(side) as usize;
@@ -53,7 +52,7 @@ pub(super) fn in_view(points: impl Iterator<Item = Point3<f64>>, camera: &Intrin
     }
 }
 
-/// Whether something nearer is on nearly all sides of a square.
+/// Whether nearer points surround a cell.
 fn is_hidden(nearest: &[Option<Point3<f32>>], columns: usize, at: usize, depth: f32) -> bool {
     let rows = nearest.len() / columns;
     let (column, row) = ((at % columns) as isize, (at / columns) as isize);
@@ -74,7 +73,7 @@ fn is_hidden(nearest: &[Option<Point3<f32>>], columns: usize, at: usize, depth: 
     directions.count_ones() >= HIDDEN_IN
 }
 
-/// Which of eight directions, an eighth of a turn each, an offset is in.
+/// The direction of an offset, in eighths of a turn.
 fn direction(dx: isize, dy: isize) -> Option<u32> {
     if (dx, dy) == (0, 0) {
         return None;

@@ -1,4 +1,4 @@
-//! Where a run is to stop: at a stage, or where a number crosses a bound.
+//! Breakpoints: where a run stops, at a stage or when a number crosses a limit.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,14 +11,14 @@ use crate::relation::Relation;
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Record, Sink};
 
-/// A number that events carry, under the name that breakpoints know it by.
+/// A number of an event that breakpoints can watch.
 struct Quantity {
     name: &'static str,
     about: &'static str,
     of: fn(&Event) -> Option<f64>,
 }
 
-/// A quantity that one kind of event carries.
+/// A quantity of one kind of event.
 macro_rules! quantity {
     ($name:literal, $about:literal, $kind:ident, $event:ident => $value:expr) => {
         Quantity {
@@ -32,12 +32,12 @@ macro_rules! quantity {
     };
 }
 
-/// Every number that a breakpoint can watch.
+/// All numbers that a breakpoint can watch.
 #[rustfmt::skip]
 const QUANTITIES: &[Quantity] = &[
     quantity!("keypoints", "keypoints of a photo",
         FeaturesDetected, event => Some(event.features.keypoints.len() as f64)),
-    quantity!("matches", "matches that are distinct and unique",
+    quantity!("matches", "matches that pass the ratio test and are unique",
         MatchesDecided, event => Some(event.candidates() as f64)),
     quantity!("depths", "matches with a depth",
         DepthsLifted, event => Some(event.with_depth() as f64)),
@@ -63,7 +63,7 @@ const QUANTITIES: &[Quantity] = &[
         MinimumAssessed, event => Some(event.runner_up? - event.best)),
 ];
 
-/// What a breakpoint waits for.
+/// The condition of a breakpoint.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BreakAt {
     /// The start of a stage of this name.
@@ -72,19 +72,19 @@ pub enum BreakAt {
     Crossing(Crossing),
 }
 
-/// A watched number and its bound.
+/// A watched number and its limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crossing {
-    /// Position in the table of quantities.
+    /// The position in the table of quantities.
     quantity: usize,
     relation: Relation,
     bound: f64,
 }
 
-/// Why a text is no breakpoint.
+/// Why a text is not a breakpoint.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no breakpoint: {expected}; write a stage such as `fb.ransac` or a comparison such \
+    "`{text}` is not a breakpoint: {expected}; write a stage such as `fb.ransac` or a comparison such \
      as `inliers < 10`"
 )]
 pub struct BreakpointError {
@@ -94,7 +94,7 @@ pub struct BreakpointError {
 
 /// One breakpoint: `fb.ransac`, `inliers < 10`, `mi.coverage < 0.1`.
 ///
-/// A comparison stops the run when it becomes true, not again while it stays so.
+/// A comparison stops the run when it becomes true, and not again while it stays true.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breakpoint {
     text: String,
@@ -103,15 +103,15 @@ pub struct Breakpoint {
 }
 
 impl Breakpoint {
-    /// Stages around the estimators, not of one of them.
+    /// Stages outside the estimators.
     const OUTSIDE: [&'static str; 2] = ["retrieve", "fusion"];
 
-    /// Whether a stage is around the estimators, not of one of them.
+    /// Whether a stage is outside the estimators.
     pub fn is_outside(stage: &str) -> bool {
         Self::OUTSIDE.contains(&stage)
     }
 
-    /// Names of the stages a breakpoint can be set at, in the order of a run.
+    /// The stages at which a breakpoint can be set, in the order of a run.
     pub fn stages() -> Vec<&'static str> {
         let stages = [
             Stage::Detect,
@@ -135,19 +135,19 @@ impl Breakpoint {
             .collect()
     }
 
-    /// Names of the numbers a breakpoint can watch, each with what it is.
+    /// The numbers that a breakpoint can watch: name and description.
     pub fn quantities() -> impl Iterator<Item = (&'static str, &'static str)> {
         QUANTITIES
             .iter()
             .map(|quantity| (quantity.name, quantity.about))
     }
 
-    /// The estimator whose stage or number it is; any without.
+    /// The estimator of the stage or number; `None` means any.
     pub fn method(&self) -> Option<Method> {
         self.method
     }
 
-    /// What it waits for.
+    /// Its condition.
     pub fn at(&self) -> &BreakAt {
         &self.at
     }
@@ -179,41 +179,42 @@ impl FromStr for Breakpoint {
             }
             None => (None, scoped),
         };
-        let at =
-            match comparison {
-                Some((_, relation, bound)) => {
-                    if relation == Relation::Contains {
-                        return Err(refuse("numbers are compared by = != < <= > >=".to_owned()));
-                    }
-                    let quantity = QUANTITIES
-                        .iter()
-                        .position(|quantity| quantity.name == name)
-                        .ok_or_else(|| {
-                            let names: Vec<_> = QUANTITIES.iter().map(|q| q.name).collect();
-                            refuse(format!("`{name}` is none of {}", names.join(", ")))
-                        })?;
-                    let bound = bound
-                        .parse()
-                        .ok()
-                        .filter(|bound: &f64| bound.is_finite())
-                        .ok_or_else(|| refuse(format!("`{bound}` is no number")))?;
-                    BreakAt::Crossing(Crossing {
-                        quantity,
-                        relation,
-                        bound,
-                    })
+        let at = match comparison {
+            Some((_, relation, bound)) => {
+                if relation == Relation::Contains {
+                    return Err(refuse(
+                        "numbers are compared with = != < <= > >=".to_owned(),
+                    ));
                 }
-                None if method.is_some() && Self::OUTSIDE.contains(&name) => {
-                    return Err(refuse(format!("`{name}` belongs to no method")));
-                }
-                None => {
-                    let stages = Self::stages();
-                    let stage = stages.iter().find(|stage| **stage == name);
-                    BreakAt::Stage(stage.ok_or_else(|| {
-                        refuse(format!("`{name}` is none of {}", stages.join(", ")))
-                    })?)
-                }
-            };
+                let quantity = QUANTITIES
+                    .iter()
+                    .position(|quantity| quantity.name == name)
+                    .ok_or_else(|| {
+                        let names: Vec<_> = QUANTITIES.iter().map(|q| q.name).collect();
+                        refuse(format!("`{name}` is not one of {}", names.join(", ")))
+                    })?;
+                let bound = bound
+                    .parse()
+                    .ok()
+                    .filter(|bound: &f64| bound.is_finite())
+                    .ok_or_else(|| refuse(format!("`{bound}` is not a number")))?;
+                BreakAt::Crossing(Crossing {
+                    quantity,
+                    relation,
+                    bound,
+                })
+            }
+            None if method.is_some() && Self::OUTSIDE.contains(&name) => {
+                return Err(refuse(format!("the stage `{name}` belongs to no method")));
+            }
+            None => {
+                let stages = Self::stages();
+                let stage = stages.iter().find(|stage| **stage == name);
+                BreakAt::Stage(stage.ok_or_else(|| {
+                    refuse(format!("`{name}` is not one of {}", stages.join(", ")))
+                })?)
+            }
+        };
         Ok(Self {
             text: text.to_owned(),
             method,
@@ -224,7 +225,7 @@ impl FromStr for Breakpoint {
 
 posescope_core::serde_as_text!(Breakpoint);
 
-/// Breakpoints, and what they remember of the run.
+/// Breakpoints with their state in a run.
 #[derive(Clone, Debug, Default)]
 pub struct Breakpoints {
     watched: Vec<Watched>,
@@ -233,12 +234,12 @@ pub struct Breakpoints {
 #[derive(Clone, Debug)]
 struct Watched {
     breakpoint: Breakpoint,
-    /// Whether the comparison was true when its number was told last.
+    /// Whether the comparison was true at the last event of its number.
     was_true: bool,
 }
 
 impl Breakpoints {
-    /// A list of breakpoints, none of which was reached yet.
+    /// Breakpoints that have not been reached yet.
     pub fn new(breakpoints: impl IntoIterator<Item = Breakpoint>) -> Self {
         let watched = breakpoints.into_iter().map(|breakpoint| Watched {
             breakpoint,
@@ -249,7 +250,7 @@ impl Breakpoints {
         }
     }
 
-    /// Takes over other breakpoints in the middle of a run: those that stay remember what they saw.
+    /// Replaces the breakpoints in the middle of a run. Those that stay keep their state.
     pub(super) fn replace(&mut self, other: Self) {
         let old = std::mem::replace(&mut self.watched, other.watched);
         for new in &mut self.watched {
@@ -259,7 +260,7 @@ impl Breakpoints {
         }
     }
 
-    /// The first breakpoint that an event reaches, as it was written. Every event must be shown.
+    /// The text of the first breakpoint that an event reaches. Must be called with every event.
     pub fn reached(&mut self, record: &Record) -> Option<String> {
         let mut reached = None;
         for watched in &mut self.watched {
@@ -291,7 +292,7 @@ impl Breakpoints {
             && matches!(ended.stage, Stage::Estimator(_))
             && record.methods.len() == 1
         {
-            // The next estimator's numbers are others.
+            // The next estimator has its own numbers.
             for watched in &mut self.watched {
                 watched.was_true = false;
             }
@@ -308,7 +309,7 @@ pub struct StopAtBreakpoint {
 }
 
 impl StopAtBreakpoint {
-    /// Stops at the first of these.
+    /// Stops at the first of these breakpoints.
     pub fn new(breakpoints: Breakpoints) -> Self {
         Self {
             breakpoints,
@@ -316,7 +317,7 @@ impl StopAtBreakpoint {
         }
     }
 
-    /// The breakpoint that ended the run, as it was written.
+    /// The text of the breakpoint that ended the run.
     pub fn reached(&self) -> Option<&str> {
         self.reached.as_deref()
     }
@@ -324,7 +325,7 @@ impl StopAtBreakpoint {
 
 impl Sink for StopAtBreakpoint {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        // The stages that close behind the break are not breaks of their own.
+        // The ends of the open stages must not count as breaks.
         if self.reached.is_some() {
             return Err(Cancelled);
         }
@@ -445,7 +446,7 @@ mod tests {
         assert!(message("fb.ransack").contains("ransac"));
         assert!(message("xy.ransac").contains("`xy` is no method"));
         assert!(message("inlers < 10").contains("inliers"));
-        assert!(message("inliers < ten").contains("no number"));
+        assert!(message("inliers < ten").contains("`ten` is not a number"));
         assert!(message("").contains("fb.ransac"));
         assert!(message("fb.fusion").contains("belongs to no method"));
     }

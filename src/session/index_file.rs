@@ -1,4 +1,4 @@
-//! The retrieval index of a scene, opened when it is first asked.
+//! The retrieval index of a scene, opened on first use.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,8 +9,8 @@ use crate::params::Params;
 use crate::retrieval::RetrievalParams;
 use crate::scene::{NoIndex, Retriever, Scene};
 
-/// Where a scene's index is. Opening one checks every byte of it, so that is done only for somebody
-/// who asks, and once for the same parameters.
+/// The index of a scene. Opening it checks every byte, so it is opened on first use, and again only if the
+/// parameters change.
 #[derive(Debug, Default)]
 pub struct IndexFile {
     argument: String,
@@ -31,7 +31,7 @@ impl std::fmt::Debug for Opened {
 }
 
 impl IndexFile {
-    /// The index of the scene that `argument` names: in a file, or where it is put by default.
+    /// The index of the scene `argument`: this file, or the default one.
     pub fn new(argument: impl Into<String>, file: Option<PathBuf>) -> Self {
         Self {
             argument: argument.into(),
@@ -40,12 +40,12 @@ impl IndexFile {
         }
     }
 
-    /// The index that a task asks.
+    /// The index of a task.
     pub fn of(task: &Task) -> Self {
         Self::new(&task.scene, task.protocol.index.first().cloned())
     }
 
-    /// The file, if one was named.
+    /// The file, if one is named.
     pub fn file(&self) -> Option<&PathBuf> {
         self.file.as_ref()
     }

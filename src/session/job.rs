@@ -1,4 +1,4 @@
-//! What a session is asked to run, and the thread that runs it.
+//! The job of a session, and the thread that runs it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -15,22 +15,22 @@ use crate::localize::{
 };
 use crate::scene::{FrameStore, NoIndex, Scene, SceneError};
 
-/// One query, its references, and what to do with them.
+/// One query, its references, and how to localise it.
 #[derive(Clone)]
 pub struct Job {
-    /// Where the references are.
+    /// The scene of the references.
     pub references: Arc<dyn Scene>,
-    /// Where the query is; often the same scene.
+    /// The scene of the query, often the same.
     pub queries: Arc<dyn Scene>,
     /// The query's position in its scene.
     pub query: usize,
-    /// The references, once they are chosen.
+    /// The references; empty until they are chosen.
     pub chosen: References,
-    /// What is asked of the query.
+    /// How the query is localised.
     pub task: Task,
-    /// What a choice by looks asks.
+    /// The index for retrieval.
     pub index: Arc<IndexFile>,
-    /// Where frames are remembered, with all that is worked out about them, for the next job too.
+    /// The cache of frames and everything computed about them, shared between jobs.
     pub frames: Arc<FrameStore>,
 }
 
@@ -40,36 +40,38 @@ pub enum JobError {
     /// A frame cannot be read, or the job was cancelled.
     #[error(transparent)]
     Localize(#[from] LocalizeError),
-    /// What another system answered cannot be read.
+    /// The poses or matches of another system cannot be read.
     #[error(transparent)]
     Foreign(#[from] SceneError),
     /// References cannot be chosen.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
-    /// There is no index to ask.
+    /// There is no usable index.
     #[error(transparent)]
     Index(#[from] NoIndex),
-    /// Nobody said which references to take.
-    #[error("no reference is chosen for query {query}")]
+    /// References must be named, and none is.
+    #[error(
+        "no reference is chosen for query {query}; choose one, or random:K, nearest:K, matches:K or retrieve:K"
+    )]
     NoneNamed {
         /// The query frame's name.
         query: String,
     },
     /// No frame is near enough to be a reference.
     #[error(
-        "no frame with pose and scan within {radius_m} m of query {query}; raise the radius \
-         or the prior, or choose references by hand"
+        "no frame with a pose and a cloud within {radius_m} m of query {query}; raise the radius \
+         or the prior, or name the references"
     )]
     NoneNear {
         /// The query frame's name.
         query: String,
-        /// How far from the query they were sought \[m\].
+        /// The search distance around the query \[m\].
         radius_m: f64,
     },
 }
 
 impl JobError {
-    /// Whether the observer asked the job to stop.
+    /// Whether the observer cancelled the job.
     pub fn is_cancelled(&self) -> bool {
         matches!(
             self,
@@ -78,7 +80,7 @@ impl JobError {
     }
 }
 
-/// Starts the worker. Nobody joins it: it ends by itself, or at the next event or checkpoint after a
+/// Starts the worker thread. It is never joined: it ends by itself, or at the next event or checkpoint after a
 /// cancel.
 pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
     let worker = outbox.clone();
@@ -87,7 +89,7 @@ pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
         .spawn(move || {
             let on_choice = |chosen: &References| {
                 let chosen = chosen.clone();
-                // If the session is gone, the next event finds out.
+                // If the session is gone, the next event fails.
                 let _ = worker.change(|run| {
                     run.ranking = None;
                     run.chosen = Some(chosen);
@@ -102,7 +104,7 @@ pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
                     RunState::Broken(format!("internal error: {}", words_of(panic.as_ref())))
                 }
             };
-            // Nobody to tell: the session was dropped.
+            // Fails only if the session was dropped.
             let _ = worker.state(last);
         });
     if let Err(error) = started {
@@ -112,10 +114,10 @@ pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
 }
 
 impl Job {
-    /// Chooses references where there are none yet, and localises.
+    /// Chooses references if there are none yet, and localises.
     ///
-    /// `number` is the query's among those that the observer hears of. `on_choice` hears which frames the references are before any of them is used. Hands out what
-    /// [`Localizer::localize`] does: with a fusion the fused results only.
+    /// `number` is the index of the query for the observer. `on_choice` gets the references before they are used.
+    /// Returns the results of [`Localizer::localize`]: with a fusion, only the fused ones.
     ///
     /// # Errors
     /// [`JobError`].

@@ -1,4 +1,4 @@
-//! What a job has read.
+//! The input of a job.
 
 use crate::geometry::Pose;
 use crate::problem::Problem;
@@ -8,6 +8,6 @@ use crate::problem::Problem;
 pub struct Loaded {
     /// The query and each of its references.
     pub problems: Vec<Problem>,
-    /// Where the query camera was, if that is known. The estimators do not see it.
+    /// The true pose of the query, if known. The estimators do not see it.
     pub truth: Option<Pose>,
 }

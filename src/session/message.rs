@@ -1,4 +1,4 @@
-//! What a worker has to say, on its way to the session.
+//! Messages from the worker to the session.
 
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -6,22 +6,22 @@ use std::sync::mpsc::Sender;
 use super::run::{Run, RunState};
 use crate::trace::Cancelled;
 
-/// What the worker says: a change to what the session knows of the run.
+/// A message: a change to the session's copy of the run.
 pub(super) type Message = Box<dyn FnOnce(&mut Run) + Send>;
 
-/// The way from the worker to the session.
+/// The channel from the worker to the session.
 #[derive(Clone)]
 pub(super) struct Outbox {
     pub(super) messages: Sender<Message>,
-    /// Called behind every message.
+    /// Called after every message.
     pub(super) wake: Arc<dyn Fn() + Send + Sync>,
 }
 
 impl Outbox {
-    /// Changes what the session knows of the run.
+    /// Changes the session's copy of the run.
     ///
     /// # Errors
-    /// [`Cancelled`] where the session is gone. Who goes on all the same finds out at the next event.
+    /// [`Cancelled`] if the session is gone.
     pub(super) fn change(
         &self,
         change: impl FnOnce(&mut Run) + Send + 'static,
@@ -33,10 +33,10 @@ impl Outbox {
         Ok(())
     }
 
-    /// Says which state the run is in.
+    /// Sets the state of the run.
     ///
     /// # Errors
-    /// [`Cancelled`] where the session is gone.
+    /// [`Cancelled`] if the session is gone. This may be ignored: the next event fails too.
     pub(super) fn state(&self, state: RunState) -> Result<(), Cancelled> {
         self.change(|run| run.state = state)
     }

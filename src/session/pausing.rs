@@ -1,4 +1,4 @@
-//! Pausing a run between two of its events.
+//! Pauses a run between two events.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,32 +16,32 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
 
-/// How a run goes on.
+/// How a run continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunMode {
-    /// It does not: it waits behind the next event, or within a loop that tells nothing.
+    /// It waits after the next event, or inside a loop without events.
     Paused,
     /// It runs to the next event.
     StepInto,
-    /// It runs behind the stage that begins here, or to the next event.
+    /// It runs past the stage that begins here, or to the next event.
     StepOver,
-    /// It runs to the end of the stage around it.
+    /// It runs to the end of the surrounding stage.
     StepOut,
     /// It runs to the next breakpoint, or to the end.
     Running,
 }
 
-/// What the session asks of its run.
+/// A command of the session to its run.
 pub(super) enum Command {
-    /// To go on in this mode, or to pause.
+    /// Continue in this mode, or pause.
     Go(RunMode),
-    /// To stop at these breakpoints from here on.
+    /// Stop at these breakpoints from now on.
     Breakpoints(Breakpoints),
-    /// To end.
+    /// End the run.
     Cancel,
 }
 
-/// The session's end of the run.
+/// The session's handle on the run.
 pub(super) struct Control {
     commands: Sender<Command>,
     /// Raised with every command, so that a run without events notices it too.
@@ -50,13 +50,13 @@ pub(super) struct Control {
 
 impl Control {
     pub(super) fn send(&self, command: Command) {
-        // A worker that is gone has nothing to obey.
+        // Fails only if the worker has ended.
         let _ = self.commands.send(command);
         self.attention.store(true, Ordering::Release);
     }
 }
 
-/// The worker's end: it passes every event on, obeys commands and waits where they say so.
+/// The worker's side: forwards every event, obeys commands and pauses.
 pub(super) struct PausingObserver {
     commands: Receiver<Command>,
     attention: Arc<AtomicBool>,
@@ -64,16 +64,16 @@ pub(super) struct PausingObserver {
     mode: RunMode,
     breakpoints: Breakpoints,
     is_cancelled: bool,
-    /// Where the run waits next in the present mode.
+    /// Where the run pauses next in the current mode.
     pause_at: PauseAt,
-    /// Where the steps from the last event end; `None` before the first event.
+    /// Where steps from the last event end; `None` before the first event.
     steps: Option<Steps>,
     begun: Instant,
-    /// How long it has waited for a command.
+    /// The total time spent waiting for commands.
     waited: Duration,
 }
 
-/// When to wait next, breakpoints aside.
+/// Where to pause next, apart from breakpoints.
 #[derive(Clone, Copy)]
 enum PauseAt {
     NextEvent,
@@ -82,7 +82,7 @@ enum PauseAt {
     Never,
 }
 
-/// Where the steps from an event end.
+/// Where steps from an event end.
 #[derive(Clone, Copy)]
 struct Steps {
     over: PauseAt,
@@ -94,7 +94,7 @@ impl Steps {
         let depth = record.depth;
         let (over, out) = match record.event {
             Event::StageStarted(_) => (PauseAt::EndOfStage(depth), depth),
-            // At the end of a stage, out means out of the one around it.
+            // At the end of a stage, "out" leaves the surrounding stage.
             Event::StageEnded(_) => (PauseAt::NextEvent, depth.saturating_sub(1)),
             _ => (PauseAt::NextEvent, depth),
         };
@@ -127,7 +127,7 @@ impl PauseAt {
 }
 
 impl PausingObserver {
-    /// An observer that begins in a mode, and what controls it.
+    /// An observer that starts in a mode, and its control.
     pub(super) fn new(mode: RunMode, breakpoints: Breakpoints, outbox: Outbox) -> (Control, Self) {
         let (sender, commands) = channel();
         let attention = Arc::<AtomicBool>::default();
@@ -150,7 +150,7 @@ impl PausingObserver {
         (control, observer)
     }
 
-    /// If the session is gone, the next event finds out.
+    /// Ignores that the session is gone: the next event fails then.
     fn change(&self, change: impl FnOnce(&mut Run) + Send + 'static) {
         let _ = self.outbox.change(change);
     }
@@ -166,7 +166,7 @@ impl PausingObserver {
         }
     }
 
-    /// Obeys the commands that have come.
+    /// Obeys all pending commands.
     fn obey_all(&mut self) -> Result<(), Cancelled> {
         while let Ok(command) = self.commands.try_recv() {
             self.obey(command);
@@ -178,7 +178,7 @@ impl PausingObserver {
         }
     }
 
-    /// Waits for a mode to go on in. To pause is none.
+    /// Waits for a command to continue.
     fn wait(&mut self, breakpoint: Option<String>) -> Result<(), Cancelled> {
         self.outbox.state(RunState::Paused { breakpoint })?;
         let since = Instant::now();
@@ -251,15 +251,15 @@ impl LocalizeObserver for PausingObserver {
 
 impl Sink for PausingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        // Time that it waited is no work.
+        // Waiting does not count as work.
         let worked = self.begun.elapsed().saturating_sub(self.waited);
-        let told = record.clone();
+        let record_copy = record.clone();
         self.outbox.change(move |run| {
-            run.push(told, worked);
-            // It was told to go on, or is about to say that it waits.
+            run.push(record_copy, worked);
+            // Either it was resumed, or it reports the pause next.
             run.state = RunState::Running;
         })?;
-        // A mode that was set before this event starts from the event before it.
+        // A mode set before this event refers to the previous event.
         self.obey_all()?;
         self.steps = Some(Steps::from(record));
         let breakpoint = self.breakpoints.reached(record);
@@ -269,8 +269,7 @@ impl Sink for PausingObserver {
         Ok(())
     }
 
-    /// A run that was told to pause need not come to its next event first. One that told nothing yet
-    /// does, so that there is something to look at.
+    /// Pauses without waiting for the next event, except before the first one: there would be nothing to show.
     fn attend(&mut self) -> Result<(), Cancelled> {
         self.obey_all()?;
         if self.mode == RunMode::Paused && self.steps.is_some() {

@@ -1,4 +1,4 @@
-//! What a run has told, in the order in which it was told.
+//! The events and results of a run, in their order.
 
 use std::fmt;
 use std::ops::Range;
@@ -23,21 +23,21 @@ pub enum RunState {
     Loading,
     /// Events are coming in.
     Running,
-    /// The estimator waits behind the last event.
+    /// The estimator waits after the last event.
     Paused {
         /// The breakpoint that stopped it, if one did.
         breakpoint: Option<String>,
     },
-    /// All that was asked for is done.
+    /// Everything requested is done.
     Finished,
-    /// It was told to stop.
+    /// It was cancelled.
     Cancelled,
-    /// It cannot go on: bad data, or a fault of ours.
+    /// It failed: bad data, or a bug.
     Broken(String),
 }
 
 impl RunState {
-    /// What has become, in a word or two, of a method that has begun and has no result.
+    /// The state of a method that has begun and has no result.
     pub fn of_what_has_begun(&self) -> &'static str {
         match self {
             Self::Loading | Self::Running => "at work",
@@ -49,17 +49,16 @@ impl RunState {
 
 /// The records of all parts of a run, one after the other, and their results.
 ///
-/// A *cursor* is a position among the records. What is asked at a cursor is answered for the part
-/// that told the record there.
+/// A *cursor* is a position among the records. Queries at a cursor refer to the part of the record there.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// The parameters it was made with.
+    /// The parameters of the run.
     pub params: Params,
-    /// How far it searched \[m\].
+    /// The uncertainty radius \[m\].
     pub radius_m: f64,
     /// The seed of its random choices.
     pub seed: u64,
-    /// What was done to the photo of its query before.
+    /// The degradation of the query photo.
     pub degraded: Degradation,
     /// Its references, once they are chosen.
     pub chosen: Option<References>,
@@ -67,31 +66,31 @@ pub struct Run {
     pub loaded: Option<Arc<Loaded>>,
     pub(super) state: RunState,
     history: History,
-    /// How long the run had worked when each record was told.
+    /// The working time of the run at each record.
     worked: Vec<Duration>,
     spans: Vec<Span>,
     stages: Vec<StageBar>,
-    /// While references are chosen by looks: how many candidates were looked at, and how many there are.
+    /// While references are chosen by appearance: the number of compared candidates, and of all.
     pub ranking: Option<[usize; 2]>,
-    /// What would have helped a result is being looked for.
+    /// The search for remedies, while it runs.
     pub explaining: Option<Explaining>,
-    /// Positions in `stages` of those that are open, the outermost first.
+    /// The positions in `stages` of the open stages, outermost first.
     open: Vec<usize>,
 }
 
-/// What a part of a run is about.
+/// A part of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// The choice of the references.
     Retrieval,
-    /// One estimator on one reference, given by its position among those of the run.
+    /// One estimator on one reference, by the reference's position in the run.
     Reference(Method, usize),
-    /// One pose from what an estimator gave for each reference.
+    /// The fusion of an estimator's poses.
     Fusion(Method),
 }
 
 impl Part {
-    /// The estimator, if it is about one.
+    /// Its estimator, if any.
     pub fn method(self) -> Option<Method> {
         match self {
             Self::Retrieval => None,
@@ -99,7 +98,7 @@ impl Part {
         }
     }
 
-    /// The reference, if it is about one, by its position among those of the run.
+    /// Its reference, if any, by position in the run.
     pub fn reference(self) -> Option<usize> {
         match self {
             Self::Reference(_, reference) => Some(reference),
@@ -108,16 +107,16 @@ impl Part {
     }
 }
 
-/// How far the search for what would have helped a result is.
+/// The progress of the search for remedies of a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Explaining {
-    /// The method whose result went wrong.
+    /// The method of the wrong result.
     pub method: Method,
-    /// Remedies that were tried.
+    /// Remedies tried so far.
     pub tried: usize,
-    /// Remedies there are to try.
+    /// Remedies in total.
     pub remedies: usize,
-    /// When the first of them began.
+    /// The start of the first one.
     pub since: Instant,
 }
 
@@ -144,31 +143,31 @@ impl fmt::Display for Explaining {
     }
 }
 
-/// A part of a run, told without a break.
+/// The records of one part of a run.
 #[derive(Clone, Debug)]
 pub struct Span {
-    /// The part of the run that it tells.
+    /// The part.
     pub part: Part,
-    /// Positions of its records among those of the run.
+    /// The positions of its records in the run.
     pub records: Range<usize>,
     /// Its result, once there is one.
     pub result: Option<QueryResult>,
-    /// How long its stages took; a fusion takes no time worth telling.
+    /// The times of its stages; `None` for a fusion, whose time is negligible.
     pub times: Option<StageTimes>,
 }
 
 /// One stage as a bar on the timeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageBar {
-    /// The stage that the bar stands for.
+    /// The stage.
     pub stage: Stage,
     /// 1 for a whole estimator, one more for each stage around it.
     pub depth: usize,
-    /// From its first record to behind its last one; to the end of the run while it is open.
+    /// The positions of its records; up to the end of the run while it is open.
     pub records: Range<usize>,
-    /// Whether it did what it was for; `None` while it is open.
+    /// Whether it succeeded; `None` while it is open.
     pub succeeded: Option<bool>,
-    /// Whether its result was remembered from an earlier run.
+    /// Whether its result was cached from an earlier run.
     pub reused: bool,
 }
 
@@ -184,8 +183,7 @@ impl Run {
         }
     }
 
-    /// What two runs of a query may differ in, a line each: parameters that are not the default, and what is
-    /// said on the command line.
+    /// The settings in which two runs of a query may differ, one per line: changed parameters, and options.
     pub fn settings(&self) -> Vec<String> {
         let mut settings = self.params.changes();
         settings.push(format!("--radius {}", self.radius_m));
@@ -257,7 +255,7 @@ impl Run {
         });
     }
 
-    /// Puts an explained result in the place of the one that was told first.
+    /// Replaces a result by its explained version.
     pub(super) fn explain(&mut self, explained: QueryResult) {
         self.explaining = None;
         let is_same = |result: &QueryResult| {
@@ -279,7 +277,7 @@ impl Run {
         self.history.records().len()
     }
 
-    /// Whether nothing was told yet.
+    /// Whether there are no records yet.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -289,21 +287,21 @@ impl Run {
         self.history.records()
     }
 
-    /// How long the run had worked when a record was told, without the time that it waited for somebody;
-    /// being watched is part of it. A record that is still to come has the time of the last one.
+    /// The working time of the run at a record, without pauses but including the cost of observation. A future record
+    /// has the time of the last one.
     pub fn worked_until(&self, record: usize) -> Duration {
         let last = self.worked.len().saturating_sub(1);
         let time = self.worked.get(record.min(last));
         time.copied().unwrap_or_default()
     }
 
-    /// The last record that was told before the run had worked longer than that.
+    /// The last record up to this working time.
     pub fn record_at(&self, worked: Duration) -> usize {
-        let behind = self.worked.partition_point(|time| *time <= worked);
-        behind.saturating_sub(1)
+        let after = self.worked.partition_point(|time| *time <= worked);
+        after.saturating_sub(1)
     }
 
-    /// The parts of the estimators, in the order in which they ran.
+    /// The parts of the run in order.
     pub fn spans(&self) -> &[Span] {
         &self.spans
     }
@@ -313,7 +311,7 @@ impl Run {
         &self.stages
     }
 
-    /// The part that the record at `cursor` belongs to.
+    /// The part of the record at `cursor`.
     pub fn span_at(&self, cursor: usize) -> Option<&Span> {
         self.spans
             .iter()
@@ -325,20 +323,20 @@ impl Run {
         self.spans.iter().filter_map(|span| span.result.as_ref())
     }
 
-    /// The stages around the record at `cursor`, the outermost first.
+    /// The stages around the record at `cursor`, outermost first.
     pub fn stages_at(&self, cursor: usize) -> impl Iterator<Item = &StageBar> {
         self.stages
             .iter()
             .filter(move |bar| bar.records.contains(&cursor))
     }
 
-    /// What was told about something, the latest where that was several times.
+    /// The latest records of a part.
     pub fn span_of(&self, part: Part) -> Option<&Span> {
         self.spans.iter().rev().find(|span| span.part == part)
     }
 
-    /// The reference that is looked at when the cursor is somewhere, by its position among those of
-    /// the run: the one that is worked on there, in a fusion the one with the most to say.
+    /// The reference to show at a cursor, by position in the run: that of the part there, or in a fusion the one of the
+    /// greatest weight.
     pub fn reference_at(&self, cursor: usize) -> usize {
         let span = self.span_at(cursor);
         if let Some(reference) = span.and_then(|span| span.part.reference()) {
@@ -352,7 +350,7 @@ impl Run {
             .unwrap_or(0)
     }
 
-    /// The latest event of a type at or before `cursor`, told by the part at the cursor.
+    /// The latest event of a type at or before `cursor`, in the part at the cursor.
     pub fn latest<E: DebugEvent + 'static>(&self, cursor: usize) -> Option<&E> {
         self.latest_in(self.span_at(cursor)?, cursor)
     }
@@ -365,8 +363,7 @@ impl Run {
             .find_map(|record| E::from_event(&record.event))
     }
 
-    /// All events of a type that the part at the cursor has told up to there, with their
-    /// positions.
+    /// All events of a type up to `cursor` in the part there, with their positions.
     pub fn all_until<E: DebugEvent + 'static>(
         &self,
         cursor: usize,

@@ -1,4 +1,4 @@
-//! What is asked, by `run`, by `view` and in the window: everything but the query.
+//! The task of `run`, `view` and the window: everything but the query.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -10,43 +10,40 @@ use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::{self, LoosePhotos, Scene, SceneError};
 
-/// Where the references are, and how a query is localised. The command line turns into it, the window and
-/// its sessions keep it, and [`Self::command_line`] writes it down again.
+/// The scene of the references, and how a query is localised. The command line is parsed to it, the window and its
+/// sessions keep it, and [`Self::command_line`] writes it as a command line again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
-    /// The scene of the references, as it is named on the command line.
+    /// The scene of the references, as given on the command line.
     pub scene: String,
     /// How a query is localised.
     pub protocol: Protocol,
     /// Parameters of the estimators.
-    #[serde(
-        serialize_with = "write_params",
-        deserialize_with = "posescope_core::text::parsed"
-    )]
+    #[serde(serialize_with = "write_params", deserialize_with = "posescope_core::text::parsed")]
     pub params: Params,
-    /// Where the run is to stop.
+    /// Where the run stops.
     pub breakpoints: Vec<Breakpoint>,
-    /// Photos of no scene, which are the queries then.
+    /// Loose photos, which are the queries then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photos: Option<LoosePhotos>,
 }
 
-/// The scenes of a task, opened: that of the references and that of the queries, often the same.
+/// The opened scenes of a task; often both are the same.
 #[derive(Clone)]
 pub struct TaskScenes {
-    /// Where the references are.
+    /// The scene of the references.
     pub references: Arc<dyn Scene>,
-    /// Where the queries are.
+    /// The scene of the queries.
     pub queries: Arc<dyn Scene>,
 }
 
-/// Writes the parameters as a configuration file, every one of them.
+/// Writes all parameters as a configuration file.
 fn write_params<S: Serializer>(params: &Params, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&params.to_toml())
 }
 
 impl Task {
-    /// What is asked of a scene by default.
+    /// The default task on a scene.
     pub fn of(scene: impl Into<String>) -> Self {
         Self {
             scene: scene.into(),
@@ -57,7 +54,7 @@ impl Task {
         }
     }
 
-    /// The scene of the queries, if it is another one, as it is named on the command line.
+    /// The scene of the queries, if it is another one, as given on the command line.
     pub fn query_scene(&self) -> Option<&str> {
         self.protocol.query_scene.first().map(String::as_str)
     }
@@ -67,7 +64,7 @@ impl Task {
         self.protocol.radius_m()
     }
 
-    /// Opens the scenes. `opened` may have one by its argument already.
+    /// Opens the scenes. `opened` returns a scene that is open already.
     ///
     /// # Errors
     /// A scene, a photo or a file of positions that cannot be read.
@@ -86,18 +83,20 @@ impl Task {
             (None, None) => Arc::clone(&references),
         };
         Ok(TaskScenes {
-            queries: self.protocol.as_asked(queries, references.as_ref())?,
+            queries: self
+                .protocol
+                .prepared_queries(queries, references.as_ref())?,
             references,
         })
     }
 
-    /// How far from a query's known position its references may be \[m\].
+    /// How far from a query's known position references are chosen \[m\].
     pub fn reach_m(&self) -> f64 {
         self.protocol.reach_m(self.radius_m())
     }
 
-    /// The arguments of `posescope` that ask the same of a query: `run`, the scene, the options.
-    /// With `references`, against these frames; without, against those that the protocol chooses.
+    /// The arguments of `posescope` that localise a query in the same way: `run`, the scene, the options.
+    /// With `references`, against these frames; without, against those chosen by the protocol.
     pub fn arguments(&self, query: &str, references: &[String]) -> Vec<String> {
         let mut protocol = self.protocol.clone();
         if !references.is_empty() {
@@ -133,7 +132,7 @@ impl Task {
             .collect()
     }
 
-    /// The command line that asks the same of a query, for a POSIX shell. See [`Self::arguments`].
+    /// The command line of [`Self::arguments`], for a POSIX shell.
     pub fn command_line(&self, query: &str, references: &[String]) -> String {
         command_line(&self.arguments(query, references))
     }
@@ -145,7 +144,7 @@ pub fn command_line(arguments: &[String]) -> String {
     format!("posescope {}", words.join(" "))
 }
 
-/// A word as a POSIX shell reads it back.
+/// A word, quoted for a POSIX shell if necessary.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {

@@ -1,4 +1,4 @@
-//! Every event as data: one JSON object per line, for a notebook.
+//! Events as data: one JSON object per line.
 
 use std::io::{self, Write};
 
@@ -8,13 +8,13 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::Record;
 
-/// The names of the scenes that frames are from.
+/// The names of the frames' scenes.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SceneNames {
-    /// That of the references.
+    /// The scene of the references.
     #[serde(rename = "scene")]
     pub references: String,
-    /// That of the query, where it is another.
+    /// The scene of the query, if it is another one.
     #[serde(rename = "query_scene", skip_serializing_if = "Option::is_none")]
     pub query: Option<String>,
 }
@@ -32,10 +32,10 @@ struct Line<'a> {
     record: &'a Record,
 }
 
-/// Writes what a method told of a problem, as one line.
+/// Writes an event of a method on a problem as one line.
 ///
 /// # Errors
-/// What the writer says.
+/// The errors of the writer.
 pub fn write_event(
     mut to: impl Write,
     scenes: &SceneNames,

@@ -5,7 +5,7 @@ use indicatif::ProgressBar;
 use crate::event::{Event, KindSet};
 use crate::trace::{Cancelled, Record, Sink};
 
-/// Shows the stage that the run is in.
+/// Shows the current stage of a run.
 pub struct Progress {
     bar: ProgressBar,
     task: String,
@@ -13,7 +13,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Shows stages on `bar` behind `task`, the name of the query.
+    /// Shows stages on `bar` after `task`, the name of the query.
     pub fn new(bar: ProgressBar, task: String) -> Self {
         Self {
             bar,

@@ -1,7 +1,7 @@
 //! Recordings for the Rerun viewer.
 //!
-//! A [`Recorder`] is a [`Sink`](crate::trace::Sink): it puts what an estimator tells into a
-//! recording that a stock viewer opens well laid out. [`entities`] lists what is where.
+//! A [`Recorder`] is a [`Sink`](crate::trace::Sink) that records the events of an estimator, with a layout for the
+//! stock viewer. [`entities`] lists the entity paths.
 //!
 //! Two recordings of the same run are equal under `rerun rrd compare --unordered`, and a run that is
 //! killed leaves a readable recording of everything up to the last view or stage.

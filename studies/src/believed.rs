@@ -146,7 +146,7 @@ fn grade(case: &Case, counts: &mut Counts) -> Result<(), Failure> {
     for (known, withheld) in known.iter().zip(&withheld) {
         let p = probability(withheld);
         let word = withheld.confidence_word();
-        let said: &[(&str, bool)] = match known.grade {
+        let verdicts: &[(&str, bool)] = match known.grade {
             Grade::Wrong => &[
                 ("wrong, from 0.95 on", p >= 0.95),
                 ("wrong, from 0.98 on", p >= 0.98),
@@ -165,7 +165,8 @@ fn grade(case: &Case, counts: &mut Counts) -> Result<(), Failure> {
             ],
             _ => &[],
         };
-        said.iter()
+        verdicts
+            .iter()
             .for_each(|&(kind, is_bad)| counts.add(kind, withheld, is_bad));
     }
     Ok(())

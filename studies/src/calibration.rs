@@ -78,7 +78,7 @@ pub struct Options {
 }
 
 /// A query and a reference, and what is known of them.
-struct Asked {
+struct Trial {
     query: Arc<Query>,
     reference: Arc<ReferenceTuple>,
     /// Without a truth no pose is near.
@@ -157,21 +157,21 @@ fn collect(options: &Options) -> Result<Vec<Sample>, Failure> {
         let pairs = real_pairs::all()?;
         at_places(pairs.len(), |number| {
             let pair = &pairs[number];
-            let asked = Asked {
+            let trial = Trial {
                 query: pair.query.query("query")?,
                 reference: pair.reference.reference("reference")?,
                 truth: pair.query.pose,
                 conditions: ["real"; 2],
             };
-            asked.samples(&options.methods)
+            trial.samples(&options.methods)
         })?
     } else {
         let drives = all_conditions();
         at_places(options.places, |place| {
-            let asked = at(&drives, place, options.seed)?;
-            let samples: Result<Vec<_>, _> = asked
+            let trials = at(&drives, place, options.seed)?;
+            let samples: Result<Vec<_>, _> = trials
                 .iter()
-                .map(|asked| asked.samples(&options.methods))
+                .map(|trial| trial.samples(&options.methods))
                 .collect();
             Ok(samples?.concat())
         })?
@@ -180,7 +180,7 @@ fn collect(options: &Options) -> Result<Vec<Sample>, Failure> {
 }
 
 /// All pairs of conditions at one place, and queries that do not show it.
-fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Asked>, Failure> {
+fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Failure> {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(7919).wrapping_add(place as u64));
     let share: f64 = rng.random();
     let apart: f64 = rng.random_range(-9.0..9.0);
@@ -203,10 +203,10 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Asked>, Fa
         let (query, reference) = (Frame::of(drive, query), Frame::of(drive, reference));
         sides.push((query.query("query")?, truth, reference.reference(&name)?));
     }
-    let mut asked = Vec::new();
+    let mut trials = Vec::new();
     for (of_query, (query, truth, _)) in Condition::ALL.iter().zip(&sides) {
         for (of_reference, (_, _, reference)) in Condition::ALL.iter().zip(&sides) {
-            asked.push(Asked {
+            trials.push(Trial {
                 query: Arc::clone(query),
                 reference: Arc::clone(reference),
                 truth: Some(*truth),
@@ -222,7 +222,7 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Asked>, Fa
         "unknowable, set aside"
     };
     let mut unknowable = |query: &Arc<Query>, reference: &Arc<ReferenceTuple>| {
-        asked.push(Asked {
+        trials.push(Trial {
             query: Arc::clone(query),
             reference: Arc::clone(reference),
             truth: None,
@@ -253,10 +253,10 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Asked>, Fa
             );
         }
     }
-    Ok(asked)
+    Ok(trials)
 }
 
-impl Asked {
+impl Trial {
     /// A sample of every method that gives a pose.
     fn samples(&self, methods: &[Method]) -> Result<Vec<Sample>, Failure> {
         let params = Params::default();
@@ -388,8 +388,8 @@ fn judge(title: &str, samples: &[Sample]) {
     }
     print_table("judged on,poses,within 1 m,calibration error,AUC", &rows);
     println!("Other pairs, all methods, by tenths: probability said / share within 1 m\n");
-    for (said, was) in tenths(&scored(samples, "all", false)).map(said_and_was) {
-        println!("- {said:.3} / {was:.3}");
+    for (predicted, actual) in tenths(&scored(samples, "all", false)).map(predicted_and_actual) {
+        println!("- {predicted:.3} / {actual:.3}");
     }
 }
 
@@ -400,7 +400,7 @@ fn tenths(sorted: &[Scored]) -> impl Iterator<Item = &[Scored]> {
 }
 
 /// The mean probability of a bin, and the share of its poses that are near.
-fn said_and_was(bin: &[Scored]) -> (f64, f64) {
+fn predicted_and_actual(bin: &[Scored]) -> (f64, f64) {
     let share = mean(bin.iter().map(|s| f64::from(u8::from(s.1))));
     (mean(bin.iter().map(|s| s.0)), share)
 }
@@ -409,8 +409,8 @@ fn said_and_was(bin: &[Scored]) -> (f64, f64) {
 fn calibration_error(scored: &[Scored]) -> f64 {
     tenths(scored)
         .map(|bin| {
-            let (said, was) = said_and_was(bin);
-            (said - was).abs() * bin.len() as f64 / scored.len() as f64
+            let (predicted, actual) = predicted_and_actual(bin);
+            (predicted - actual).abs() * bin.len() as f64 / scored.len() as f64
         })
         .sum()
 }

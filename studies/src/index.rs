@@ -25,7 +25,7 @@ const QUERIES: usize = 200;
 ///
 /// The descriptors are synthetic: frames along a road of landmarks, of which the next frame shows nine in ten again,
 /// moved; every view of a landmark has its own noise. They say what an index costs, and nothing about how well it finds
-/// places. Each index is built in a process of its own and asked in another, so that memory is that of one of them.
+/// places. Each index is built in a process of its own and queried in another, so that memory is that of one of them.
 #[derive(clap::Args)]
 pub struct Options {
     /// How many frames are indexed; several numbers show how the cost grows.
@@ -51,14 +51,14 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         .ok_or("a number of frames expected")?;
     match (&options.build, &options.ask) {
         (Some(path), _) => println!("{}", cells(built(path, frames, options)?)),
-        (_, Some(path)) => println!("{}", cells(asked(path, frames, options)?)),
+        (_, Some(path)) => println!("{}", cells(queried(path, frames, options)?)),
         _ => {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join("road");
             let row = |frames: &usize| {
-                let [built, asked] =
+                let [built, queried] =
                     ["--build", "--ask"].map(|what| alone(what, &path, *frames, options));
-                let cells = format!("{frames} {} {}", built?, asked?);
+                let cells = format!("{frames} {} {}", built?, queried?);
                 Ok(cells.split_whitespace().map(str::to_owned).collect())
             };
             let rows: Result<Vec<Vec<String>>, Failure> = options.frames.iter().map(row).collect();
@@ -131,7 +131,7 @@ fn built(path: &Path, frames: usize, options: &Options) -> Result<[f64; 6], Fail
     ])
 }
 
-fn asked(path: &Path, frames: usize, options: &Options) -> Result<[f64; 11], Failure> {
+fn queried(path: &Path, frames: usize, options: &Options) -> Result<[f64; 11], Failure> {
     let params = RetrievalParams::default();
     let started = Instant::now();
     let index = Index::open(path, params.checks)?;

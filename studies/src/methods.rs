@@ -62,7 +62,7 @@ pub struct Options {
     matrices: bool,
 }
 
-/// A method with its settings, as it was asked for.
+/// A method with its settings, as given.
 #[derive(Clone)]
 struct Asked {
     label: String,
@@ -95,7 +95,7 @@ struct Measured {
     method: usize,
     error: Option<PoseError>,
     seconds: f64,
-    /// Normalised mutual information of the true pose, the pose found, and shuffled pixels; asked of MI alone.
+    /// Normalised mutual information of the true pose, the pose found, and shuffled pixels; tested of MI alone.
     information: Option<[f64; 3]>,
 }
 
@@ -177,13 +177,13 @@ fn cells(words: &[String]) -> Result<Vec<[String; 2]>, Failure> {
 fn measure(cases: &[Case], options: &Options) -> Result<Vec<Measured>, Failure> {
     let mut measured = Vec::new();
     for case in cases {
-        for (method, asked) in options.method.iter().enumerate() {
+        for (method, tested) in options.method.iter().enumerate() {
             let problem = &case.problem;
             let started = Instant::now();
             let mut evidence = Evidence::default();
-            let estimator = estimator::entry(asked.method).make(&asked.params);
+            let estimator = estimator::entry(tested.method).make(&tested.params);
             let outcome = estimator.estimate(problem, &mut Trace::to(&mut evidence))?;
-            let subject = Subject::new(problem, asked.method, &asked.params, &outcome, &evidence);
+            let subject = Subject::new(problem, tested.method, &tested.params, &outcome, &evidence);
             let outcome = confidence::accepted(&subject, None);
             let seconds = started.elapsed().as_secs_f64();
             let error = outcome.pose.as_ref().ok();
@@ -193,13 +193,13 @@ fn measure(cases: &[Case], options: &Options) -> Result<Vec<Measured>, Failure> 
                 let costs = [at_truth, found.best, found.shuffled.unwrap_or(1.0)];
                 Some(costs.map(|cost| 1.0 - cost))
             };
-            let is_asked = options.matrices && asked.method == Method::MI;
+            let is_wanted = options.matrices && tested.method == Method::MI;
             measured.push(Measured {
                 rows: case.rows.clone(),
                 method,
                 error: error.map(|pose| PoseError::between(&case.truth, pose)),
                 seconds,
-                information: is_asked.then(information).flatten(),
+                information: is_wanted.then(information).flatten(),
             });
         }
     }
@@ -252,10 +252,10 @@ fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failur
         print_table(&columns, &rows.collect::<Vec<_>>());
     };
     let off = |one: &&Measured| one.error.map_or(f64::INFINITY, |error| error.translation_m);
-    for (method, asked) in options.method.iter().enumerate() {
+    for (method, tested) in options.method.iter().enumerate() {
         println!(
             "{}: poses within 10 m / 2 m / 1 m, and the median error of the poses found\n",
-            asked.label
+            tested.label
         );
         matrix(method, &|here| {
             let within = |limit| {
@@ -272,7 +272,7 @@ fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failur
     let Some(mi) = options
         .method
         .iter()
-        .position(|asked| asked.method == Method::MI)
+        .position(|tested| tested.method == Method::MI)
     else {
         return Ok(());
     };

@@ -57,15 +57,17 @@ fn result_files(place: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
             return Ok(BTreeMap::from([(String::new(), own)]));
         }
     }
-    let told = |error: &dyn std::fmt::Display| format!("{}: {error}", place.display());
-    let entries = fs::read_dir(place).map_err(|error| told(&error))?.flatten();
+    let error_of = |error: &dyn std::fmt::Display| format!("{}: {error}", place.display());
+    let entries = fs::read_dir(place)
+        .map_err(|error| error_of(&error))?
+        .flatten();
     let files = entries.map(|entry| (entry.file_name(), entry.path().join("results.jsonl")));
     let found: BTreeMap<String, PathBuf> = files
         .filter(|(_, file)| file.is_file())
         .map(|(name, file)| (name.to_string_lossy().into_owned(), file))
         .collect();
     if found.is_empty() {
-        return Err(told(&"no results.jsonl in it or one folder down").into());
+        return Err(error_of(&"no results.jsonl in it or one folder down").into());
     }
     Ok(found)
 }
@@ -75,12 +77,12 @@ fn read(file: &Path) -> Result<BTreeMap<String, Value>, Failure> {
     let text = fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
     let mut results = BTreeMap::new();
     for (index, line) in text.lines().enumerate() {
-        let told =
+        let error_of =
             |error: &dyn std::fmt::Display| format!("{}:{}: {error}", file.display(), index + 1);
-        let result: Value = serde_json::from_str(line).map_err(|error| told(&error))?;
+        let result: Value = serde_json::from_str(line).map_err(|error| error_of(&error))?;
         let name = identity(&result);
         if results.insert(name.clone(), result).is_some() {
-            return Err(told(&format!("a second result of {name}")).into());
+            return Err(error_of(&format!("a second result of {name}")).into());
         }
     }
     Ok(results)

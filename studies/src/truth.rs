@@ -28,18 +28,18 @@ impl Scene for Corrected {
 pub fn open(argument: &str, poses: Option<&Path>) -> Result<Box<dyn Scene>, Failure> {
     let scene = scene::open(argument, None)?;
     let Some(path) = poses else { return Ok(scene) };
-    let told = |line: &str, error: &str| format!("{}: {line}: {error}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|error| told("", &error.to_string()))?;
+    let error_at = |line: &str, error: &str| format!("{}: {line}: {error}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|error| error_at("", &error.to_string()))?;
     let mut poses = HashMap::new();
     for line in text.lines().filter(|line| !line.starts_with('#')) {
         let mut words = line.split_whitespace();
         let Some(name) = words.next() else { continue };
         let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
         if numbers.len() != 12 {
-            return Err(told(line, "a name and 12 numbers expected").into());
+            return Err(error_at(line, "a name and 12 numbers expected").into());
         }
         let pose = pose_from_matrix(&Matrix3x4::from_row_slice(&numbers));
-        let pose = pose.map_err(|error| told(line, &error.to_string()))?;
+        let pose = pose.map_err(|error| error_at(line, &error.to_string()))?;
         poses.extend([0, 6, 10].map(|width| (format!("{name:0>width$}"), pose)));
     }
     Ok(Box::new(Corrected { scene, poses }))

@@ -37,7 +37,7 @@ fn a_known_failure_turns_no_job_red_and_one_that_is_fixed_is_said() {
     let said = eval(&sequence, &format!("{gated} --out green")).ok();
     has(
         &said.out,
-        "1 known failure is left out of gates ~ 1 fb is right now; take it off",
+        "1 known failure is left out of gates ~ 1 fb no longer fails; remove",
     );
     let junit = sequence.text("green/junit.xml");
     assert_eq!(junit.matches("<skipped").count(), 1, "{junit}");
@@ -47,7 +47,7 @@ fn a_known_failure_turns_no_job_red_and_one_that_is_fixed_is_said() {
     write(&list, "2 fb R8\n");
     let said = eval(&sequence, &format!("{gated} --out other"));
     assert_eq!(said.code, Some(1));
-    has(&said.out, "2 fb has R2, not R8 as in");
+    has(&said.out, "2 fb fails with R2 instead of R8 in");
 
     write(&list, "2\n");
     let said = eval(&sequence, &format!("{gated} --out bad"));

@@ -54,17 +54,17 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
         --query 5 --reference best:1 | random:K, nearest:K
         --query 5 --radius=-1 | a positive number
         --query 5 --radius=1,2 | takes one value here
-        --query 5 --failure-radius=3 | --failure-radius is an option of
+        --query 5 --failure-radius=3 | --failure-radius has no effect here
         --query 5 --right 1,5 | --right
         --query 5 --min-confidence 1.5 | --min-confidence
         --query 5 --explain many | --explain
         --query 70 --degrade gama=0.4 | fog, blur, exposure, gamma, noise, invert expected
         --query 70 --degrade gamma=0.01 | `gamma` takes 0.05 … 10, not `0.01`
         --query 70 --degrade noise=8,noise=9 | `noise` is given twice
-        --query 70 --degrade '' | something such as gamma=0.4,noise=8,invert expected
-        --query 5 --estimates mi=poses.txt | mi is a method of ours
+        --query 70 --degrade '' | such as gamma=0.4,noise=8,invert
+        --query 5 --estimates mi=poses.txt | mi is a built-in method
         --query 5 --estimates poses.txt | NAME=FILE expected
-        --query 5 --estimates 'A B=poses.txt' | cannot name a method
+        --query 5 --estimates 'A B=poses.txt' | is not a possible name of a method
         --method mi | --query
     ";
     for row in table.lines().map(str::trim).filter(|row| !row.is_empty()) {
@@ -80,10 +80,10 @@ fn a_scene_is_opened_and_a_mistyped_command_gets_its_suggestion() {
     let sequence = SmallSequence::write();
     for (line, words) in [
         ("evla street", "did you mean `eval`?"),
-        ("nonsense", "no command, file or folder"),
+        ("nonsense", "not a command, file or folder"),
         (
             "sequences/42 --query 5 --limit 3",
-            "--limit is an option of `posescope eval`",
+            "--limit has no effect here; use it with `posescope eval`",
         ),
     ] {
         sequence.run(line).fails_with(2, words);
@@ -116,8 +116,8 @@ fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
     refused(
         sequence.path(),
         "
-        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name one
-        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name one
+        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
+        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
         ",
     );
     sequence

@@ -47,7 +47,7 @@ fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
         let line = "run sequences/42 --query 0 --query 3 --reference nearest:1 --radius 2";
         sequence.run(&format!("{line} --method pm,mi6 --compute {compute}"))
     };
-    let without = |said: &Said| said.err.matches("not on the graphics card").count();
+    let without = |said: &Said| said.err.matches("does not use the graphics card").count();
     let asked = run("gpu");
     if is_skipped(&asked) {
         return;
@@ -55,7 +55,7 @@ fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
     assert_eq!(without(&asked), 1, "{}", asked.err);
     has(
         &asked.err,
-        "mi6 searches on the processor, not on the graphics card: it compares three channels at once\n",
+        "mi6 does not use the graphics card: it compares three channels at once\n",
     );
     assert_eq!(without(&run("auto")), 0);
 }
@@ -64,7 +64,7 @@ fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
 fn without_a_card_who_asks_for_one_is_told_in_one_line_and_others_are_served() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
     let hidden = |compute| Said::by(command_in(sequence.path(), &eval(compute)).envs(NOWHERE));
-    hidden("gpu").fails_in_one_line(5, "no graphics card to compute on");
+    hidden("gpu").fails_in_one_line(5, "no graphics card found");
     assert!(!sequence.path().join("gpu").exists(), "nothing was begun");
     assert_eq!(hidden("auto").ok().err, "");
     assert!(sequence.path().join("auto/results.jsonl").is_file());
@@ -79,7 +79,7 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
     let said = sequence
         .run(&format!("{surface} --surface surface.csv"))
         .ok();
-    assert!(said.out.starts_with("least cost 0."), "{}", said.out);
+    assert!(said.out.starts_with("lowest cost 0."), "{}", said.out);
     has(&said.out, "from the truth");
     let table = sequence.text("surface.csv");
     let (head, rows) = table.split_once('\n').expect("a head");
@@ -95,7 +95,7 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
         "
         2 | {surface} --surface surface.txt | ends in .csv or .png
         2 | {line} --method mi --surface surface.csv | name them with --query and --reference
-        2 | {line} --method fb --surface surface.csv | searches no grid
+        2 | {line} --method fb --surface surface.csv | has no cost on a grid
         "
     );
     refused(sequence.path(), &table);

@@ -54,7 +54,7 @@ fn a_run_folder_says_what_was_degraded_and_goes_on_with_nothing_else() {
     let said = plain.run(&format!("{line} run --degrade gamma=2 --resume"));
     said.fails_with(
         2,
-        "`degrade = \"invert\"` there, `degrade = \"gamma=2\"` here",
+        "`degrade = \"invert\"` instead of `degrade = \"gamma=2\"`",
     );
 
     // Noise is the same on any number of threads, and another for another seed.

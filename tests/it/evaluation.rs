@@ -192,7 +192,7 @@ fn a_run_whose_description_lacks_a_parameter_goes_on_and_compares() {
     assert!(sequence.text("whole/results.jsonl") == sequence.text("old/results.jsonl"));
     sequence.run("compare whole old").ok();
     let said = sequence.run(&format!("{EVAL} old --resume --set fb.min_trials=7"));
-    said.fails(2, "asked for otherwise ~ min_trials = 7");
+    said.fails(2, "other settings ~ min_trials = 7");
 }
 
 #[test]
@@ -204,7 +204,7 @@ fn a_folder_with_something_else_in_it_is_left_alone() {
         2 | {EVAL} sequences | not empty ~ --out
         2 | {EVAL} sequences --resume | not empty ~ --out
         2 | {EVAL} run | not empty ~ --resume
-        2 | {EVAL} run --resume --failure-radius 7 | asked for otherwise ~ failure-radius = 7.0
+        2 | {EVAL} run --resume --failure-radius 7 | other settings ~ failure-radius = 7.0
         "
     );
     refused(sequence.path(), &table);
@@ -227,7 +227,7 @@ fn parts_that_do_not_make_a_whole_are_refused() {
         sequence.path(),
         "
         3 | eval merge --out merged one | in none of the parts
-        2 | eval merge --out merged one other | asked for otherwise
+        2 | eval merge --out merged one other | other settings
         3 | eval merge --out merged one two | 0 of 2 queries ~ --resume
         ",
     );
@@ -244,7 +244,7 @@ fn gates_and_regressions_decide_the_exit_code() {
         2 | {EVAL} wrong --gate 'success > 1' | --help
         1 | {EVAL} bad --right 0.000001m,5deg --baseline good | broken since
         1 | compare good bad | queries broke
-        3 | compare good nowhere | no run here
+        3 | compare good nowhere | not a run folder
         "
     );
     refused(sequence.path(), &table);
@@ -289,7 +289,7 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
         "
         2 | results run --as tum | several results ~ --where 'method = fb'
         2 | results run --where 'method = mi' --as colmap | cameras.txt ~ --out
-        2 | results partly --where 'method = mi' --as kitti | kitti ~ frame 0 is none of the queries
+        2 | results partly --where 'method = mi' --as kitti | kitti ~ frame 0 is not a query
         ",
     );
     sequence

@@ -148,7 +148,7 @@ fn a_file_that_cannot_be_written_is_told_before_anything_is_run() {
     // The folder of the run holds what a run holds.
     for (events, code, words) in [
         ("/no/such/folder/e.jsonl", 3, "/no/such/folder/e.jsonl: "),
-        ("run/events.jsonl", 2, "outside of the run folder"),
+        ("run/events.jsonl", 2, "outside the run folder"),
     ] {
         let line = "eval sequences/42 --query 5 --method fb -q --out run --events";
         sequence.run(&format!("{line} {events}")).fails(code, words);

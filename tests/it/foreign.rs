@@ -193,11 +193,11 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
         ("1 2 3\n", "poses.txt:1: TUM"),
         (
             "a.png 1 0 0 0 0 0 0\n",
-            "are called such as `000004`; here they are called such as `a.png`",
+            "with names like `000004`; the file has names like `a.png`",
         ),
         (
             "5 1 0 0 0 0 0 0\n5.png 1 0 0 0 0 0 0\n",
-            "poses.txt:2: frame 000005 has a pose already",
+            "poses.txt:2: one pose per frame expected, frame 000005",
         ),
         (
             "0.4 0 0 0 0 0 0 1\n0.5 0 0 0 0 0 9 1\n",
@@ -209,7 +209,7 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
         ),
         (
             "77.4 0 0 0 0 0 0 1\n",
-            "their times are 0.4 … 0.7, those of the poses 77.4",
+            "the frames' times are 0.4 … 0.7, the poses' times 77.4",
         ),
         (
             "1 0 0 0 0 1 0 0 0 0 1 x\n",

@@ -66,8 +66,8 @@ fn a_table_that_is_none_is_refused_in_one_line() {
     let scene: Arc<dyn Scene> = damage::open(sequence.folder()).into();
     for (text, words) in [
         ("", "none found"),
-        ("5 1 2 3\n", "gps.csv:1: a first line with the columns"),
-        ("name x y z\n", "a line per frame"),
+        ("5 1 2 3\n", "gps.csv:1: a header with the columns"),
+        ("name x y z\n", "one line per frame"),
         (
             "name x y z\n5 1 2\n",
             "gps.csv:2: 4 columns expected, 3 found",
@@ -76,15 +76,15 @@ fn a_table_that_is_none_is_refused_in_one_line() {
             "name x y z\n5 1 2 north\n",
             "gps.csv:2: a number expected, `north` found",
         ),
-        ("name x y z\nother 1 2 3\n", "called such as `000004`"),
+        ("name x y z\nother 1 2 3\n", "names like `000004`"),
         (
             "name x y z\n5 1 2 3\n000005.png 1 2 3\n",
-            "gps.csv:3: frame 000005 has a position already",
+            "gps.csv:3: one position per frame expected, frame 000005",
         ),
         ("name lat lon\n5 95 0\n", "gps.csv:2: a latitude"),
         (
             "name lat lon\n4 1 0\n5 2 0\n",
-            "gps.csv: 3 frames with a known pose",
+            "gps.csv: at least 3 frames with a known pose",
         ),
         (
             "name lat lon\n4 1 0\n5 1 0\n7 1 0\n",
@@ -111,7 +111,5 @@ fn an_evaluation_seeks_references_where_the_file_says_and_goes_on_with_the_same_
     let again = format!("{line} --resume");
     sequence.run(&again).ok();
     table(&sequence, "name x y z\n000005 0 0 6.9\n");
-    sequence
-        .run(&again)
-        .fails(2, "gps.csv ~ asked for otherwise");
+    sequence.run(&again).fails(2, "gps.csv ~ other settings");
 }

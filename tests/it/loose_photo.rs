@@ -99,7 +99,7 @@ fn what_is_no_photo_or_no_camera_of_it_is_told() {
         (
             vec![&path, &path],
             Some(CAMERA),
-            "IMG_1.png ~ a name of its own",
+            "IMG_1.png ~ photos with different names",
         ),
         (vec![&gone], Some(CAMERA), "gone.png"),
         (vec![&broken], Some(CAMERA), "broken.png"),

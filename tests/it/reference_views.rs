@@ -164,7 +164,7 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     assert!(matches!(state, RunState::Broken(_)), "{state:?}");
     assert!(is_said(
         &window,
-        "there is no retrieval index; `posescope index walls"
+        "the retrieval index does not exist; build it with `posescope index walls"
     ));
 
     index(&file, &Params::default());

@@ -71,7 +71,10 @@ fn results_are_chosen_sorted_and_counted() {
         .iter()
         .filter(|result| !result["error"].is_null())
         .count();
-    has(&said.err, &format!("1 of {measured} that meet it"));
+    has(
+        &said.err,
+        &format!("1 of {measured} that meet the condition"),
+    );
 }
 
 #[test]

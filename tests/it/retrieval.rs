@@ -82,19 +82,19 @@ fn an_index_that_cannot_be_used_is_named_with_the_command_that_builds_it() {
     let run = |line: &str| run_in(folder.path(), line);
     let file = folder.path().join("an.index");
     let command = "`posescope index street --out an.index`";
-    let missing = format!("there is no retrieval index ~ {command}");
+    let missing = format!("the retrieval index does not exist ~ {command}");
     run(RUN).fails_in_one_line(3, &missing);
 
     run(INDEX).ok();
     let whole = fs::read(&file).expect("just written");
-    let stale = "stale: it was made with surf.threshold = 500, not 600";
+    let stale = "stale: it was built with surf.threshold = 500 instead of 600";
     run(&format!("{RUN} --set surf.threshold=600")).fails_with(3, stale);
 
     let mut damaged = whole.clone();
     damaged[whole.len() / 2] ^= 1;
     write(&file, damaged);
     run(RUN).fails_with(3, &format!("is damaged ~ {command}"));
-    has(&run(INDEX).ok().err, "is damaged ~ building it again");
+    has(&run(INDEX).ok().err, "is damaged ~ rebuilding it");
     assert!(whole == fs::read(&file).expect("is there"), "other bytes");
 
     let letter = "a letter that must not be overwritten";

@@ -224,7 +224,7 @@ fn what_is_wrong_with_a_traversal_is_named() {
     damage::expect(
         write,
         r#"
-        sdk/models/stereo_narrow_left_distortion_lut.bin | cut 76700 | 76800 bytes, 100 found
+        sdk/models/stereo_narrow_left_distortion_lut.bin | cut 76700 | 76800 bytes ~ 100 bytes found
         sdk/models/stereo_narrow_left.txt | text 1 2 3 4\n0 0 1 0\n | stereo_narrow_left.txt ~ cut off
         sdk/extrinsics/ldmrs.txt | gone | extrinsics/ldmrs.txt
         drive/stereo.timestamps | text soon 1\n | stereo.timestamps:1 ~ `timestamp chunk`

@@ -337,15 +337,15 @@ fn what_is_wrong_with_a_description_is_named_with_its_line() {
         scene.toml | fy = 100.0\n ->  | scene.toml:5 ~ `fy`
         scene.toml | fx = 100.0 -> fx = -1 | scene.toml:5 ~ positive focal lengths
         scene.toml | fx = 100.0 -> fx = "wide" | scene.toml:6
-        scene.toml | photos/*.png -> photos/*.jpg | scene.toml:1 ~ names none
+        scene.toml | photos/*.png -> photos/*.jpg | scene.toml:1 ~ no file matches
         scene.toml | photos/*.png -> ../*.png | scene.toml:1 ~ scene's folder
         scene.toml | map.xyz -> /etc/passwd | scene.toml:3 ~ scene's folder
         scene.toml | map.xyz -> none.laz | scene.toml:3 ~ none.laz
-        scene.toml | cy = 31.5 -> cy = 31.5\nk1 = -9 | scene.toml:5 ~ undistorted
+        scene.toml | cy = 31.5 -> cy = 31.5\nk1 = -9 | scene.toml:5 ~ a distortion that can be removed
         scene.toml | [camera] -> clouds = { files = "*.xyz" }\n[camera] | scene.toml:3 ~ both found
         poses.txt | text  | poses.txt ~ none found
         poses.txt | text 1 2 3\n | poses.txt:1 ~ 8 numbers ~ 3 words found
-        poses.txt | text 1 0 0 0 0 1 0 0 0 0 1 0\n | poses.txt ~ 3 images ~ `img1`
+        poses.txt | text 1 0 0 0 0 1 0 0 0 0 1 0\n | poses.txt ~ one line per image expected (3) ~ `img1`
         poses.txt | text 5.0 0 0 0 0 0 0 1\n | poses.txt ~ img0 ~ between 5 and 5
         map.xyz | text 1 2 3\n1 2 x\n | map.xyz:2 ~ `x`
         map.xyz | text heading\n | map.xyz ~ none found

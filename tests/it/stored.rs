@@ -69,8 +69,8 @@ fn what_is_wrong_in_a_run_file_is_told_with_its_line() {
         method = ["fb", "mi"] | method = [] | method | at least one method
         random:2 | best:2 | reference | `best:2` is no choice of references
         r-wavg | mean | fusion | `mean` is no fusion; maxf, avg, wavg, r-wavg or joint expected
-        [2.0] | [-2.0] | radius | positive radius
-        scene_index = 0 | scene_index = 1 | scene_index | scene_index 1 names none of the 1 scenes
+        [2.0] | [-2.0] | radius | radius above 0
+        scene_index = 0 | scene_index = 1 | scene_index | a scene_index below 1 expected
         run/1 | run/9 | schema | posescope.run/1 expected
         seed = 1 | preset = "huge" | preset | `huge` is no preset; single, multi or large expected
         version = | shard = "3/2"\nversion = | shard | I/N expected

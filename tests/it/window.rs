@@ -303,7 +303,7 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
     run_until_idle(&mut window);
     let wrong = vec!["inlers < 3".to_owned()];
     send(&mut window, Command::SetBreakpoints(wrong));
-    assert!(is_said(&window, "`inlers` is none of"));
+    assert!(is_said(&window, "`inlers` is not one of"));
 }
 
 #[test]
@@ -514,7 +514,7 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
         ("\"mi\"", "\"mo\"", "`mo` is no method"),
         ("\"avg\"", "\"mean\"", "`mean` is no fusion"),
         ("matches:2", "best:2", "`best:2` is no choice of references"),
-        ("inliers <", "inlers <", "`inlers` is none of"),
+        ("inliers <", "inlers <", "`inlers` is not one of"),
         ("fb]\\nratio", "fb]\\nratoi", "`fb.ratoi`"),
         ("\"radius\"", "\"radios\"", "unknown field `radios`"),
     ] {

@@ -21,16 +21,16 @@ use crate::describe::parameters;
 use crate::geometry::Pose;
 
 parameters! {
-    /// How `pm.search=descent` and `mi.search=descent` go down.
+    /// Parameters of `pm.search=descent` and `mi.search=descent`.
     #[derive(Clone, Debug, PartialEq)]
     pub struct DescentParams {
-        /// Copies of the photos, each twice as coarse as the one after it.
+        /// Number of pyramid levels, each half the size of the next finer one.
         pub levels: usize = count("levels", "", 1..=8),
         /// Standard deviation of the Gaussian that smooths both photos on the finest level.
         pub sigma_px: f64 = number("sigma", "px", 0.3..=20.0),
-        /// Steps on a level at most.
+        /// Most steps per level.
         pub most_steps: usize = count("steps", "", 1..=1000),
-        /// Points of the cloud that are compared at most, evenly drawn.
+        /// Most points of the cloud, evenly sampled.
         pub most_points: usize = count("points", "", 50..=1_000_000),
     }
 }

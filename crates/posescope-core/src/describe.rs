@@ -123,7 +123,7 @@ pub struct Described {
 #[non_exhaustive]
 pub enum ParamError {
     /// No parameter has this key.
-    #[error("there is no parameter `{key}`{}; `posescope params` lists all", hint(.nearest))]
+    #[error("`{key}` is not a parameter{}; `posescope params` lists all", hint(.nearest))]
     Unknown {
         /// The key as given.
         key: String,
@@ -288,7 +288,7 @@ macro_rules! parameters {
         $visibility:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])*
-                $field_visibility:vis $field:ident: $type:ty = $kind:ident $said:tt
+                $field_visibility:vis $field:ident: $type:ty = $kind:ident $arguments:tt
             ),* $(,)?
         }
     ) => {
@@ -296,7 +296,7 @@ macro_rules! parameters {
         $visibility struct $name {
             $(
                 $(#[doc = $doc])*
-                #[doc = $crate::describe::parameters!(@doc $kind $said)]
+                #[doc = $crate::describe::parameters!(@doc $kind $arguments)]
                 $field_visibility $field: $type,
             )*
         }
@@ -305,7 +305,7 @@ macro_rules! parameters {
             fn visit(&mut self, visitor: &mut dyn $crate::describe::ParamVisitor) {
                 $(
                     $crate::describe::parameters!(
-                        @show $kind $said, visitor, &mut self.$field, concat!($($doc, "\n"),*)
+                        @show $kind $arguments, visitor, &mut self.$field, concat!($($doc, "\n"),*)
                     );
                 )*
             }
@@ -318,9 +318,9 @@ macro_rules! parameters {
         }
     };
 
-    (@doc number $said:tt) => { $crate::describe::parameters!(@range $said) };
-    (@doc count $said:tt) => { $crate::describe::parameters!(@range $said) };
-    (@doc $kind:ident $said:tt) => { "" };
+    (@doc number $arguments:tt) => { $crate::describe::parameters!(@range $arguments) };
+    (@doc count $arguments:tt) => { $crate::describe::parameters!(@range $arguments) };
+    (@doc $kind:ident $arguments:tt) => { "" };
     (@range ($key:literal, "", $range:expr)) => {
         concat!("\n`", stringify!($range), "`")
     };

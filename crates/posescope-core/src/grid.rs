@@ -40,9 +40,9 @@ parameters! {
         pub yaw_fine_range_deg: f64 = number("yaw_fine_range", "°", 0.0..=45.0),
         /// Step of the fine yaw angles.
         pub yaw_fine_step_deg: f64 = number("yaw_fine_step", "°", 0.01..=10.0),
-        /// How often position and yaw are searched, one after the other; the paper does it once.
+        /// Rounds of searching position, then yaw; the paper has one.
         pub rounds: usize = count("rounds", "", 1..=10),
-        /// Least coverage of a hypothesis that has a say, as a share of the pixels covered at the
+        /// Least coverage of an eligible hypothesis, as a share of the pixels covered at the
         /// reference pose.
         ///
         /// Fewer pixels make lower costs: without a floor both costs have their global minimum where

@@ -18,7 +18,7 @@ pub use result::{
     SCHEMA, Setting, Status, evaluate,
 };
 pub use select::{
-    ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, tell_ranking,
+    ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, report_ranking,
 };
 pub use single::{localize, localize_by, localize_jointly, localize_traced, words_of};
 pub use timing::{StageTimes, StageTimings};

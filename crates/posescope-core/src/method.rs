@@ -106,7 +106,7 @@ const LONGEST_NAME: usize = 24;
 /// What is no name of a method.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` cannot name a method: lower-case letters, digits and -_.+ expected, a letter first, \
+    "`{0}` is not a possible name of a method: lower-case letters, digits and -_.+ expected, a letter first, \
      {LONGEST_NAME} at most"
 )]
 pub struct MethodNameError(String);

@@ -137,7 +137,7 @@ impl Params {
         for (group, entries) in &table {
             let Some(entries) = entries.as_table() else {
                 return Err(ParamError::Syntax(format!(
-                    "`{group}` stands outside a group; parameters live in tables such as [fb]"
+                    "`{group}` is outside a group; parameters belong to tables such as [fb]"
                 )));
             };
             for (name, value) in entries {
@@ -257,7 +257,7 @@ mod tests {
         );
         assert_eq!(
             message(params.assign("fb.ratoi=0.7")),
-            "there is no parameter `fb.ratoi` (did you mean `fb.ratio`?); `posescope params` lists all"
+            "`fb.ratoi` is not a parameter (did you mean `fb.ratio`?); `posescope params` lists all"
         );
         assert_eq!(
             message(params.assign("fb.accept=never")),

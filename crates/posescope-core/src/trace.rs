@@ -197,9 +197,9 @@ impl<'a> Trace<'a> {
         }
         let outcome = body(self);
         if let Some(observer) = &mut self.observer {
-            let told = observer.end_stage(stage, outcome.is_ok(), around);
+            let delivered = observer.end_stage(stage, outcome.is_ok(), around);
             if outcome.is_ok() {
-                told?;
+                delivered?;
             }
         }
         outcome
@@ -223,8 +223,8 @@ impl<'a> Trace<'a> {
         let mut both = Fanout::new(vec![second, &mut onward]);
         let mut inner = Trace::new(&mut both, attention);
         let outcome = body(&mut inner);
-        let told = inner.observer.map_or(0, |inner| inner.next);
-        observer.next = first + told;
+        let emitted = inner.observer.map_or(0, |inner| inner.next);
+        observer.next = first + emitted;
         outcome
     }
 }
@@ -298,10 +298,10 @@ impl Observer<'_> {
             succeeded,
             reused: std::mem::take(&mut self.reused),
         };
-        let told = self.deliver(ended.into());
+        let delivered = self.deliver(ended.into());
         self.depth -= 1;
         self.methods.truncate(around);
-        told
+        delivered
     }
 
     fn deliver(&mut self, event: Event) -> Result<(), Cancelled> {

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             .num_threads(threads.parse()?)
             .build_global()?;
     }
-    let gpu = Arc::new(Gpu::asked_for()?);
+    let gpu = Arc::new(Gpu::requested()?);
     let card = gpu.name().unwrap_or_default();
     println!("card: {card}; threads: {}", rayon::current_num_threads());
     println!("points   cost  hypotheses     threads/s        card/s   card : threads");

@@ -24,7 +24,7 @@ pub(crate) fn choose(software_will_do: bool) -> Result<wgpu::Adapter, GpuError> 
         .into_iter()
         .min_by_key(|adapter| rank(adapter.get_info().device_type))
         .ok_or_else(|| {
-            GpuError::NoAdapter("no driver for Vulkan, Metal or Direct3D 12 has one".to_owned())
+            GpuError::NoAdapter("no driver for Vulkan, Metal or Direct3D 12 offers one".to_owned())
         })?;
     let info = chosen.get_info();
     let name = described(&info);
@@ -32,7 +32,9 @@ pub(crate) fn choose(software_will_do: bool) -> Result<wgpu::Adapter, GpuError> 
         if !software_will_do {
             return Err(GpuError::OnlySoftware(name));
         }
-        log::warn!("no graphics card; {name} plays one, which is slower than the processor itself");
+        log::warn!(
+            "no graphics card found; using the software emulation {name}, which is slower than --compute cpu"
+        );
     }
     match lacking(&chosen.limits()) {
         Some(what) => Err(GpuError::TooSmall { name, what }),
@@ -40,7 +42,7 @@ pub(crate) fn choose(software_will_do: bool) -> Result<wgpu::Adapter, GpuError> 
     }
 }
 
-/// The lowest is taken, of equals the first.
+/// The rank of a kind; the lowest is chosen, the first of equals.
 fn rank(kind: DeviceType) -> u8 {
     match kind {
         DeviceType::DiscreteGpu => 0,
@@ -51,12 +53,12 @@ fn rank(kind: DeviceType) -> u8 {
     }
 }
 
-/// The card and how it is driven: `NVIDIA H200 (Vulkan)`.
+/// The card and its API: `NVIDIA H200 (Vulkan)`.
 pub(crate) fn described(info: &AdapterInfo) -> String {
     format!("{} ({:?})", info.name, info.backend)
 }
 
-/// What the shaders need and a card has not.
+/// A requirement of the shaders that a card does not meet.
 fn lacking(limits: &Limits) -> Option<String> {
     let needed = [
         (
@@ -70,13 +72,13 @@ fn lacking(limits: &Limits) -> Option<String> {
             limits.max_storage_buffers_per_shader_stage,
         ),
         (
-            "bytes that a workgroup shares",
+            "bytes of workgroup memory",
             SHARED,
             limits.max_compute_workgroup_storage_size,
         ),
     ];
     let missing = needed.into_iter().find(|(_, needed, there)| there < needed);
-    missing.map(|(what, needed, there)| format!("{needed} {what} are needed, it has {there}"))
+    missing.map(|(what, needed, there)| format!("{needed} {what} needed, {there} available"))
 }
 
 #[cfg(test)]
@@ -94,7 +96,7 @@ mod tests {
         };
         assert_eq!(
             lacking(&small).as_deref(),
-            Some("8 buffers in a shader are needed, it has 4")
+            Some("8 buffers in a shader needed, 4 available")
         );
     }
 }

@@ -113,18 +113,18 @@ impl Card {
         let bytes = 4 * words as u64;
         encoder.copy_buffer_to_buffer(from, 0, staging, 0, bytes);
         let submitted = self.queue.submit([encoder.finish()]);
-        let (tell, told) = mpsc::channel();
+        let (sender, receiver) = mpsc::channel();
         let answer = staging.slice(..bytes);
         answer.map_async(wgpu::MapMode::Read, move |mapped| {
-            // Nobody listens any more where the card was lost meanwhile.
-            let _ = tell.send(mapped);
+            // Fails only if the card was lost meanwhile.
+            let _ = sender.send(mapped);
         });
         let wait = wgpu::PollType::Wait {
             submission_index: Some(submitted),
             timeout: Some(PATIENCE),
         };
         self.device.poll(wait).map_err(|why| self.lost(&why)).ok()?;
-        let mapped = told.recv().map_err(|why| self.lost(&why)).ok()?;
+        let mapped = receiver.recv().map_err(|why| self.lost(&why)).ok()?;
         mapped.map_err(|why| self.lost(&why)).ok()?;
         let view = answer
             .get_mapped_range()
@@ -166,7 +166,7 @@ fn watch(device: &wgpu::Device, name: &str, failure: &Arc<Mutex<Option<GpuError>
 fn remember(failure: &Mutex<Option<GpuError>>, why: GpuError) {
     let mut failure = lock(failure);
     if failure.is_none() {
-        log::warn!("{why}; the processor goes on");
+        log::warn!("{why}; continuing on the processor");
         *failure = Some(why);
     }
 }

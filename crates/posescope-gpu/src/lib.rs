@@ -1,19 +1,18 @@
 //! The grid search of posescope on a graphics card.
 //!
-//! [`Gpu`] is a [`Device`] of the core: it draws the points of a cloud for a batch of hypotheses, tells
-//! which of them are seen, and answers with whole numbers, from which the core makes the same costs as
-//! from its own. That they are the same to the last bit is no luck:
+//! [`Gpu`] is a [`Device`] of the core. It draws the points of a cloud for a batch of hypotheses, finds the
+//! visible points and returns integers, from which the core computes the same costs as from its own. They are
+//! equal to the last bit because:
 //!
-//! - A pixel and a depth come from sums and products that are rounded one by one, as the processor rounds
-//!   them: nothing that a compiler may fuse stands beside each other. The quotient, which cards may round
-//!   as they like, is corrected in whole numbers (`shaders/project.wgsl`).
-//! - Depths are compared as whole numbers by atomic maxima, and of two points at the same depth the first
-//!   one is seen, so that no order of threads has a part in what is drawn (`shaders/draw.wgsl`).
+//! - Pixels and depths are sums and products that are rounded one by one, as on the processor. The order of operations leaves a
+//!   compiler nothing to fuse. The quotient, which cards may round freely, is corrected in integers (`shaders/project.wgsl`).
+//! - Depths are compared as integers by atomic maxima. The first of two points at the same depth is visible, so the result does not
+//!   depend on the order of threads (`shaders/draw.wgsl`).
 //! - Histograms are counts, and so are the errors of the photometric cost, in units of 2⁻¹⁶
 //!   (`shaders/counts.wgsl`, `shaders/half.wgsl`).
 //!
-//! A card is asked a few thousand questions with known answers before it is trusted, and the core scores
-//! some of each batch on its own threads.
+//! A card must pass a test of a few thousand known answers before it is used, and the core checks some hypotheses
+//! of each batch on the processor.
 
 mod adapter;
 mod card;
@@ -36,40 +35,38 @@ use loaded::OnCard;
 
 pub use failure::GpuError;
 
-/// Hypotheses that are worth waking a card for, where nobody asked for it.
-const LEAST_UNASKED: usize = 1024;
-/// Hypotheses that are worth handing over, where somebody asked for the card.
-const LEAST_ASKED: usize = 16;
+/// The fewest hypotheses for which a card is used automatically.
+const LEAST_AUTOMATIC: usize = 1024;
+/// The fewest hypotheses for which a requested card is used.
+const LEAST_REQUESTED: usize = 16;
 
-/// A graphics card that scores hypotheses, found when it is first needed.
+/// A graphics card that scores hypotheses, opened on first use.
 pub struct Gpu {
     engine: OnceLock<Result<Arc<Engine>, GpuError>>,
-    is_asked_for: bool,
-    /// Methods of which was said that they do without the card.
+    is_requested: bool,
+    /// Methods that were reported not to use the card.
     left_out: Mutex<BTreeSet<Method>>,
 }
 
 impl Gpu {
-    /// A card of this computer, for searches of some thousand hypotheses; it is looked for when the first
-    /// of them comes. Software that plays a card is none.
+    /// A card of this computer for large searches, opened on the first of them. Software emulations are not used.
     pub fn if_any() -> Self {
         Self {
             engine: OnceLock::new(),
-            is_asked_for: false,
+            is_requested: false,
             left_out: Mutex::default(),
         }
     }
 
-    /// A card of this computer, or where there is none, software that plays one, which is said as a
-    /// warning.
+    /// A card of this computer, or a software emulation with a warning.
     ///
     /// # Errors
-    /// [`GpuError`]: there is neither, or it computes otherwise than the processor.
-    pub fn asked_for() -> Result<Self, GpuError> {
+    /// [`GpuError`]: there is neither, or its results differ from the processor's.
+    pub fn requested() -> Result<Self, GpuError> {
         let engine = Engine::open(true)?;
         Ok(Self {
             engine: OnceLock::from(Ok(Arc::new(engine))),
-            is_asked_for: true,
+            is_requested: true,
             left_out: Mutex::default(),
         })
     }
@@ -112,10 +109,10 @@ impl fmt::Debug for Gpu {
 
 impl Device for Gpu {
     fn batch(&self, hypotheses: usize) -> Option<usize> {
-        let least = if self.is_asked_for {
-            LEAST_ASKED
+        let least = if self.is_requested {
+            LEAST_REQUESTED
         } else {
-            LEAST_UNASKED
+            LEAST_AUTOMATIC
         };
         if hypotheses < least {
             return None;
@@ -142,10 +139,10 @@ impl Device for Gpu {
     }
 
     fn left_out(&self, method: Method, why: &str) {
-        let mut told = self.left_out.lock().unwrap_or_else(PoisonError::into_inner);
-        // Once, and not for each of a thousand queries.
-        if self.is_asked_for && told.insert(method) {
-            log::warn!("{method} searches on the processor, not on the graphics card: it {why}");
+        let mut reported = self.left_out.lock().unwrap_or_else(PoisonError::into_inner);
+        // Once, not for every query.
+        if self.is_requested && reported.insert(method) {
+            log::warn!("{method} does not use the graphics card: it {why}");
         }
     }
 }

@@ -43,12 +43,12 @@ impl OnCard {
         let count = workload.points.len();
         let most_bytes = card.limits.max_storage_buffer_binding_size;
         if count >= MOST_POINTS || 16 * count as u64 > most_bytes {
-            return Err(too_small(format!("{count} points do not fit into it")));
+            return Err(too_small(format!("{count} points do not fit")));
         }
         let (kernel, value): (_, &dyn Fn(f32) -> u32) = match workload.tallying {
             Tallying::Counts { bins, .. } if bins > MOST_BINS => {
                 return Err(too_small(format!(
-                    "a joint histogram of {bins} × {bins} bins does not fit into it, at most \
+                    "a joint histogram of {bins} × {bins} bins does not fit, at most \
                      {MOST_BINS} × {MOST_BINS} do"
                 )));
             }

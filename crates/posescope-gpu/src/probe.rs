@@ -25,7 +25,7 @@ struct Question {
 /// Whether the card gives the processor's numbers.
 pub(crate) fn is_exact(card: &Card, kernels: &Kernels) -> bool {
     let questions = questions();
-    let Some(answers) = asked(card, kernels, &questions) else {
+    let Some(answers) = answers_to(card, kernels, &questions) else {
         return false;
     };
     questions
@@ -107,7 +107,7 @@ impl Question {
     }
 }
 
-fn asked(card: &Card, kernels: &Kernels, questions: &[Question]) -> Option<Vec<u32>> {
+fn answers_to(card: &Card, kernels: &Kernels, questions: &[Question]) -> Option<Vec<u32>> {
     let storage = BufferUsages::STORAGE;
     let filled = |content: &[u8]| card.filled("probe", content, storage);
     let points: Vec<[u32; 4]> = questions

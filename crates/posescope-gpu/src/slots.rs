@@ -118,7 +118,7 @@ impl Drawing {
         }
         Err(GpuError::TooSmall {
             name: card.name().to_owned(),
-            what: format!("a query of {pixels} pixels does not fit into it"),
+            what: format!("a query of {pixels} pixels does not fit"),
         })
     }
 

@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 
 /// The card of all tests, or `None` after it was said that there is none.
 fn gpu() -> Option<Arc<Gpu>> {
-    match Gpu::asked_for() {
+    match Gpu::requested() {
         Ok(gpu) => Some(Arc::new(gpu)),
         Err(why @ GpuError::NoAdapter(_)) => {
             println!("skipped: {why}");

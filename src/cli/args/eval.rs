@@ -23,10 +23,10 @@ pub struct EvalArgs {
     pub protocol: Given,
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// Repeat at each value of a parameter or of a step of --degrade
+    /// Repeat the run at each value of a parameter or of a --degrade step
     ///
-    /// Each value has its own folder below --out; a table has success and error over them: gamma=0.2:1:0.1,
-    /// fb.ratio=0.5:0.9:0.05.
+    /// Each value gets its own folder below --out, and a table shows success and error over the values. For
+    /// example gamma=0.2:1:0.1 or fb.ratio=0.5:0.9:0.05.
     #[arg(
         long,
         value_name = "PARAM=FROM:TO:STEP",
@@ -36,16 +36,16 @@ pub struct EvalArgs {
     pub sweep: Option<Sweep>,
     #[command(flatten)]
     pub judging: JudgingArgs,
-    /// The run folder [default: below runs/, named after what is asked]
+    /// The run folder [default: below runs/, named after scenes and options]
     #[arg(long, help_heading = "Output", value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write every event as JSON, one object per line
     ///
-    /// With --resume they are appended to the file.
+    /// With --resume, events are appended to the file.
     #[arg(long, value_name = "FILE.jsonl")]
     #[arg(help_heading = "Output", hide_short_help = true)]
     pub events: Option<PathBuf>,
-    /// Continue the run in the folder
+    /// Continue the run in the folder --out
     #[arg(long, help_heading = "Runs")]
     pub resume: bool,
     /// Run part I of N; `posescope eval merge` puts the parts together
@@ -82,19 +82,19 @@ pub struct MergeArgs {
     pub judging: JudgingArgs,
 }
 
-/// What a run is measured by, and which of its failures are recorded.
+/// How a run is judged, and which of its failures are recorded.
 #[derive(Clone, Debug, Args)]
 pub struct JudgingArgs {
     /// Exit with code 1 unless this holds; repeatable
     ///
-    /// "right@mi >= 0.9", "recall@0.5m,5deg@fb >= 0.8", "share(D3)@mi <= 0.05", "median(confidence)@fb >= 0.9", "median(time)@mi <=
-    /// 2" [s], the paper's "success@mi >= 0.9".
+    /// "right@mi >= 0.9", "recall@0.5m,5deg@fb >= 0.8", "share(D3)@mi <= 0.05", "median(confidence)@fb >= 0.9",
+    /// "median(time)@mi <= 2" [s], the paper's "success@mi >= 0.9".
     #[arg(long, help_heading = "Judging", value_name = "EXPR")]
     pub gate: Vec<Gate>,
-    /// Failures that gates and --baseline leave out
+    /// A list of failures that gates and --baseline ignore
     ///
-    /// `QUERY METHOD` or `QUERY METHOD CODE` in each line; # starts a comment. Entries that are right now are
-    /// reported.
+    /// One entry per line, `QUERY METHOD` or `QUERY METHOD CODE`; # starts a comment. Entries that no longer fail
+    /// are reported.
     #[arg(long, value_name = "FILE")]
     #[arg(help_heading = "Judging", hide_short_help = true)]
     pub known_failures: Option<PathBuf>,
@@ -108,10 +108,10 @@ pub struct JudgingArgs {
 }
 
 impl JudgingArgs {
-    /// How many failures are recorded where no number is given.
+    /// Recorded failures by default.
     const KEPT: usize = 20;
 
-    /// How many failures are recorded.
+    /// The number of failures to record.
     pub fn kept_failures(&self) -> usize {
         self.keep_failures.unwrap_or(Self::KEPT)
     }

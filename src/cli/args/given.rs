@@ -1,11 +1,11 @@
-//! Options of a struct, as far as they were given.
+//! The options of a protocol that were given on the command line.
 
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use posescope::run::Protocol;
 
 use crate::cli::failure::CliError;
 
-/// The options of a protocol, to be laid over another protocol.
+/// The given options of a protocol, which override another protocol.
 #[derive(Clone, Debug)]
 pub struct Given(ArgMatches);
 
@@ -31,7 +31,7 @@ impl Args for Given {
 }
 
 impl Given {
-    /// What was given, and `defaults` for the rest.
+    /// The given options, and `defaults` for the rest.
     pub fn over(&self, defaults: Protocol) -> Result<Protocol, CliError> {
         let mut protocol = defaults;
         let updated = protocol.update_from_arg_matches(&self.0);

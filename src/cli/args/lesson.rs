@@ -6,7 +6,7 @@ use clap::Args;
 
 #[derive(Debug, Args)]
 pub struct LessonArgs {
-    /// A lesson by its name or file; without it, all are listed
+    /// The name or the file of a lesson; without it, all lessons are listed
     #[arg(value_name = "NAME|FILE.md")]
     pub name: Option<String>,
     /// Save the lesson as a Rerun recording instead of opening the window

@@ -1,40 +1,34 @@
-//! The arguments of what reads run folders: `results` and `compare`.
+//! The arguments of the commands that read run folders: `results` and `compare`.
 
 use std::path::PathBuf;
 
-use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use clap::{Args, ValueEnum};
 use posescope::diagnosis::{Code, Tolerance};
-use posescope::measure::{Condition, Field, Order, Plot, TableName};
+use posescope::measure::{Condition, Field, Format, Order, Plot, TableName};
 
 #[derive(Debug, Args)]
 pub struct ResultsArgs {
     /// The run folder
     pub run: PathBuf,
-    /// Only results that meet this, for example "method = mi and code = D1 and coverage < 0.1"; --help
-    /// lists the fields
+    /// Only results that meet this condition, for example "method = mi and code = D1"; --help lists the
+    /// fields
     #[arg(long = "where", value_name = "CONDITION", long_help = conditions())]
     pub condition: Option<Condition>,
-    /// Sort by a field; -FIELD for the greatest first
+    /// Sort by a field; -FIELD puts the greatest first
     #[arg(long, value_name = "FIELD", allow_hyphen_values = true)]
     pub sort: Option<Order>,
-    /// The fields to show [default: a few; in files all]
+    /// The fields to show [default: a few; all in files]
     #[arg(long, value_name = "FIELDS", value_delimiter = ',', value_parser = field)]
     pub columns: Vec<&'static Field>,
-    /// At most N rows
+    /// Show at most N rows
     #[arg(long, value_name = "N")]
     pub rows: Option<usize>,
-    /// text, json, csv, markdown, latex, html, or poses: tum, kitti, colmap, vloc
+    /// The form: text, json, csv, markdown, latex, html, or poses as tum, kitti, colmap, vloc
     ///
-    /// json: the lines of results.jsonl. html: the report. vloc: the form of visuallocalization.net.
-    #[arg(
-        long = "as",
-        value_name = "FORM",
-        default_value = "text",
-        value_parser = PossibleValuesParser::new(Form::NAMES).map(|name: String| Form::named(&name))
-    )]
+    /// json prints lines of results.jsonl, html writes the report, vloc is the format of visuallocalization.net.
+    #[arg(long = "as", value_name = "FORM", value_enum, default_value = "text")]
     pub form: Form,
-    /// Which table: rows, summary, verdicts, or paper:1 … paper:6
+    /// The table: rows, summary, verdicts, or paper:1 … paper:6
     #[arg(long, value_name = "TABLE", value_enum, default_value = "rows")]
     pub table: TableName,
     /// Draw a figure as SVG: errors, verdicts, success, recall, causes, basin or margin
@@ -45,26 +39,26 @@ pub struct ResultsArgs {
         conflicts_with_all = ["condition", "sort", "columns", "rows"]
     )]
     pub plot: Option<Plot>,
-    /// The file to write, for colmap a folder [default: stdout]
+    /// The file to write, or the folder for colmap [default: stdout]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// What a right pose is [default: as in the run]
+    /// The largest error of a right pose [default: as in the run]
     #[arg(long, value_name = "METRES,DEGREES")]
     pub right: Option<Tolerance>,
 }
 
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// The run before
+    /// The earlier run
     #[arg(value_name = "RUN_A")]
     pub before: PathBuf,
-    /// The run after
+    /// The later run
     #[arg(value_name = "RUN_B")]
     pub after: PathBuf,
-    /// Ignore changes of a pose up to this
+    /// Ignore changes of a pose's error up to this
     #[arg(long, value_name = "METRES,DEGREES", default_value = "0.1m,0.5deg")]
     pub tolerance: Tolerance,
-    /// Write the report of the second run, with the first beside it
+    /// Write the report of RUN_B with its changes since RUN_A
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
     /// Save a recording with both runs on the same timelines
@@ -73,7 +67,7 @@ pub struct CompareArgs {
 }
 
 /// The form of results.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Form {
     Text,
     Json,
@@ -81,23 +75,21 @@ pub enum Form {
     Markdown,
     Latex,
     Html,
-    /// Poses, in a format of another program.
-    Poses(posescope::measure::Format),
+    Tum,
+    Kitti,
+    Colmap,
+    Vloc,
 }
 
 impl Form {
-    const NAMES: [&'static str; 10] = [
-        "text", "json", "csv", "markdown", "latex", "html", "tum", "kitti", "colmap", "vloc",
-    ];
-
-    fn named(name: &str) -> Self {
-        match name {
-            "json" => Self::Json,
-            "csv" => Self::Csv,
-            "markdown" => Self::Markdown,
-            "latex" => Self::Latex,
-            "html" => Self::Html,
-            other => posescope::measure::Format::from_name(other).map_or(Self::Text, Self::Poses),
+    /// The format of poses, if it is one.
+    pub fn poses(self) -> Option<Format> {
+        match self {
+            Self::Tum => Some(Format::Tum),
+            Self::Kitti => Some(Format::Kitti),
+            Self::Colmap => Some(Format::Colmap),
+            Self::Vloc => Some(Format::Vloc),
+            _ => None,
         }
     }
 }
@@ -112,9 +104,9 @@ fn conditions() -> String {
     let codes = Code::all().into_iter();
     let codes = codes.map(|code| format!("\n- {code}: {}", code.title()));
     format!(
-        "Only results that meet this, for example \"method = mi and code = D1 and coverage < 0.1\".\n\n\
-         FIELD RELATION VALUE, joined by and, or, not and parentheses. Relations: = != < <= > >=, and ~ \
-         for words that contain others. Fields:{}\n\nCodes:{}",
+        "Only results that meet this condition, for example \"method = mi and code = D1 and coverage < 0.1\".\n\n\
+         Write FIELD RELATION VALUE, joined by and, or, not and parentheses. Relations: = != < <= > >=, and ~ \
+          for text that contains the value. Fields:{}\n\nCodes:{}",
         fields.collect::<String>(),
         codes.collect::<String>()
     )

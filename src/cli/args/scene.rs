@@ -1,4 +1,4 @@
-//! The arguments of what takes a scene as a whole: `doctor`, `index` and `synth`.
+//! The arguments of the commands on whole scenes: `doctor`, `index` and `synth`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -12,12 +12,12 @@ use super::ConfigArgs;
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
-    /// Where to write: DIR/CONDITION, or in the layout kitti DIR/sequences/CONDITION and
+    /// The folder to write to: DIR/CONDITION, or for the layout kitti DIR/sequences/CONDITION and
     /// DIR/poses/CONDITION.txt
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// The layout, by the name of the scene format that reads it. tum holds depths up to 13 m only;
-    /// colmap has some of each scan's points
+    /// The layout, named after the scene format that reads it. tum stores depths up to 13 m only;
+    /// colmap stores some of each scan's points
     #[arg(
         long,
         value_name = "NAME",
@@ -33,13 +33,13 @@ pub struct SynthArgs {
             .try_map(|name: String| Street::size(&name).ok_or("a size expected"))
     )]
     pub size: Size,
-    /// Write every Nth frame only; frames keep their numbers, poses and times stay complete
+    /// Write only every Nth frame; frames keep their numbers, poses and times stay complete
     #[arg(long, value_name = "N", default_value = "1")]
     pub every: NonZeroUsize,
-    /// Write this traversal only; repeatable
+    /// Write only this traversal; repeatable
     #[arg(long, value_parser = PossibleValuesParser::new(Street::conditions()))]
     pub condition: Vec<String>,
-    /// Write into a folder that is not empty, replacing sequences of the same names
+    /// Write into a folder that is not empty and replace its sequences of the same name
     #[arg(long)]
     pub force: bool,
 }
@@ -49,13 +49,13 @@ pub struct DoctorArgs {
     /// The scenes, as for `run`
     #[arg(value_name = "SCENE", required = true)]
     pub scenes: Vec<String>,
-    /// The format of the scenes, where their content does not tell
+    /// The format of the scenes [default: detected]
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
-    /// Save a picture: the cloud of a frame on its photo, and the route
+    /// Save a picture of the cloud of a frame on its photo, and of the route
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
-    /// Save a recording of the frames that were compared
+    /// Save a recording of the compared frames
     #[arg(long, value_name = "FILE.rrd")]
     pub save: Option<PathBuf>,
 }
@@ -64,15 +64,15 @@ pub struct DoctorArgs {
 pub struct IndexArgs {
     /// The scene, as for `run`
     pub scene: String,
-    /// The format of the scene, where its content does not tell
+    /// The format of the scene [default: detected]
     #[arg(long, value_name = "NAME")]
     pub format: Option<String>,
-    /// Index every Nth frame only
+    /// Index only every Nth frame
     #[arg(long, value_name = "N", default_value = "1")]
     pub every: NonZeroUsize,
-    /// Leave out a frame, or the queries of a run folder; repeatable
+    /// Leave out a frame, or all queries of a run folder; repeatable
     ///
-    /// Use this where queries and index are of the same drive: retrieval would find the query itself.
+    /// Use this if queries and index come from the same drive; otherwise retrieval finds the query itself.
     #[arg(long, value_name = "FRAME|RUN")]
     pub without: Vec<String>,
     /// The file to write [default: in the user's cache directory, where `run` finds it]
@@ -81,7 +81,7 @@ pub struct IndexArgs {
     /// The seed of every random choice
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Build the index even if it is up to date, and replace any file
+    /// Build the index even if it is up to date, and overwrite any existing file
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]

@@ -6,15 +6,15 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use posescope::app::{Arrangement, Moment, views};
 
-/// A picture of the window instead of the window.
+/// Saves a picture of the window instead of opening it.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Screenshot")]
 pub struct ScreenshotArgs {
-    /// Save a picture of the window, without a display: PNG or JPEG, by its ending
+    /// Save a picture of the window as PNG or JPEG; needs no display
     #[arg(long, value_name = "FILE.png|FILE.jpg")]
     #[arg(hide_short_help = true)]
     pub screenshot: Option<PathBuf>,
-    /// The moment of the run: its end, the end of a method, or the step of a number
+    /// The moment to show: the end of the run, the end of a method, or a step number
     #[arg(
         long,
         value_name = "end|METHOD|STEP",
@@ -43,7 +43,7 @@ pub struct ScreenshotArgs {
     )]
     #[arg(hide_short_help = true)]
     pub scale: f32,
-    /// On a light ground
+    /// Use the light theme
     #[arg(long, requires = "screenshot")]
     #[arg(hide_short_help = true)]
     pub light: bool,
@@ -55,7 +55,7 @@ pub struct ScreenshotArgs {
     )]
     #[arg(hide = true)]
     pub view: Option<String>,
-    /// What the window is arranged for
+    /// The arrangement of the window
     #[arg(
         long,
         hide = true,
@@ -82,7 +82,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         .and_then(|(width, height)| Some([side(width)?, side(height)?]))
         .ok_or_else(|| {
             format!(
-                "two sides such as 1500x950 expected, each of {} to {} px",
+                "a width and a height such as 1500x950 expected, each from {} to {} px",
                 SIDES.start(),
                 SIDES.end()
             )
@@ -93,5 +93,5 @@ fn scale(text: &str) -> Result<f32, String> {
     text.parse()
         .ok()
         .filter(|scale| (0.5..=4.0).contains(scale))
-        .ok_or_else(|| "a number of 0.5 to 4 expected".to_owned())
+        .ok_or_else(|| "a number from 0.5 to 4 expected".to_owned())
 }

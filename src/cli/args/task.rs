@@ -1,4 +1,4 @@
-//! The arguments of what localises a query: `run` and `view`.
+//! The arguments of the commands that localise a query: `run` and `view`.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ pub struct RunArgs {
     pub scene: String,
     /// The frame to localise, or a photo; repeatable
     ///
-    /// 3823 finds the frame 003823. A photo is a file that is no frame of the scene.
+    /// 3823 finds the frame 003823. A photo is an image file that is not a frame of the scene.
     #[arg(long, value_name = "FRAME|PHOTO", required_unless_present = "all")]
     #[arg(help_heading = "Queries")]
     pub query: Vec<String>,
@@ -35,14 +35,14 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE.jsonl")]
     #[arg(help_heading = "Output", hide_short_help = true)]
     pub events: Option<PathBuf>,
-    /// Write the matches of fb into this folder, in the form that --matches reads
+    /// Write the matches of fb into this folder, in the format that --matches reads
     #[arg(long, value_name = "DIR")]
     #[arg(help_heading = "Output", hide_short_help = true)]
     pub export_matches: Option<PathBuf>,
-    /// Only score a dense grid and write its costs, as a picture or a table
+    /// Score a dense grid and write its costs as a picture or a table, without localising
     ///
-    /// Every position and heading (surface.step, surface.yaw_step) of one query, reference and method; written is
-    /// the lowest cost at each position.
+    /// Scores every position and heading (surface.step, surface.yaw_step) for one query, reference and method, and
+    /// writes the lowest cost at each position.
     #[arg(
         long,
         value_name = "FILE.png|FILE.csv",
@@ -58,10 +58,10 @@ pub struct ViewArgs {
     /// The scene of the references, or the folder of a run; see `posescope run --help`
     #[arg(default_value = "street", value_name = "SCENE|RUN")]
     pub scene: String,
-    /// The frame to begin with, or a photo that is no frame of the scene
+    /// The frame to start with, or a photo that is not a frame of the scene
     #[arg(long, help_heading = "Queries", value_name = "FRAME|PHOTO")]
     pub query: Option<String>,
-    /// Compare the results of the run with those of this one
+    /// Compare the results of RUN with those of this run
     #[arg(long, help_heading = "Runs", value_name = "RUN")]
     pub before: Option<PathBuf>,
     #[command(flatten)]
@@ -70,31 +70,26 @@ pub struct ViewArgs {
     pub screenshot: super::ScreenshotArgs,
 }
 
-/// What is asked of a query, in the window or without one.
+/// How a query is localised, in the window or without it.
 #[derive(Debug, Args)]
 pub struct TaskArgs {
     /// The camera of a photo [default: from EXIF]
     ///
-    /// Focal lengths and centre [px], a camera line of COLMAP, or its cameras.txt.
-    #[arg(
-        long,
-        value_name = "fx,fy,cx,cy",
-        requires = "query",
-        conflicts_with = "query_scene"
-    )]
+    /// Focal lengths and principal point [px], a camera line of COLMAP, or a cameras.txt.
+    #[arg(long, value_name = "fx,fy,cx,cy", requires = "query", conflicts_with = "query_scene")]
     #[arg(help_heading = "Queries", hide_short_help = true)]
     pub camera: Option<CameraArgument>,
     #[command(flatten)]
     pub protocol: Given,
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// Stop at a stage (fb.ransac) or where a number crosses a bound (inliers < 10); repeatable
+    /// Stop at a stage (fb.ransac) or when a number crosses a limit (inliers < 10); repeatable
     #[arg(long = "break", value_name = "EXPR")]
     #[arg(help_heading = "Runs", hide_short_help = true)]
     pub breakpoints: Vec<Breakpoint>,
 }
 
-/// Options of a protocol that only a run over many queries has.
+/// Options of a protocol that only `eval` takes.
 const ONLY_EVAL: [(&str, &str); 3] = [
     ("limit", "--limit"),
     ("preset", "--preset"),
@@ -102,7 +97,7 @@ const ONLY_EVAL: [(&str, &str); 3] = [
 ];
 
 impl TaskArgs {
-    /// What is asked of the queries of a scene.
+    /// The task that these arguments describe for a scene.
     pub fn task(&self, scene: &str) -> Result<Task, CliError> {
         self.refuse_many_queries()?;
         let protocol = self.protocol.over(Protocol::default())?;
@@ -124,11 +119,11 @@ impl TaskArgs {
         })
     }
 
-    /// Refuses options that would change nothing here.
+    /// Refuses options that have no effect here.
     pub fn refuse_many_queries(&self) -> Result<(), CliError> {
         match ONLY_EVAL.iter().find(|(field, _)| self.protocol.has(field)) {
             Some((_, option)) => Err(CliError::Usage(format!(
-                "{option} is an option of `posescope eval`"
+                "{option} has no effect here; use it with `posescope eval`"
             ))),
             None => Ok(()),
         }
@@ -155,12 +150,12 @@ pub struct RecordingArgs {
     pub spawn: bool,
 }
 
-/// What a scene argument may be, format by format.
+/// The help of the scene argument: every format.
 fn scene_formats() -> String {
     let formats = posescope::scene::ALL.iter();
     let lines = formats.map(|entry| format!("\n- {}: {}", entry.name, entry.about));
     format!(
-        "The scene of the references. Its format is recognised from its content, or --format names it:{}",
+        "The scene of the references. Its format is detected; --format overrides it:{}",
         lines.collect::<String>()
     )
 }

@@ -7,12 +7,12 @@ use posescope::localize::QueryResult;
 use posescope::measure::read_rows;
 use posescope::run::{RunFile, ScenePair, Scenes, inputs, is_called, read_run};
 
-use super::{Asked, written};
+use super::{PlannedRun, written};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 
-/// What the run asked, of the queries on which a method failed, with what the arguments change.
-pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
+/// The run again, over its failed queries, with the changes of the arguments.
+pub fn plan(args: &EvalArgs, before: &Path) -> Result<PlannedRun, CliError> {
     let run = read_run(before)?;
     let failed = failed(&read_rows(before)?);
     let params = run.params().map_err(|source| CliError::Config {
@@ -30,7 +30,7 @@ pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
         pair.only(|query: &str| is_failed(query) && is_named(query))
     });
     let pairs: Vec<ScenePair> = pairs.filter(|pair| !pair.queries.is_empty()).collect();
-    Ok(Asked {
+    Ok(PlannedRun {
         run: RunFile {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             inputs: inputs(&protocol)?,
@@ -45,7 +45,7 @@ pub fn asked(args: &EvalArgs, before: &Path) -> Result<Asked, CliError> {
     })
 }
 
-/// Whether a query of the run is wrong or has no pose.
+/// Whether the run has a result that is wrong or has no pose.
 pub fn has_failed(before: &Path) -> Result<bool, CliError> {
     Ok(!failed(&read_rows(before)?).is_empty())
 }

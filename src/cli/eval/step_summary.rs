@@ -1,4 +1,4 @@
-//! A few lines for the page of a CI job: where `GITHUB_STEP_SUMMARY` names a file, they are appended to it.
+//! The summary on the page of a CI job, appended to the file that `GITHUB_STEP_SUMMARY` names.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
@@ -7,10 +7,10 @@ use std::path::Path;
 use posescope::measure::{Report, RunComparison, plain};
 use posescope::run::RunFile;
 
-/// The variable by which GitHub Actions says where the summary of a step goes.
+/// The variable that names the summary file of a step in GitHub Actions.
 const VARIABLE: &str = "GITHUB_STEP_SUMMARY";
 
-/// Appends the text where a job wants one. That nobody can write there is no reason to fail.
+/// Appends the text if a job wants a summary. A file that cannot be written is only a warning.
 pub fn append(text: &str) {
     let Some(path) = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()) else {
         return;
@@ -22,7 +22,7 @@ pub fn append(text: &str) {
     }
 }
 
-/// What a run came to: gates, figures by method, what is new since the baseline.
+/// The summary of a run: gates, figures by method, changes since the baseline.
 pub fn of_run(
     run: &RunFile,
     folder: &Path,

@@ -11,7 +11,7 @@ use crate::cli::failure::CliError;
 use crate::cli::terminal::Terminal;
 use crate::cli::{output, table::figures};
 
-/// Runs every value into a folder of its own below `folder`, and writes there how the results follow it.
+/// Runs every value into its own folder below `folder`, and writes table and curves over the values there.
 pub fn sweep(
     args: &EvalArgs,
     sweep: &Sweep,

@@ -8,17 +8,16 @@ use crate::relation::Relation;
 
 /// A condition on a result.
 ///
-/// `FIELD RELATION VALUE`, joined by `and`, `or`, `not` and parentheses; `and` binds more tightly than
-/// `or`. Relations are those of [`Relation`]; `~` is for words. Words are
-/// compared without regard to capitals; those with spaces stand in quotes. A number that a result does
-/// not have meets no relation.
+/// `FIELD RELATION VALUE`, joined by `and`, `or`, `not` and parentheses; `and` binds more tightly than `or`.
+/// Relations are those of [`Relation`]; `~` is for text only. Text is compared ignoring case, and needs quotes if
+/// it contains spaces. A missing number meets no relation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     text: String,
     tree: Tree,
 }
 
-/// What is wrong with a condition.
+/// Why a condition is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{condition}`: {expected}")]
 pub struct ConditionError {
@@ -35,11 +34,11 @@ enum Tree {
     Words(&'static Field, Relation, String),
 }
 
-/// How deep conditions may be nested.
+/// The greatest nesting depth.
 const DEEPEST: usize = 64;
 
 impl Condition {
-    /// The condition as it was given.
+    /// The text of the condition.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -71,22 +70,22 @@ impl FromStr for Condition {
     type Err = ConditionError;
 
     fn from_str(text: &str) -> Result<Self, ConditionError> {
-        let wrong = |expected: String| ConditionError {
+        let error = |expected: String| ConditionError {
             condition: text.to_owned(),
             expected,
         };
-        let tokens = tokens(text).map_err(wrong)?;
+        let tokens = tokens(text).map_err(error)?;
         let mut parser = Parser {
             tokens: &tokens,
             depth: 0,
         };
-        let tree = parser.any().map_err(wrong)?;
+        let tree = parser.any().map_err(error)?;
         match parser.tokens.first() {
             None => Ok(Self {
                 text: text.trim().to_owned(),
                 tree,
             }),
-            Some(token) => Err(wrong(format!(
+            Some(token) => Err(error(format!(
                 "`and` or `or` expected before {}",
                 token.shown()
             ))),
@@ -126,7 +125,7 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
                 let inside = &rest[1..];
                 let end = inside
                     .find(first)
-                    .ok_or(format!("{first} expected at its end"))?;
+                    .ok_or(format!("a closing {first} expected"))?;
                 (Token::Quoted(inside[..end].to_owned()), end + 2)
             }
             _ => {
@@ -135,7 +134,9 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
                 };
                 let end = rest.find(is_end).unwrap_or(rest.len());
                 if end == 0 {
-                    return Err(format!("a word or a relation expected at `{rest}`"));
+                    return Err(format!(
+                        "a field, a value or a relation expected at `{rest}`"
+                    ));
                 }
                 (Token::Word(rest[..end].to_owned()), end)
             }
@@ -158,7 +159,7 @@ impl Parser<'_> {
         Some(first)
     }
 
-    /// Takes a word of the language if it is next.
+    /// Consumes a keyword if it is next.
     fn takes(&mut self, word: &str) -> bool {
         let is_next = matches!(self.tokens.first(), Some(Token::Word(next)) if next == word);
         if is_next {
@@ -186,7 +187,7 @@ impl Parser<'_> {
     fn one(&mut self) -> Result<Tree, String> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return Err(format!("at most {DEEPEST} parts in each other expected"));
+            return Err(format!("at most {DEEPEST} nested parts expected"));
         }
         let tree = if self.takes("not") {
             Tree::Not(Box::new(self.one()?))
@@ -212,7 +213,7 @@ impl Parser<'_> {
         };
         let Some(Token::Relation(relation)) = self.next().cloned() else {
             return Err(format!(
-                "a relation expected behind `{}`: = != < <= > >= ~",
+                "a relation expected after `{}`: = != < <= > >= ~",
                 field.name
             ));
         };
@@ -264,9 +265,9 @@ mod tests {
         assert!(error("error ~ 1").contains("is for words"));
         assert!(error("(error > 1").contains("`)` expected"));
         assert!(error("error > 1 error < 2").contains("`and` or `or` expected before `error`"));
-        assert!(error("code = 'D1").contains("expected at its end"));
-        assert!(error(&"(".repeat(9999)).contains("in each other"));
-        assert!(error(&"not ".repeat(9999)).contains("in each other"));
+        assert!(error("code = 'D1").contains("a closing ' expected"));
+        assert!(error(&"(".repeat(9999)).contains("nested parts"));
+        assert!(error(&"not ".repeat(9999)).contains("nested parts"));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What can be asked of a result.
+//! The fields of a result for conditions, orders and tables.
 
 use std::cmp::Ordering;
 
@@ -12,7 +12,7 @@ pub struct Field {
     pub name: &'static str,
     /// What it is, with its unit.
     pub about: &'static str,
-    /// Digits behind the point; `None` for words.
+    /// Digits after the decimal point; `None` for text.
     pub decimals: Option<usize>,
     read: Read,
 }
@@ -41,7 +41,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The order of two values of one field. What is not there comes last either way.
+    /// Compares two values of one field. Missing values come last in either direction.
     pub(super) fn compare(&self, other: &Self, descending: bool) -> Ordering {
         let forward = match (self, other) {
             (Self::None, Self::None) => return Ordering::Equal,
@@ -87,7 +87,7 @@ impl Field {
                 .first()
                 .map_or(String::new(), |d| d.code.to_string())
         }),
-        words("cause", "the primary verdict in one phrase", |r| {
+        words("cause", "the primary verdict as a phrase", |r| {
             r.diagnosis
                 .first()
                 .map_or(String::new(), |d| d.code.title().to_owned())
@@ -129,34 +129,34 @@ impl Field {
         }),
         number(
             "coverage",
-            "share of the photo that is covered at the result",
+            "share of the photo covered at the result",
             3,
             |r| Some(r.cost.as_ref()?.coverage_best),
         ),
         number(
             "basin",
-            "how far from the truth the search ends right [m]",
+            "radius around the truth from which the search finds it [m]",
             1,
             |r| r.cost.as_ref()?.basin_m,
         ),
         number(
             "margin",
-            "how much more the cheapest minimum elsewhere costs",
+            "cost of the best minimum elsewhere above that at the truth",
             4,
             |r| r.cost.as_ref()?.basin_margin,
         ),
         number("radius", "the uncertainty radius [m]", 1, |r| {
             Some(r.setting?.radius_m)
         }),
-        number("references", "references asked for", 0, |r| {
+        number("references", "requested number of references", 0, |r| {
             Some(r.setting?.references as f64)
         }),
-        number("helped", "remedies that made it right", 0, |r| {
+        number("helped", "number of remedies that helped", 0, |r| {
             Some(r.explanation.as_ref()?.helped.len() as f64)
         }),
     ];
 
-    /// What a table of results also has: nothing to sort or compare by.
+    /// Further columns of tables, which cannot be used in conditions.
     pub const POSE: &[Self] = &[
         number(
             "max_euler",
@@ -175,7 +175,7 @@ impl Field {
         }),
         number(
             "qx",
-            "x of the rotation to the world, a quaternion",
+            "x of the quaternion of the rotation to the world",
             4,
             |r| quaternion(r, 0),
         ),
@@ -184,10 +184,10 @@ impl Field {
         number("qw", "scalar of the quaternion", 4, |r| quaternion(r, 3)),
     ];
 
-    /// The field of a name.
+    /// The field with this name.
     ///
     /// # Errors
-    /// The names that there are.
+    /// An unknown name; the error lists all names.
     pub fn find(name: &str) -> Result<&'static Self, UnknownWord> {
         let mut all = Self::ALL.iter();
         let names = Self::ALL.iter().map(|field| field.name);
@@ -195,7 +195,7 @@ impl Field {
             .ok_or_else(|| UnknownWord::among(name, "field", names))
     }
 
-    /// How its values stand in a table.
+    /// The alignment of its column in a table.
     pub fn align(&self) -> Align {
         match self.decimals {
             Some(_) => Align::Right,
@@ -211,7 +211,7 @@ impl Field {
         }
     }
 
-    /// Its value with all digits; nothing where there is none.
+    /// Its value with all digits; empty if missing.
     pub fn whole(&self, result: &QueryResult) -> String {
         match self.of(result) {
             Value::Number(number) => number.to_string(),
@@ -219,7 +219,7 @@ impl Field {
         }
     }
 
-    /// Its value as it is shown; nothing where there is none.
+    /// Its value as shown; empty if missing.
     pub fn text(&self, result: &QueryResult) -> String {
         match self.of(result) {
             Value::Words(words) => words,

@@ -10,15 +10,15 @@ use laz::{LazItem, LazItemType, LazVlr};
 
 use super::{MapCloud, expect_room};
 
-/// Points that are decoded at once.
+/// Points per decoded batch.
 const BATCH: u64 = 65_536;
-/// The least that a point takes before it is compressed \[bytes\].
+/// The smallest size of an uncompressed point \[bytes\].
 const LEAST_RECORD: u64 = 20;
 
-/// Reads the points. A panic of the decoder, which counts on sound data, is an error like any other.
+/// Reads the points. The decoder panics on damaged data, which becomes an error.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     catch_unwind(|| decoded(path, size))
-        .unwrap_or_else(|_| Err("points that can be decoded expected".to_owned()))
+        .unwrap_or_else(|_| Err("decodable points expected; the file is damaged".to_owned()))
 }
 
 fn decoded(path: &Path, size: u64) -> Result<MapCloud, String> {
@@ -55,16 +55,16 @@ fn decoded(path: &Path, size: u64) -> Result<MapCloud, String> {
     }
 }
 
-/// Bytes at a place of a file.
+/// Bytes at a position of a file.
 fn bytes_at<const N: usize>(file: &mut (impl Read + Seek), at: u64) -> Result<[u8; N], String> {
     let mut bytes = [0; N];
     let read = file.seek(SeekFrom::Start(at));
     read.and_then(|_| file.read_exact(&mut bytes))
-        .map_err(|_| "a LAS file expected, it is cut off".to_owned())?;
+        .map_err(|_| "a complete LAS file expected, it is cut off".to_owned())?;
     Ok(bytes)
 }
 
-/// Compares the lengths of the records behind the points, which version 1.4 has, with the file.
+/// Checks the lengths of the records after the points (version 1.4) against the size of the file.
 fn expect_extended_records(file: &mut (impl Read + Seek), size: u64) -> Result<(), String> {
     let version: [u8; 2] = bytes_at(file, 24)?;
     if version < [1, 4] {
@@ -84,9 +84,9 @@ fn expect_extended_records(file: &mut (impl Read + Seek), size: u64) -> Result<(
     Ok(())
 }
 
-/// Compares the lengths in compressed points with the file: that of the table of chunks, to which what
-/// stands before the points leads, and those of the layers in which newer points are compressed. Each
-/// chunk begins with a point that is not compressed.
+/// Checks the lengths inside compressed points against the size of the file: that of the chunk table, whose position
+/// precedes the points, and those of the layers that newer point formats are compressed in. Each chunk begins with
+/// an uncompressed point.
 fn expect_chunks(file: &mut (impl Read + Seek), size: u64, layout: &LazVlr) -> Result<(), String> {
     let damaged = |_| "compressed points expected, the file is cut off".to_owned();
     let start = file.stream_position().map_err(damaged)?;
@@ -132,7 +132,7 @@ fn expect_chunks(file: &mut (impl Read + Seek), size: u64, layout: &LazVlr) -> R
     Ok(())
 }
 
-/// In how many layers a part of the points is compressed; none in older formats.
+/// The number of layers that an item is compressed in; 0 in older formats.
 fn layers_of(item: &LazItem) -> u64 {
     match item.item_type() {
         LazItemType::Point14 => 9,

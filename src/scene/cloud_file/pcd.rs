@@ -8,18 +8,18 @@ use pcd_rs::{DataKind, DynReader, DynRecord, Field, PcdMeta};
 
 use super::{MapCloud, expect_room};
 
-/// A back reference of LZF takes 3 bytes and stands for 264 at most.
+/// The highest compression ratio of LZF: a back reference of 3 bytes encodes at most 264 bytes.
 const MOST_COMPRESSED: u64 = 88;
 
-/// Whether a file of this start is one: comments, then the version.
+/// Whether a file begins like a PCD file: comments, then the version.
 pub(super) fn is_pcd(start: &[u8]) -> bool {
     let text = String::from_utf8_lossy(start);
     let mut lines = text.lines().map(str::trim);
-    let said = lines.find(|line| !line.is_empty() && !line.starts_with('#'));
-    said.is_some_and(|line| line.starts_with("VERSION "))
+    let first = lines.find(|line| !line.is_empty() && !line.starts_with('#'));
+    first.is_some_and(|line| line.starts_with("VERSION "))
 }
 
-/// Reads the points. Where the sensor stood (`VIEWPOINT`) is not applied, as other readers don't.
+/// Reads the points. Like other readers, ignores the position of the sensor (`VIEWPOINT`).
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: pcd_rs::Error| error.to_string();
     let io = |error: std::io::Error| error.to_string();
@@ -58,12 +58,12 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     Ok(cloud)
 }
 
-/// Checks the layout, and says how many bytes a point takes at least.
+/// Checks the layout, and returns the smallest size of a point \[bytes\].
 fn expect_fields(meta: &PcdMeta) -> Result<u64, String> {
     let mut record: u64 = 0;
     for field in &meta.field_defs {
         let bytes = match meta.data {
-            // A digit and what separates it from the next.
+            // A digit and a separator.
             DataKind::Ascii => 2,
             _ => field.kind.byte_size() as u64,
         };

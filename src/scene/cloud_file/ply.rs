@@ -9,7 +9,7 @@ use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyTyp
 
 use super::{MapCloud, expect_room};
 
-/// The position of a vertex, without whatever else it has.
+/// The position of a vertex; other properties are ignored.
 #[derive(Default)]
 struct Vertex([f64; 3]);
 
@@ -39,7 +39,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// Reads the vertices, which come first in every file that has them, one by one.
+/// Reads the vertices one by one. They must be the first element.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: std::io::Error| error.to_string();
     let mut reader = BufReader::new(File::open(path).map_err(text)?);
@@ -51,7 +51,7 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
         .next()
         .filter(|e| e.name == "vertex")
     else {
-        return Err("an element `vertex` expected before any other".to_owned());
+        return Err("`element vertex` expected as the first element".to_owned());
     };
     for axis in ["x", "y", "z"] {
         if !vertex.properties.contains_key(axis) {
@@ -86,18 +86,18 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     Ok(cloud)
 }
 
-/// How many bytes each vertex takes at least. Lists are refused: clouds have none, and their lengths
-/// are one more thing not to be believed.
+/// The smallest size of a vertex \[bytes\]. Lists are refused: clouds have none, and their lengths would have to be
+/// checked too.
 fn least_bytes(vertex: &ElementDef, encoding: Encoding) -> Result<u64, String> {
     vertex
         .properties
         .values()
         .map(|property| match (&property.data_type, encoding) {
             (PropertyType::List(..), _) => Err(format!(
-                "numbers as properties of the vertices expected, `{}` is a list",
+                "only numbers as properties of the vertices expected, `{}` is a list",
                 property.name
             )),
-            // A digit and what separates it from the next.
+            // A digit and a separator.
             (PropertyType::Scalar(_), Encoding::Ascii) => Ok(2),
             (PropertyType::Scalar(kind), _) => Ok(match kind {
                 ScalarType::Char | ScalarType::UChar => 1,

@@ -1,4 +1,4 @@
-//! XYZ text: a point per line, and whatever else the line says of it.
+//! XYZ text: one point per line; further columns are ignored.
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader};
@@ -7,7 +7,7 @@ use std::path::Path;
 use super::MapCloud;
 use crate::scene::SceneError;
 
-/// Reads the points. The first line may be a heading, or the number of points.
+/// Reads the points. The first line may be a header or the number of points.
 pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let io = SceneError::io(path);
     let mut cloud = MapCloud::default();

@@ -1,6 +1,6 @@
 //! Models as binary files: `cameras.bin`, `images.bin`, `points3D.bin`, little-endian.
 //!
-//! Every count is compared with what is left of the file before anything is made for it.
+//! Every count is checked against the rest of the file before anything is allocated.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -11,9 +11,9 @@ use super::super::{SceneError, lines};
 use super::camera::{ModelCamera, model_of_number};
 use super::model::{Model, ModelImage, Points};
 
-/// The longest name of an image \[bytes\]; that of a path on most systems.
+/// The longest name of an image \[bytes\], the limit of a path on most systems.
 const LONGEST_NAME: u64 = 4096;
-/// The id of a feature that was matched to no point.
+/// The id of a feature without a point.
 const NO_POINT: u64 = u64::MAX;
 
 pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
@@ -42,7 +42,7 @@ fn cameras(path: &Path) -> Result<BTreeMap<u32, ModelCamera>, SceneError> {
     Ok(cameras)
 }
 
-/// A model without points has no such file.
+/// Reads the points. A model without points has no such file.
 fn points(path: &Path) -> Result<Points, SceneError> {
     let mut points = Points::default();
     if !path.is_file() {
@@ -94,7 +94,7 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     Ok(images)
 }
 
-/// A binary file from its start, which knows how much of it is left.
+/// A binary file that is read from start to end, and knows how much is left.
 struct BinaryFile {
     path: PathBuf,
     reader: BufReader<File>,
@@ -115,7 +115,7 @@ impl BinaryFile {
         })
     }
 
-    /// An error at the current place.
+    /// An error at the current position.
     fn error(&self, expected: impl Into<String>) -> SceneError {
         SceneError::expected(
             &self.path,
@@ -155,7 +155,7 @@ impl BinaryFile {
         Ok(number)
     }
 
-    /// How many records follow, each of so many bytes at least.
+    /// Reads the number of the following records, each of at least this many bytes.
     fn count(&mut self, what: &str, least_bytes: u64) -> Result<u64, SceneError> {
         let count = self.u64()?;
         if count > self.left / least_bytes {
@@ -178,7 +178,7 @@ impl BinaryFile {
         Ok(())
     }
 
-    /// A text up to a zero byte. It goes into messages and tables, whose lines it must not break.
+    /// Reads a text up to a zero byte. Control characters are refused, since it is printed in messages and tables.
     fn name(&mut self) -> Result<String, SceneError> {
         let mut bytes = Vec::new();
         let limited = &mut (&mut self.reader).take(LONGEST_NAME);
@@ -189,8 +189,8 @@ impl BinaryFile {
         });
         let name = name.ok_or_else(|| {
             self.error(format!(
-                "the name of an image expected, at most {LONGEST_NAME} bytes without control \
-                 characters, and a zero"
+                "the name of an image expected: at most {LONGEST_NAME} bytes without control \
+                 characters, then a zero byte"
             ))
         })?;
         self.left -= name.len() as u64 + 1;

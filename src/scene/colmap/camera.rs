@@ -3,15 +3,14 @@
 use super::super::lens::{Distortion, pinhole};
 use crate::camera::Intrinsics;
 
-/// A camera of a model: as the photos were taken, pixel centres at integers.
+/// A camera of a model, with its distortion. Pixel centres are at integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct ModelCamera {
     pub intrinsics: Intrinsics,
     pub distortion: Distortion,
 }
 
-/// The models that are understood, by their numbers in binary files, with the count of their
-/// parameters.
+/// The supported models with their number of parameters. The index is the model's number in binary files.
 const MODELS: [(&str, usize); 5] = [
     ("SIMPLE_PINHOLE", 3),
     ("PINHOLE", 4),
@@ -20,7 +19,7 @@ const MODELS: [(&str, usize); 5] = [
     ("OPENCV", 8),
 ];
 
-/// The name of a model and how many parameters it has.
+/// The name of a model and its number of parameters.
 pub(super) fn model_of_number(number: u32) -> Result<(&'static str, usize), String> {
     let model = usize::try_from(number).ok().and_then(|n| MODELS.get(n));
     model
@@ -33,7 +32,7 @@ fn known() -> String {
 }
 
 impl ModelCamera {
-    /// The camera of a model by its parameters, in COLMAP's order.
+    /// The camera of a model from its parameters, in COLMAP's order.
     pub fn new(
         model: &str,
         (width, height): (u64, u64),
@@ -44,7 +43,7 @@ impl ModelCamera {
             .find(|(name, _)| *name == model)
             .ok_or_else(|| {
                 format!(
-                    "{} expected, `{model}` found; `colmap image_undistorter` makes one of it",
+                    "{} expected, `{model}` found; `colmap image_undistorter` converts it",
                     known()
                 )
             })?;

@@ -1,4 +1,4 @@
-//! What both forms of a model say, as far as it matters here.
+//! The content of a model, whether binary or text.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,23 +13,23 @@ pub(super) struct Model {
 }
 
 pub(in super::super) struct ModelImage {
-    /// The file, below the folder of the photos.
+    /// The file, relative to the folder of the photos.
     pub name: String,
     pub camera: u32,
     pub camera_from_world: Pose,
-    /// The points that it observes, as positions in [`Model::points`].
+    /// The observed points, as positions in [`Model::points`].
     pub observed: Vec<u32>,
 }
 
 #[derive(Default)]
 pub(super) struct Points {
-    /// In the order in which they are added.
+    /// In the order of addition.
     pub positions: Vec<[f64; 3]>,
     by_id: HashMap<u64, u32>,
 }
 
 impl Points {
-    /// Adds a point. Positions are counted in 32 bits, which is more points than fit any memory.
+    /// Adds a point. 32 bits count more points than fit into memory.
     pub fn add(&mut self, id: u64, position: [f64; 3]) {
         let index = self.positions.len() as u32;
         self.positions.push(position);
@@ -39,6 +39,6 @@ impl Points {
     /// The position of a point in the list.
     pub fn find(&self, id: u64) -> Result<u32, String> {
         let found = self.by_id.get(&id).copied();
-        found.ok_or_else(|| format!("points of points3D expected, {id} found"))
+        found.ok_or_else(|| format!("the id of a point of points3D expected, {id} found"))
     }
 }

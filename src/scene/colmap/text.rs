@@ -54,8 +54,8 @@ fn points(path: &Path) -> Result<Points, SceneError> {
     Ok(points)
 }
 
-/// Two lines for each image: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` of
-/// each of its features, which may be none.
+/// Two lines per image: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` of each feature. The
+/// second line may be empty.
 fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     let file = TextFile::read(path)?;
     let mut images = Vec::new();
@@ -72,13 +72,13 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     Ok(images)
 }
 
-/// The line of each image, and the one of its features.
+/// The line of each image with that of its features.
 fn pairs_of_lines(file: &TextFile) -> impl Iterator<Item = (Line<'_>, Option<Line<'_>>)> {
     let mut lines = file.all_lines();
-    std::iter::from_fn(move || Some((lines.find(Line::is_said)?, lines.next())))
+    std::iter::from_fn(move || Some((lines.find(Line::has_content)?, lines.next())))
 }
 
-/// The images of a text, with the lines that name them, without what they observe.
+/// The images of a text with their lines, without observed points.
 pub(in super::super) fn image_lines(
     file: &TextFile,
 ) -> impl Iterator<Item = (Line<'_>, Result<ModelImage, SceneError>)> {
@@ -109,7 +109,7 @@ fn image(line: Line<'_>) -> Result<ModelImage, SceneError> {
     })
 }
 
-/// The points that features were matched to; −1 stands for none.
+/// The points of the features; −1 means none.
 fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
     let words = line.words().collect::<Vec<_>>();
     if words.len() % 3 != 0 {

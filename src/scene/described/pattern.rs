@@ -1,4 +1,4 @@
-//! Files by a pattern: a path whose last part may have stars, which stand for anything.
+//! File patterns: a path whose last part may contain `*`, which matches anything.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::super::SceneError;
 use super::super::folder::entries;
 
-/// The files that the pattern names: by number where they are called by numbers, such as times, and in
-/// natural order otherwise, `a2.png` before `a10.png`.
+/// The files that match the pattern. If all names are numbers, such as times, they are sorted by number; otherwise
+/// in natural order, `a2.png` before `a10.png`.
 pub(super) fn files(pattern: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let folder = match pattern.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -26,7 +26,7 @@ pub(super) fn files(pattern: &Path) -> Result<Vec<PathBuf>, SceneError> {
     Ok(found)
 }
 
-/// The number that a file is called by.
+/// The number in a file's name.
 fn number(path: &Path) -> Option<f64> {
     let number: f64 = path.file_stem()?.to_str()?.parse().ok()?;
     number.is_finite().then_some(number)
@@ -43,7 +43,7 @@ fn matches(pattern: &str, name: &str) -> bool {
     else {
         return false;
     };
-    // Each part between two stars where it is first found.
+    // Each part between two stars matches at its first occurrence.
     middle.iter().all(|part| {
         let found = rest.split_once(part);
         rest = found.map_or(rest, |(_, after)| after);
@@ -51,8 +51,8 @@ fn matches(pattern: &str, name: &str) -> bool {
     })
 }
 
-/// A name in runs of digits and of other characters, which compare as people order names: digits by
-/// their number, and before others. Names that differ in leading zeros alone compare by all their bytes.
+/// The sort key of natural order: runs of digits, compared by number and before other characters, and the name for
+/// ties of leading zeros.
 fn natural(name: &str) -> (Vec<(bool, usize, Vec<u8>)>, String) {
     let is_digit = u8::is_ascii_digit;
     let runs = name.as_bytes();

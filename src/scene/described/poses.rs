@@ -1,4 +1,4 @@
-//! The poses of a described scene, by time or by line.
+//! The poses of a `scene.toml`, by time or by line.
 
 use std::path::{Path, PathBuf};
 
@@ -9,10 +9,10 @@ use super::super::pose_text::{PoseLines, PoseText};
 use super::super::trajectory::Trajectory;
 use crate::geometry::Pose;
 
-/// What the file says of a photo.
+/// The pose and time of a photo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct FramePoses {
-    /// As the file has it.
+    /// The pose as in the file.
     pub pose: Option<Pose>,
     /// When the photo was taken \[s\].
     pub time_s: Option<f64>,
@@ -27,7 +27,7 @@ pub(super) fn read(path: &Path, photos: &[PathBuf]) -> Result<Vec<FramePoses>, S
     }
 }
 
-/// A photo is called by its time.
+/// Poses of photos whose names are times.
 fn by_time(
     file: &TextFile,
     trajectory: Trajectory,
@@ -44,7 +44,7 @@ fn by_time(
     if poses.iter().all(|frame| frame.pose.is_none()) {
         let (first, last) = trajectory.range().unwrap_or_default();
         return Err(file.error(format!(
-            "poses at the times that the images are called by expected, such as {}; these are \
+            "poses at the times in the images' names expected, such as {}; the poses are \
              between {first} and {last}",
             stem(&photos[0])
         )));
@@ -62,8 +62,8 @@ fn by_line(
         let pose = poses.of_frame(index, photos.len(), &name);
         let pose = pose.ok_or_else(|| {
             file.error(format!(
-                "a line for each of {} images expected, or for each number from 0 that their \
-                 names end with; {} lines found, none for `{name}`",
+                "one line per image expected ({}), or one per number from 0 at the end of their names; \
+                 {} lines found, none for `{name}`",
                 photos.len(),
                 poses.count(),
             ))

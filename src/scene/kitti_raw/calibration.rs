@@ -14,23 +14,23 @@ pub(super) const CAMERAS: &str = "calib_cam_to_cam.txt";
 const VELODYNE: &str = "calib_velo_to_cam.txt";
 const IMU: &str = "calib_imu_to_velo.txt";
 
-/// Where the sensors of a drive are, and one of its rectified cameras.
+/// The extrinsics of a drive's sensors, and one of its rectified cameras.
 pub(super) struct Calibration {
     pub intrinsics: Intrinsics,
     pub camera_from_camera0: Pose,
     pub camera0_from_velodyne: Pose,
-    /// The scanner from the IMU, whose axes are forward, left, up as well.
+    /// The scanner from the IMU; the axes of both are forward, left, up.
     pub velodyne_from_imu: Pose,
 }
 
 impl Calibration {
-    /// Of a camera such as `image_02`, from the folder of its day.
+    /// Reads the calibration of a camera such as `image_02` from the folder of its day.
     pub fn read(day: &Path, camera: &str) -> Result<Self, SceneError> {
         let number = camera.trim_start_matches("image_");
         let cameras = TextFile::read(&day.join(CAMERAS))?;
         let projection = labelled::<12>(&cameras, &format!("P_rect_{number}"))?;
         let [width, height] = labelled::<2>(&cameras, &format!("S_rect_{number}"))?;
-        // The frame of all sensors is the rectified camera 0, whichever camera is read.
+        // All extrinsics refer to the rectified camera 0.
         let rectified_from_camera0 = pose(&cameras, "R_rect_00", None)?;
         let velodyne = TextFile::read(&day.join(VELODYNE))?;
         let imu = TextFile::read(&day.join(IMU))?;
@@ -49,7 +49,7 @@ impl Calibration {
     }
 }
 
-/// The transform of a rotation and perhaps a translation.
+/// The transform of a rotation and an optional translation.
 fn pose(file: &TextFile, rotation: &str, translation: Option<&str>) -> Result<Pose, SceneError> {
     let [a, b, c, d, e, f, g, h, i] = labelled::<9>(file, rotation)?;
     let [x, y, z] = match translation {

@@ -11,7 +11,7 @@ use super::super::gps::EARTH_RADIUS_M;
 use super::super::lines::TextFile;
 use crate::geometry::Pose;
 
-/// What a packet says, as far as it matters here. The frame of the IMU is x forward, y left, z up.
+/// The used parts of a packet. The frame of the IMU is x forward, y left, z up.
 #[derive(Clone, Debug)]
 pub(super) struct Packet {
     /// \[°\]
@@ -20,7 +20,7 @@ pub(super) struct Packet {
     longitude_deg: f64,
     /// \[m\]
     altitude_m: f64,
-    /// World from IMU: roll, pitch, yaw \[rad\], 0 being level and east.
+    /// World from IMU, from roll, pitch, yaw \[rad\]; 0 is level and east.
     rotation: UnitQuaternion<f64>,
     /// Velocity in the frame of the IMU \[m/s\].
     pub velocity: Vector3<f64>,
@@ -28,7 +28,7 @@ pub(super) struct Packet {
     pub angular_rate: Vector3<f64>,
 }
 
-/// The packets of a drive by their numbers; none where it has no such folder.
+/// The packets of a drive by number; empty if the drive has no such folder.
 pub(super) fn read(folder: &Path) -> Result<BTreeMap<usize, Packet>, SceneError> {
     let data = folder.join("data");
     if !data.is_dir() {
@@ -53,7 +53,7 @@ impl Packet {
     fn new(numbers: &[f64; 30]) -> Self {
         let [latitude_deg, longitude_deg, altitude_m, roll, pitch, yaw] =
             [0, 1, 2, 3, 4, 5].map(|i| numbers[i]);
-        // Velocities are forward, left and up along the ground, rates about the axes of the IMU.
+        // Velocities are forward, left and up along the ground; rates are about the axes of the IMU.
         let along_ground = Vector3::new(numbers[8], numbers[9], numbers[10]);
         let ground_from_imu = UnitQuaternion::from_euler_angles(roll, pitch, 0.0);
         Self {
@@ -66,7 +66,7 @@ impl Packet {
         }
     }
 
-    /// The pose in the Mercator projection of a scale: x east, y north, z up \[m\].
+    /// The pose in a Mercator projection with this scale: x east, y north, z up \[m\].
     fn mercator_from_imu(&self, scale: f64) -> Pose {
         let x = scale * EARTH_RADIUS_M * self.longitude_deg.to_radians();
         let y = scale * EARTH_RADIUS_M * ((90.0 + self.latitude_deg).to_radians() / 2.0).tan().ln();

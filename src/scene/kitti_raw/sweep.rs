@@ -1,17 +1,17 @@
-//! The motion of the car while the scanner turns once, about 1.2 m at 12 m/s.
+//! The motion of the car during one turn of the scanner, about 1.2 m at 12 m/s.
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::oxts::Packet;
 use crate::geometry::Pose;
 
-/// How long a sweep takes where nothing says so \[s\]: the scanner turns ten times a second.
+/// The default duration of a sweep \[s\]: the scanner turns ten times per second.
 pub(super) const USUAL_S: f64 = 0.1;
 
-/// How the car moved during a sweep: steadily, as the packet of the frame says.
+/// The motion of the car during a sweep, constant as in the packet of the frame.
 ///
-/// The scanner turns clockwise seen from above and faces forward when the cameras take their photo. So
-/// what is at the left was measured before the photo and what is at the right after it.
+/// The scanner turns clockwise seen from above, and faces forward when the photo is taken. Points on the left are
+/// therefore measured before the photo, points on the right after it.
 #[derive(Clone, Debug)]
 pub(super) struct Sweep {
     duration_s: f64,
@@ -22,7 +22,7 @@ pub(super) struct Sweep {
 }
 
 impl Sweep {
-    /// Of a duration \[s\]; a recorded one that no scanner takes is replaced by the usual.
+    /// A sweep of a duration \[s\]; an implausible duration is replaced by the default.
     pub fn new(packet: &Packet, duration_s: f64) -> Self {
         let is_likely = (0.02..0.5).contains(&duration_s);
         Self {
@@ -32,8 +32,7 @@ impl Sweep {
         }
     }
 
-    /// Where the scanner would have measured a point, had it been where it was when the photo was
-    /// taken.
+    /// The point as measured from the position of the scanner at the time of the photo.
     pub fn corrected(&self, point: &Point3<f64>, velodyne_from_imu: &Pose) -> Point3<f64> {
         let azimuth = point.y.atan2(point.x);
         let time_s = -azimuth / std::f64::consts::TAU * self.duration_s;
@@ -41,9 +40,9 @@ impl Sweep {
         velodyne_from_imu * (photo_from_then * (velodyne_from_imu.inverse() * point))
     }
 
-    /// The IMU at the photo from the IMU at a time \[s\] after it.
+    /// The IMU at the photo from the IMU `time_s` later.
     fn imu_motion(&self, time_s: f64) -> Pose {
-        // The velocity turns with the car: half-way round it is the mean to second order.
+        // The velocity turns with the car; half-way it equals the mean to second order.
         let half_way = UnitQuaternion::from_scaled_axis(self.angular_rate * (time_s / 2.0));
         Pose::from_parts(
             Translation3::from(half_way * self.velocity * time_s),

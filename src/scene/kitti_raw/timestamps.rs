@@ -7,7 +7,7 @@ use chrono::NaiveDateTime;
 use super::super::SceneError;
 use super::super::lines::{TextFile, excerpt};
 
-/// The times by frame number \[s since 1970\]; none where there is no file.
+/// The times by frame number \[s since 1970\]; empty if there is no file.
 pub(super) fn read(path: &Path) -> Result<Vec<f64>, SceneError> {
     if !path.is_file() {
         return Ok(Vec::new());

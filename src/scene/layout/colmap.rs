@@ -1,5 +1,5 @@
-//! A COLMAP model as text, in `NAME/sparse/0`, with its photos in `NAME/images`. The points are some of
-//! each frame's scan, which it alone observes.
+//! A COLMAP model as text, in `NAME/sparse/0`, with its photos in `NAME/images`. The points are a part of each frame's
+//! scan, observed by that frame only.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -9,7 +9,6 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::{Point2, Point3};
 
 use super::{Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_image};
-use crate::camera::Intrinsics;
 use crate::scene::SceneError;
 
 pub(super) const LAYOUT: Layout = Layout {
@@ -18,16 +17,16 @@ pub(super) const LAYOUT: Layout = Layout {
     create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
 };
 
-/// How many points of a frame are written at most: a photo has some thousand features.
+/// The most points per frame: a photo has some thousand features.
 const MOST_POINTS: usize = 2000;
 
-/// A pixel, and the point that is seen there in the world's frame \[m\].
+/// A pixel, and the point there in the world frame \[m\].
 type Observation = (Point2<f64>, Point3<f64>);
 
 struct Writer {
     folder: PathBuf,
     drive: Drive,
-    /// What each written frame observes.
+    /// The observations of each written frame.
     observed: Mutex<BTreeMap<usize, Vec<Observation>>>,
 }
 
@@ -69,16 +68,12 @@ impl DriveWriter for Writer {
     }
 
     fn finish(&self) -> Result<(), SceneError> {
-        let Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = self.drive.intrinsics;
-        let parameters = joined(&[fx, fy, cx + 0.5, cy + 0.5]);
-        let cameras = format!("1 PINHOLE {width} {height} {parameters}\n");
+        let camera = self.drive.intrinsics;
+        let parameters = joined(&[camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]);
+        let cameras = format!(
+            "1 PINHOLE {} {} {parameters}\n",
+            camera.width, camera.height
+        );
         let (mut images, mut points) = (String::new(), String::new());
         let observed = self.observed.lock().unwrap_or_else(PoisonError::into_inner);
         let mut id = 0;

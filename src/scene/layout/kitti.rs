@@ -1,9 +1,8 @@
 //! KITTI odometry, in `sequences/NAME` and `poses/NAME.txt`, with one colour camera.
 //!
-//! The left colour camera, `image_2`, is the only one, and all four projection matrices are its: so
-//! its frame is also that of camera 0, of which poses and `Tr` speak. Scans are in the frame of the
-//! scanner, as KITTI's are, x forward, y left, z up: reading a scan back rounds its points once, by
-//! a few micrometres.
+//! The only camera is the left colour camera, `image_2`, and all four projection matrices are the same. Its frame is
+//! therefore also that of camera 0, which poses and `Tr` refer to. Scans are in the frame of the scanner, as in KITTI:
+//! x forward, y left, z up. Reading a scan back rounds its points by a few micrometres.
 
 use std::path::{Path, PathBuf};
 
@@ -75,7 +74,7 @@ impl DriveWriter for Writer {
     fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
         let name = &self.drive.names[shot.index];
         let scan = velodyne_bytes(shot.scan, &self.drive.scanner);
-        // The scan first: where there is a photo, the frame is complete.
+        // The scan first: a frame with a photo is complete.
         write(&self.folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
         write_image(
             &self.folder.join(IMAGES).join(format!("{name}.png")),
@@ -84,7 +83,7 @@ impl DriveWriter for Writer {
     }
 }
 
-/// A scan in the frame of its scanner, which is at this position in the camera's frame \[m\].
+/// A scan in the frame of its scanner, given the scanner's position in the camera's frame \[m\].
 fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>) -> Vec<u8> {
     let velodyne_from_camera = CAMERA_FROM_VELODYNE.transpose();
     let mut bytes = Vec::new();

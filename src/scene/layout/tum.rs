@@ -1,4 +1,4 @@
-//! TUM RGB-D, in `NAME`. Depths up to 13 m can be said.
+//! TUM RGB-D, in `NAME`. Depths are limited to 13 m.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ struct Writer {
     drive: Drive,
 }
 
-/// What a frame's images are called: by its time.
+/// The name of a frame's images: its time.
 fn stem(time_s: f64) -> String {
     format!("{time_s:.6}")
 }

@@ -1,4 +1,4 @@
-//! The camera of loose photos, as a command line gives it.
+//! The argument of `--camera`, for loose photos.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,19 +10,19 @@ use super::super::lens::{Distortion, pinhole};
 use super::super::lines::{TextFile, excerpt, numbers};
 use crate::camera::Intrinsics;
 
-/// Four numbers, a line of COLMAP's `cameras.txt`, or such a file.
+/// Four numbers, a line of COLMAP's `cameras.txt`, or a `cameras.txt`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraArgument {
     /// `fx fy cx cy` \[px\], with pixel centres at integers.
     Pinhole([f64; 4]),
-    /// `ID MODEL WIDTH HEIGHT PARAMETERS…`, with COLMAP's pixels.
+    /// `ID MODEL WIDTH HEIGHT PARAMETERS…`, with COLMAP's pixel coordinates.
     Line(String),
     /// A file of such lines.
     File(PathBuf),
 }
 
 impl CameraArgument {
-    /// The camera of a photo of a size \[px\], and what is to be taken out of it.
+    /// The camera of a photo of a size \[px\], with its distortion.
     pub(super) fn of_photo(
         &self,
         photo: &Path,
@@ -35,8 +35,8 @@ impl CameraArgument {
                     (0.0..f64::from(width)).contains(cx) && (0.0..f64::from(height)).contains(cy);
                 if !is_inside {
                     return Err(error(format!(
-                        "{width}x{height} pixels found, but --camera has its centre at {cx},{cy}: \
-                         fx,fy,cx,cy for photos of this size expected"
+                        "a photo of {width}x{height} pixels found, but --camera has its centre at {cx},{cy}; \
+                         give fx,fy,cx,cy for this size"
                     )));
                 }
                 Ok(ModelCamera {
@@ -53,7 +53,7 @@ impl CameraArgument {
                 } = camera.intrinsics;
                 if (w, h) != (width, height) {
                     return Err(error(format!(
-                        "{w}x{h} pixels expected, as --camera says, {width}x{height} found"
+                        "{w}x{h} pixels expected, as in --camera, {width}x{height} found"
                     )));
                 }
                 Ok(camera)
@@ -72,12 +72,12 @@ impl CameraArgument {
                 match fitting.collect::<Vec<_>>().as_slice() {
                     [camera, rest @ ..] if rest.iter().all(|other| other == camera) => Ok(**camera),
                     [] => Err(file.error(format!(
-                        "a camera of {width}x{height} pixels expected, as {} has, none of {} found",
+                        "a camera for the {width}x{height} pixels of {} expected, none of {} cameras fits",
                         photo.display(),
                         cameras.len()
                     ))),
                     several => Err(file.error(format!(
-                        "one camera of {width}x{height} pixels expected, {} found; give one of the lines \
+                        "one camera for {width}x{height} pixels expected, {} found; give one of the lines \
                          as --camera",
                         several.len()
                     ))),

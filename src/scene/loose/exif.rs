@@ -1,4 +1,4 @@
-//! What a photo's file says of the camera that took it.
+//! The EXIF data of a photo: focal length and orientation.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -7,10 +7,10 @@ use std::path::Path;
 use exif::{In, Tag, Value};
 use image::metadata::Orientation;
 
-/// The diagonal of the 35 mm film that EXIF's equivalent focal length is meant for (CIPA DCG-001) \[mm\].
+/// The diagonal of 35 mm film, to which the equivalent focal length refers (CIPA DCG-001) \[mm\].
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
 
-/// The tags of a file, none where it has no EXIF or none that can be read.
+/// The tags of a file; `None` if it has no readable EXIF data.
 pub(super) struct Exif(Option<exif::Exif>);
 
 impl Exif {
@@ -29,17 +29,17 @@ impl Exif {
         (number.is_finite() && number > 0.0).then_some(number)
     }
 
-    /// How the image is to be turned so that up is up.
+    /// How to rotate the image upright.
     pub fn orientation(&self) -> Orientation {
         let number = self.number(Tag::Orientation).map(|number| number as u8);
         let turned = number.and_then(Orientation::from_exif);
         turned.unwrap_or(Orientation::NoTransforms)
     }
 
-    /// The focal length \[px\] in an image of a size \[px\], and how it is known.
+    /// The focal length \[px\] in an image of a size \[px\], and its source as text.
     ///
-    /// By the sensor's own pixels where their density is told, otherwise by the equivalent on 35 mm film,
-    /// whose diagonal the image's is.
+    /// From the pixel density of the sensor if given, otherwise from the equivalent focal length on 35 mm film, whose
+    /// diagonal corresponds to that of the image.
     pub fn focal_px(&self, (width, height): (u32, u32)) -> Option<(f64, String)> {
         let by_sensor = || {
             let focal_mm = self.number(Tag::FocalLength)?;
@@ -53,7 +53,7 @@ impl Exif {
                 5 => 1e-3,
                 _ => 25.4,
             };
-            // The density is that of the image as the camera wrote it, which may have been larger.
+            // The density refers to the original image, which may have been larger.
             let written = self
                 .number(Tag::PixelXDimension)
                 .unwrap_or(f64::from(width));
@@ -66,7 +66,7 @@ impl Exif {
             let focal_px = film_mm * diagonal / FILM_DIAGONAL_MM;
             Some((focal_px, format!("{film_mm:.0} mm on 35 mm film")))
         };
-        // No lens sees less than a third of a degree or more than 170°.
+        // Lenses have fields of view from a third of a degree to 170°.
         let is_lens = |(focal_px, _): &(f64, String)| {
             let across = f64::from(width.max(height));
             (0.04 * across..200.0 * across).contains(focal_px)

@@ -1,6 +1,5 @@
-//! Features and matches as hloc (Sarlin et al., *From Coarse to Fine*, CVPR 2019) writes them: one file
-//! with `IMAGE/keypoints` (N × 2, often in 16 bits), one with `IMAGE0/IMAGE1/matches0`, where the names
-//! have `-` for `/`.
+//! Features and matches of hloc (Sarlin et al., *From Coarse to Fine*, CVPR 2019): one file with `IMAGE/keypoints`
+//! (N × 2, often in 16 bits), one with `IMAGE0/IMAGE1/matches0`, where names have `-` instead of `/`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,25 +10,25 @@ use hdf5_pure::{Dataset, File, Group};
 use super::{MOST_KEYPOINTS, RawMatches};
 use crate::scene::SceneError;
 
-/// Folders within folders that images are looked for in.
+/// How deep groups are searched for images.
 const DEEPEST: usize = 8;
-/// Images and pairs at most, so that a damaged file ends the search.
+/// The most images and pairs; limits the search in a damaged file.
 const MOST_ENTRIES: usize = 1 << 20;
 
-/// The open files, and what is where.
+/// The open files, and their content by name.
 pub(super) struct HlocFiles {
     features: File,
     features_path: PathBuf,
     matches: File,
     matches_path: PathBuf,
-    /// Images by their names with `-` for `/`.
+    /// Images by their names with `-` instead of `/`.
     images: BTreeMap<String, String>,
-    /// Pairs as they are stored, by the frames' names.
+    /// Stored pairs by the frames' names.
     pairs: BTreeMap<(String, String), Vec<[String; 2]>>,
 }
 
 impl HlocFiles {
-    /// Finds out which of the files has the features and which the matches.
+    /// Opens the files, and detects which contains features and which matches.
     pub(super) fn open(folder: &Path, files: &[&PathBuf]) -> Result<Self, SceneError> {
         let (mut features, mut matches) = (None, None);
         for path in files {
@@ -43,7 +42,7 @@ impl HlocFiles {
             };
             if let Some((other, ..)) = slot.replace(((*path).clone(), file, found)) {
                 let expected = format!(
-                    "one file of features and one of matches expected in a folder; `{}` is another of its \
+                    "one file of features and one of matches expected in a folder; `{}` has the same \
                      kind",
                     other.display()
                 );
@@ -77,7 +76,7 @@ impl HlocFiles {
         })
     }
 
-    /// The matches of two frames, if they are stored in this order.
+    /// Reads the matches of two frames, if they are stored in this order.
     pub(super) fn read(&self, first: &str, second: &str) -> Result<Option<RawMatches>, SceneError> {
         let key = (first.to_owned(), second.to_owned());
         let stored = match self.pairs.get(&key).map(Vec::as_slice) {
@@ -98,13 +97,13 @@ impl HlocFiles {
                 content(&self.features_path, &expected)
             })?;
             let place = format!("{name}/keypoints");
-            let found = self.features.dataset(&place).map_err(said);
+            let found = self.features.dataset(&place).map_err(text_of);
             let found = found.and_then(|set| positions(&set));
             found.map_err(|why| content(&self.features_path, &format!("{place}: {why}")))
         };
         let (first, second) = (keypoints(&stored[0])?, keypoints(&stored[1])?);
         let place = format!("{}/{}/matches0", stored[0], stored[1]);
-        let partners = self.matches.dataset(&place).map_err(said);
+        let partners = self.matches.dataset(&place).map_err(text_of);
         let partners = partners
             .and_then(|set| partners_of(&set))
             .map_err(|why| content(&self.matches_path, &format!("{place}: {why}")))?;
@@ -117,7 +116,7 @@ impl HlocFiles {
     }
 }
 
-fn said(why: hdf5_pure::Error) -> String {
+fn text_of(why: hdf5_pure::Error) -> String {
     why.to_string()
 }
 
@@ -125,7 +124,7 @@ fn content(path: &Path, expected: &dyn std::fmt::Display) -> SceneError {
     SceneError::expected(path, expected.to_string().replace('\n', " "))
 }
 
-/// The name of a frame whose image goes by this name.
+/// The name of the frame of an image.
 fn frame_name(image: &str) -> String {
     let base = image.rsplit('/').next().unwrap_or(image);
     match base.rsplit_once('.') {
@@ -140,9 +139,9 @@ struct Found {
     matches: Vec<[String; 2]>,
 }
 
-/// Looks for groups that have keypoints or matches.
+/// Searches groups for keypoints and matches.
 fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), String> {
-    let sets = group.datasets().map_err(said)?;
+    let sets = group.datasets().map_err(text_of)?;
     if sets.iter().any(|name| name == "keypoints") {
         found.keypoints.push(path.join("/"));
     }
@@ -155,8 +154,8 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
     if path.len() == DEEPEST {
         return Ok(());
     }
-    for name in group.groups().map_err(said)? {
-        let inside = group.group(&name).map_err(said)?;
+    for name in group.groups().map_err(text_of)? {
+        let inside = group.group(&name).map_err(text_of)?;
         path.push(name);
         walk(&inside, path, found)?;
         path.pop();
@@ -164,9 +163,9 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
     Ok(())
 }
 
-/// Refuses what is larger than any photo's keypoints before it is read.
+/// Refuses arrays that are larger than any photo's keypoints, before reading them.
 fn check_size(set: &Dataset) -> Result<Vec<u64>, String> {
-    let shape = set.shape().map_err(said)?;
+    let shape = set.shape().map_err(text_of)?;
     let count = shape
         .iter()
         .try_fold(1_u64, |all, &side| all.checked_mul(side));
@@ -182,16 +181,16 @@ fn positions(set: &Dataset) -> Result<Vec<[f32; 2]>, String> {
     let [_, 2] = check_size(set)?[..] else {
         return Err("positions expected, an array N × 2".to_owned());
     };
-    let numbers: Vec<f32> = match set.element_size().map_err(said)? {
-        // hloc stores halves, which the crate hands out as they are.
+    let numbers: Vec<f32> = match set.element_size().map_err(text_of)? {
+        // hloc stores half floats, which the crate cannot convert.
         2 => {
-            let bytes = set.read_raw().map_err(said)?;
+            let bytes = set.read_raw().map_err(text_of)?;
             let halves = bytes.chunks_exact(2);
             halves
                 .map(|half| f16::from_le_bytes([half[0], half[1]]).to_f32())
                 .collect()
         }
-        _ => set.read_f32().map_err(said)?,
+        _ => set.read_f32().map_err(text_of)?,
     };
     Ok(numbers
         .chunks_exact(2)
@@ -203,7 +202,7 @@ fn partners_of(set: &Dataset) -> Result<Vec<Option<usize>>, String> {
     let [_] = check_size(set)?[..] else {
         return Err("one number for each keypoint expected".to_owned());
     };
-    let numbers = set.read_i64().map_err(said)?;
+    let numbers = set.read_i64().map_err(text_of)?;
     let partner = |number: i64| match number {
         -1 => Ok(None),
         _ => usize::try_from(number)

@@ -1,5 +1,5 @@
-//! Matches as `.npz`: `keypoints0` and `keypoints1` (N × 2), and `matches`, for each of the first the
-//! number of its partner or −1.
+//! Matches as `.npz`: `keypoints0` and `keypoints1` (N × 2), and `matches`, the partner of each keypoint of the first
+//! or −1.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -11,7 +11,7 @@ use super::{MOST_KEYPOINTS, RawMatches};
 use crate::scene::SceneError;
 use crate::scene::lines::excerpt;
 
-/// Bytes of an array at most: as many keypoints as there may be, of two numbers of eight bytes.
+/// The largest array \[bytes\]: two numbers of eight bytes for the most keypoints.
 const MOST_BYTES: u64 = 16 * MOST_KEYPOINTS as u64 + 4096;
 
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
@@ -22,7 +22,7 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let mut array = |name: &str| -> Result<Array, String> {
         let entry = archive.by_name(&format!("{name}.npy"));
         let entry = entry.map_err(|why| why.to_string())?;
-        // The size that the archive announces may be wrong; no more than is allowed is read.
+        // The announced size may be wrong, so reading is limited.
         let mut bytes = Vec::new();
         let read = entry.take(MOST_BYTES + 1).read_to_end(&mut bytes);
         read.map_err(|why| why.to_string())?;
@@ -52,9 +52,9 @@ struct Array {
 }
 
 impl Array {
-    /// Reads a `.npy` file: a magic number, a version, the length of a header, the header as a Python
-    /// dictionary, the numbers. The crates that read it bring a grammar of Python's literals, which takes
-    /// longer to build than all other formats of matches together.
+    /// Reads a `.npy` file: a magic number, a version, the length of a header, the header as a Python dictionary, the
+    /// numbers. The existing crates contain a grammar of Python literals, which takes longer to build than all other
+    /// formats of matches together.
     fn parse(bytes: &[u8]) -> Result<Self, String> {
         let header = Header::read(bytes).ok_or("an array of numpy (.npy) expected")?;
         let Header { shape, kind, data } = header;
@@ -79,7 +79,7 @@ impl Array {
         };
         if count != Some(numbers.len() as u64) {
             return Err(format!(
-                "an array of {shape:?} expected, the file is cut off or longer"
+                "an array of shape {shape:?} expected, the file is shorter or longer"
             ));
         }
         Ok(Self { shape, numbers })
@@ -112,7 +112,7 @@ fn numbers<const N: usize>(data: &[u8], read: fn([u8; N]) -> f64) -> Vec<f64> {
     numbers.iter().map(|bytes| read(*bytes)).collect()
 }
 
-/// What stands before the numbers.
+/// The header of an array, and the bytes after it.
 struct Header<'a> {
     shape: Vec<u64>,
     kind: &'a str,
@@ -140,7 +140,7 @@ impl<'a> Header<'a> {
             let (_, after) = text.split_once(&format!("'{key}':"))?;
             Some(after.trim_start())
         };
-        // Rows first: what one writes who does not ask for something else.
+        // Row-major order is numpy's default.
         value("fortran_order")?.starts_with("False").then_some(())?;
         let (kind, _) = value("descr")?.strip_prefix('\'')?.split_once('\'')?;
         let (sides, _) = value("shape")?.strip_prefix('(')?.split_once(')')?;

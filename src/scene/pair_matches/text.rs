@@ -1,4 +1,4 @@
-//! Matches as text, a line each: `x y` in the first photo, `x y` in the second \[px\].
+//! Matches as text, one per line: `x y` in the first photo, `x y` in the second \[px\].
 
 use std::fmt::Write as _;
 use std::io;
@@ -10,7 +10,7 @@ use super::{RawMatches, pair};
 use crate::scene::SceneError;
 use crate::scene::lines::TextFile;
 
-/// Reads a file of matches. What a line has behind its four numbers, such as a score, says nothing here.
+/// Reads a file of matches. Further columns, such as a score, are ignored.
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let file = TextFile::read(path)?;
     let mut found = RawMatches {
@@ -26,7 +26,7 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
                 .next()
                 .ok_or_else(|| line.error("a line `x y x y` expected, it is cut off"))?;
             line.number(word)?;
-            // Not by way of `f64`, which would round twice.
+            // Not via `f64`, which would round twice.
             *number = word.parse().unwrap_or(f32::INFINITY);
         }
         let [x, y, other_x, other_y] = numbers;
@@ -37,8 +37,7 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     Ok(found)
 }
 
-/// Writes the matches that stand out and are mutual into a folder, to the last bit, so that they read
-/// back to what they were.
+/// Writes the accepted matches (distinct and mutual) into a folder. Reading them back gives the same bits.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -55,7 +54,7 @@ pub fn write_matches(
     for found in decisions.iter().flatten().filter(is_match) {
         let at = features.keypoints[found.query];
         let other = others.keypoints[found.reference];
-        // Digits enough to be read back to the same number.
+        // Rust prints enough digits to read back the same number.
         let _ = writeln!(text, "{} {} {} {}", at.x, at.y, other.x, other.y);
     }
     std::fs::create_dir_all(folder)?;

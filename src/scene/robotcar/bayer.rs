@@ -1,8 +1,8 @@
-//! Colours of a sensor that has one of them at each pixel.
+//! Demosaicing of Bayer images.
 
 use image::{GrayImage, Rgb, RgbImage};
 
-/// The colours of the two by two pixels at the top left, row by row.
+/// The colours of the top-left 2 × 2 pixels, row by row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pattern {
     Gbrg,
@@ -10,7 +10,7 @@ pub(super) enum Pattern {
 }
 
 impl Pattern {
-    /// The channel that a pixel measures: 0 red, 1 green, 2 blue.
+    /// The channel of a pixel: 0 red, 1 green, 2 blue.
     pub(super) fn channel(self, x: u32, y: u32) -> usize {
         let tile = match self {
             Self::Gbrg => [[1, 2], [0, 1]],
@@ -20,8 +20,7 @@ impl Pattern {
     }
 }
 
-/// The photo in colour, each missing value the mean of the nearest that were measured (bilinear
-/// interpolation, as the SDK does it).
+/// The colour photo. Missing values are bilinearly interpolated, as in the SDK.
 pub(super) fn demosaiced(raw: &GrayImage, pattern: Pattern) -> RgbImage {
     let (width, height) = raw.dimensions();
     RgbImage::from_fn(width, height, |x, y| {

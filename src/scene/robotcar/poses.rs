@@ -1,4 +1,4 @@
-//! Where the vehicle was: GPS/INS in the world, visual odometry from place to place.
+//! The poses of the vehicle: GPS/INS in the world frame, visual odometry relative to the start.
 
 use std::path::Path;
 
@@ -8,23 +8,22 @@ use super::super::trajectory::Trajectory;
 use super::sdk::transform;
 use crate::geometry::Pose;
 
-/// Between poses this far apart in time, what lies between is not interpolated \[µs\]: the INS measures
-/// every 20 ms, the stereo camera every 62 ms.
+/// The longest interval for interpolation \[µs\]: the INS measures every 20 ms, the stereo camera every 62 ms.
 const LONGEST_GAP_US: f64 = 500_000.0;
-/// Slower than this the car stands \[m/s\]; the noise of a standing INS is a tenth of it.
+/// Below this speed the car stands \[m/s\]; the noise of a standing INS is a tenth of it.
 const STANDS_M_S: f64 = 0.5;
-/// The status of rows that can be believed.
+/// The status of reliable rows.
 const GOOD: &str = "INS_SOLUTION_GOOD";
 
-/// The trajectory of poses by time \[µs\].
+/// A trajectory of poses by time \[µs\].
 fn track(samples: Vec<(u64, Pose)>) -> Trajectory {
     let samples = samples.into_iter().map(|(time, pose)| (time as f64, pose));
     Trajectory::new(samples.collect(), LONGEST_GAP_US, 0.0)
 }
 
-/// When the car first moves and when it last stops \[µs\]; `None` where it never does.
+/// The times of the car's first motion and last stop \[µs\]; `None` if it never moves.
 pub(super) fn first_and_last_motion(track: &Trajectory) -> Option<(f64, f64)> {
-    /// Speeds are taken over at least this time \[µs\].
+    /// Speeds are measured over at least this time \[µs\].
     const OVER_US: f64 = 900_000.0;
     let samples = track.samples();
     let later = |at: usize| {
@@ -43,13 +42,13 @@ pub(super) fn first_and_last_motion(track: &Trajectory) -> Option<(f64, f64)> {
     Some((samples[first].0, later(last)?.0))
 }
 
-/// Reads `gps/ins.csv`: the INS in the world (north, east, down), where its status is good.
+/// Reads the good rows of `gps/ins.csv`: the INS in the world frame (north, east, down).
 pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
     let mut lines = file.lines();
     let header = lines
         .next()
-        .ok_or_else(|| file.error("a line of headings expected"))?;
+        .ok_or_else(|| file.error("a header expected, the file is empty"))?;
     let column = |name: &str| {
         let found = header.words().position(|word| word == name);
         found.ok_or_else(|| header.error(format!("a column `{name}` expected")))
@@ -73,14 +72,14 @@ pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
     Ok(track(samples))
 }
 
-/// Reads `vo/vo.csv`: the motion of the vehicle from one photo to the next, chained.
+/// Reads `vo/vo.csv`: chains the motions of the vehicle from photo to photo.
 pub(super) fn read_odometry(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
     let mut pose = Pose::identity();
     let mut samples: Vec<(u64, Pose)> = Vec::new();
     for line in file.lines().skip(1) {
         let words: Vec<&str> = line.words().collect();
-        // The columns are called source and destination; the motion is from the second to the first.
+        // Of the columns source and destination, the motion is from the second to the first.
         let at = microseconds(&line, word(&line, &words, 0)?)?;
         let from = microseconds(&line, word(&line, &words, 1)?)?;
         if samples.is_empty() {
@@ -92,7 +91,7 @@ pub(super) fn read_odometry(path: &Path) -> Result<Trajectory, SceneError> {
     Ok(track(samples))
 }
 
-/// The transform whose position, roll, pitch and yaw are in these columns.
+/// The transform from the position, roll, pitch and yaw in these columns.
 fn transform_at(line: &Line<'_>, words: &[&str], at: [usize; 6]) -> Result<Pose, SceneError> {
     let mut numbers = [0.0; 6];
     for (number, column) in numbers.iter_mut().zip(at) {

@@ -1,4 +1,4 @@
-//! Scans around a frame, gathered into one cloud.
+//! Accumulates the scans around a frame to one cloud.
 
 use std::path::{Path, PathBuf};
 
@@ -13,18 +13,18 @@ use super::sdk::Sdk;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 
-/// Scans from this long before and after a frame are gathered, as long as the car was near \[µs\].
+/// Scans up to this time before and after a frame are accumulated, if the car was near \[µs\].
 const AROUND_US: u64 = 15_000_000;
-/// Scans from farther away than this are left out \[m\].
+/// Scans from farther away are skipped \[m\].
 const NEAR_M: f64 = 50.0;
-/// Bytes of a scan at most; a scan of the LMS has 13 kB.
+/// The largest scan file \[bytes\]; a scan of the LMS has 13 kB.
 const LONGEST_SCAN: u64 = 1 << 26;
 
-/// The laser scanners, and whether one scans in a plane (x, y, reflectance) or in space (x, y, z).
+/// The laser scanners, and whether they scan a plane (x, y, reflectance) or space (x, y, z).
 const SCANNERS: [(&str, bool); 3] = [("lms_front", true), ("lms_rear", true), ("ldmrs", false)];
 
 pub(super) struct ScanFile {
-    /// When it was taken \[µs\].
+    /// The time of the scan \[µs\].
     time: u64,
     path: PathBuf,
     is_planar: bool,
@@ -52,10 +52,10 @@ pub(super) fn scan_files(traversal: &Path, sdk: &Sdk) -> Result<Vec<ScanFile>, S
     Ok(files)
 }
 
-/// The scans of a traversal, of which those around a frame make its cloud.
+/// The scans of a traversal. A frame's cloud is made of the scans around it.
 pub(super) struct Scans {
     pub files: Vec<ScanFile>,
-    /// How the vehicle moved.
+    /// The motion of the vehicle.
     pub motion: Trajectory,
     /// The times of the frames \[µs\].
     pub times: Vec<u64>,
@@ -79,8 +79,8 @@ impl Clouds for Scans {
 
     fn missing(&self) -> Option<&str> {
         Some(
-            "scans of lms_front, lms_rear or ldmrs around its time, and vo/vo.csv or gps/ins.csv \
-             that say how the car moved, are needed",
+            "scans of lms_front, lms_rear or ldmrs around its time expected, and the motion of the car in \
+             vo/vo.csv or gps/ins.csv",
         )
     }
 
@@ -107,7 +107,7 @@ impl Clouds for Scans {
     }
 }
 
-/// The points of a scan in the scanner's frame: triples of numbers of eight bytes.
+/// The points of a scan in the scanner's frame: triples of `f64`.
 fn read(file: &ScanFile) -> Result<Vec<Point3<f64>>, SceneError> {
     let path = &file.path;
     let io = SceneError::io(path);
@@ -116,7 +116,7 @@ fn read(file: &ScanFile) -> Result<Vec<Point3<f64>>, SceneError> {
         return Err(SceneError::expected(
             path,
             format!(
-                "a scan of 24 bytes for each point expected, at most {LONGEST_SCAN}, {size} found"
+                "a scan of 24 bytes per point and at most {LONGEST_SCAN} bytes expected, {size} bytes found"
             ),
         ));
     }

@@ -1,4 +1,4 @@
-//! The calibration that comes with the SDK: `models` and `extrinsics`.
+//! The calibration of the SDK: `models` and `extrinsics`.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub(super) struct Sdk {
 }
 
 impl Sdk {
-    /// Looks for it in a traversal's folder and beside it.
+    /// Searches a traversal's folder and its parent.
     pub(super) fn find(traversal: &Path) -> Option<Self> {
         let traversal = traversal.canonicalize().ok()?;
         let places = [Some(traversal.as_path()), traversal.parent()];
@@ -32,15 +32,14 @@ impl Sdk {
             .map(|folder| Self { folder })
     }
 
-    /// The transform of a sensor: for a camera from the vehicle to it, for a laser or the INS from it to
-    /// the vehicle.
+    /// The extrinsics of a sensor: from the vehicle to a camera, but from a laser or the INS to the vehicle.
     pub(super) fn extrinsics(&self, sensor: &str) -> Result<Pose, SceneError> {
         let file = TextFile::read(&self.folder.join(format!("extrinsics/{sensor}.txt")))?;
         let [[x, y, z, roll, pitch, yaw]] = file.rows()?;
         Ok(transform([x, y, z], [roll, pitch, yaw]))
     }
 
-    /// The model of a camera whose photos are of this size, with its look-up table.
+    /// The model of a camera with photos of this size, and its look-up table.
     pub(super) fn camera_model(
         &self,
         name: &str,
@@ -50,7 +49,7 @@ impl Sdk {
         let mut lines = file.lines();
         let mut next = || {
             lines.next().ok_or_else(|| {
-                file.error("a line `fx fy cx cy` and four of a 4x4 matrix expected, it is cut off")
+                file.error("a line `fx fy cx cy` and the four lines of a 4x4 matrix expected, the file is cut off")
             })
         };
         let intrinsics = pinhole(next()?.numbers()?, size).map_err(|why| file.error(why))?;
@@ -69,8 +68,8 @@ impl Sdk {
     }
 }
 
-/// For each pixel of undistorted photos its place in the photo as it was taken \[px\]: in the file, all
-/// columns come first, then all rows.
+/// The position in the original photo for each pixel of undistorted photos \[px\]. The file has all columns first, then
+/// all rows.
 fn read_table(path: &Path, (width, height): (u32, u32)) -> Result<Vec<[f32; 2]>, SceneError> {
     let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
     let pixels = width as usize * height as usize;
@@ -78,7 +77,7 @@ fn read_table(path: &Path, (width, height): (u32, u32)) -> Result<Vec<[f32; 2]>,
         return Err(SceneError::expected(
             path,
             format!(
-                "a look-up table for photos of {width}x{height} pixels expected, {} bytes, {} found",
+                "a look-up table of {} bytes for photos of {width}x{height} pixels expected, {} bytes found",
                 pixels * 16,
                 bytes.len()
             ),
@@ -99,18 +98,18 @@ pub(super) fn transform(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pos
     )
 }
 
-/// A camera, and what takes the distortion out of its photos.
+/// A camera, and the table that undistorts its photos.
 pub(super) struct CameraModel {
     /// The pinhole of undistorted photos.
     pub(super) intrinsics: Intrinsics,
     /// From x right, y down, z forward to the camera's axes.
     pub(super) camera_from_image: Pose,
-    /// For each pixel where it is in the photo as it was taken \[px\].
+    /// The position in the original photo for each pixel \[px\].
     table: Vec<[f32; 2]>,
 }
 
 impl CameraModel {
-    /// The photo as a pinhole would have taken it; black where the lens saw nothing.
+    /// The undistorted photo; black outside the original photo.
     pub(super) fn undistorted(&self, raw: &RgbImage) -> RgbImage {
         let (width, height) = raw.dimensions();
         let mut straight = RgbImage::new(width, height);

@@ -1,4 +1,4 @@
-//! How a stock viewer lays a recording out: a row per method, beside the world.
+//! The layout of a recording in the stock viewer: the world, and a row per method.
 
 use rerun::SeriesLines;
 use rerun::blueprint::components::{Corner2D, Eye3DKind};
@@ -14,33 +14,33 @@ use crate::method::Method;
 use crate::palette;
 use crate::problem::Problem;
 
-/// Photos of cars are wide.
+/// Ranked frames per row; car photos are wide.
 const RANKS_PER_ROW: usize = 3;
 
-/// What a layout follows from.
+/// The input of a layout.
 pub(super) struct LayoutInput<'a> {
-    /// The methods that are run.
+    /// The methods of the run.
     pub(super) methods: &'a [Method],
-    /// The eyes stand where its reference does.
+    /// The first problem; its reference defines the points of view.
     pub(super) first: &'a Problem,
-    /// References of a query.
+    /// The number of references of a query.
     pub(super) references: usize,
-    /// Ranked frames that have a picture.
+    /// The number of ranked frames with a picture.
     pub(super) ranked: usize,
-    /// What is known at the end.
+    /// What to show first.
     pub(super) focus: Focus,
-    /// Whether the pages of a lesson are shown.
+    /// Whether the recording has pages of a lesson.
     pub(super) has_pages: bool,
 }
 
-/// What the layout leads the eye to, once the results are known; nothing before.
+/// What the layout shows first, once the results are known; empty before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Focus {
-    /// The estimators whose results are wrong or missing, of a hybrid the one that it took.
+    /// The estimators with wrong or missing results; for a hybrid, the one whose pose it took.
     pub(super) wrong: Vec<Method>,
-    /// The methods whose results are proven wrong by a picture.
+    /// The methods with a picture that proves the failure.
     pub(super) proven: Vec<Method>,
-    /// What is to be seen in the world at once, in the frame of the first reference camera \[m\].
+    /// Places that the view of the world must include, in the frame of the first reference camera \[m\].
     pub(super) places: Vec<[f64; 3]>,
 }
 
@@ -49,7 +49,7 @@ pub(super) fn send(stream: &mut Stream, input: &LayoutInput<'_>) {
     stream.send_layout(&root(input));
 }
 
-/// Names and colours of what is plotted.
+/// Logs names and colours of the plots.
 pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
     let names = |names: &[&str]| SeriesLines::new().with_names(names.iter().copied());
     if shows_features(methods) {
@@ -67,7 +67,7 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
     }
 }
 
-/// Whether anything of FB can be in the recording; a hybrid tells what both its methods do.
+/// Whether the recording may contain FB; a hybrid records both its methods.
 fn shows_features(methods: &[Method]) -> bool {
     methods.iter().any(|&method| {
         let parts = estimator::find(method).and_then(Entry::hybrid);
@@ -75,13 +75,13 @@ fn shows_features(methods: &[Method]) -> bool {
     })
 }
 
-/// Whether a method's cost is made of a joint histogram.
+/// Whether a method's cost uses a joint histogram.
 fn has_histogram(method: Method) -> bool {
     let cost = estimator::find(method).and_then(Entry::cost);
     cost.is_some_and(|cost| cost.explains == ExplanationKind::JointHistogram)
 }
 
-/// The world and the words on the left, a row per method on the right.
+/// The world and text on the left, a row per method on the right.
 fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     let LayoutInput {
         methods,
@@ -117,7 +117,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         rows.push((1.0, feature_row()));
     }
     let mut direct = estimator::direct_methods(methods);
-    // The tab of what went wrong is the open one.
+    // The first tab, which is open, shows a failure.
     direct.sort_by_key(|method| !focus.wrong.contains(method));
     let share = match direct.first() {
         Some(first) if focus.wrong.contains(first) => 1.8,
@@ -127,13 +127,13 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     let direct: Vec<_> = direct
         .map(|method| search_row(method, viewpoints))
         .collect();
-    // Three rows would leave too little height for the photos.
+    // Three rows would be too low for the photos.
     if rows.is_empty() {
         rows = equal(direct);
     } else if !direct.is_empty() {
         rows.push((share, BlueprintNode::Tabs(direct)));
     }
-    // The proofs come first: they are what a recording of a failure opens on.
+    // The proofs come first: a recording of a failure opens on them.
     let proofs = focus.proven.iter().map(|&method| {
         let name = format!("Why {} is wrong", method.label());
         view("2D", name, entities::proof(method))
@@ -161,7 +161,7 @@ fn ranks(ranked: usize) -> BlueprintNode {
 
 fn overview(viewpoints: &Viewpoints<'_>, places: &[[f64; 3]]) -> BlueprintView {
     BlueprintView::new("3D", "World", "/")
-        // The maps of PM and MI lie in the same place: each has a view of its own.
+        // The maps of PM and MI overlap, so each has its own view.
         .of([
             "+ /world/**",
             "- /world/search/**",
@@ -265,7 +265,7 @@ fn plot(name: impl Into<String>, origin: impl Into<String>) -> BlueprintNode {
 struct Viewpoints<'a>(&'a Problem);
 
 impl Viewpoints<'_> {
-    /// Looks over the reference camera's shoulder, from so far that all places are in sight.
+    /// Looks from behind the reference camera, far enough to see all places.
     fn behind(&self, places: &[[f64; 3]]) -> EyeControls3D {
         let up = [0.0, -1.0, 0.0];
         let Some(nearest) = places.iter().map(|place| place[2]).reduce(f64::min) else {
@@ -285,13 +285,13 @@ impl Viewpoints<'_> {
         )
     }
 
-    /// Looks down on the whole disc of the search, with ahead upwards.
+    /// Looks down on the disc of the search, with the forward direction up.
     fn above(&self) -> EyeControls3D {
         let height = 2.2 * self.0.uncertainty_radius_m;
         self.at([0.0, -height, -0.01], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     }
 
-    /// Coordinates in the reference camera's frame; its centre is the drawn origin.
+    /// A point of view in the reference camera's frame; its centre is the drawn origin.
     fn at(&self, position: [f64; 3], target: [f64; 3], up: [f64; 3]) -> EyeControls3D {
         let rotation = self.0.reference.world_from_camera.rotation;
         let world = |v: [f64; 3]| -> [f32; 3] {

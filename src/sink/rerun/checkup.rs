@@ -1,4 +1,4 @@
-//! A recording of some frames with their clouds, to see whether they fit together.
+//! The recording of `doctor`: frames with their clouds, to see whether they fit together.
 
 use std::sync::Arc;
 
@@ -13,8 +13,7 @@ use crate::picture;
 use crate::problem::ReferenceTuple;
 use crate::render::{RenderParams, color_cloud};
 
-/// Records frames of a scene: each with its camera, photo and cloud in the world, and with its cloud on its
-/// photo.
+/// Records frames of a scene: camera, photo and cloud in the world, and the cloud on the photo.
 ///
 /// # Errors
 /// [`RecordError`].

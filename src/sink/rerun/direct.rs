@@ -1,4 +1,4 @@
-//! What PM and MI tell: synthetic views, and what the cost made of them.
+//! Records direct methods: synthetic views, and their evaluation by the cost.
 
 use std::sync::Arc;
 
@@ -16,17 +16,17 @@ use crate::grid::{Offset, Phase};
 use crate::picture::{self, Painter};
 use crate::render::Comparison;
 
-/// Of a search that goes down a slope, every second hypothesis is better than all before: one in so many is shown.
+/// Every how many new bests one is shown: in a search along a slope, every second hypothesis is a new best.
 const SHOWN_BESTS: usize = 10;
 
-/// What a direct method told so far, as far as later events refer to it.
+/// The state of a direct method that later events need.
 #[derive(Default)]
 pub(super) struct DirectContext {
-    /// The best pose so far, if it was not shown, with its place on the timeline `eval`.
+    /// The best pose so far, if not yet shown, with its time on `eval`.
     unseen: Option<(i64, Arc<Comparison>)>,
     /// The best-so-far offsets.
     path: Vec<Offset>,
-    /// The costs that have the ends of the colour map.
+    /// The range of the colour map.
     range: Option<CostRange>,
     costs: Vec<(i64, f64)>,
     coverages: Vec<(i64, f64)>,
@@ -111,7 +111,7 @@ impl DirectContext {
     }
 }
 
-/// Pictures of a synthetic view and of what the cost makes of it, by what they show.
+/// Pictures of a synthetic view and of its evaluation, by name.
 pub(super) fn packed(comparison: &Comparison) -> Vec<(&'static str, Encoded)> {
     let painter = Painter::new(&comparison.view);
     let mut pictures = vec![("synthetic", png(painter.synthetic()))];

@@ -1,4 +1,4 @@
-//! Where things are in a recording: its application, its timelines, its entity paths.
+//! The application id, timelines and entity paths of recordings.
 
 use crate::estimator;
 use crate::event::Side;
@@ -9,19 +9,19 @@ pub const APPLICATION_ID: &str = "posescope";
 
 /// One number per query of the run.
 pub const QUERY_TIMELINE: &str = "query";
-/// One number per decision of an estimator: few enough to walk through by hand.
+/// One number per decision of an estimator: few enough to step through by hand.
 pub const STEP_TIMELINE: &str = "step";
 /// One number per hypothesis: a trial of MLESAC, or an evaluation of the grid search.
 pub const EVAL_TIMELINE: &str = "eval";
 
-/// One number per event of an estimator, from 0 for each of them: on it all of them advance together.
+/// One number per event of an estimator, from 0 for each: all estimators advance together on it.
 pub const LOCKSTEP_TIMELINE: &str = "lockstep";
 
 /// The page of a lesson, as Markdown.
 pub const LESSON: &str = "lesson";
-/// Everything that has a place in the world.
+/// Everything in the world.
 pub const WORLD: &str = "world";
-/// The roots of all that belongs to one query, whichever methods were asked.
+/// The roots of all entities of one query, for any methods.
 pub fn of_a_query() -> impl Iterator<Item = &'static str> {
     let methods = estimator::methods().map(|method| method.name());
     [WORLD, PROOF, "query", "search", "fusion", "retrieval"]
@@ -34,7 +34,7 @@ pub const RANSAC_BEST: &str = "fb/ransac/best";
 pub const RANSAC_INLIERS: &str = "fb/ransac/inliers";
 /// Log likelihood of each trial.
 pub const RANSAC_LIKELIHOOD: &str = "fb/ransac/likelihood";
-/// How many query features passed each step of FB.
+/// The number of query features that passed each step of FB.
 pub const FUNNEL: &str = "fb/funnel";
 /// The funnel with its labels, as Markdown.
 pub const FUNNEL_TABLE: &str = "fb/funnel/table";
@@ -42,20 +42,20 @@ pub const FUNNEL_TABLE: &str = "fb/funnel/table";
 pub const QUERY_IMAGE: &str = "query/image";
 /// Keypoints of the query before their states are known.
 pub const QUERY_DETECTED: &str = "query/keypoints/detected";
-/// What each reference had to say in the fused poses, as Markdown.
+/// The contribution of each reference to the fused poses, as Markdown.
 pub const FUSION_TABLE: &str = "fusion/table";
 /// The ranked frames with scores and inliers, as Markdown.
 pub const RETRIEVAL_TABLE: &str = "retrieval/table";
-/// Where the ranked frames are.
+/// The places of the ranked frames.
 pub const RETRIEVAL_PLACES: &str = "world/retrieval";
-/// Pictures that prove what is wrong.
+/// Pictures that prove failures.
 pub const PROOF: &str = "proof";
 /// The results of the query, as Markdown.
 pub const REPORT: &str = "report";
-/// The decisions, in words.
+/// The decisions as sentences.
 pub const LOG: &str = "log";
 
-/// The name of a match whose state is not yet decided, beside those of
+/// The name for matches without a state yet, besides those of
 /// [`FeatureState::NAMES`](crate::features::FeatureState::NAMES).
 pub const UNDECIDED: &str = "undecided";
 
@@ -67,17 +67,17 @@ pub fn cloud(reference: usize) -> String {
     }
 }
 
-/// What is known about a reference.
+/// The root of a reference.
 pub fn reference(reference: usize) -> String {
     format!("{WORLD}/reference/{reference}")
 }
 
-/// What is known about the true pose of the query.
+/// The root of the query's true pose.
 pub fn truth() -> String {
     format!("{WORLD}/truth")
 }
 
-/// What a method found.
+/// The root of a method's estimate.
 pub fn estimate(method: Method) -> String {
     format!("{WORLD}/estimate/{}", method.name())
 }
@@ -130,28 +130,28 @@ pub fn yaw_curve(method: Method) -> String {
     format!("search/{}/yaw", method.name())
 }
 
-/// Something that a direct method shows: `synthetic`, `residual`, `weights`, `joint_histogram`,
+/// A picture or plot of a direct method: `synthetic`, `residual`, `weights`, `joint_histogram`,
 /// `entropy`, `cost`, `coverage`, `best`.
 pub fn direct(method: Method, part: &str) -> String {
     format!("{}/{part}", method.name())
 }
 
-/// The picture that proves what is wrong with a method's result.
+/// The picture that proves a method's failure.
 pub fn proof(method: Method) -> String {
     format!("{PROOF}/{}", method.name())
 }
 
-/// The stage that a method is in.
+/// The current stage of a method.
 pub fn stage(method: Method) -> String {
     format!("stage/{}", method.name())
 }
 
-/// The query above a frame that was ranked as a reference, by its rank from 0.
+/// The query above a ranked frame, by its rank from 0.
 pub fn rank(rank: usize) -> String {
     format!("retrieval/rank/{rank}")
 }
 
-/// What is drawn on a ranked frame: its verified `matches`, a `label`.
+/// A part of a ranked frame: its verified `matches` or its `label`.
 pub fn rank_part(rank: usize, part: &str) -> String {
     format!("retrieval/rank/{rank}/{part}")
 }
@@ -161,7 +161,7 @@ pub fn fusion_weights(method: Method) -> String {
     format!("fusion/{}/weights", method.name())
 }
 
-/// Where each reference alone puts the query.
+/// The query's positions by each reference alone.
 pub fn fusion_candidates(method: Method) -> String {
     format!("{WORLD}/fusion/{}", method.name())
 }

@@ -1,9 +1,9 @@
-//! Why there is no recording, or not a whole one.
+//! Errors of recordings.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Why there is no recording, or not a whole one.
+/// Why a recording cannot be made or is incomplete.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The file cannot be created.
@@ -11,7 +11,7 @@ pub enum RecordError {
     Create {
         /// The file of the recording.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
     /// The file was created but could not be written to its end.
@@ -22,27 +22,27 @@ pub enum RecordError {
         /// What went wrong.
         message: String,
     },
-    /// The URL is not that of a viewer.
+    /// The URL is not one of a viewer.
     #[error("cannot connect to `{url}`: {message}")]
     Address {
         /// The URL.
         url: String,
-        /// What is wrong with it.
+        /// The error.
         message: String,
     },
     /// No viewer could be started.
     #[error("cannot start a Rerun viewer: {0}")]
     Spawn(String),
-    /// Nothing can be recorded beside the run.
-    #[error("cannot start the thread that records: {0}")]
+    /// The thread of the recorder could not be started.
+    #[error("cannot start the recorder's thread: {0}")]
     Thread(#[source] io::Error),
     /// A viewer did not take the recording.
     #[error("the viewer did not receive the whole recording: {0}")]
     Viewer(String),
-    /// Something could not be put into the form of a recording.
+    /// Something could not be encoded.
     #[error("cannot record {what}: {message}")]
     Encode {
-        /// The thing that was to be recorded.
+        /// The thing to record.
         what: String,
         /// What went wrong.
         message: String,

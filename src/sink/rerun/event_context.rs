@@ -1,19 +1,19 @@
-//! What a recorded event belongs to: its reference, problem and estimator.
+//! The context of a recorded event: its reference, problem and estimator.
 
 use super::scene::Origin;
 use crate::method::Method;
 use crate::problem::Problem;
 
-/// What a recorded event belongs to.
+/// The context of a recorded event.
 pub(super) struct EventContext<'a> {
-    /// Position of the reference among those of the query.
+    /// The position of the reference among those of the query.
     pub(super) reference: usize,
     /// The problem being solved.
     pub(super) problem: &'a Problem,
-    /// The estimator that tells; inside the hybrid the one that it runs.
+    /// The emitting estimator; inside a hybrid, the one that it runs.
     pub(super) method: Method,
-    /// Hypotheses of the estimator in earlier runs: the timeline `eval` goes on where they ended.
+    /// The estimator's hypotheses in earlier runs, after which the timeline `eval` continues.
     pub(super) evals: i64,
-    /// What is drawn at (0, 0, 0).
+    /// The place drawn at (0, 0, 0).
     pub(super) origin: Origin,
 }

@@ -1,4 +1,4 @@
-//! What FB tells: keypoints, matches, RANSAC, funnel, rays.
+//! Records FB: keypoints, matches, RANSAC, funnel, rays.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::geometry::Pose;
 use crate::palette::{self, Rgb};
 use crate::picture;
 
-/// What FB told so far, as far as later events refer to it.
+/// The state of FB that later events need.
 #[derive(Default)]
 pub(super) struct FeatureContext {
     query: Arc<Features>,
@@ -26,7 +26,7 @@ pub(super) struct FeatureContext {
     decisions: Arc<[Option<Match>]>,
     lifted: Arc<[LiftedMatch]>,
     reference_from_query: Option<Pose>,
-    /// The row of the canvas at which the reference photo begins.
+    /// The first row of the reference photo on the canvas.
     canvas_top: u32,
     likelihoods: Vec<(i64, f64)>,
     inliers: Vec<(i64, f64)>,
@@ -57,7 +57,7 @@ impl FeatureContext {
         }
     }
 
-    /// Records the trials, which are kept until a stage is over.
+    /// Records the trials, which are collected until a stage is over.
     pub(super) fn tell_trials(&mut self, stream: &mut Stream) {
         stream.log_scalars(entities::RANSAC_LIKELIHOOD, &self.likelihoods);
         stream.log_scalars(entities::RANSAC_INLIERS, &self.inliers);
@@ -109,7 +109,7 @@ impl FeatureContext {
         );
     }
 
-    /// From query keypoints, by index, to their nearest reference keypoints.
+    /// Lines from query keypoints, by index, to their nearest reference keypoints.
     fn lines(&self, members: &[usize], color: Rgb) -> LineStrips2D {
         let ends = members.iter().filter_map(|&query| {
             let from = self.query.keypoints.get(query)?;
@@ -159,7 +159,7 @@ impl FeatureContext {
         self.rays(states, context, stream);
     }
 
-    /// Keypoints in one state, with the number that decided it on the label.
+    /// Keypoints in one state, labelled with the number that decided it.
     fn points(&self, members: &[usize], states: &[FeatureState], color: Rgb) -> Points2D {
         let pixels = members.iter().filter_map(|&query| {
             let keypoint = self.query.keypoints.get(query)?;
@@ -214,7 +214,7 @@ impl FeatureContext {
     }
 }
 
-/// How many features passed each step: each state is where some of them stopped.
+/// The number of features that passed each step, from their final states.
 fn funnel(states: &[FeatureState]) -> [(&'static str, usize); 5] {
     let at_least = |index: usize| states.iter().filter(|state| state.index() >= index).count();
     [
@@ -226,7 +226,7 @@ fn funnel(states: &[FeatureState]) -> [(&'static str, usize); 5] {
     ]
 }
 
-/// The state's deciding number, in words.
+/// The number that decided a state, as text.
 fn decided_by(state: &FeatureState) -> String {
     match state {
         FeatureState::RatioFailed { ratio } => format!("ratio {ratio:.2}"),

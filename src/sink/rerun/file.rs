@@ -1,7 +1,7 @@
 //! The file that a recording is saved to.
 //!
-//! Rerun's own file sink writes on a thread of its own and only logs what goes wrong there: a full
-//! disk, or a footer that could not be written. This one keeps the first error.
+//! Rerun's file sink writes on its own thread and only logs errors there, such as a full disk or a footer that
+//! could not be written. This one keeps the first error.
 
 use std::fs::File;
 use std::io::{self, Write as _};
@@ -16,7 +16,7 @@ use rerun::sink::{LogSink, SinkFlushError};
 
 use super::error::RecordError;
 
-/// A recording file; clones write to the same one.
+/// A recording file; clones write to the same file.
 #[derive(Clone)]
 pub(super) struct RecordingFile {
     path: PathBuf,
@@ -30,7 +30,7 @@ enum Writer {
 }
 
 impl RecordingFile {
-    /// Creates the file, replacing one that exists, and writes its header.
+    /// Creates or replaces the file, and writes its header.
     pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
         let refused = |source: io::Error| RecordError::Create {
             path: path.to_owned(),
@@ -46,7 +46,7 @@ impl RecordingFile {
         })
     }
 
-    /// What went wrong, if anything did.
+    /// The error, if any.
     pub(super) fn error(&self) -> Option<RecordError> {
         match &*self.writer() {
             Writer::Broken(message) => Some(self.incomplete(message.clone())),
@@ -54,7 +54,7 @@ impl RecordingFile {
         }
     }
 
-    /// Writes the footer and waits until everything is on the disk.
+    /// Writes the footer and syncs the file to disk.
     pub(super) fn finish(&self) -> Result<(), RecordError> {
         let mut writer = self.writer();
         match std::mem::replace(&mut *writer, Writer::Finished) {
@@ -81,8 +81,7 @@ fn finish(mut encoder: Encoder<File>) -> Result<(), String> {
     let mut file = encoder.into_inner().map_err(|error| error.to_string())?;
     written
         .and_then(|()| file.flush())
-        // Some file systems admit only here that there is no room. What is no regular file, such as
-        // a pipe, cannot be synchronised.
+        // Some file systems report a full disk only here. A pipe or another special file cannot be synced.
         .and_then(|()| match file.sync_all() {
             Err(error) if error.kind() != io::ErrorKind::InvalidInput => Err(error),
             _ => Ok(()),
@@ -90,7 +89,7 @@ fn finish(mut encoder: Encoder<File>) -> Result<(), String> {
         .map_err(|error| error.to_string())
 }
 
-/// The bare cause, so that a message does not say "failed to write" twice.
+/// The bare cause, so a message does not contain "failed to write" twice.
 fn into_io(error: EncodeError) -> io::Error {
     match error {
         EncodeError::Write(error) => error,
@@ -104,7 +103,7 @@ impl LogSink for RecordingFile {
         if let Writer::Open(encoder) = &mut *writer
             && let Err(error) = encoder.append(&message)
         {
-            // A footer behind a torn message would help nobody.
+            // A footer after a torn message is useless.
             encoder.do_not_emit_footer();
             *writer = Writer::Broken(into_io(error).to_string());
         }

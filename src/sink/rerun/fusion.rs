@@ -1,4 +1,4 @@
-//! What a fusion tells: weights, who was left out, what each reference alone gave.
+//! Records a fusion: weights, dropped references, and the pose of each reference alone.
 
 use rerun::{BarChart, Points3D, TextDocument};
 
@@ -10,7 +10,7 @@ use crate::fusion::ShareOutcome;
 use crate::method::Method;
 use crate::palette;
 
-/// The fusions of one query so far, as a table each.
+/// The tables of one query's fusions so far.
 #[derive(Default)]
 pub(super) struct FusionTables {
     tables: String,
@@ -38,7 +38,7 @@ impl FusionTables {
     }
 }
 
-/// Where each reference alone puts the query.
+/// The query's position by each reference alone.
 fn candidates(event: &ReferencesFused, origin: Origin) -> Points3D {
     let placed = || {
         event

@@ -1,30 +1,30 @@
-//! Pictures of few colours, which are recorded by number: a third of the bytes to be packed, and fewer
-//! afterwards. With the colours themselves a recording of the paper's four methods is 7 % larger.
+//! Pictures of few colours, stored as palette indices: a third of the bytes to compress. In full colour, a
+//! recording of the paper's four methods is 7 % larger.
 
 use crate::cost::{IntensityPair, PhotometricWeights};
 use crate::palette::{self, Rgb};
 use crate::picture::{Painter, RESIDUAL_RANGE, WEIGHT_GRAYS};
 
-/// A picture whose pixels are places in a palette.
+/// A picture with palette indices as pixels.
 pub(super) struct Indexed {
     pub(super) width: u32,
     pub(super) height: u32,
-    /// 256 colours at most.
+    /// At most 256 colours.
     pub(super) palette: Vec<Rgb>,
     /// Row by row.
     pub(super) indices: Vec<u8>,
 }
 
-/// Steps of a difference's colour to either side of none.
+/// The number of colour steps to either side of zero.
 const STEPS: u8 = 32;
 
-/// Query minus synthetic view, blue where the query is darker, orange where it is brighter, in steps of two
-/// grey values. The same colours stand for the same differences in all pictures.
+/// Query minus synthetic view, blue where the query is darker, orange where it is brighter, in steps of two grey
+/// values. The scale is the same in all pictures.
 pub(super) fn residual(painter: &Painter<'_>, pairs: &[IntensityPair]) -> Indexed {
     let steps = f64::from(STEPS);
     let level = |pair: &IntensityPair| {
         let share = f64::from(pair.query - pair.synthetic) / RESIDUAL_RANGE;
-        // A number that is none has the background's colour.
+        // NaN gets the background colour.
         (1.0 + steps + (share.clamp(-1.0, 1.0) * steps).round()) as u8
     };
     let colors = (0..=2 * STEPS).map(|level| palette::diverging(f64::from(level) / steps - 1.0));
@@ -36,7 +36,7 @@ pub(super) fn residual(painter: &Painter<'_>, pairs: &[IntensityPair]) -> Indexe
     }
 }
 
-/// Which pixels the photometric cost counted: white; those it ignored: grey.
+/// The pixels that the photometric cost counted (white) and ignored (grey).
 pub(super) fn weights(painter: &Painter<'_>, weights: &PhotometricWeights) -> Indexed {
     let [ignored, counted] = WEIGHT_GRAYS.map(|gray| [gray; 3]);
     let levels = weights.counted.iter().map(|&counts| 1 + u8::from(counts));

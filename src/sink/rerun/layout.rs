@@ -1,7 +1,6 @@
-//! A small language for blueprints: containers and views with their properties.
+//! Blueprints: containers and views with their properties.
 //!
-//! Rerun's own blueprint types lack view properties, such as where the eye of a 3-D view is, and
-//! draw their ids at random.
+//! Rerun's own blueprint types lack view properties, such as the camera of a 3-D view, and have random ids.
 
 use rerun::blueprint::components::{
     ColumnShare, ContainerKind, IncludedContent, LoopMode, PanelState, PlayState, QueryExpression,
@@ -18,7 +17,7 @@ use xxhash_rust::xxh3::xxh3_128;
 
 use super::entities::{APPLICATION_ID, STEP_TIMELINE};
 
-/// What a panel shows.
+/// A view.
 pub(super) struct BlueprintView {
     class: &'static str,
     name: String,
@@ -28,7 +27,7 @@ pub(super) struct BlueprintView {
 }
 
 impl BlueprintView {
-    /// Everything at and below `origin`.
+    /// A view of everything at and below `origin`.
     pub(super) fn new(
         class: &'static str,
         name: impl Into<String>,
@@ -43,13 +42,13 @@ impl BlueprintView {
         }
     }
 
-    /// Instead of everything, what these expressions say (`+ /world/**`, `- /world/search/**`).
+    /// Restricts the content to these expressions (`+ /world/**`, `- /world/search/**`).
     pub(super) fn of(mut self, contents: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.contents = contents.into_iter().map(Into::into).collect();
         self
     }
 
-    /// With a property of the view; `name` is that of the archetype.
+    /// Adds a property of the view; `name` is that of the archetype.
     pub(super) fn with(
         mut self,
         name: &'static str,
@@ -60,18 +59,18 @@ impl BlueprintView {
     }
 }
 
-/// A part of the layout.
+/// A node of the layout.
 pub(super) enum BlueprintNode {
-    /// Beside each other, with their shares of the width.
+    /// Side by side, with shares of the width.
     Row {
-        /// What a tab calls it.
+        /// The title of its tab.
         name: String,
-        /// The nodes from left to right, each with its share of the width.
+        /// The nodes from left to right, with their shares of the width.
         children: Vec<(f32, BlueprintNode)>,
     },
-    /// Above each other, with their shares of the height.
+    /// Stacked, with shares of the height.
     Column(Vec<(f32, BlueprintNode)>),
-    /// One at a time, the first one shown.
+    /// Tabs; the first one is open.
     Tabs(Vec<BlueprintNode>),
     /// A single view.
     View(Box<BlueprintView>),
@@ -83,9 +82,8 @@ impl From<BlueprintView> for BlueprintNode {
     }
 }
 
-/// Sends a layout along with a recording, with the time panel on `step`, at the end of the run. The one
-/// that is sent last holds; each `revision` is a layout of its own, because a viewer goes on with what
-/// it made of one that it knows.
+/// Sends a layout with a recording, with the time panel on `step` at the end of the run. The last layout is used. Each
+/// `revision` has its own id, because a viewer keeps its state of a known layout.
 pub(super) fn send(
     root: &BlueprintNode,
     recording_id: &str,
@@ -126,7 +124,7 @@ pub(super) fn send(
     Ok(())
 }
 
-/// Logs a node and what it holds; `place` says where in the tree it is. Returns its name there.
+/// Logs a node with its children; `place` is its path in the tree. Returns that path.
 fn log_node(
     stream: &RecordingStream,
     node: &BlueprintNode,
@@ -208,13 +206,13 @@ fn path_of(node: &BlueprintNode, place: &str) -> String {
     }
 }
 
-/// A viewer keeps what it knows of a view under its id, and goes on with the layout of the recording before
-/// until it has read the next one: what has an id must be of one class in all recordings.
+/// A viewer keeps its state of a view by id, and uses the layout of the previous recording until it has read the
+/// next one. So an id must have the same class in all recordings.
 fn view_path(place: &str, class: &str) -> String {
     format!("view/{}", uuid(&format!("{place} {class}")))
 }
 
-/// The same layout has the same ids in every recording.
+/// A stable id: the same layout has the same ids in every recording.
 fn id(place: &str) -> u128 {
     xxh3_128(place.as_bytes())
 }

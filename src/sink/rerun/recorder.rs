@@ -1,4 +1,4 @@
-//! The recorder: a sink that has a run recorded on a thread of its own.
+//! The recorder: a sink that records a run on its own thread.
 
 use std::collections::BTreeSet;
 use std::panic;
@@ -17,31 +17,31 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
 
-/// So many tasks wait for the thread at most: a synthetic view that waits keeps a megabyte or two.
+/// The most tasks in the queue; a queued synthetic view takes one or two megabytes.
 const WAITING: usize = 64;
 
 /// One thing to record.
 type Task = Box<dyn FnOnce(&mut Recording) + Send>;
 
-/// Puts runs into a Rerun recording, one query after the other.
+/// Records runs for the Rerun viewer, one query after the other.
 ///
-/// Pictures are packed and rows are written on a thread of the recorder, while the run goes on; a run that is much
-/// faster waits for it. What is recorded follows from what the run tells alone, not from when it does.
+/// Pictures are encoded and rows written on the recorder's thread while the run continues; a much faster run waits
+/// for it. The recording depends only on the events of the run, not on their timing.
 ///
-/// A recording that breaks does not break the run: the recorder remembers its first error, wants no
-/// more events and reports the error when it is closed.
+/// A failing recording does not fail the run: the recorder keeps its first error, ignores further events and
+/// reports the error when it is closed.
 pub struct Recorder {
     writer: Option<Writer>,
-    /// Whether the recording takes nothing more.
+    /// Whether the recording has failed.
     is_broken: Arc<AtomicBool>,
-    /// The estimators that told all they tell of the query at work, by reference.
+    /// The estimators whose events of the current query are complete, by reference.
     recorded: BTreeSet<(usize, Method)>,
     reference: usize,
-    /// Whether the method at work is a hybrid that only repeats what its parts told.
+    /// Whether the current method is a hybrid that only repeats the events of its parts.
     is_repetition: bool,
 }
 
-/// The thread and the way to it.
+/// The thread and the channel to it.
 struct Writer {
     tasks: SyncSender<Task>,
     thread: JoinHandle<Recording>,
@@ -60,10 +60,10 @@ impl Recorder {
         let recording = Recording::open(targets, identity, methods)?;
         let is_broken = Arc::new(AtomicBool::new(recording.is_broken()));
         let (tasks, waiting) = sync_channel(WAITING);
-        let told = Arc::clone(&is_broken);
+        let shared = Arc::clone(&is_broken);
         let thread = thread::Builder::new()
             .name("recorder".to_owned())
-            .spawn(move || record(recording, waiting, &told))
+            .spawn(move || record(recording, waiting, &shared))
             .map_err(RecordError::Thread)?;
         Ok(Self {
             writer: Some(Writer { tasks, thread }),
@@ -74,13 +74,13 @@ impl Recorder {
         })
     }
 
-    /// With the pages of a lesson, which the layout leaves room for.
+    /// Reserves room for the pages of a lesson in the layout.
     pub fn with_pages(self) -> Self {
         self.tell(Recording::leave_room_for_pages);
         self
     }
 
-    /// Shows a page of a lesson, as Markdown, from here on.
+    /// Shows a page of a lesson, as Markdown, from now on.
     pub fn show_page(&mut self, markdown: &str) {
         let markdown = markdown.to_owned();
         self.tell(move |recording| recording.show_page(&markdown));
@@ -94,7 +94,7 @@ impl Recorder {
         self.finish().map_or(Ok(()), Recording::close)
     }
 
-    /// Waits until all that was told is recorded.
+    /// Waits until everything is recorded.
     fn finish(&mut self) -> Option<Recording> {
         let Writer { tasks, thread } = self.writer.take()?;
         drop(tasks);
@@ -107,7 +107,7 @@ impl Recorder {
 
     fn tell(&self, task: impl FnOnce(&mut Recording) + Send + 'static) {
         if let Some(writer) = &self.writer {
-            // A thread that is gone says why when it is joined.
+            // If the thread has panicked, joining it reports why.
             writer.tasks.send(Box::new(task)).ok();
         }
     }
@@ -117,7 +117,7 @@ impl Recorder {
     }
 }
 
-/// What is told becomes rows, in its order.
+/// Records the tasks in order.
 fn record(mut recording: Recording, tasks: Receiver<Task>, is_broken: &AtomicBool) -> Recording {
     for task in tasks {
         task(&mut recording);
@@ -126,12 +126,12 @@ fn record(mut recording: Recording, tasks: Receiver<Task>, is_broken: &AtomicBoo
     recording
 }
 
-/// A run that ends early leaves behind what it told.
+/// A run that ends early keeps its recorded events.
 impl Drop for Recorder {
     fn drop(&mut self) {
         if let Some(Writer { tasks, thread }) = self.writer.take() {
             drop(tasks);
-            // While another panic is on its way this one would end the process without a word.
+            // A second panic while unwinding would abort the process silently.
             thread.join().ok();
         }
     }
@@ -147,7 +147,7 @@ impl LocalizeObserver for Recorder {
 
     fn begin_method(&mut self, reference_index: usize, method: Method) {
         self.reference = reference_index;
-        // Decided once: while a hybrid runs, its own parts are recorded one after the other.
+        // Decided once: while the hybrid runs, its parts are added to `recorded`.
         let parts = estimator::find(method).and_then(|entry| entry.hybrid());
         let was_recorded = |method| self.recorded.contains(&(reference_index, method));
         self.is_repetition =

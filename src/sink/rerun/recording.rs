@@ -1,4 +1,4 @@
-//! A recording as it grows: what a run tells becomes rows of entities.
+//! A recording in progress: converts the events of a run to rows of entities.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -31,26 +31,26 @@ use crate::trace::Record;
 /// Width of a proof \[px\].
 const PROOF_WIDTH: u32 = 1280;
 
-/// A recording into which runs are put, one query after the other.
+/// A recording of runs, one query after the other.
 ///
-/// A recording that breaks does not break the run: it remembers its first error, takes nothing more and reports
-/// the error when it is closed.
+/// A failing recording does not fail the run: it keeps its first error, ignores further events and reports the
+/// error when it is closed.
 pub(super) struct Recording {
     stream: Stream,
     identity: Identity,
     params: Params,
     methods: Vec<Method>,
-    /// Drawn at (0, 0, 0); chosen with the first query, the same for the whole recording.
+    /// The place drawn at (0, 0, 0), from the first query for the whole recording.
     origin: Option<Origin>,
     is_laid_out: bool,
-    /// Whether the pages of a lesson are shown.
+    /// Whether there are pages of a lesson.
     has_pages: bool,
     query: CurrentQuery,
-    /// Hypotheses of each estimator in earlier runs.
+    /// The number of each estimator's hypotheses in earlier runs.
     evals: BTreeMap<Method, i64>,
 }
 
-/// What was recorded of the query at work.
+/// The state of the current query.
 #[derive(Default)]
 struct CurrentQuery {
     problems: Vec<Problem>,
@@ -60,18 +60,18 @@ struct CurrentQuery {
     method: Option<Method>,
     clouds: BTreeSet<usize>,
     stages: Vec<Stage>,
-    /// The estimators whose stages are open, the outermost first.
+    /// The estimators whose stages are open, outermost first.
     estimators: Vec<ActiveEstimator>,
     fusion: FusionTables,
-    /// What proofs are made from, by reference and estimator.
+    /// The records for proofs, by reference and estimator.
     records: BTreeMap<(usize, Method), Vec<Record>>,
-    /// Methods whose results are proven by a picture.
+    /// Methods with a proof.
     proven: Vec<Method>,
-    /// Ranked frames that have a picture.
+    /// The number of ranked frames with a picture.
     ranked: usize,
 }
 
-/// An estimator whose events come in.
+/// A running estimator.
 #[derive(Default)]
 struct ActiveEstimator {
     hypotheses: i64,
@@ -90,7 +90,7 @@ impl Recording {
         methods: &[Method],
     ) -> Result<Self, RecordError> {
         let mut params = Params::default();
-        // The report says so when the configuration cannot be read.
+        // The report mentions an unreadable configuration.
         let _ = params.merge_toml(&identity.configuration);
         Ok(Self {
             stream: Stream::open(targets, identity)?,
@@ -105,17 +105,17 @@ impl Recording {
         })
     }
 
-    /// Leaves room in the layout for the pages of a lesson.
+    /// Reserves room in the layout for the pages of a lesson.
     pub(super) fn leave_room_for_pages(&mut self) {
         self.has_pages = true;
     }
 
-    /// Whether nothing more is taken.
+    /// Whether the recording has failed.
     pub(super) fn is_broken(&self) -> bool {
         self.stream.is_broken()
     }
 
-    /// Shows a page of a lesson, as Markdown, from here on.
+    /// Shows a page of a lesson, as Markdown, from now on.
     pub(super) fn show_page(&mut self, markdown: &str) {
         self.stream.advance();
         let page = TextDocument::from_markdown(markdown);
@@ -131,7 +131,7 @@ impl Recording {
         self.stream.close()
     }
 
-    /// What holds for the whole recording follows from its first problem.
+    /// Records what the whole recording shares, from its first problem.
     fn set_up(&mut self, first: &Problem) -> Origin {
         let reference = &first.reference.world_from_camera;
         let origin = Origin(reference.translation.vector);
@@ -142,7 +142,7 @@ impl Recording {
         origin
     }
 
-    /// Sends the layout, as soon as it is known whether the references of the first query were ranked.
+    /// Sends the first layout, once it is known whether the references were ranked.
     fn lay_out(&mut self) {
         if !self.is_laid_out && !self.query.problems.is_empty() {
             self.is_laid_out = true;
@@ -150,7 +150,7 @@ impl Recording {
         }
     }
 
-    /// Sends the layout again, now that it is known what went wrong.
+    /// Sends the layout again, now that the failures are known.
     fn lay_out_story(&mut self) {
         let CurrentQuery {
             problems,
@@ -159,7 +159,7 @@ impl Recording {
             proven,
             ..
         } = &self.query;
-        // A lesson tells its story itself, from the beginning.
+        // The layout of a lesson stays as it is.
         if results.is_empty() || self.stream.is_broken() || self.has_pages {
             return;
         }
@@ -183,7 +183,7 @@ impl Recording {
         blueprint::send(&mut self.stream, &input);
     }
 
-    /// The picture that proves what is wrong with a result, once for every method.
+    /// Records the picture that proves a failure, once per method.
     fn prove(&mut self, result: &QueryResult) {
         let query = &self.query;
         let (Some(problem), Some(estimator)) = (query.problem(), proof::responsible(result)) else {
@@ -208,7 +208,7 @@ impl Recording {
         }
     }
 
-    /// Nothing of the last query must be taken for the next one's.
+    /// Clears all entities of the previous query.
     fn wipe(&mut self) {
         for path in entities::of_a_query() {
             self.stream.log(path, &rerun::Clear::recursive());
@@ -235,7 +235,7 @@ impl Recording {
                 };
                 camera.log(&mut self.stream, origin);
             }
-            // The estimate of an earlier query must not be taken for this one's.
+            // The estimate of an earlier query must not stay visible.
             None => self.stream.log(&owner, &rerun::Clear::recursive()),
         }
     }
@@ -255,7 +255,7 @@ impl Recording {
         let CurrentQuery {
             problems, results, ..
         } = &self.query;
-        // It says what all methods found: where they advance together that is told too early.
+        // Not on the timeline `lockstep`: the report would show results too early there.
         self.stream.set_lockstep(None);
         let text = report::markdown(problems, results, &self.identity, origin);
         self.stream
@@ -291,13 +291,13 @@ impl Recording {
             self.say(&format!("{path} stopped here"), TextLogLevel::WARN);
         }
         self.show_stage();
-        // A file is smaller and sooner written in larger pieces.
+        // Larger chunks make a file smaller and faster to write.
         if self.stream.is_live() || matches!(stage, Stage::Estimator(_)) {
             self.stream.flush();
         }
     }
 
-    /// The lane of the method that was asked for shows all stages, those inside the hybrid too.
+    /// Shows the open stages in the lane of the requested method, including those inside a hybrid.
     fn show_stage(&mut self) {
         let Some(method) = self.query.method else {
             return;
@@ -305,14 +305,14 @@ impl Recording {
         let state = match self.query.stages.as_slice() {
             // An empty state ends the lane.
             [] => StateChange::single(""),
-            // The lane itself says which method it is.
+            // The lane is named after the method already.
             [_] => StateChange::single(method.name()),
             [_, inner @ ..] => StateChange::single(narration::stages(inner)),
         };
         self.stream.log(&entities::stage(method), &state);
     }
 
-    /// The cloud as the direct methods colour it.
+    /// The cloud with the colours of the direct methods.
     fn colored(&self, tuple: &ReferenceTuple) -> ColoredCloud {
         let ReferenceTuple {
             photo, intrinsics, ..
@@ -394,7 +394,7 @@ impl CurrentQuery {
     }
 }
 
-/// What a run tells, as its observer hears it.
+/// The calls of the run's observer.
 impl Recording {
     pub(super) fn begin_query(
         &mut self,
@@ -411,7 +411,7 @@ impl Recording {
             return;
         };
         self.stream.set_query(query_index);
-        // Where every estimator begins.
+        // Every estimator begins here.
         self.stream.set_lockstep(Some(0));
         self.stream.advance();
         let origin = match self.origin {
@@ -469,7 +469,7 @@ impl Recording {
         self.stream.flush_blocking();
     }
 
-    /// Records an event. Of an estimator that tells again what it told before, only the stages are.
+    /// Records an event. For a repeated estimator, only the stages are recorded.
     pub(super) fn accept(&mut self, record: &Record, is_repeated: bool) {
         if self.stream.is_broken() {
             return;

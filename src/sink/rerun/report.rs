@@ -9,7 +9,7 @@ use crate::params::Params;
 use crate::problem::Problem;
 use crate::table::{Align, Table};
 
-/// What the methods made of one query, so far.
+/// The report on one query so far.
 pub(super) fn markdown(
     problems: &[Problem],
     results: &[QueryResult],
@@ -49,7 +49,7 @@ pub(super) fn markdown(
     text
 }
 
-/// What went wrong, in sentences: the primary verdict of each method, what it leads to, what helped.
+/// The failures in sentences: primary verdict, consequences and remedies of each method.
 fn story(results: &[QueryResult]) -> String {
     let mut text = String::new();
     for result in results.iter().filter(|result| !result.diagnosis.is_empty()) {
@@ -164,7 +164,7 @@ fn costs(results: &[QueryResult]) -> String {
     section("Costs", &table)
 }
 
-/// What our costs say of the poses of other systems.
+/// Our costs at the poses of other systems.
 fn costs_at_poses(results: &[QueryResult]) -> String {
     let mut table = Table::new("", "", ["pose", "cost of", "pose", "truth", "coverage"]);
     table.align[1] = Align::Left;
@@ -182,7 +182,7 @@ fn costs_at_poses(results: &[QueryResult]) -> String {
     section("Costs at the poses of other systems", &table)
 }
 
-/// A table below its title; nothing without rows.
+/// A table with a title; empty without rows.
 fn section(title: &str, table: &Table) -> String {
     if table.rows.is_empty() {
         "\n".to_owned()

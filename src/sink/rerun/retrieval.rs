@@ -1,4 +1,4 @@
-//! What retrieval tells: the ranked frames beside the query, with scores and verified matches.
+//! Records retrieval: the ranked frames with the query, scores and verified matches.
 
 use image::imageops::thumbnail;
 use nalgebra::Point2;
@@ -16,13 +16,13 @@ use crate::picture;
 use crate::problem::Query;
 use crate::retrieval::{Criterion, Geometry, RankedReference, ReferenceRanking, VerifiedMatch};
 
-/// Width of a canvas at most \[px\]: ten of them weigh as much as one photo of full size.
+/// The greatest width of a canvas \[px\]: ten of them are as large as one photo of full size.
 const CANVAS_WIDTH: u32 = 480;
 
-/// What a ranking is shown against.
+/// The context of a ranking.
 pub(super) struct RankingContext<'a> {
     pub(super) query: &'a Query,
-    /// Where the query camera was, if that is known.
+    /// The true pose of the query, if known.
     pub(super) truth: Option<&'a Pose>,
     pub(super) origin: Origin,
 }
@@ -35,7 +35,7 @@ pub(super) fn tell(event: &ReferencesRanked, context: &RankingContext<'_>, strea
     stream.log(entities::RETRIEVAL_PLACES, &places(ranking, context.origin));
     let pictured = ranking.pictured().iter().zip(event.photos.iter());
     for (rank, (reference, photo)) in pictured.enumerate() {
-        // The frame is in the table all the same.
+        // The frame is still in the table.
         let Some(photo) = photo else { continue };
         let photo_pair = PhotoPair::of(&context.query.photo, photo);
         let path = entities::rank(rank);
@@ -50,12 +50,12 @@ pub(super) fn tell(event: &ReferencesRanked, context: &RankingContext<'_>, strea
     }
 }
 
-/// The query above a ranked frame, small.
+/// A small picture of the query above a ranked frame.
 struct PhotoPair {
     picture: image::RgbImage,
-    /// Pixels of the canvas per pixel of the photos, across and down.
+    /// Pixels of the canvas per pixel of the photos, horizontally and vertically.
     scale: [f64; 2],
-    /// The row of the photos at which the ranked frame begins.
+    /// The first row of the ranked frame, in pixels of the photos.
     top: f64,
 }
 
@@ -77,8 +77,7 @@ impl PhotoPair {
         }
     }
 
-    /// Rerun's pixel (0, 0) is the corner of the image, that of the photos the centre of their first
-    /// pixel.
+    /// Rerun's pixel (0, 0) is the corner of the image, ours the centre of the first pixel.
     fn shown(&self, x: f64, y: f64) -> [f32; 2] {
         let [across, down] = self.scale;
         [((x + 0.5) * across) as f32, ((y + 0.5) * down) as f32]
@@ -102,7 +101,7 @@ impl PhotoPair {
             .with_radii([Radius::new_ui_points(0.75)])
     }
 
-    /// Words on the seam between the photos.
+    /// A label on the seam between the photos.
     fn label(&self, words: &str, is_chosen: bool) -> Points2D {
         let color = if is_chosen {
             palette::light(palette::REFERENCE)
@@ -118,7 +117,7 @@ impl PhotoPair {
     }
 }
 
-/// Where the ranked frames are.
+/// The places of the ranked frames.
 fn places(ranking: &ReferenceRanking, origin: Origin) -> Points3D {
     let known = || {
         let ranked = ranking.frames.iter().enumerate();

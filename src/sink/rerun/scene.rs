@@ -1,4 +1,4 @@
-//! What is given and what comes out, in the world: clouds, cameras, photos.
+//! Records the world: clouds, cameras and photos.
 
 use std::sync::Arc;
 
@@ -17,10 +17,10 @@ use crate::picture;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::ColoredCloud;
 
-/// How large cameras are drawn \[m\].
+/// The drawn size of cameras \[m\].
 const IMAGE_PLANE_M: f32 = 1.5;
 
-/// The place that is drawn at (0, 0, 0), in world coordinates \[m\].
+/// The place drawn at (0, 0, 0), in world coordinates \[m\].
 ///
 /// A viewer draws in single precision, in which map coordinates have steps of half a metre.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,7 @@ impl Origin {
     }
 }
 
-/// Records the query's photo and, under their names, the references' cameras with theirs.
+/// Records the query's photo, and the references' cameras with their photos and names.
 pub(super) fn log_photos(
     stream: &mut Stream,
     problems: &[Problem],
@@ -65,7 +65,7 @@ pub(super) fn log_photos(
     }
 }
 
-/// A reference's camera with its photo, under its name.
+/// Records a reference's camera with its photo and name.
 pub(super) fn log_reference(
     stream: &mut Stream,
     index: usize,
@@ -86,7 +86,7 @@ pub(super) fn log_reference(
     stream.log_image(&entities::camera_image(&owner), photo);
 }
 
-/// A camera of the query: where it was, or where a method says that it was.
+/// A camera in the world, with colour and label.
 pub(super) struct PlacedCamera<'a> {
     pub(super) owner: &'a str,
     pub(super) world_from_camera: &'a Pose,
@@ -114,21 +114,17 @@ impl PlacedCamera<'_> {
 }
 
 /// Rerun's pixel (0, 0) is the corner of the image, ours the centre of its first pixel.
-fn pinhole(intrinsics: &Intrinsics) -> Pinhole {
-    let Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    } = *intrinsics;
-    Pinhole::from_focal_length_and_resolution([fx as f32, fy as f32], [width as f32, height as f32])
-        .with_principal_point([cx as f32 + 0.5, cy as f32 + 0.5])
-        .with_image_plane_distance(IMAGE_PLANE_M)
+fn pinhole(camera: &Intrinsics) -> Pinhole {
+    let focal_lengths = [camera.fx as f32, camera.fy as f32];
+    Pinhole::from_focal_length_and_resolution(
+        focal_lengths,
+        [camera.width, camera.height].map(|side| side as f32),
+    )
+    .with_principal_point([camera.cx as f32 + 0.5, camera.cy as f32 + 0.5])
+    .with_image_plane_distance(IMAGE_PLANE_M)
 }
 
-/// The cloud in the colours that the reference photo gives it, else in its grey values.
+/// Records a cloud in the colours of the reference photo, or in its grey values.
 pub(super) fn log_cloud(
     stream: &mut Stream,
     index: usize,
@@ -162,7 +158,7 @@ fn photo_color(tuple: &ReferenceTuple, point: &Point3<f32>) -> Option<Rgb> {
     )
 }
 
-/// Rays from a camera centre to points, all in the reference camera's frame.
+/// Records rays from a camera centre to points, all in the reference camera's frame.
 pub(super) fn log_rays(
     stream: &mut Stream,
     path: &str,

@@ -1,4 +1,4 @@
-//! What a recording leads the eye to: the proofs of what went wrong, and where all poses are.
+//! What the layout of a recording shows first: the failures with their proofs, and all poses.
 
 use super::blueprint::Focus;
 use crate::geometry::Pose;
@@ -7,13 +7,13 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::proof::responsible;
 
-/// Whether a result is wrong or missing, or a verdict says what is wrong with it.
+/// Whether a result is wrong or missing, or has a failure verdict.
 pub(super) fn is_wrong(result: &QueryResult) -> bool {
     let mut verdicts = result.diagnosis.iter();
     result.grade.is_failure() || verdicts.any(|one| one.code.is_failure())
 }
 
-/// What the layout leads to, from all results of a query.
+/// What the layout shows first, from all results of a query.
 pub(super) fn focus(
     first: &Problem,
     truth: Option<&Pose>,

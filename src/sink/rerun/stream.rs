@@ -1,4 +1,4 @@
-//! The stream of a recording: its times, its flushes, its first error.
+//! The stream of a recording: timelines, flushes and the first error.
 
 use std::time::Duration;
 
@@ -14,8 +14,8 @@ use super::layout::{self, BlueprintNode};
 use super::targets::OpenTargets;
 use super::{Identity, RecordError, Targets};
 
-/// Nothing is flushed by time or size. Chunks then end where the run says so, which makes two
-/// recordings of one run equal chunk by chunk.
+/// Nothing is flushed by time or size. The run determines the chunks, so two recordings of one run are equal chunk by
+/// chunk.
 const BATCHER: ChunkBatcherConfig = ChunkBatcherConfig {
     flush_tick: Duration::MAX,
     flush_num_bytes: u64::MAX,
@@ -29,16 +29,16 @@ pub(super) struct Stream {
     recording: RecordingStream,
     file: Option<RecordingFile>,
     error: Option<RecordError>,
-    /// A viewer went away while the file is well: what is left goes to the file.
+    /// The viewer is lost but the file is intact: recording continues to the file.
     viewer_lost: bool,
-    /// Whether somebody looks on while it grows.
+    /// Whether a viewer shows the recording while it grows.
     is_live: bool,
     now: Now,
-    /// Layouts that were sent.
+    /// The number of layouts sent.
     layouts: i64,
 }
 
-/// Where a row stands on each timeline.
+/// The time of a row on each timeline.
 struct Now {
     query: i64,
     step: i64,
@@ -54,7 +54,7 @@ impl Stream {
             .recording_id(id.as_str())
             .recording_name(identity.recording_name())
             .send_properties(true)
-            // Somebody asked for this recording, whatever the environment says.
+            // The recording was requested, whatever the environment says.
             .enabled(true)
             .batcher_config(BATCHER)
             .set_sinks(sinks)
@@ -76,44 +76,44 @@ impl Stream {
         })
     }
 
-    /// Sends a layout, which takes the place of the one before.
+    /// Sends a layout, which replaces the previous one.
     pub(super) fn send_layout(&mut self, root: &BlueprintNode) {
         let sent = layout::send(root, &self.id, self.layouts, &self.recording);
         self.layouts += 1;
         self.keep(sent.map_err(|error| unrecordable("the layout", &error)));
     }
 
-    /// Whether somebody looks on while it grows.
+    /// Whether a viewer shows the recording while it grows.
     pub(super) fn is_live(&self) -> bool {
         self.is_live
     }
 
-    /// Whether recording on makes sense.
+    /// Whether the recording has failed.
     pub(super) fn is_broken(&self) -> bool {
         self.error.is_some() && !self.viewer_lost
     }
 
-    /// From here on the rows belong to this query.
+    /// Following rows belong to this query.
     pub(super) fn set_query(&mut self, index: usize) {
         self.now.query = index as i64;
     }
 
-    /// From here on the rows belong to this hypothesis, or to none.
+    /// Following rows belong to this hypothesis, or to none.
     pub(super) fn set_eval(&mut self, eval: Option<i64>) {
         self.now.eval = eval;
     }
 
-    /// From here on the rows belong to this event of its estimator, or to none.
+    /// Following rows belong to this event of its estimator, or to none.
     pub(super) fn set_lockstep(&mut self, event: Option<u64>) {
         self.now.lockstep = event.map(|event| event as i64);
     }
 
-    /// Goes on to the next decision of the timeline.
+    /// Advances to the next decision.
     pub(super) fn advance(&mut self) {
         self.now.step += 1;
     }
 
-    /// Records something as of now.
+    /// Records something at the current time.
     pub(super) fn log(&mut self, path: &str, what: &dyn AsComponents) {
         if self.is_broken() {
             return;
@@ -132,11 +132,11 @@ impl Stream {
                 None => self.recording.disable_timeline(timeline),
             }
         }
-        let told = self.recording.log(path, what);
-        self.keep(told.map_err(|error| unrecordable(path, &error)));
+        let logged = self.recording.log(path, what);
+        self.keep(logged.map_err(|error| unrecordable(path, &error)));
     }
 
-    /// Records an image as of now.
+    /// Records an image at the current time.
     pub(super) fn log_image(&mut self, path: &str, image: Encoded) {
         match image {
             Ok(image) => self.log(path, &image),
@@ -144,14 +144,13 @@ impl Stream {
         }
     }
 
-    /// Records something that holds at all times.
+    /// Records something for all times.
     pub(super) fn log_static(&mut self, path: &str, what: &dyn AsComponents) {
-        let told = self.recording.log_static(path, what);
-        self.keep(told.map_err(|error| unrecordable(path, &error)));
+        let logged = self.recording.log_static(path, what);
+        self.keep(logged.map_err(|error| unrecordable(path, &error)));
     }
 
-    /// Records one number per hypothesis, at once. They have no step: thousands of them would stand
-    /// at the same one.
+    /// Records one number per hypothesis in one batch. They have no step: thousands would share the same one.
     pub(super) fn log_scalars(&mut self, path: &str, rows: &[(i64, f64)]) {
         if rows.is_empty() || self.is_broken() {
             return;
@@ -160,21 +159,21 @@ impl Stream {
             TimeColumn::new_sequence(QUERY_TIMELINE, rows.iter().map(|_| self.now.query)),
             TimeColumn::new_sequence(EVAL_TIMELINE, rows.iter().map(|row| row.0)),
         ];
-        let told = rerun::Scalars::new(rows.iter().map(|row| row.1))
+        let logged = rerun::Scalars::new(rows.iter().map(|row| row.1))
             .columns_of_unit_batches()
             .map_err(Into::into)
             .and_then(|columns| self.recording.send_columns(path, times, columns));
-        self.keep(told.map_err(|error| unrecordable(path, &error)));
+        self.keep(logged.map_err(|error| unrecordable(path, &error)));
     }
 
-    /// Hands what was recorded so far to the targets, so that a killed run leaves it behind.
+    /// Sends everything recorded so far to the targets, where it survives a killed run.
     pub(super) fn flush(&mut self) {
         let flushed = self.recording.flush_async();
         self.keep(flushed.map_err(|error| RecordError::Viewer(error.to_string())));
         self.ask_file();
     }
 
-    /// Hands out what was recorded as [`Self::flush`] does, and waits until the targets have it.
+    /// Like [`Self::flush`], and waits until the targets have received it.
     pub(super) fn flush_blocking(&mut self) {
         let flushed = self.recording.flush_blocking();
         self.ask_file();
@@ -186,7 +185,7 @@ impl Stream {
         }
     }
 
-    /// The end of the recording, with the first error of its life.
+    /// Closes the recording, and returns its first error.
     pub(super) fn close(mut self) -> Result<(), RecordError> {
         self.flush_blocking();
         let finished = self.file.as_ref().map_or(Ok(()), RecordingFile::finish);
@@ -201,8 +200,8 @@ impl Stream {
         }
     }
 
-    fn keep(&mut self, told: Result<(), RecordError>) {
-        if let Err(error) = told {
+    fn keep(&mut self, logged: Result<(), RecordError>) {
+        if let Err(error) = logged {
             self.error.get_or_insert(error);
         }
     }

@@ -1,5 +1,5 @@
-//! The grid search in the world: cost and coverage on the ground, the way of the search, and the
-//! cost over the yaw angle.
+//! Records the grid search in the world: cost and coverage on the ground, the path of the search, and the cost
+//! over the yaw angle.
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use rerun::components::{DrawOrder, ImageFormat, Opacity};
@@ -14,13 +14,13 @@ use super::stream::Stream;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
 use crate::palette::{self, Rgb};
 
-/// How far below the camera the ground is drawn \[m\]: about where it is for a car's camera.
+/// The drawn depth of the ground below the camera \[m\], typical for a car's camera.
 const GROUND_M: f64 = 1.6;
-/// The layers above the ground \[m\], so that none hides another.
+/// The heights of layers above the ground \[m\], so none hides another.
 const FINE_ABOVE_M: f64 = 0.02;
 const PATH_ABOVE_M: f64 = 0.05;
 
-/// The costs that have the ends of the colour map.
+/// The range of costs on the colour map.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CostRange {
     least: f64,
@@ -28,7 +28,7 @@ pub(super) struct CostRange {
 }
 
 impl CostRange {
-    /// The range of the hypotheses that have a say; `None` where none has.
+    /// The range of the eligible hypotheses; `None` if there are none.
     pub(super) fn of(surface: &ScoredLattice) -> Option<Self> {
         let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
         Some(Self {
@@ -48,8 +48,8 @@ impl CostRange {
     }
 }
 
-/// Cost and coverage as maps on the ground. Low costs and high coverages are bright; cells without a
-/// say are grey, cells that are no hypothesis are left out.
+/// Records cost and coverage as maps on the ground. Low costs and high coverages are bright, ineligible cells
+/// grey; cells without a hypothesis are left out.
 pub(super) fn log_maps(
     stream: &mut Stream,
     surface: &ScoredLattice,
@@ -89,14 +89,14 @@ pub(super) fn log_maps(
     );
 }
 
-/// A lattice of positions as a map; `color` answers `None` where there is nothing to show.
+/// A lattice of positions as a map; `color` returns `None` for cells to leave out.
 fn grid_map(
     lattice: &Lattice,
     context: &EventContext<'_>,
     color: impl Fn(usize) -> Option<Rgb>,
 ) -> GridMap {
     let (columns, rows) = (lattice.columns, lattice.rows);
-    // The first row of an image is the one farthest ahead.
+    // The first row of the image is farthest ahead.
     let cells = (0..rows)
         .rev()
         .flat_map(|row| (0..columns).map(move |column| row * columns + column));
@@ -143,7 +143,7 @@ fn on_ground(offset: &Offset, above_m: f64, context: &EventContext<'_>) -> [f32;
     context.origin.place(&world.coords)
 }
 
-/// The way of the best-so-far hypothesis.
+/// Records the path of the best hypothesis so far.
 pub(super) fn log_path(stream: &mut Stream, path: &[Offset], context: &EventContext<'_>) {
     let places = path
         .iter()
@@ -154,8 +154,8 @@ pub(super) fn log_path(stream: &mut Stream, path: &[Offset], context: &EventCont
     stream.log(&entities::search(context.method, "path"), &strip);
 }
 
-/// How much less each yaw angle costs than the worst one: the best is the highest bar. Bars of the
-/// costs themselves would all look alike, because costs of neighbours differ by a few per cent.
+/// Records how much lower each yaw angle's cost is than the highest: the best is the tallest bar. Bars of the
+/// costs themselves would look alike, because neighbours differ by a few per cent.
 pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, context: &EventContext<'_>) {
     let Some(range) = CostRange::of(surface) else {
         return;

@@ -1,4 +1,4 @@
-//! Where a recording goes, and what it is known by.
+//! The targets of a recording, and its identity.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::Scene;
 
-/// Where a recording goes. All of them can be combined; none is a recording that nobody keeps.
+/// The targets of a recording, which can be combined.
 #[derive(Clone, Debug, Default)]
 pub struct Targets {
     /// A file to save to.
@@ -27,7 +27,7 @@ pub struct Targets {
 }
 
 impl Targets {
-    /// A file alone.
+    /// Only a file.
     pub fn file(path: &Path) -> Self {
         Self {
             save: Some(path.to_owned()),
@@ -36,12 +36,12 @@ impl Targets {
     }
 }
 
-/// What the stable id of a recording follows from.
+/// The data that the stable id of a recording is derived from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identity {
     /// The scene's name.
     pub scene: String,
-    /// The name of the queries' scene, where it is another one.
+    /// The name of the queries' scene, if it is another one.
     pub query_scene: Option<String>,
     /// The query frames' names.
     pub queries: Vec<String>,
@@ -49,14 +49,14 @@ pub struct Identity {
     pub references: Vec<String>,
     /// The configuration, as TOML.
     pub configuration: String,
-    /// What was done to the photos of the queries before.
+    /// The degradation of the query photos.
     pub degraded: Degradation,
     /// The seed of every random choice.
     pub seed: u64,
 }
 
 impl Identity {
-    /// That of a run between two scenes, some of whose frames the caller names.
+    /// The identity of a run between two scenes, without the frames, which the caller adds.
     pub fn of(
         references: &dyn Scene,
         queries: &dyn Scene,
@@ -74,7 +74,7 @@ impl Identity {
         }
     }
 
-    /// A query's name, with its scene where there are two: frames of both may be called alike.
+    /// A query's name, with its scene if there are two, which may share names.
     pub fn query_label(&self, name: &str) -> String {
         match &self.query_scene {
             Some(scene) => format!("{scene} {name}"),
@@ -82,7 +82,7 @@ impl Identity {
         }
     }
 
-    /// A reference's name, with its scene where there are two.
+    /// A reference's name, with its scene if there are two.
     pub fn reference_label(&self, name: &str) -> String {
         match &self.query_scene {
             Some(_) => format!("{} {name}", self.scene),
@@ -90,7 +90,7 @@ impl Identity {
         }
     }
 
-    /// What a viewer calls the recording.
+    /// The name of the recording in a viewer.
     pub fn recording_name(&self) -> String {
         let queries = self.queries.join(" ");
         match &self.query_scene {
@@ -102,18 +102,18 @@ impl Identity {
         }
     }
 
-    /// The recording id: equal for equal runs, whenever and wherever they are made.
+    /// The recording id: the same for the same run at any time and place.
     pub fn recording_id(&self) -> String {
-        // The debug form quotes every string, so that no two identities are spelled alike.
+        // The debug form quotes every string, so different identities have different texts.
         format!("{:032x}", xxh3_128(format!("{self:?}").as_bytes()))
     }
 }
 
-/// Targets that are ready to be written to.
+/// Open targets.
 pub(super) struct OpenTargets {
-    /// The sinks that get every message.
+    /// The sinks for every message.
     pub(super) sinks: Vec<Box<dyn LogSink>>,
-    /// The file among them, which can also tell what became of it.
+    /// The file among them, which also reports its errors.
     pub(super) file: Option<RecordingFile>,
 }
 
@@ -171,7 +171,7 @@ fn spawn() -> Result<Viewer, RecordError> {
             SpawnError::ExecutableNotFoundInPath {
                 executable_name, ..
             } => format!(
-                "there is no `{executable_name}` in the PATH (`pip install rerun-sdk` brings it)"
+                "there is no `{executable_name}` in the PATH; install it with `pip install rerun-sdk`"
             ),
             other => other.to_string(),
         })

@@ -1,4 +1,4 @@
-//! A viewer that a recording is sent to.
+//! A connection to a viewer.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -6,10 +6,9 @@ use std::time::Duration;
 use rerun::log::LogMsg;
 use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
 
-/// A connection that is given up when it fails for the first time.
+/// A connection that is closed at its first failure.
 ///
-/// Rerun's own sink goes on trying: every flush then waits a second, and the run and a recording
-/// file beside it wait with it.
+/// Rerun's own sink keeps trying: every flush would wait a second, and delay the run and the recording file.
 pub(super) struct Viewer {
     connection: GrpcSink,
     lost: Mutex<Option<String>>,

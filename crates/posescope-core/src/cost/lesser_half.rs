@@ -133,8 +133,8 @@ fn count_below<S: Simd>(simd: S, values: &[f32], limit: f32) -> u32 {
     let [one, none] = [1, 0].map(|number| i32x8::splat(simd, number));
     let mut sums = [none; SUMS];
     for group in groups {
-        for (sum, eight) in sums.iter_mut().zip(group.as_chunks::<8>().0) {
-            let is_below = f32x8::from_slice(simd, eight).simd_lt(all_below);
+        for (sum, lanes) in sums.iter_mut().zip(group.as_chunks::<8>().0) {
+            let is_below = f32x8::from_slice(simd, lanes).simd_lt(all_below);
             *sum += simd.select_i32x8(is_below, one, none);
         }
     }

@@ -1,11 +1,11 @@
-//! What rules are asked for against their verdicts: changes of settings, for a method with its parameters.
+//! Builds the remedies of rules: changes of settings, for a method with its parameters.
 
 use super::family::Family;
 use crate::method::Method;
 use crate::params::Params;
 use crate::robust::MlesacParams;
 
-/// What is done differently.
+/// A change of one setting.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
     /// A parameter, as `--set` takes it: `grid.rounds=2`.
@@ -14,14 +14,14 @@ pub enum Change {
     Radius(f64),
     /// Another method.
     Method(Method),
-    /// Another reference: the one so many places farther from the one that was used.
+    /// Another reference, this many places farther than the one used.
     Reference(usize),
 }
 
-/// Changes that are tried together.
+/// Changes to try together.
 pub type Remedy = Vec<Change>;
 
-/// What remedies are asked for: a method with its parameters and the radius of its search.
+/// The input of a rule's remedies: a method with its parameters and the radius of its search.
 #[derive(Clone, Copy, Debug)]
 pub struct Ask<'a> {
     /// How the method finds its pose.
@@ -43,7 +43,7 @@ impl Ask<'_> {
         Change::Set(format!("{key}={word}"))
     }
 
-    /// The first key, for a method that matches again the second.
+    /// The first key, or the second for a method with guided matching.
     pub(super) fn key(&self, first: &'static str, guided: &'static str) -> &'static str {
         match self.family {
             Family::Guided => guided,
@@ -70,7 +70,7 @@ impl Ask<'_> {
         ))
     }
 
-    /// More search of the kind that the method does; `None` for one that does none.
+    /// A longer search of the method's kind; `None` for methods without a search.
     pub(super) fn more_search(&self) -> Option<Change> {
         match self.family {
             Family::Grid => Some(self.rounds()),
@@ -105,7 +105,7 @@ impl Ask<'_> {
     pub(super) fn ratio(&self, by: f64) -> Change {
         match self.family {
             Family::Guided => {
-                // Matched again, a feature needs not stand out as far.
+                // With guided matching, features need not be as distinct.
                 self.set("fb2.ratio", (self.params.fb2.ratio + by).clamp(0.1, 0.98))
             }
             _ => self.set("fb.ratio", (self.params.fb.ratio + by).clamp(0.1, 1.0)),
@@ -120,7 +120,7 @@ impl Ask<'_> {
         }
     }
 
-    /// How far a projected point may be from the keypoint that it lends its depth \[px\].
+    /// The greatest distance of a projected point from the keypoint that takes its depth \[px\].
     pub(super) fn depth_radius_px(&self) -> f64 {
         match self.family {
             Family::Guided => self.params.fb2.depth_radius_px,
@@ -137,7 +137,7 @@ impl Ask<'_> {
     }
 }
 
-/// Three digits are enough, and are what the command line then says.
+/// Rounds to three decimals, as shown on the command line.
 fn rounded(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0
 }

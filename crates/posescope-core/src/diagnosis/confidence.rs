@@ -1,12 +1,12 @@
 //! How likely an accepted pose is right, without knowing the truth.
 //!
-//! What an estimator leaves behind says how far its pose stands out from what chance gives: for methods of
-//! features the inliers beyond chance, how well they fix the pose, and whether the photos go together there
-//! better than elsewhere; for a search on a grid how deep its minimum is beside the other hypotheses, the
-//! runner-up and shuffled pixels; for a search from many starts how many of them end at it, and whether
-//! features lead there too. A logistic function of these signals is the probability of being within
-//! [`WITHIN_M`]. Its coefficients were fitted on some conditions of the street, at default parameters, and are
-//! judged on others (`docs/diagnosis.md`).
+//! The evidence of an estimator shows how far its pose stands out from chance. For feature-based methods these are
+//! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
+//! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
+//! shuffled pixels. For a search from many starts it is how many of them end there, and whether features agree. A
+//! logistic function of these signals is the probability of being within [`WITHIN_M`]. Its coefficients were
+//! fitted on some conditions of the street with default parameters, and evaluated on others (numbers in
+//! `studies/README.md`).
 
 mod appearance;
 mod coefficients;
@@ -34,16 +34,16 @@ use inliers::Inliers;
 use minimum::Minimum;
 use settled::Settled;
 
-/// The distance from the truth that [`PoseConfidence::probability`] speaks of \[m\].
+/// The distance from the truth that [`PoseConfidence::probability`] refers to \[m\].
 pub const WITHIN_M: f64 = 1.0;
 
-/// A pose is trusted from this probability on.
+/// The least probability of a trusted pose.
 pub const TRUSTED_FROM: f64 = 0.95;
 
-/// A pose of less probability is more likely wrong than right.
+/// Below this probability, confidence is low: the pose is more likely wrong than right.
 pub const LOW_BELOW: f64 = 0.5;
 
-/// How likely a pose is right, in one word.
+/// How likely a pose is right, as a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Confidence {
     /// At least [`TRUSTED_FROM`].

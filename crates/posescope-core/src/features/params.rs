@@ -12,7 +12,7 @@ parameters! {
         /// 0 to 255, as for OpenCV's `hessianThreshold`. A Gaussian blob whose peak differs by a from
         /// the ground reaches about 0.8 a².
         pub threshold: f64 = number("threshold", "", 0.0..=1e6),
-        /// Number of octaves, doublings of the scale that are searched.
+        /// Number of octaves; each doubles the scale.
         ///
         /// The first finds blobs with σ from 1.6 px to 3.2 px; each further one doubles the scale
         /// (section 3.3).
@@ -22,10 +22,10 @@ parameters! {
         /// Octaves join without a gap from 4 on; more make them overlap, and the features that are
         /// found twice fail the ratio test.
         pub intervals: usize = count("intervals", "", 3..=12),
-        /// Whether to leave features upright (U-SURF): for cameras that do not roll, this is faster,
-        /// and tells more features apart.
+        /// Whether features are upright (U-SURF): for cameras that do not roll, this is faster and more
+        /// distinctive.
         pub upright: bool = flag("upright"),
-        /// Distance between the samples of the first octave; it doubles with each octave.
+        /// Sampling distance in the first octave; it doubles with each octave.
         pub initial_step: usize = count("initial_step", "px", 1..=8),
         /// Largest number of features to keep, the strongest; 0 keeps all.
         pub max_keypoints: usize = count("max_keypoints", "", 0..=1_000_000),

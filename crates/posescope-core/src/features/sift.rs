@@ -24,13 +24,13 @@ parameters! {
         /// Smallest contrast of a feature: the magnitude of the difference of Gaussians, of grey values
         /// from 0 to 1.
         pub contrast: f64 = number("contrast", "", 0.0..=1.0),
-        /// Largest ratio of the principal curvatures of a feature: what lies on an edge has a larger one.
+        /// Largest ratio of the principal curvatures of a feature; points on edges have a larger one.
         pub edge_ratio: f64 = number("edge_ratio", "", 1.0..=1000.0),
-        /// Scales that are searched in each octave.
+        /// Scales per octave.
         pub intervals: usize = count("intervals", "", 1..=8),
-        /// Whether the image is enlarged to twice its size first, which finds the smallest features.
+        /// Whether to double the size of the image first, which finds the smallest features.
         pub enlarge: bool = flag("enlarge"),
-        /// Whether to leave features upright: for cameras that do not roll.
+        /// Whether features are upright, for cameras that do not roll.
         pub upright: bool = flag("upright"),
         /// Largest number of features to keep, the strongest; 0 keeps all.
         pub max_keypoints: usize = count("max_keypoints", "", 0..=1_000_000),

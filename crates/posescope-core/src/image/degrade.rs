@@ -32,21 +32,20 @@ const VEIL: f32 = 204.0;
 const STORED_GAMMA: f64 = 2.2;
 
 parameters! {
-    /// A degradation of a photo, by default none. It is written as `gamma=0.4,noise=8,invert`.
+    /// A degradation of a photo, none by default. Written as `gamma=0.4,noise=8,invert`.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Degradation {
-        /// Share of the light that is a veil of one grey (204) instead of the scene.
+        /// Fog: share of the light that comes from a uniform grey (204) instead of the scene.
         pub fog: f64 = number("fog", "", 0.0..=1.0),
-        /// Standard deviation of the Gaussian that the photo is smoothed with.
+        /// Blur: standard deviation of a Gaussian.
         pub blur_px: f64 = number("blur", "px", 0.0..=20.0),
-        /// Light more (below 0: less) than the photo was taken with; what exceeds white is lost.
+        /// Exposure: brighter above 0, darker below; values beyond white are clipped.
         pub exposure_stops: f64 = number("exposure", "stops", -8.0..=8.0),
-        /// Exponent of the grey values, of which white is 1: below 1 the dark becomes brighter, above 1
-        /// darker.
+        /// Gamma: exponent of grey values from 0 to 1; below 1 dark parts become brighter, above 1 darker.
         pub gamma: f64 = number("gamma", "", 0.05..=10.0),
-        /// Standard deviation of Gaussian noise, drawn by the seed and the query's name.
+        /// Noise: standard deviation of Gaussian noise, seeded by --seed and the query's name.
         pub noise_levels: f64 = number("noise", "grey levels", 0.0..=128.0),
-        /// The negative.
+        /// Invert: the negative of the photo.
         pub invert: bool = flag("invert"),
     }
 }
@@ -69,10 +68,10 @@ impl Default for Degradation {
 #[non_exhaustive]
 pub enum DegradationError {
     /// Nothing is written, or nothing between two commas.
-    #[error("something such as gamma=0.4,noise=8,invert expected, found `{0}`")]
+    #[error("STEP=STRENGTH expected, such as gamma=0.4,noise=8,invert; `{0}` found")]
     Empty(String),
     /// A name that is none.
-    #[error("`{name}` is no degradation; {known} expected")]
+    #[error("`{name}` is not a degradation; {known} expected")]
     Unknown {
         /// The name.
         name: String,
@@ -410,7 +409,7 @@ mod tests {
         let said = |text: &str| text.parse::<Degradation>().expect_err(text).to_string();
         assert_eq!(
             said("gama=0.4"),
-            "`gama` is no degradation; fog, blur, exposure, gamma, noise, invert expected"
+            "`gama` is not a degradation; fog, blur, exposure, gamma, noise, invert expected"
         );
         assert_eq!(said("gamma=0"), "`gamma` takes 0.05 … 10, not `0`");
         assert_eq!(said("blur=-1"), "`blur` takes 0 … 20 px, not `-1`");

@@ -38,17 +38,17 @@ parameters! {
     /// Parameters of the cost that judges the poses of `mi6`, `fb2` and `robust`.
     #[derive(Clone, Debug, PartialEq)]
     pub struct JudgeParams {
-        /// Which channels have a say: grey value, local contrast, strength of edges, or the mean of all.
+        /// Channels of the cost: grey value, local contrast, edge strength, or the mean of all.
         pub channels: Channels = choice("channels"),
-        /// Whether normalised mutual information is taken less what chance gives as many pixels.
+        /// Whether to subtract the chance level at this number of pixels from normalised mutual information.
         pub corrected: bool = flag("corrected"),
         /// Standard deviation of the Gaussian that smooths the query.
         pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
         /// Standard deviation of the Gaussian that smooths the reference photo before it colours the cloud.
         pub reference_sigma_px: f64 = number("reference_sigma", "px", 0.0..=20.0),
-        /// Standard deviation of the Gaussian that smooths both photos before edges are sought.
+        /// Standard deviation of the Gaussian that smooths both photos before edge detection.
         pub edge_sigma_px: f64 = number("edge_sigma", "px", 0.0..=20.0),
-        /// Standard deviation of the surroundings that a grey value is held against for its contrast.
+        /// Standard deviation of the neighbourhood that local contrast compares a grey value with.
         pub contrast_sigma_px: f64 = number("contrast_sigma", "px", 1.0..=200.0),
         /// Bins per axis of each joint histogram.
         pub bins: usize = count("bins", "", 2..=256),

@@ -16,7 +16,7 @@ use super::observer::checkpoint;
 use super::single::estimate_traced;
 use super::{
     LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_by,
-    tell_ranking,
+    report_ranking,
 };
 use crate::diagnosis::{Evidence, Subject, Tolerance, confidence};
 use crate::estimator::{self, Estimator, Failure, Given, Hybrid, Outcome, hybrid_outcome};
@@ -240,7 +240,7 @@ impl<'a> Localizer<'a> {
             places,
         };
         observer.begin_query(index, &work.problems, work.truth.as_ref());
-        self.tell_rankings(requests, observer)?;
+        self.report_rankings(requests, observer)?;
         // Explained is what went wrong once every method has had its turn, so that all answers are
         // there first and no method finds its work done by a remedy of another.
         let mut unexplained = Vec::new();
@@ -328,22 +328,22 @@ impl<'a> Localizer<'a> {
         Ok(())
     }
 
-    /// Each ranking once, though several requests may take their references from it.
-    fn tell_rankings(
+    /// Reports each ranking once, even if several requests share it.
+    fn report_rankings(
         &self,
         requests: &[Request],
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
-        let mut told: Vec<&Arc<ReferenceRanking>> = Vec::new();
+        let mut reported: Vec<&Arc<ReferenceRanking>> = Vec::new();
         for ranking in requests
             .iter()
             .filter_map(|r| r.references.ranking.as_ref())
         {
-            if !told.iter().any(|known| Arc::ptr_eq(known, ranking)) {
+            if !reported.iter().any(|known| Arc::ptr_eq(known, ranking)) {
                 observer.begin_retrieval();
                 let sink: &mut dyn Sink = &mut *observer;
-                tell_ranking(ranking, &self.references, &mut Trace::to(sink))?;
-                told.push(ranking);
+                report_ranking(ranking, &self.references, &mut Trace::to(sink))?;
+                reported.push(ranking);
             }
         }
         Ok(())
@@ -423,8 +423,9 @@ impl<'a> Localizer<'a> {
             }
             None => self.estimate(work, problem, method, observer)?,
         };
-        let told = self.with_ranking_judged(candidate.result.clone(), request, work.truth.as_ref());
-        observer.end_method(&told, &candidate.times);
+        let reported =
+            self.with_ranking_judged(candidate.result.clone(), request, work.truth.as_ref());
+        observer.end_method(&reported, &candidate.times);
         let of_method = work.candidates.entry(method).or_default();
         of_method.resize_with(work.problems.len(), || None);
         of_method[problem] = Some(candidate);
@@ -447,13 +448,13 @@ impl<'a> Localizer<'a> {
             Some(flag) => Trace::watched(&mut fanout, flag),
             None => Trace::to(&mut fanout),
         };
-        let asked = &work.problems[problem];
+        let current = &work.problems[problem];
         let outcome = match self.foreign.estimates(method) {
             Some(estimates) => {
                 let given = Given::new(method, Arc::clone(estimates));
-                localize_by(&given, asked, &mut trace)?
+                localize_by(&given, current, &mut trace)?
             }
-            None => self.ask(asked, method, &mut trace)?,
+            None => self.ask(current, method, &mut trace)?,
         };
         let estimated = Estimated {
             outcome,

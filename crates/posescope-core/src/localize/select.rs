@@ -145,7 +145,7 @@ impl From<Vec<usize>> for References {
 ///
 /// # Errors
 /// Only [`Cancelled`]. A photo that cannot be read is not shown: watching never changes the answer.
-pub fn tell_ranking(
+pub fn report_ranking(
     ranking: &Arc<ReferenceRanking>,
     references: &dyn Scene,
     trace: &mut Trace<'_>,
@@ -209,7 +209,9 @@ pub enum ChoiceError {
         query: String,
     },
     /// There is nothing that could rank frames.
-    #[error("retrieve:K needs an index of the references, and there is none")]
+    #[error(
+        "retrieve:K needs a retrieval index of the references; build it with `posescope index`"
+    )]
     NoIndex,
     /// A frame cannot be read.
     #[error(transparent)]

@@ -51,7 +51,10 @@ impl QueryResult {
             paragraphs.push(format!("helped: {args} ({})", helped.error));
         }
         if explanation.helped.is_empty() {
-            paragraphs.push(format!("none of {} remedies helped", explanation.runs));
+            paragraphs.push(format!(
+                "none of the {} remedies tried helped",
+                explanation.runs
+            ));
         }
         if !explanation.complete {
             paragraphs.push("stopped before all remedies were tried".to_owned());

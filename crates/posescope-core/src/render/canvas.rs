@@ -252,8 +252,8 @@ impl Projected {
         if is_known {
             let [a, b, c] = self.turned.each_ref().map(Vec::as_slice);
             for ((((pixels, depths), a), b), c) in places.zip(a).zip(b).zip(c) {
-                let eight = of_eight.project(loaded(simd, [a, b, c]));
-                (*pixels, *depths) = (eight.pixels, eight.depths);
+                let projected = of_eight.project(loaded(simd, [a, b, c]));
+                (*pixels, *depths) = (projected.pixels, projected.depths);
             }
             return;
         }
@@ -269,8 +269,8 @@ impl Projected {
             *a = simd.as_array_f32x8(turned[0]);
             *b = simd.as_array_f32x8(turned[1]);
             *c = simd.as_array_f32x8(turned[2]);
-            let eight = of_eight.project(turned);
-            (*pixels, *depths) = (eight.pixels, eight.depths);
+            let projected = of_eight.project(turned);
+            (*pixels, *depths) = (projected.pixels, projected.depths);
         }
     }
 }

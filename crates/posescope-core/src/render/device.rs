@@ -17,26 +17,24 @@ use crate::method::Method;
 /// What scores many hypotheses at once, beside the threads of the processor. Which results it gives must
 /// not depend on it.
 pub trait Device: Send + Sync + Debug {
-    /// How many of so many hypotheses to hand over at a time; `None` where the threads are to score them:
-    /// they are too few to be worth it, or there is no such device (any more).
+    /// The batch size for a number of hypotheses. `None` if the processor should score them: there are too few, or
+    /// the device is missing or lost.
     fn batch(&self, hypotheses: usize) -> Option<usize>;
 
-    /// Takes over what all hypotheses of a query have in common; `None` where that is more than the device
-    /// can take.
+    /// Loads the common data of all hypotheses of a query; `None` if they do not fit into the device.
     fn load(&self, workload: &Workload<'_>) -> Option<Box<dyn Loaded>>;
 
-    /// The device's numbers were not those of the threads: it is not to be asked again.
+    /// The device's numbers differ from the processor's: it must not be used again.
     fn distrust(&self);
 
-    /// A method scores its hypotheses on the threads, whatever the device could do; `why` goes on after its
-    /// name. To be said where somebody asked for the device.
+    /// Warns, if the device was requested, that a method does not use it. `why` completes the sentence "METHOD …".
     fn left_out(&self, method: Method, why: &str);
 }
 
-/// What all hypotheses of a query have in common, on a device.
+/// The common data of all hypotheses of a query, on a device.
 pub trait Loaded: Send + Sync {
-    /// A tally for each projection, in their order, and `None` for one that the device cannot decide
-    /// exactly; `None` for all where the device was lost.
+    /// The tally of each projection in order, or `None` for one that the device cannot decide exactly. `None` as a
+    /// whole if the device was lost.
     fn tally(&self, projections: &[ProjectionRows]) -> Option<Vec<Option<Tally>>>;
 }
 
@@ -94,18 +92,18 @@ impl Tally {
 /// The device of this process, as the pool of threads is one.
 static IN_USE: OnceLock<Arc<dyn Device>> = OnceLock::new();
 
-/// Has everybody in this process score on this device where that is worth it. Results do not depend on it.
-/// `false` where another was named before.
+/// Sets the device that this process scores on if it is worth it. Results do not depend on it. Returns `false` if
+/// a device was set before.
 pub fn use_device(device: Arc<dyn Device>) -> bool {
     IN_USE.set(device).is_ok()
 }
 
-/// The device that [`use_device`] named.
+/// The device set by [`use_device`].
 pub(super) fn device_in_use() -> Option<Arc<dyn Device>> {
     IN_USE.get().cloned()
 }
 
-/// Tells the device in use that a method does without it.
+/// Reports to the device in use that a method does not use it.
 pub(crate) fn leave_out(method: Method, why: &str) {
     if let Some(device) = device_in_use() {
         device.left_out(method, why);

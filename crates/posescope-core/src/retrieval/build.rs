@@ -284,7 +284,7 @@ fn number(count: usize) -> io::Result<u32> {
     u32::try_from(count).map_err(|_| {
         io::Error::new(
             io::ErrorKind::FileTooLarge,
-            format!("{count} is more than an index can hold"),
+            format!("{count} is more than an index can store"),
         )
     })
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum IndexError {
     /// There is no file.
-    #[error("{}: there is no retrieval index", .path.display())]
+    #[error("{}: the retrieval index does not exist", .path.display())]
     NotFound {
         /// Where the index should be.
         path: PathBuf,
@@ -28,7 +28,7 @@ pub enum IndexError {
         path: PathBuf,
     },
     /// A layout that this version does not read.
-    #[error("{}: a retrieval index of layout {found}, and not of {expected}", .path.display())]
+    #[error("{}: the retrieval index has layout {found} instead of {expected}", .path.display())]
     Version {
         /// The file.
         path: PathBuf,
@@ -63,7 +63,7 @@ pub enum BuildError<E: std::error::Error + 'static> {
     Frame(E),
     /// A vocabulary larger than what it would be learnt from.
     #[error(
-        "{found} descriptors are too few for a vocabulary of {words} words; up to {} suit them",
+        "{found} descriptors are too few for a vocabulary of {words} words; at most {} words are possible",
         (.found / 10).max(1)
     )]
     TooFewDescriptors {

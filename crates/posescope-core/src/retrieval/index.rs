@@ -111,15 +111,20 @@ impl Index {
             })
         };
         if made.scene != scene {
-            return stale(format!("it is of {}, not of {scene}", made.scene));
+            return stale(format!(
+                "it was built for {} instead of {scene}",
+                made.scene
+            ));
         }
         if made.fingerprint != fingerprint_text(fingerprint) {
-            return stale(format!("the frames of {scene} have changed since"));
+            return stale(format!("the frames of {scene} have changed"));
         }
-        for (key, asked) in recipe {
+        for (key, wanted) in recipe {
             let made = made.recipe.get(key).map_or("nothing", String::as_str);
-            if made != asked {
-                return stale(format!("it was made with {key} = {made}, not {asked}"));
+            if made != wanted {
+                return stale(format!(
+                    "it was built with {key} = {made} instead of {wanted}"
+                ));
             }
         }
         Ok(())
@@ -138,7 +143,7 @@ impl Index {
         {
             Some((key, made)) => Err(IndexError::Stale {
                 path: self.path.clone(),
-                why: format!("it was made with {key} = {made}, not nothing"),
+                why: format!("it was built with {key} = {made}, which is not set now"),
             }),
             None => Ok(()),
         }

@@ -211,7 +211,7 @@ impl MappedIndex {
             return Err(damaged("it is cut off"));
         };
         if u64::from_le_bytes(*expected) != sum {
-            return Err(damaged("its checksum does not fit"));
+            return Err(damaged("its checksum does not match"));
         }
         if magic[KIND.len()] != LAYOUT {
             return Err(IndexError::Version {

@@ -5,20 +5,20 @@ use crate::describe::parameters;
 use crate::features::SurfParams;
 
 parameters! {
-    /// What an index is made of and how it is asked.
+    /// Parameters of building and querying an index.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RetrievalParams {
-        /// Features of a photo at most, the strongest.
+        /// Most features per photo; the strongest are used.
         pub features: usize = count("features", "", 1..=100_000),
-        /// Descriptors per word that the vocabulary is learnt from, at most.
+        /// Most descriptors per word to learn the vocabulary from.
         pub sample: usize = count("sample", "", 1..=10_000),
-        /// Rounds of approximate k-means at most.
+        /// Most rounds of approximate k-means.
         pub iterations: usize = count("iterations", "", 1..=1000),
         /// Randomised k-d trees over the words.
         pub trees: usize = count("trees", "", 1..=64),
         /// Words that a descriptor is compared with.
         pub checks: usize = count("checks", "", 1..=1_000_000),
-        /// Frames that are verified, the first in the order of their scores; 0 verifies none.
+        /// Number of best-scored frames to verify geometrically; 0 turns verification off.
         pub verify: usize = count("verify", "", 0..=100_000),
         /// Fewest inliers of a verified frame.
         pub min_inliers: usize = count("min_inliers", "", 2..=1000),
@@ -28,7 +28,7 @@ parameters! {
 }
 
 parameters! {
-    /// What an index is built of.
+    /// Parameters of an index.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct IndexParams {
         /// Number of visual words.

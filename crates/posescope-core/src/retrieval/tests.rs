@@ -212,17 +212,20 @@ fn an_index_of_something_else_is_stale_and_says_why() {
         scene,
         ..request.clone()
     });
-    assert!(message.contains("of landmarks, not of street"), "{message}");
+    assert!(
+        message.contains("for landmarks instead of street"),
+        "{message}"
+    );
     let message = why(BuildRequest {
         fingerprint: 43,
         ..request.clone()
     });
-    assert!(message.contains("have changed since"), "{message}");
+    assert!(message.contains("have changed"), "{message}");
     let mut recipe = request.recipe.clone();
     recipe.insert("features".to_owned(), "500".to_owned());
     let message = why(BuildRequest { recipe, ..request });
     assert!(
-        message.contains("made with features = 1000, not 500"),
+        message.contains("built with features = 1000 instead of 500"),
         "{message}"
     );
 }
@@ -238,7 +241,7 @@ fn a_vocabulary_too_large_is_refused_and_leaves_no_file() {
     let outcome = build(&path, &request, |f| Ok::<_, Infallible>(view(f, 0)), |_| ());
     let message = outcome.expect_err("900 descriptors").to_string();
     assert!(message.contains("900 descriptors"), "{message}");
-    assert!(message.contains("up to 90"), "{message}");
+    assert!(message.contains("at most 90"), "{message}");
     assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
 }
 
@@ -279,7 +282,7 @@ fn files_that_are_none_are_told_apart() {
         Err(error) => error.to_string(),
         Ok(_) => panic!("is no index"),
     };
-    assert!(message().contains("there is no retrieval index"));
+    assert!(message().contains("the retrieval index does not exist"));
     for content in [
         "",
         "short",
@@ -304,7 +307,7 @@ fn another_layout_is_named() {
     fs::write(&path, bytes).expect("writable");
     let error = Index::open(&path, 64).err().map(|error| error.to_string());
     let error = error.unwrap_or_default();
-    assert!(error.contains("of layout 2, and not of 1"), "{error}");
+    assert!(error.contains("layout 2 instead of 1"), "{error}");
 }
 
 fn small_file() -> Vec<u8> {

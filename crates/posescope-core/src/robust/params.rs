@@ -16,22 +16,22 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default)]
     pub struct MlesacParams {
-        /// MLESAC: σ, the noise of a true match per image axis.
+        /// MLESAC: σ, the noise of a true match along each image axis.
         pub sigma_px: f64 = number("sigma", "px", 0.05..=20.0),
         /// MLESAC: greatest reprojection error of an inlier.
         pub inlier_threshold_px: f64 = number("inlier", "px", 0.1..=50.0),
-        /// MLESAC: probability with which a sample without false matches is to be drawn.
+        /// MLESAC: required probability of drawing a sample without false matches.
         pub confidence: f64 = number("confidence", "", 0.5..=0.999_999),
-        /// MLESAC: trials at most.
+        /// MLESAC: most trials.
         pub max_trials: usize = count("max_trials", "", 1..=10_000_000),
-        /// MLESAC: trials at least, unless that is more than at most.
+        /// MLESAC: fewest trials, limited by max_trials.
         pub min_trials: usize = count("min_trials", "", 1..=10_000_000),
-        /// MLESAC: rounds of expectation–maximisation for the mixing of one hypothesis.
+        /// MLESAC: rounds of expectation–maximisation for the mixing weight of a hypothesis.
         pub em_iterations: usize = count("em_iterations", "", 1..=1000),
         /// Refinement: loss of a residual.
         pub loss: LossShape = choice("loss"),
-        /// Refinement: residual from which on the loss grows more slowly than its square; least
-        /// squares have none.
+        /// Refinement: residual from which the loss grows more slowly than quadratically; not used by least
+        /// squares.
         pub loss_scale_px: f64 = number("loss_scale", "px", 0.05..=50.0),
     }
 }

@@ -8,13 +8,15 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum SceneError {
     /// Neither a folder nor a built-in scene.
-    #[error("{argument}: no such file or folder, and not the name of a built-in scene (street)")]
+    #[error("{argument}: no such file or folder; a path expected, or the built-in scene street")]
     NotFound {
         /// The scene argument.
         argument: String,
     },
     /// A folder of no known layout.
-    #[error("{argument}: not recognised as any of the formats {known}; --format names one")]
+    #[error(
+        "{argument}: not recognised as any of the formats {known}; name one with --format, or see `posescope run --help`"
+    )]
     NotRecognized {
         /// The scene argument.
         argument: String,
@@ -22,7 +24,7 @@ pub enum SceneError {
         known: String,
     },
     /// `--format` with an unknown name.
-    #[error("there is no scene format `{format}`; there are {known}")]
+    #[error("--format {format}: one of {known} expected")]
     UnknownFormat {
         /// The format as it was given.
         format: String,
@@ -30,7 +32,7 @@ pub enum SceneError {
         known: String,
     },
     /// The street in a condition that it does not have.
-    #[error("{argument}: there is no such condition of the street; there are {known}")]
+    #[error("{argument}: one of the conditions {known} expected after street:")]
     UnknownCondition {
         /// The scene argument.
         argument: String,
@@ -91,7 +93,7 @@ pub enum SceneError {
     },
     /// A frame without a cloud cannot be a reference.
     #[error(
-        "{}: frame {frame} has no scan, so it cannot be a reference; {hint}",
+        "{}: frame {frame} has no cloud, so it cannot be a reference; {hint}",
         .path.display()
     )]
     NoCloud {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::{Color32, Sense, TextureHandle, Ui, Vec2};
 use image::DynamicImage;
 
+use crate::app::pictures;
 use crate::app::textures::color_image;
 use crate::app::views::histogram::explains;
 use crate::app::views::legend;
@@ -93,8 +94,8 @@ impl Mode {
                 picture::synthetic(&made.view).into()
             }),
             Self::Residual => of("synthetic/residual", &|made| {
-                let range = picture::residual_range(&made.pairs);
-                picture::residual_within(&made.view, &made.pairs, range).into()
+                let range = pictures::residual_range(&made.pairs);
+                pictures::residual_within(&made.view, &made.pairs, range).into()
             }),
             Self::Weights => {
                 shown.comparison.explanation.as_ref()?;
@@ -103,7 +104,7 @@ impl Mode {
             Self::Coverage => {
                 let query = Arc::clone(&problem.query);
                 of("synthetic/coverage", &move |made| {
-                    picture::coverage(&query.photo.gray, &made.view).into()
+                    pictures::coverage(&query.photo.gray, &made.view).into()
                 })
             }
         };
@@ -115,7 +116,7 @@ impl Mode {
         match (self, explanation) {
             (Self::Residual, _) => {
                 let pairs = shown.map_or(&[][..], |shown| &shown.comparison.pairs);
-                let range = picture::residual_range(pairs);
+                let range = pictures::residual_range(pairs);
                 let words = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| format!("{}", share * range));
                 let places = [0.0, 0.25, 0.5, 0.75, 1.0];
                 let ends: [(f64, &str); 5] =
@@ -151,9 +152,9 @@ impl Mode {
 
 fn weights(made: &Comparison) -> DynamicImage {
     match &made.explanation {
-        Some(Explanation::Weights(weights)) => picture::weights(&made.view, weights).into(),
+        Some(Explanation::Weights(weights)) => pictures::weights(&made.view, weights).into(),
         Some(Explanation::JointHistogram(histogram)) => {
-            picture::contributions(&made.view, &made.pairs, histogram).into()
+            pictures::contributions(&made.view, &made.pairs, histogram).into()
         }
         None => picture::synthetic(&made.view).into(),
     }

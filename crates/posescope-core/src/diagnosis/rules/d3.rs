@@ -20,7 +20,7 @@ use crate::grid::{Offset, Phase, ScoredLattice};
 pub(super) const RULE: Rule = Rule {
     code: Code::D3,
     title: "the search missed a lower cost near the truth",
-    advice: "search more: grid.rounds, a smaller grid.coarse_step; mi6.starts for mi6 and robust",
+    advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
     applies_to: Family::COSTED,
     needs_truth: true,
     is_conclusive: true,

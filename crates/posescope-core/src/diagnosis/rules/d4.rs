@@ -18,7 +18,7 @@ use crate::grid::Phase;
 pub(super) const RULE: Rule = Rule {
     code: Code::D4,
     title: "the truth is outside of what is searched",
-    advice: "raise --radius or grid.yaw_range; lower grid.coverage_floor",
+    advice: "if the reference is wrong, use another; otherwise raise --radius or grid.yaw_range, or lower grid.coverage_floor",
     applies_to: Family::SEARCHING,
     needs_truth: true,
     is_conclusive: true,

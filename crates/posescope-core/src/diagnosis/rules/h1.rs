@@ -15,7 +15,7 @@ use crate::method::Method;
 pub(super) const RULE: Rule = Rule {
     code: Code::H1,
     title: "the wrong method's pose was kept",
-    advice: "ask the other method alone, or use robust",
+    advice: "run the other method alone, or use robust",
     applies_to: Family::ALL,
     needs_truth: true,
     is_conclusive: false,
