@@ -15,35 +15,35 @@ sed -i 's/^\(f[xy]\) = .*/\1 = 900/' "$made/overcast/scene.toml"
 "$posescope" index street --every 10 --set index.words=1000 --out "$made/street.index" --quiet
 echo 000450 1 0 0 0 0 0 0 > "$made/poses.txt"
 
-# NAME SCENE QUERIES QUERY REFERENCE VIEW AT [ARGUMENTS OF ITS OWN …]
+# NAME SCENE QUERIES QUERY REFERENCE AT [ARGUMENTS OF ITS OWN …]
 picture() {
     local reference=()
     [ "$5" = retrieved ] || reference=(--reference "$5")
-    "$posescope" view "$2" --query-scene "$3" --query "$4" "${reference[@]}" --view "$6" --at "$7" \
-        --window 800x440 --screenshot "$1.jpg" "${@:8}"
+    "$posescope" view "$2" --query-scene "$3" --query "$4" "${reference[@]}" --at "$6" \
+        --window 1280x720 --screenshot "$1.jpg" "${@:7}"
 }
-picture X1 street "$made/overcast" 600 600 images fb --method fb --set surf.max_keypoints=150
-picture R1 street:snow street:night 138 122 space fb
-picture R2 street street 589 583 images fb --method fb --degrade fog=0.9
-picture R3 street:snow street:night 450 450 images fb
-picture R4 street street 589 583 images fb --method fb --set surf.max_keypoints=600 --set fb.depth_radius=0.3
-picture R5 street street:sun 322 333 images fb --method fb --set surf.max_keypoints=400
-picture R6 street street 589 583 images fb --method fb --set surf.max_keypoints=600 --set fb.max_trials=2
-picture R7 street street:rain 180 174 images fb --method fb
-picture R8 street street 802 789 images fb
-picture R9 street street 589 574 space fb --method fb,mi --radius 8
-picture D1 street:snow street:night 212 217 surface pm
-picture D2 street:snow street:night 169 178 surface mi
-picture D3 street:snow street:night 450 450 surface mi
-picture D4 street:snow street:night 138 122 surface mi
-picture D5 street street 589 583 surface mi --method mi --degrade fog=1
-picture D6 street:snow street:night 356 357 synthetic pm
-picture D7 street street 583 589 histogram mi
-picture D8 street street:night 147 154 surface pm --method pm
-picture H1 street street:night 147 154 surface hy --method fb,mi,hy
-picture F1 street street:night 147 154 fusion fb --method fb --reference 150 --reference 143 --fusion avg
-picture F2 street street 589 583 fusion end --method mi6 --reference 595 --fusion joint
-picture V1 street street:snow 75 retrieved retrieval end --method fb --reference retrieve:1 --prior 400 \
+picture X1 street "$made/overcast" 600 600 fb --method fb --set surf.max_keypoints=150
+picture R1 street:snow street:night 138 122 fb
+picture R2 street street 589 583 fb --method fb --degrade fog=0.9
+picture R3 street:snow street:night 450 450 fb
+picture R4 street street 589 583 fb --method fb --set surf.max_keypoints=600 --set fb.depth_radius=0.3
+picture R5 street street:sun 322 333 fb --method fb --set surf.max_keypoints=400
+picture R6 street street 589 583 fb --method fb --set surf.max_keypoints=600 --set fb.max_trials=2
+picture R7 street street:rain 180 174 fb --method fb
+picture R8 street street 802 789 fb
+picture R9 street street 589 574 fb --method fb,mi --radius 8
+picture D1 street:snow street:night 212 217 pm
+picture D2 street:snow street:night 169 178 mi
+picture D3 street:snow street:night 450 450 mi
+picture D4 street:snow street:night 138 122 mi
+picture D5 street street 589 583 mi --method mi --degrade fog=1
+picture D6 street:snow street:night 356 357 pm
+picture D7 street street 583 589 mi
+picture D8 street street:night 147 154 pm --method pm
+picture H1 street street:night 147 154 hy --method fb,mi,hy
+picture F1 street street:night 147 154 fb --method fb --reference 150 --reference 143 --fusion avg
+picture F2 street street 589 583 end --method mi6 --reference 595 --fusion joint
+picture V1 street street:snow 75 retrieved end --method fb --reference retrieve:1 --prior 400 \
     --index "$made/street.index"
-picture E1 street street 589 583 report end --method other,mi --estimates other="$made/poses.txt"
-picture L1 street:snow street:night 719 709 surface mi --method mi
+picture E1 street street 589 583 end --method other,mi --estimates other="$made/poses.txt"
+picture L1 street:snow street:night 719 709 mi --method mi

@@ -346,7 +346,7 @@ impl AppState {
                 self.options.shows_why = why;
             }
             (None, Some(method)) => {
-                self.note(format!("{} has not begun yet", method.label()), false)
+                self.note(format!("{} has not begun yet", method.label()), false);
             }
             (None, None) => {}
         }

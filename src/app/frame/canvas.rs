@@ -94,7 +94,7 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
     };
     let galley = ui
         .painter()
-        .layout_no_wrap(format!("{title}"), theme::caption(), color);
+        .layout_no_wrap(title.to_owned(), theme::caption(), color);
     ui.painter()
         .galley(rect.min + vec2(2.0, 2.0), galley, color);
     if response.on_hover_text(spoken).clicked() {

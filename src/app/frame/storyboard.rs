@@ -59,7 +59,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
         });
     });
     ui.scope_builder(UiBuilder::new().max_rect(line), |ui| {
-        scrub(ui, state, commands)
+        scrub(ui, state, commands);
     });
 }
 
@@ -162,7 +162,7 @@ fn why(
     }
     let cause = result.diagnosis.first().map(|found| found.code);
     let caption = match (cause, result.grade.is_failure()) {
-        (Some(code), true) => format!("why: {code}"),
+        (Some(code), true) => format!("why: {}", code.title()),
         (None, true) => "why".to_owned(),
         (_, false) => "what decided".to_owned(),
     };
@@ -388,10 +388,12 @@ fn scrub(ui: &mut Ui, state: &AppState, commands: &Queue) {
             (None, _) => "No step yet".to_owned(),
         };
         let color = method.map_or(ui.visuals().weak_text_color(), theme::method);
-        ui.add_sized(
-            [NAME, 18.0],
-            egui::Label::new(RichText::new(title).size(12.0)).truncate(),
-        );
+        let size = vec2(NAME, 18.0);
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(size, layout, |ui| {
+            ui.set_min_size(size);
+            ui.add(egui::Label::new(RichText::new(title).size(12.0)).truncate());
+        });
         let records = bar
             .map(|bar| bar.records.clone())
             .or(span.map(|span| span.records.clone()));

@@ -31,7 +31,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes:
             running(ui, state, commands, panes);
         });
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            shown(ui, state, commands)
+            shown(ui, state, commands);
         });
     });
 }
