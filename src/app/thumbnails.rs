@@ -117,8 +117,10 @@ impl Thumbnails {
 fn is_drawn(event: &Event) -> bool {
     matches!(
         event,
-        Event::FeaturesDetected(_)
-            | Event::MatchesDecided(_)
+        Event::FeaturesDetected(FeaturesDetected {
+            side: Side::Query,
+            ..
+        }) | Event::MatchesDecided(_)
             | Event::DepthsLifted(_)
             | Event::FeaturesClassified(_)
             | Event::ViewRendered(_)
@@ -135,15 +137,10 @@ fn picture_of(question: &Question) -> DynamicImage {
         dotted(&picture::photo(&problem.query.photo), keypoints, &colors)
     };
     match &question.event {
-        Event::FeaturesDetected(event) => {
-            let photo = match event.side {
-                Side::Query => &problem.query.photo,
-                Side::Reference => &problem.reference.photo,
-            };
-            let keypoints = &event.features.keypoints;
-            let colors = vec![Some(palette::STATES[1]); keypoints.len()];
-            dotted(&picture::photo(photo), keypoints, &colors)
-        }
+        Event::FeaturesDetected(event) => dots(vec![
+            Some(palette::STATES[1]);
+            event.features.keypoints.len()
+        ]),
         Event::MatchesDecided(event) => dots(
             event
                 .decisions

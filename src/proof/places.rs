@@ -201,7 +201,7 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
         let is_taken = if rank < ranking.chosen { ", taken" } else { "" };
         let title = format!("{}. {}{away}{is_taken}", rank + 1, frame.name);
         let mut panel = Panel::new(title, picture::photo(photo).into_rgb8());
-        if away_m.is_some_and(|away_m| away_m <= case.problem.believed_within_m()) {
+        if away_m.is_some_and(|away_m| away_m <= case.problem.uncertainty_radius_m) {
             let (width, height) = (panel.picture.width() as f32, panel.picture.height() as f32);
             let corners = [
                 [0.0, 0.0],

@@ -2,7 +2,8 @@
 
 mod numbers;
 
-use egui::{Button, Frame, Grid, RichText, ScrollArea, Stroke, Ui, vec2};
+use egui::collapsing_header::CollapsingState;
+use egui::{Button, Frame, Grid, Label, RichText, ScrollArea, Stroke, Ui, vec2};
 use serde_json::Value;
 
 use super::Panes;
@@ -59,13 +60,15 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
             if !others.is_empty() {
                 heading(ui, "Also found");
                 for (index, other) in others.iter().enumerate() {
-                    let title = RichText::new(capital(other.code.title())).size(12.5);
-                    egui::CollapsingHeader::new(title)
-                        .id_salt(("also", index))
-                        .show(ui, |ui| {
-                            ui.label(&other.text);
-                            evidence(ui, other);
-                        });
+                    let id = ui.make_persistent_id(("also", index));
+                    let state = CollapsingState::load_with_default_open(ui.ctx(), id, false);
+                    let header = state.show_header(ui, |ui| {
+                        ui.add(Label::new(capital(other.code.title())).wrap());
+                    });
+                    header.body(|ui| {
+                        ui.label(&other.text);
+                        evidence(ui, other);
+                    });
                 }
             }
         }

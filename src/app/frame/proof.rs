@@ -7,6 +7,8 @@ use crate::app::theme;
 use crate::palette;
 use crate::proof::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
 
+/// What a title may take beside a narrow picture \[points\].
+const LEAST_TITLE: f32 = 150.0;
 /// Half the size of a mark \[points\].
 const MARK: f32 = 7.0;
 
@@ -58,8 +60,7 @@ fn on_screen(area: Rect, place: &Place) -> Rect {
 fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect) {
     let words = ui.visuals().text_color();
     let title = pos2(rect.left(), rect.top() - 3.0);
-    let room = ui.max_rect().right() - rect.left();
-    let galley = elided(ui, &panel.title, words, room);
+    let galley = elided(ui, &panel.title, words, rect.width().max(LEAST_TITLE));
     ui.painter()
         .galley(title - vec2(0.0, galley.size().y), galley, words);
     let texture = textures.of(ui.ctx(), "proof", &panel.picture, |picture| {
@@ -150,6 +151,14 @@ fn labels<'a>(painter: &egui::Painter, marks: impl Iterator<Item = (&'a Mark, Po
                 panel.contains_rect(*rect) && !taken.iter().any(|other| other.intersects(*rect))
             });
         let rect = free.unwrap_or_else(|| place(0.0));
+        if (rect.center().y - at.y).abs() > size.y {
+            let end = if rect.left() > at.x {
+                rect.left_center()
+            } else {
+                rect.right_center()
+            };
+            painter.line_segment([at, end], Stroke::new(1.0, Color32::from_gray(200)));
+        }
         painter.rect_filled(rect, 2.0, Color32::from_black_alpha(190));
         painter.galley(rect.min + vec2(3.0, 1.0), galley, Color32::WHITE);
         taken.push(rect);

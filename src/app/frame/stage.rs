@@ -79,8 +79,8 @@ fn number(stage: Stage, event: &Event) -> Option<String> {
         }
         (Stage::Consensus, Event::PoseRefined(event)) => format!("{} inliers", event.inliers),
         (Stage::Accept, Event::ConsensusJudged(event)) => match event.acceptance.needed {
-            Some(needed) => format!("{} of {needed} needed", event.acceptance.inliers),
-            None => format!("{}: too few", event.acceptance.inliers),
+            Some(needed) => format!("{} inliers, {needed} needed", event.acceptance.inliers),
+            None => format!("{} inliers: too few", event.acceptance.inliers),
         },
         (Stage::Color, Event::ViewRendered(event)) => cost("start", event.comparison.score.cost?),
         (Stage::Search(_), Event::PhaseSearched(event)) => {

@@ -292,7 +292,7 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
         .as_deref()
         .map_or(0, |loaded| loaded.problems.len());
     let of = match row.part.reference() {
-        Some(reference) if references > 1 => format!("reference {} of {references}", reference + 1),
+        Some(reference) if references > 1 => format!("  ref {} of {references}", reference + 1),
         _ => String::new(),
     };
     let color = row
@@ -308,46 +308,41 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let (grade, grade_color) = match &result {
         Some(result) => {
             let error = result.error.map(|error| error.translation());
-            let text = format!(
-                "{} {}",
-                result.grade.glyph(),
-                error.unwrap_or_else(|| result.grade.to_string())
-            );
-            (text, theme::grade(ui.visuals(), result.grade))
+            let text = error.unwrap_or_else(|| result.grade.to_string());
+            let color = theme::grade(ui.visuals(), result.grade);
+            (format!("{} {text}", result.grade.glyph()), color)
         }
         None => (String::new(), color),
     };
-    let spoken = format!("Show {} {of}", part_name(row.part));
-    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, spoken.trim_end()));
+    let spoken = format!("Show {}{of}", part_name(row.part));
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &spoken));
     let painter = ui.painter_at(rect);
-    let top = if of.is_empty() {
-        rect.center().y
-    } else {
-        rect.center().y - 7.0
-    };
-    let at = painter.text(
-        pos2(rect.left() + 4.0, top),
+    let left = rect.left() + 4.0;
+    let (upper, lower) = (rect.center().y - 7.0, rect.center().y + 8.0);
+    let name = part_name(row.part);
+    painter.text(
+        pos2(left, upper),
         Align2::LEFT_CENTER,
-        part_name(row.part),
+        name,
         theme::body(),
         color,
     );
-    let galley = elided(ui, &grade, grade_color, rect.right() - at.right() - 8.0);
-    painter.galley(
-        pos2(at.right() + 6.0, top - galley.size().y / 2.0),
-        galley,
+    let small = theme::caption();
+    let at = painter.text(
+        pos2(left, lower),
+        Align2::LEFT_CENTER,
+        &grade,
+        small.clone(),
         grade_color,
     );
-    if !of.is_empty() {
-        let weak = ui.visuals().weak_text_color();
-        painter.text(
-            pos2(rect.left() + 4.0, rect.center().y + 8.0),
-            Align2::LEFT_CENTER,
-            &of,
-            theme::caption(),
-            weak,
-        );
-    }
+    let weak = ui.visuals().weak_text_color();
+    painter.text(
+        pos2(at.right(), lower),
+        Align2::LEFT_CENTER,
+        &of,
+        small,
+        weak,
+    );
     let help = if of.is_empty() {
         "Show what it did"
     } else {

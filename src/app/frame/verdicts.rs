@@ -1,8 +1,7 @@
 //! The verdict bar: what each method's result is worth, and the selected one in one sentence.
 
 use egui::{
-    Align, Button, Label, Layout, Rect, RichText, Role, Sense, Stroke, Ui, UiBuilder, WidgetInfo,
-    pos2, vec2,
+    Align, Button, Layout, Rect, Role, Sense, Stroke, Ui, UiBuilder, WidgetInfo, pos2, vec2,
 };
 
 use super::proof::elided;
@@ -46,22 +45,22 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let layout = Layout::top_down(Align::Min);
     ui.scope_builder(
         UiBuilder::new()
-            .max_rect(words.shrink2(vec2(0.0, 8.0)))
+            .max_rect(words.shrink2(vec2(0.0, 4.0)))
             .layout(layout),
         |ui| {
             let (first, second) = sentence(state, span, result.as_ref());
-            ui.add(
-                Label::new(
-                    RichText::new(&first)
-                        .size(15.0)
-                        .color(ui.visuals().strong_text_color()),
-                )
-                .truncate(),
-            )
-            .on_hover_text(&first);
+            ui.spacing_mut().item_spacing.y = 1.0;
+            let strong = ui.visuals().strong_text_color();
+            let rows = lines(ui, &first, egui::FontId::proportional(15.0), strong, 2);
             if !second.is_empty() {
-                ui.add(Label::new(RichText::new(&second).weak()).truncate())
-                    .on_hover_text(&second);
+                let weak = ui.visuals().weak_text_color();
+                lines(
+                    ui,
+                    &second,
+                    theme::body(),
+                    weak,
+                    if rows > 1 { 1 } else { 2 },
+                );
             }
         },
     );
@@ -76,6 +75,19 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
         },
     );
     ui.advance_cursor_after_rect(area);
+}
+
+/// A text in at most so many lines, whole on hover. How many it takes.
+fn lines(ui: &mut Ui, text: &str, font: egui::FontId, color: egui::Color32, most: usize) -> usize {
+    let mut job = egui::text::LayoutJob::simple(text.to_owned(), font, color, ui.available_width());
+    job.wrap.max_rows = most;
+    let galley = ui.fonts_mut(|fonts| fonts.layout_job(job));
+    let (rect, response) = ui.allocate_exact_size(galley.size(), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
+    let rows = galley.rows.len();
+    ui.painter().galley(rect.min, galley, color);
+    response.on_hover_text(text);
+    rows
 }
 
 fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, span: Option<&Span>) {
@@ -192,8 +204,9 @@ fn sentence(
     split(&text)
 }
 
-/// The first sentence, and the others.
+/// The first sentence, and the others; without the marks of code, which a page would show.
 pub(in crate::app) fn split(text: &str) -> (String, String) {
+    let text = &text.replace('`', "");
     match text.split_once(". ") {
         Some((first, others)) => (format!("{first}."), others.to_owned()),
         None => (text.to_owned(), String::new()),
