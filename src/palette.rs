@@ -160,4 +160,79 @@ mod tests {
         assert_eq!(diverging(0.0), [255; 3]);
         assert_eq!([diverging(-3.0), diverging(1.0)], DIVERGING);
     }
+
+    /// Linear RGB as people without red or green cones see it (Machado, Oliveira, Fernandes 2009, severity 1).
+    const COLOUR_BLIND: [[[f64; 3]; 3]; 2] = [
+        [
+            [0.152_286, 1.052_583, -0.204_868],
+            [0.114_503, 0.786_281, 0.099_216],
+            [-0.003_882, -0.048_116, 1.051_998],
+        ],
+        [
+            [0.367_322, 0.860_646, -0.227_968],
+            [0.280_085, 0.672_501, 0.047_413],
+            [-0.011_820, 0.042_940, 0.968_881],
+        ],
+    ];
+
+    fn times(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
+        matrix.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
+    }
+
+    /// CIE L*a*b* of a colour, for a white of D65.
+    fn lab(color: Rgb, seen_by: Option<&[[f64; 3]; 3]>) -> [f64; 3] {
+        const XYZ: [[f64; 3]; 3] = [
+            [0.412_456_4, 0.357_576_1, 0.180_437_5],
+            [0.212_672_9, 0.715_152_2, 0.072_175_0],
+            [0.019_333_9, 0.119_192_0, 0.950_304_1],
+        ];
+        let linear = color.map(|channel| {
+            let share = f64::from(channel) / 255.0;
+            if share <= 0.04045 {
+                share / 12.92
+            } else {
+                ((share + 0.055) / 1.055).powf(2.4)
+            }
+        });
+        let seen = seen_by.map_or(linear, |matrix| times(matrix, linear));
+        let [x, y, z] = times(&XYZ, seen.map(|channel| channel.clamp(0.0, 1.0)));
+        let [x, y, z] = [x / 0.950_47, y, z / 1.088_83].map(|share| {
+            if share > 0.008_856 {
+                share.cbrt()
+            } else {
+                7.787 * share + 16.0 / 116.0
+            }
+        });
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    #[test]
+    fn colours_stay_apart_for_colour_blind_eyes() {
+        // Four times what can just be seen.
+        const LEAST: f64 = 9.2;
+        let of_methods = Method::PAPER.map(|own| ("method", method(own)));
+        let grades = [("right", TRUTH), ("wrong", ESTIMATE), ("selected", ACCENT)];
+        let colors = of_methods.into_iter().chain(grades);
+        let colors: Vec<(&str, Rgb)> = colors.collect();
+        let eyes = COLOUR_BLIND.iter().map(Some).chain([None]);
+        for eye in eyes {
+            for (at, (name, color)) in colors.iter().enumerate() {
+                for (other, second) in &colors[at + 1..] {
+                    let (a, b) = (lab(*color, eye), lab(*second, eye));
+                    let apart = a
+                        .iter()
+                        .zip(b)
+                        .map(|(a, b)| (a - b).powi(2))
+                        .sum::<f64>()
+                        .sqrt();
+                    assert!(
+                        apart >= LEAST,
+                        "{name} {color:?} and {other} {second:?}: {apart:.1}"
+                    );
+                }
+            }
+        }
+        // Black and white are told apart by everyone.
+        assert!((lab([255; 3], None)[0] - 100.0).abs() < 0.01);
+    }
 }

@@ -24,7 +24,7 @@ use crate::params::Params;
 use crate::proof::ProofPicture;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
+use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span, StageBar};
 
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -388,10 +388,20 @@ impl AppState {
         self.shown_run().span_at(self.shown_cursor())
     }
 
-    /// The stage at the cursor that chooses what the canvas shows: the innermost one.
+    /// The stage at the cursor that chooses what the canvas shows.
     pub(super) fn shown_stage(&self) -> Option<Stage> {
-        let stages = self.shown_run().stages_at(self.shown_cursor());
-        stages.last().map(|bar| bar.stage)
+        let (run, cursor) = (self.shown_run(), self.shown_cursor());
+        let here = run.stages_at(cursor).last()?;
+        let Stage::Estimator(_) = here.stage else {
+            return Some(here.stage);
+        };
+        // Between the stages of a method its latest one is shown, at its end the one that gave the result.
+        let inside = |bar: &&StageBar| {
+            here.records.start <= bar.records.start && bar.records.start <= cursor
+        };
+        let mut inside = run.stages().iter().filter(inside).rev();
+        let latest = inside.find(|bar| !matches!(bar.stage, Stage::Estimator(_)));
+        latest.or(Some(here)).map(|bar| bar.stage)
     }
 
     /// The part that a method is judged by: its fused pose, else that of the selected reference, else its last.

@@ -54,6 +54,7 @@ mod space;
 mod stored;
 mod sweep;
 mod synth;
+mod tour;
 #[path = "../../crates/posescope-core/tests/it/two_walls.rs"]
 mod two_walls;
 mod verdicts;

@@ -99,5 +99,5 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
     send(&mut window, Command::Maximize(Some("queries")));
-    assert!(is_said(&window, &format!("{failed} of 6 queries wrong")));
+    assert!(is_said(&window, &format!("{failed} of 6 wrong")));
 }

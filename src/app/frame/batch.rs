@@ -169,7 +169,7 @@ pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, pan
                 ui.strong(format!(
                     "{} · {}{error}",
                     result.query,
-                    result.method_name()
+                    result.method.label()
                 ));
                 let text = match (result.diagnosis.first(), &result.reason) {
                     (Some(found), _) => found.text.clone(),
@@ -192,7 +192,10 @@ pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, pan
                 commands.send(Command::OpenSelected);
             }
         });
-        canvas::ui(ui, state, commands, panes, 1);
+        match span.map(|span| span.part) {
+            Some(part) if state.needs_why(part) => canvas::why(ui, state, panes),
+            _ => canvas::ui(ui, state, commands, panes, 1),
+        }
     });
     let lower = lower.with_min_y(lower.top() + 8.0);
     ui.scope_builder(UiBuilder::new().max_rect(lower), |ui| {

@@ -104,7 +104,7 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
 }
 
 /// The proof picture of what is selected.
-fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
+pub(super) fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
     let part = state.shown_span().map(|span| span.part);
     let Some(part) = part else {
         proof::empty(ui, "Nothing has run yet. Space runs the query.");

@@ -7,8 +7,9 @@ use crate::app::theme;
 use crate::palette;
 use crate::proof::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
 
-/// What a title may take beside a narrow picture \[points\].
-const LEAST_TITLE: f32 = 150.0;
+/// Height of a title, and the least between it and the next one \[points\].
+const TITLE: f32 = 18.0;
+const GAP: f32 = 8.0;
 /// Half the size of a mark \[points\].
 const MARK: f32 = 7.0;
 
@@ -30,7 +31,13 @@ pub(super) fn ui(
         let response = ui.interact(rect, ui.scope_id().with(("panel", index)), Sense::click());
         let title = panel.title.clone();
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &title));
-        draw(ui, textures, panel, rect);
+        let rects = || places.iter().map(|place| on_screen(area, place));
+        // A title may go on to the next panel to the right.
+        let next = rects().filter(|other| other.left() > rect.right() && title_meets(*other, rect));
+        let end = next
+            .map(|other| other.left() - GAP)
+            .fold(area.right(), f32::min);
+        draw(ui, textures, panel, rect, end);
         let first_small = 1 + usize::from(shown.below.is_some());
         if let Some(small) = index.checked_sub(first_small) {
             let response = response.on_hover_text("Click to show this large");
@@ -57,10 +64,16 @@ fn on_screen(area: Rect, place: &Place) -> Rect {
     Rect::from_min_size(corner, vec2(place.width, place.height))
 }
 
-fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect) {
+/// Whether the title above a panel is as high as another panel with its own title.
+fn title_meets(other: Rect, rect: Rect) -> bool {
+    let title = rect.top() - TITLE..=rect.top();
+    other.top() - TITLE <= *title.end() && *title.start() <= other.bottom()
+}
+
+fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32) {
     let words = ui.visuals().text_color();
     let title = pos2(rect.left(), rect.top() - 3.0);
-    let galley = elided(ui, &panel.title, words, rect.width().max(LEAST_TITLE));
+    let galley = elided(ui, &panel.title, words, title_end - rect.left());
     ui.painter()
         .galley(title - vec2(0.0, galley.size().y), galley, words);
     let texture = textures.of(ui.ctx(), "proof", &panel.picture, |picture| {

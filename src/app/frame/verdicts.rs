@@ -213,6 +213,29 @@ pub(in crate::app) fn split(text: &str) -> (String, String) {
     }
 }
 
+/// `Try WORDS NUMBER` in a width: the words end with an ellipsis where they do not fit, the number never does.
+fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
+    let fits = |text: &str| {
+        let text = text.to_owned();
+        let galley = ui
+            .painter()
+            .layout_no_wrap(text, theme::body(), ui.visuals().text_color());
+        galley.size().x <= width
+    };
+    let whole = format!("Try {words}{number}");
+    if fits(&whole) {
+        return whole;
+    }
+    let mut kept = words.to_owned();
+    while kept.pop().is_some() {
+        let text = format!("Try {kept}…{number}");
+        if fits(&text) {
+            return text;
+        }
+    }
+    format!("Try{number}")
+}
+
 /// The best of what helped, or the offer to look for it; always of the same width.
 fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult) {
     let size = vec2(BUTTON - 16.0, 30.0);
@@ -226,7 +249,8 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
             Some(helped) => {
                 let args = helped.args.iter().filter(|arg| *arg != "--set");
                 let args: Vec<&str> = args.map(String::as_str).collect();
-                let text = format!("Try {} → {}", args.join(" "), helped.error.translation());
+                let error = helped.error.translation();
+                let text = fitted(ui, &args.join(" "), &format!(" → {error}"), size.x - 16.0);
                 (text, Some(Command::Try(helped.args.clone())))
             }
             None => (
@@ -253,9 +277,11 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         Some(Command::Explain) => {
             action::of(&Command::Explain).map(|action| action.tooltip(ui.ctx()))
         }
-        Some(_) => Some(format!(
-            "{text}. Keeps this run as A and runs the query with this"
+        Some(Command::Try(args)) => Some(format!(
+            "Keeps this run as A and runs the query with {}",
+            args.join(" ")
         )),
+        Some(_) => None,
         None => None,
     };
     let response = match help {

@@ -33,7 +33,7 @@ impl View for QueriesView {
             .keys()
             .filter(|query| context.has_failed(**query));
         let failed = failed.count();
-        let words = format!("{failed} of {} queries wrong", context.results.len());
+        let words = format!("{failed} of {} wrong", context.results.len());
         let only = ui.checkbox(&mut self.only_failures, words);
         only.on_hover_text("Only queries where at least one method is wrong or found no pose");
         let frames = context.setup.queries.frames();
