@@ -4,9 +4,8 @@ use std::cell::RefCell;
 
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
-use super::cost_line::CostLine;
-use super::dense_map::DenseAsk;
 use super::save_target::SaveTarget;
+use super::scoring::{CostLine, DenseAsk};
 use super::selection::VerdictChange;
 use super::setup::ReferencePick;
 use super::view_options::{CompareMode, Tab};

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::cost_line::{CostAlong, CostLine, LineTracer};
-use super::dense_map::{DenseAsk, DenseFiller, DenseMap};
 use super::navigation::Navigation;
-use super::prober::{Probe, Prober};
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
+use super::scoring::{
+    CostAlong, CostLine, DenseAsk, DenseFiller, DenseMap, LineTracer, Probe, Prober,
+};
 use super::selection::{Known, KnownResults, Results, Selection};
 use super::setup::Setup;
 use super::shown::ShownReason;

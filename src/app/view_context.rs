@@ -5,11 +5,9 @@ use std::sync::Arc;
 
 use super::camera::NamedPose;
 use super::command::{Command, Queue};
-use super::cost_line::CostAlong;
-use super::dense_map::DenseMap;
 use super::lecture;
-use super::prober::Probe;
 use super::queries::Queries;
+use super::scoring::{CostAlong, DenseMap, Probe};
 use super::selection::{ResultRow, Results, Wanted};
 use super::setup::Setup;
 use super::shown::{ShownReason, ShownView};

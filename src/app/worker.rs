@@ -9,19 +9,37 @@ use std::thread;
 /// Answers questions in their order, beside the window's thread. [`Worker::forget`] drops those that wait.
 pub(super) struct Worker<Q, A> {
     questions: Sender<(usize, Q)>,
-    /// An answer, or `None` where the question ended in a panic.
-    answers: Receiver<(usize, Option<A>)>,
+    answers: Receiver<(usize, Message<A>)>,
     /// Grows when questions are dropped; older ones are not worked on.
     epoch: Arc<AtomicUsize>,
     waiting: usize,
 }
 
+/// What the thread sends.
+enum Message<A> {
+    /// An answer, or a part of one.
+    Part(A),
+    /// The end of a question; not whole where it ended in a panic.
+    End { is_whole: bool },
+}
+
 impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
-    /// Starts the thread. It wakes the window for each answer.
+    /// Starts a thread with one answer to each question. It wakes the window for each answer.
     pub(super) fn new(
         name: &str,
         ctx: egui::Context,
         answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> Self {
+        Self::in_parts(name, ctx, move |question, emit| {
+            emit(answer(question));
+        })
+    }
+
+    /// Starts a thread that answers each question in parts. `emit` returns whether more is wanted.
+    pub(super) fn in_parts(
+        name: &str,
+        ctx: egui::Context,
+        answer: impl Fn(Q, &mut dyn FnMut(A) -> bool) + Send + 'static,
     ) -> Self {
         let (questions, inbox) = mpsc::channel::<(usize, Q)>();
         let (outbox, answers) = mpsc::channel();
@@ -30,14 +48,22 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
         // Without a thread `ask` finds nobody to send to.
         let _ = thread::Builder::new().name(name.to_owned()).spawn(move || {
             for (asked, question) in inbox {
-                if asked < now.load(Ordering::Relaxed) {
+                let is_wanted = || asked >= now.load(Ordering::Relaxed);
+                if !is_wanted() {
                     continue;
                 }
-                let answer = catch_unwind(AssertUnwindSafe(|| answer(question)));
-                if outbox.send((asked, answer.ok())).is_err() {
+                let send = |message| {
+                    let is_sent = outbox.send((asked, message)).is_ok();
+                    ctx.request_repaint();
+                    is_sent
+                };
+                let mut emit = |part| send(Message::Part(part)) && is_wanted();
+                let answered = catch_unwind(AssertUnwindSafe(|| answer(question, &mut emit)));
+                if !send(Message::End {
+                    is_whole: answered.is_ok(),
+                }) {
                     break;
                 }
-                ctx.request_repaint();
             }
         });
         Self {
@@ -60,10 +86,16 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
     pub(super) fn poll(&mut self) -> Vec<Option<A>> {
         let now = self.epoch.load(Ordering::Relaxed);
         let mut taken = Vec::new();
-        while let Ok((asked, answer)) = self.answers.try_recv() {
-            if asked == now {
-                self.waiting -= 1;
-                taken.push(answer);
+        while let Ok((asked, message)) = self.answers.try_recv() {
+            if asked != now {
+                continue;
+            }
+            match message {
+                Message::Part(part) => taken.push(Some(part)),
+                Message::End { is_whole } => {
+                    self.waiting -= 1;
+                    taken.extend((!is_whole).then_some(None));
+                }
             }
         }
         taken

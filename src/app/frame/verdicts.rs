@@ -244,13 +244,16 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         .explaining
         .filter(|explaining| explaining.method == result.method);
     let can_explain = result.error.or(result.initial_error).is_some();
+    let mut whole = String::new();
     let (text, command) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
                 let args = helped.args.iter().filter(|arg| *arg != "--set");
                 let args: Vec<&str> = args.map(String::as_str).collect();
                 let error = helped.error.translation();
-                let text = fitted(ui, &args.join(" "), &format!(" → {error}"), size.x - 16.0);
+                let (words, number) = (args.join(" "), format!(" → {error}"));
+                whole = format!("Try {words}{number}");
+                let text = fitted(ui, &words, &number, size.x - 16.0);
                 (text, Some(Command::Try(helped.args.clone())))
             }
             None => (
@@ -273,6 +276,9 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         .min_size(size)
         .fill(theme::selected(ui.visuals()));
     let response = ui.add_enabled(is_on, button.wrap_mode(egui::TextWrapMode::Truncate));
+    if !whole.is_empty() {
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &whole));
+    }
     let help = match &command {
         Some(Command::Explain) => {
             action::of(&Command::Explain).map(|action| action.tooltip(ui.ctx()))

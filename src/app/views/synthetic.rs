@@ -199,8 +199,7 @@ fn caption(
         if context.is_probing() {
             ui.spinner();
         }
-        ui.add(egui::Label::new(&words).truncate())
-            .on_hover_text(&words);
+        ui.add(egui::Label::new(words).wrap());
     });
 }
 

@@ -1,0 +1,481 @@
+//! What the costs say of poses that the run did not try: one pose, the line between two, a dense map. All of it is
+//! computed beside the window's thread.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::worker::Worker;
+use crate::estimator;
+use crate::geometry::Pose;
+use crate::grid::{DenseSurface, GridParams, LatticeTooLarge};
+use crate::method::Method;
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::render::{Comparison, Score};
+
+/// The direct methods at one pose.
+#[derive(Clone)]
+pub struct Probe {
+    /// `world_from_camera`.
+    pub pose: Pose,
+    /// The synthetic view and cost of each method that has one.
+    pub comparisons: Vec<(Method, Arc<Comparison>)>,
+}
+
+struct ProbeRequest {
+    problem: Problem,
+    methods: Vec<Method>,
+    params: Arc<Params>,
+    pose: Pose,
+}
+
+/// Answers for the pose that was asked for last; older questions are dropped.
+pub(super) struct Prober {
+    worker: Worker<ProbeRequest, Probe>,
+    asked: Option<Pose>,
+    latest: Option<Probe>,
+}
+
+impl Prober {
+    pub(super) fn new(ctx: egui::Context) -> Self {
+        Self {
+            worker: Worker::new("prober", ctx, |request: ProbeRequest| request.answer()),
+            asked: None,
+            latest: None,
+        }
+    }
+
+    /// Asks what these methods' costs say of a pose, unless it was asked for last.
+    pub(super) fn ask(
+        &mut self,
+        problem: &Problem,
+        methods: &[Method],
+        params: &Arc<Params>,
+        pose: Pose,
+    ) {
+        if self.asked == Some(pose) {
+            return;
+        }
+        self.asked = Some(pose);
+        self.worker.forget();
+        self.worker.ask(ProbeRequest {
+            problem: problem.clone(),
+            methods: methods.to_vec(),
+            params: Arc::clone(params),
+            pose,
+        });
+    }
+
+    /// Forgets everything: the problem or the parameters have changed.
+    pub(super) fn forget(&mut self) {
+        self.worker.forget();
+        self.asked = None;
+        self.latest = None;
+    }
+
+    /// Takes in answers. An error is a fault of ours.
+    pub(super) fn poll(&mut self) -> Result<(), String> {
+        for answer in self.worker.poll() {
+            self.latest = Some(answer.ok_or("the pose could not be tried")?);
+        }
+        Ok(())
+    }
+
+    /// The answer for a pose; until it comes, the latest there is.
+    pub(super) fn latest(&self) -> Option<&Probe> {
+        self.latest.as_ref()
+    }
+
+    /// Whether an answer is still to come.
+    pub(super) fn is_busy(&self) -> bool {
+        self.worker.is_busy()
+    }
+}
+
+impl ProbeRequest {
+    fn answer(&self) -> Probe {
+        let compare = |method: Method| {
+            let estimator = estimator::entry(method).make(&self.params);
+            let comparison = estimator.compare_at(&self.problem, &self.pose)?;
+            Some((method, Arc::new(comparison)))
+        };
+        // Beside each other, and not in the pool of threads: a thread of the pool that waits for what
+        // another method makes of the frame would take up a part of that itself, and wait for ever.
+        let comparisons = std::thread::scope(|scope| {
+            let methods = self.methods.iter();
+            let started: Vec<_> = methods
+                .map(|&method| scope.spawn(move || compare(method)))
+                .collect();
+            let ended = started.into_iter().map(|thread| match thread.join() {
+                Ok(comparison) => comparison,
+                Err(panic) => std::panic::resume_unwind(panic),
+            });
+            ended.flatten().collect()
+        });
+        Probe {
+            pose: self.pose,
+            comparisons,
+        }
+    }
+}
+
+/// A line between two poses, and the method whose cost is wanted along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CostLine {
+    /// The direct method.
+    pub method: Method,
+    /// Where the line has its share 0 (`world_from_camera`).
+    pub from: Pose,
+    /// Where it has its share 1 (`world_from_camera`).
+    pub to: Pose,
+}
+
+impl CostLine {
+    /// How many poses are tried between the two ends, each end included once.
+    const BETWEEN: isize = 48;
+    /// How many are tried beyond each end, at the same distances.
+    const BEYOND: isize = 12;
+
+    /// The pose at a share of the way; below 0 and above 1 it goes on in the same direction.
+    pub fn pose(&self, share: f64) -> Pose {
+        /// Below this sine of the angle between two rotations they are taken for equal.
+        const PARALLEL: f64 = 1e-12;
+        // To the last bit, so that the costs there are those of the poses themselves.
+        if share == 0.0 {
+            return self.from;
+        }
+        if share == 1.0 {
+            return self.to;
+        }
+        let (from, to) = (&self.from, &self.to);
+        let translation = from.translation.vector.lerp(&to.translation.vector, share);
+        let rotation = from.rotation.try_slerp(&to.rotation, share, PARALLEL);
+        Pose::from_parts(translation.into(), rotation.unwrap_or(from.rotation))
+    }
+
+    /// Its length \[m\].
+    pub fn length_m(&self) -> f64 {
+        (self.to.translation.vector - self.from.translation.vector).norm()
+    }
+
+    /// The shares that are tried, from the least to the greatest.
+    fn shares() -> impl Iterator<Item = f64> {
+        let places = -Self::BEYOND..=Self::BETWEEN + Self::BEYOND;
+        places.map(|place| place as f64 / Self::BETWEEN as f64)
+    }
+}
+
+/// The cost along a line.
+#[derive(Clone, Debug)]
+pub struct CostAlong {
+    /// The line.
+    pub line: CostLine,
+    /// Shares of the way, rising, with the score of each pose; empty until they are computed.
+    pub scores: Vec<(f64, Option<Score>)>,
+}
+
+impl CostAlong {
+    /// Whether the costs are computed.
+    pub fn is_complete(&self) -> bool {
+        !self.scores.is_empty()
+    }
+}
+
+/// Scores the poses of lines: of each method the one that was asked for last.
+pub(super) struct LineTracer {
+    worker: Worker<(Problem, Arc<Params>, CostLine), CostAlong>,
+    along: Vec<CostAlong>,
+}
+
+impl LineTracer {
+    pub(super) fn new(ctx: egui::Context) -> Self {
+        let worker = Worker::new(
+            "cost line",
+            ctx,
+            |(problem, params, line): (Problem, Arc<Params>, CostLine)| {
+                let poses: Vec<Pose> = CostLine::shares()
+                    .map(|share| problem.reference_from_query(&line.pose(share)))
+                    .collect();
+                let mut scores = Vec::new();
+                let estimator = estimator::entry(line.method).make(&params);
+                estimator.with_scorer(&problem, &mut |scorer| scores = scorer.score(&poses));
+                CostAlong {
+                    line,
+                    scores: CostLine::shares()
+                        .zip(scores.into_iter().map(Some))
+                        .collect(),
+                }
+            },
+        );
+        Self {
+            worker,
+            along: Vec::new(),
+        }
+    }
+
+    /// Asks for the cost along a line, unless it is known or asked for.
+    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, line: CostLine) {
+        if self.along.iter().any(|along| along.line == line) {
+            return;
+        }
+        self.along.retain(|along| along.line.method != line.method);
+        self.along.push(CostAlong {
+            line,
+            scores: Vec::new(),
+        });
+        self.worker.ask((problem.clone(), Arc::clone(params), line));
+    }
+
+    /// Forgets all lines: the problem or the parameters have changed.
+    pub(super) fn forget(&mut self) {
+        self.worker.forget();
+        self.along.clear();
+    }
+
+    /// Takes in answers. An error is a fault of ours.
+    pub(super) fn poll(&mut self) -> Result<(), String> {
+        for answer in self.worker.poll() {
+            let answer = answer.ok_or("the cost between two poses could not be computed")?;
+            // Another line may be wanted by now.
+            if let Some(along) = self
+                .along
+                .iter_mut()
+                .find(|along| along.line == answer.line)
+            {
+                *along = answer;
+            }
+        }
+        Ok(())
+    }
+
+    /// The line of a method that was asked for last.
+    pub(super) fn along(&self, method: Method) -> Option<&CostAlong> {
+        self.along.iter().find(|along| along.line.method == method)
+    }
+
+    /// Whether more is to come.
+    pub(super) fn is_busy(&self) -> bool {
+        self.worker.is_busy()
+    }
+}
+
+/// Which dense map is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DenseAsk {
+    /// The direct method whose cost it is of.
+    pub method: Method,
+    /// The reference, by its position among those of the run.
+    pub reference: usize,
+    /// Distance of neighbouring positions \[m\].
+    pub step_m: f64,
+    /// Distance of neighbouring headings \[°\].
+    pub yaw_step_deg: f64,
+    /// Pixels that a hypothesis must cover to be eligible.
+    pub least_covered: u32,
+}
+
+/// A dense map, as far as it is filled.
+pub struct DenseMap {
+    ask: DenseAsk,
+    surface: Result<DenseSurface, LatticeTooLarge>,
+    took: Duration,
+}
+
+impl DenseMap {
+    fn new(ask: DenseAsk, problem: &Problem, params: &Params) -> Self {
+        let grid = GridParams {
+            coarse_step_m: ask.step_m,
+            yaw_step_deg: ask.yaw_step_deg,
+            ..params.grid.clone()
+        };
+        let radius_m = problem.uncertainty_radius_m;
+        Self {
+            ask,
+            surface: DenseSurface::new(radius_m, &grid, ask.least_covered),
+            took: Duration::ZERO,
+        }
+    }
+
+    /// What was asked for.
+    pub fn ask(&self) -> &DenseAsk {
+        &self.ask
+    }
+
+    /// What is known so far, or why nothing can be known.
+    pub fn surface(&self) -> Result<&DenseSurface, &LatticeTooLarge> {
+        self.surface.as_ref()
+    }
+
+    /// How long it took so far.
+    pub fn took(&self) -> Duration {
+        self.took
+    }
+}
+
+/// A map to go on with from where it is.
+struct DenseRequest {
+    problem: Problem,
+    params: Arc<Params>,
+    ask: DenseAsk,
+    surface: DenseSurface,
+}
+
+/// The scores of the next hypotheses of a map, or that the method has no cost.
+struct Scored {
+    ask: DenseAsk,
+    scores: Option<Vec<Score>>,
+    took: Duration,
+}
+
+/// Fills the map that is shown, and stands still while none is.
+pub(super) struct DenseFiller {
+    worker: Worker<DenseRequest, Scored>,
+    /// The map that is being filled.
+    filling: Option<DenseAsk>,
+    /// Whether a map was asked for since the last poll.
+    is_shown: bool,
+    /// The latest of each method.
+    maps: Vec<DenseMap>,
+}
+
+impl DenseFiller {
+    pub(super) fn new(ctx: egui::Context) -> Self {
+        Self {
+            worker: Worker::in_parts("dense map", ctx, fill),
+            filling: None,
+            is_shown: false,
+            maps: Vec::new(),
+        }
+    }
+
+    /// Has a map filled for as long as this is called in each frame. Another map of the same method is forgotten; one
+    /// that was begun goes on.
+    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, ask: DenseAsk) {
+        self.is_shown = true;
+        if self.filling == Some(ask) {
+            return;
+        }
+        self.pause();
+        if !self.maps.iter().any(|map| map.ask == ask) {
+            self.maps.retain(|map| map.ask.method != ask.method);
+            self.maps.push(DenseMap::new(ask, problem, params));
+        }
+        let map = self.maps.iter().find(|map| map.ask == ask);
+        let surface = map.and_then(|map| map.surface.as_ref().ok());
+        let Some(surface) = surface.filter(|surface| !surface.is_complete()) else {
+            return;
+        };
+        self.filling = Some(ask);
+        self.worker.ask(DenseRequest {
+            problem: problem.clone(),
+            params: Arc::clone(params),
+            ask,
+            surface: surface.clone(),
+        });
+    }
+
+    fn pause(&mut self) {
+        self.worker.forget();
+        self.filling = None;
+    }
+
+    /// Forgets all maps: the problem or the parameters have changed.
+    pub(super) fn forget(&mut self) {
+        self.pause();
+        self.maps.clear();
+    }
+
+    /// Takes in answers, and stands still if no map was asked for since the last time. An error is a fault of ours.
+    pub(super) fn poll(&mut self) -> Result<(), String> {
+        for answer in self.worker.poll() {
+            let scored = answer.ok_or("the dense map could not be computed")?;
+            let Some(scores) = scored.scores else {
+                self.pause();
+                let method = scored.ask.method.label();
+                return Err(format!("{method} has no cost to fill a map with"));
+            };
+            let map = self.maps.iter_mut().find(|map| map.ask == scored.ask);
+            if let Some(map) = map
+                && let Ok(surface) = &mut map.surface
+            {
+                surface.take(&scores);
+                map.took += scored.took;
+            }
+        }
+        if !self.worker.is_busy() {
+            self.filling = None;
+        }
+        if !self.is_shown {
+            self.pause();
+        }
+        self.is_shown = false;
+        Ok(())
+    }
+
+    /// The map of a method that was asked for last.
+    pub(super) fn map(&self, method: Method) -> Option<&DenseMap> {
+        self.maps.iter().find(|map| map.ask.method == method)
+    }
+
+    /// Whether more is to come.
+    pub(super) fn is_busy(&self) -> bool {
+        self.filling.is_some()
+    }
+}
+
+/// Scores batch after batch for as long as more is wanted.
+fn fill(mut request: DenseRequest, emit: &mut dyn FnMut(Scored) -> bool) {
+    let DenseRequest {
+        problem,
+        params,
+        ask,
+        surface,
+    } = &mut request;
+    let estimator = estimator::entry(ask.method).make(params);
+    let has_cost = estimator.with_scorer(problem, &mut |scorer| {
+        let mut is_wanted = true;
+        while is_wanted && !surface.is_complete() {
+            let begun = Instant::now();
+            let scores = Some(surface.score_next(scorer));
+            let took = begun.elapsed();
+            is_wanted = emit(Scored {
+                ask: *ask,
+                scores,
+                took,
+            });
+        }
+    });
+    if !has_cost {
+        emit(Scored {
+            ask: *ask,
+            scores: None,
+            took: Duration::ZERO,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::yaw;
+
+    #[test]
+    fn a_line_goes_through_both_poses_and_on_beyond_them() {
+        let line = CostLine {
+            method: Method::MI,
+            from: Pose::translation(1.0, 0.0, 2.0),
+            to: Pose::translation(5.0, 0.5, 2.0) * yaw(0.3),
+        };
+        let off = |share: f64, pose: Pose| (line.pose(share).inverse() * pose).to_homogeneous();
+        for (share, pose) in [(0.0, line.from), (1.0, line.to)] {
+            let off = off(share, pose) - nalgebra::Matrix4::identity();
+            assert!(off.norm() < 1e-12, "{off}");
+            assert!(CostLine::shares().any(|tried| tried == share));
+        }
+        let beyond = line.pose(1.5).translation.vector - line.to.translation.vector;
+        assert!((beyond - nalgebra::Vector3::new(2.0, 0.25, 0.0)).norm() < 1e-12);
+        let turned = line.pose(1.5).rotation.angle();
+        assert!((turned - 0.45).abs() < 1e-12, "{turned}");
+        assert!((line.length_m() - (16.25_f64).sqrt()).abs() < 1e-12);
+    }
+}
