@@ -125,8 +125,7 @@ fn every_verdict_has_a_picture_without_overlap() {
         assert!(drawn.len() >= least, "{method}: {}", drawn.len());
         for (code, picture) in drawn {
             let width = 960.0;
-            let height = picture.height_for(width);
-            let places = picture.places(width, height);
+            let (places, height) = picture.on_page(width);
             assert_eq!(places.len(), picture.panels().count());
             for (at, one) in places.iter().enumerate() {
                 let ends = [one.left + one.width, one.top + one.height];
