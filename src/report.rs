@@ -25,10 +25,10 @@ use crate::table::Table;
 use pictures::{DrawnProof, Witness, thumbnail};
 
 /// The default number of failures with a picture.
-pub const PICTURES: usize = 24;
+pub const PICTURES: usize = 16;
 
 /// The most queries with a photo in the report: more would make it too large to send, and take longer than the run.
-const MOST_PHOTOS: usize = 500;
+const MOST_PHOTOS: usize = 250;
 
 /// The name of the file in a run folder.
 pub const REPORT: &str = "report.html";

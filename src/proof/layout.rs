@@ -23,6 +23,10 @@ pub struct Place {
 }
 
 impl Place {
+    fn area(&self) -> f32 {
+        self.width * self.height
+    }
+
     /// The largest place for a panel inside, at its upper left corner.
     fn fitted(self, panel: &Panel) -> Self {
         let aspect = panel.aspect();
@@ -54,11 +58,12 @@ impl ProofPicture {
         self.better(width, height, worth)
     }
 
-    /// The places on a page of this width, and the height that they take: those that show most for their height.
+    /// The places on a page of this width, and the height that they take: those that fill more of it.
     pub fn on_page(&self, width: f32) -> (Vec<Place>, f32) {
         const MOST: f32 = 1.2;
-        let per_height = |places: &[Place]| worth(places) / bottom(places);
-        let places = self.better(width, MOST * width, per_height);
+        let filled =
+            |places: &[Place]| places.iter().map(Place::area).sum::<f32>() / bottom(places);
+        let places = self.better(width, MOST * width, filled);
         let height = bottom(&places).ceil();
         (places, height)
     }
@@ -161,9 +166,8 @@ impl ProofPicture {
 
 /// What places show: their area. A small panel counts half, because it may be small.
 fn worth(places: &[Place]) -> f32 {
-    let area = |place: &Place| place.width * place.height;
-    let small: f32 = places.iter().skip(1).map(area).sum();
-    places.first().map_or(0.0, area) + 0.5 * small
+    let small: f32 = places.iter().skip(1).map(Place::area).sum();
+    places.first().map_or(0.0, Place::area) + 0.5 * small
 }
 
 /// The lower end of the lowest place.

@@ -403,7 +403,7 @@ fn curve(
 }
 
 /// Round distances from 0 up to this one \[m\], at most seven.
-fn ticks(most_m: f64) -> Vec<f64> {
+pub(super) fn ticks(most_m: f64) -> Vec<f64> {
     const STEPS_M: [f64; 15] = [
         0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0,
     ];

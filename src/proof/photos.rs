@@ -209,15 +209,14 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     doubtful.sort_by(|a, b| spread(b).total_cmp(&spread(a)));
     let missing = doubtful.iter().filter(|one| one.point.is_none()).count();
     let with_depth = doubtful.len() - missing;
-    let judged = if case.truth.is_some() {
-        "with a false one"
-    } else {
-        "with a depth"
+    let judged = match case.truth {
+        Some(_) => "false (orange)",
+        None => "with a depth (orange)",
     };
     let reference = &case.problem.reference;
     let mut large = Panel::new(
         format!(
-            "Depths on the reference; matches: {with_depth} orange {judged}, {missing} white without"
+            "Depths of the cloud. Matches: {with_depth} {judged}, {missing} without a depth (white)"
         ),
         cloud_picture(
             &reference.photo,
@@ -260,7 +259,7 @@ fn depth_patch(photo: &RgbImage, one: &Matched<'_>) -> Panel {
         image::imageops::FilterType::Nearest,
     );
     let title = match one.depth_range_m {
-        Some((near, far)) => format!("Depths {near:.1} to {far:.1} m around this match"),
+        Some((near, far)) => format!("{near:.1} to {far:.1} m around this match"),
         None => "No depth near this match".to_owned(),
     };
     let mut panel = Panel::new(title, large);

@@ -264,7 +264,7 @@ fn scale_width(scale: &ColorScale) -> f32 {
 }
 
 /// The upper left end of a box in a corner of a panel that covers no mark; the lower left corner if all do.
-fn free_corner(
+pub(super) fn free_corner(
     panel: &Place,
     [width, height]: [f32; 2],
     marks: impl Iterator<Item = [f32; 2]> + Clone,

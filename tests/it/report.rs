@@ -25,6 +25,18 @@ fn named<'a>(page: &'a str, before: &str, end: char) -> Vec<&'a str> {
         .collect()
 }
 
+/// The page has these words, each after the one before.
+#[track_caller]
+fn has_in_order(page: &str, words: &str) {
+    let mut rest = page;
+    for word in words.split(" ~ ") {
+        let (_, after) = rest
+            .split_once(word)
+            .unwrap_or_else(|| panic!("`{word}` is missing or too early"));
+        rest = after;
+    }
+}
+
 /// Where recordings can be looked at without a viewer of one's own: the version that writes them.
 fn web_viewer() -> String {
     let manifest = text(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
@@ -89,7 +101,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     }
 
     // What came of the run is first, what was run is last.
-    has(
+    has_in_order(
         &page,
         "class=\"headline\" ~ id=\"gates\" ~ id=\"methods\" ~ id=\"causes\" ~ id=\"failures\" ~ id=\"queries\" ~ \
          id=\"plots\" ~ id=\"figures\" ~ id=\"asked\"",

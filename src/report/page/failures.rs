@@ -4,10 +4,11 @@ use maud::{Markup, html};
 
 use super::super::{ReportedResult, RunReport};
 use super::results::place;
-use super::words::{class_of, first_sentence, likely, sentences, with_code};
+use super::words::{class_of, sentences, with_code};
 use crate::localize::QueryResult;
 use crate::run::{Protocol, RunFile};
 use crate::session::Task;
+use posescope_core::text::first_sentence;
 
 /// Rerun's web viewer in the version of our recordings. It reads the recording at the URL appended to this one.
 const WEB_VIEWER: &str = "https://app.rerun.io/version/0.36.3/?url=";
@@ -52,7 +53,7 @@ fn failure(report: &RunReport, one: &ReportedResult, is_open: bool) -> Markup {
                     @if report.has_several_groups() { " · " (place(one)) }
                     " · " span class=(class_of(result.grade)) { (worth(result)) }
                     @if let Some(known) = result.confidence.as_ref().filter(|_| result.pose.is_some()) {
-                        " · " (likely(known)) " likely right"
+                        " · " (known.likely()) " likely right"
                     }
                     @if let Some(change) = one.change { " · " (change.name()) " since the baseline" }
                 }

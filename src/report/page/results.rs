@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::super::{ReportedResult, RunReport};
-use super::words::{capital, class_of, likely};
+use super::words::{capital, class_of};
 use crate::diagnosis::{Code, Grade};
 use crate::measure::Group;
 
@@ -175,7 +175,7 @@ fn cell(report: &RunReport, one: &ReportedResult, column: &Column) -> Markup {
         "start (m)" => number(result.initial_error.map(|error| error.translation_m), 3),
         "confidence" => match &result.confidence {
             Some(known) => {
-                html! { td class=[class] data-v=(known.probability) { (likely(known)) } }
+                html! { td class=[class] data-v=(known.probability) { (known.likely()) } }
             }
             None => html! { td class=[class] data-v="" {} },
         },

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::diagnosis::{Confidence, Grade, PoseConfidence, confidence};
+use crate::diagnosis::Grade;
 use crate::localize::QueryResult;
 
 /// A text in which words between backticks are code.
@@ -15,14 +15,6 @@ pub(super) fn with_code(text: &str) -> Markup {
                 @if at % 2 == 1 { code { (part) } } @else { (part) }
             }
         } @else { (text) }
-    }
-}
-
-/// The first sentence of a text, and the rest.
-pub(super) fn first_sentence(text: &str) -> (&str, &str) {
-    match text.find(". ") {
-        Some(end) => (&text[..=end], text[end + 1..].trim_start()),
-        None => (text, ""),
     }
 }
 
@@ -43,15 +35,6 @@ pub(super) fn class_of(grade: Grade) -> &'static str {
     }
 }
 
-/// The probability of being right, with a filled diamond before a low one.
-pub(super) fn likely(known: &PoseConfidence) -> String {
-    let percent = confidence::percent(known.probability);
-    match known.word {
-        Confidence::Low => format!("{} {percent}", Confidence::Low.glyph()),
-        _ => percent,
-    }
-}
-
 /// What is wrong with a result, in sentences.
 pub(super) fn sentences(result: &QueryResult) -> String {
     match (result.diagnosis.first(), &result.reason) {
@@ -64,15 +47,6 @@ pub(super) fn sentences(result: &QueryResult) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_number_with_a_point_does_not_end_the_first_sentence() {
-        assert_eq!(
-            first_sentence("Cost 0.915 at 5.08 m. The lowest is 0.929."),
-            ("Cost 0.915 at 5.08 m.", "The lowest is 0.929.")
-        );
-        assert_eq!(first_sentence("No pose"), ("No pose", ""));
-    }
 
     #[test]
     fn words_between_backticks_are_code_and_a_single_backtick_is_none() {
