@@ -93,11 +93,11 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             let phase = event.surface.lattice.phase.name();
             match &event.best {
                 Some(best) => format!(
-                    "{phase}: the least cost is at {}",
+                    "{phase}: the lowest cost is at {}",
                     place(&best.reference_from_camera())
                 ),
                 None if event.surface.minimum().is_some() => {
-                    format!("{phase}: shown, and not searched")
+                    format!("{phase}: recorded for display, not searched")
                 }
                 None => format!("{phase}: no hypothesis has a cost"),
             }

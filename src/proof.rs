@@ -257,6 +257,11 @@ impl Panel {
     }
 }
 
+/// Whether two places are at most this far from each other.
+fn is_near(one: [f32; 2], other: [f32; 2], within: f32) -> bool {
+    (one[0] - other[0]).hypot(one[1] - other[1]) <= within
+}
+
 impl Mark {
     fn new(thing: Thing, at: [f32; 2], label: impl Into<String>) -> Self {
         Self {

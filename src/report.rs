@@ -25,10 +25,10 @@ use crate::table::Table;
 use pictures::{DrawnProof, Witness, thumbnail};
 
 /// The default number of failures with a picture.
-pub const PICTURES: usize = 24;
+pub const PICTURES: usize = 16;
 
 /// The most queries with a photo in the report: more would make it too large to send, and take longer than the run.
-const MOST_PHOTOS: usize = 500;
+const MOST_PHOTOS: usize = 250;
 
 /// The name of the file in a run folder.
 pub const REPORT: &str = "report.html";
@@ -39,6 +39,8 @@ struct RunReport {
     /// Parameters that are not at their defaults.
     changes: Vec<String>,
     results: Vec<ReportedResult>,
+    /// The positions of the failures among the results, the worst first.
+    worst: Vec<usize>,
     measures: Vec<Measures>,
     tables: Vec<Table>,
     gates: Vec<GateResult>,
@@ -73,7 +75,7 @@ struct ReportedResult {
 }
 
 /// Writes the report of a run into its folder or to `out`, compared with a baseline if given, and with pictures of
-/// at most `pictures` failures.
+/// at most `pictures` failures, the worst.
 ///
 /// # Errors
 /// A run that cannot be read, or a file that cannot be written. A scene that cannot be opened becomes a note.
@@ -108,6 +110,7 @@ impl RunReport {
             Some(before) => Some(compared_with(before, &measured.results, &mut results)?),
             None => None,
         };
+        let worst = worst_first(&results);
         let mut thumbnails = BTreeMap::new();
         let protocol = &run.protocol;
         let scenes = Scenes::open(
@@ -124,12 +127,12 @@ impl RunReport {
                         "Only the first {MOST_PHOTOS} of {queries} queries have photos"
                     ));
                 }
-                draw_failures(&run, &scenes, &params, &mut results, pictures);
-                let failures = results.iter().filter(|one| one.result.grade.is_failure());
-                let failures = failures.count();
-                if failures > pictures {
+                let drawn = &worst[..pictures.min(worst.len())];
+                draw_failures(&run, &scenes, &params, &mut results, drawn);
+                if worst.len() > pictures {
                     notes.push(format!(
-                        "Only the first {pictures} of {failures} failures have pictures"
+                        "Only the {pictures} worst of {} failures have pictures",
+                        worst.len()
                     ));
                 }
             }
@@ -142,12 +145,37 @@ impl RunReport {
             gates: read_gate_results(folder)?,
             run,
             results,
+            worst,
             measures: measured.measures,
             thumbnails,
             notes,
             baseline,
         })
     }
+
+    /// Whether the results come from several scenes or settings.
+    fn has_several_groups(&self) -> bool {
+        let mut groups = self.measures.iter().map(|one| &one.group);
+        let first = groups.next();
+        groups.any(|group| Some(group) != first)
+    }
+}
+
+/// The positions of the failures: those that a change broke first, then wrong poses by their error, then those without
+/// a pose.
+fn worst_first(results: &[ReportedResult]) -> Vec<usize> {
+    let failures = (0..results.len()).filter(|&at| results[at].result.grade.is_failure());
+    let mut failures: Vec<usize> = failures.collect();
+    let is_broken = |at: usize| results[at].change == Some(Change::Broken);
+    let off_m = |at: usize| {
+        let error = results[at].result.error;
+        error.map_or(f64::NEG_INFINITY, |error| error.translation_m)
+    };
+    failures.sort_by(|&one, &other| {
+        let by_error = off_m(other).total_cmp(&off_m(one));
+        is_broken(other).cmp(&is_broken(one)).then(by_error)
+    });
+    failures
 }
 
 fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<ReportedResult> {
@@ -221,18 +249,14 @@ fn thumbnails(
     painted.collect()
 }
 
-/// Localises the first failures again and draws their proofs.
+/// Localises these results again and draws their proofs.
 fn draw_failures(
     run: &RunFile,
     scenes: &Scenes,
     params: &Params,
     results: &mut [ReportedResult],
-    most: usize,
+    failures: &[usize],
 ) {
-    let failures: Vec<usize> = (0..results.len())
-        .filter(|&at| results[at].result.grade.is_failure())
-        .take(most)
-        .collect();
     for pair in &run.pairs {
         let references = scenes.references[pair.scene_index].as_ref();
         let queries = scenes.of_queries(pair);
@@ -242,7 +266,7 @@ fn draw_failures(
         };
         let localizer = run.protocol.configured(localizer);
         let localizer = localizer.with_foreign(foreign).explaining(0);
-        for &at in &failures {
+        for &at in failures {
             let result = &results[at].result;
             let is_of_pair = run
                 .pair_of(result)

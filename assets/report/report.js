@@ -74,6 +74,16 @@
   filters.addEventListener("reset", () => setTimeout(show));
   more.addEventListener("click", () => { limit = Infinity; show(); });
 
+  // A cause shows the results that have it.
+  for (const link of document.querySelectorAll("a[data-cause]")) {
+    link.addEventListener("click", () => {
+      filters.reset();
+      filters.elements.code.value = link.dataset.cause;
+      limit = FIRST;
+      show();
+    });
+  }
+
   // What a link names may be out of the table or closed.
   const follow = () => {
     const name = decodeURIComponent(location.hash.slice(1));
@@ -85,8 +95,10 @@
     }
     const there = name && document.getElementById(name);
     if (!there) return;
-    if (there.tagName === "DETAILS") there.open = true;
-    there.scrollIntoView({ block: "center" });
+    for (let at = there; at; at = at.parentElement) {
+      if (at.tagName === "DETAILS") at.open = true;
+    }
+    there.scrollIntoView({ block: there.tagName === "TR" ? "center" : "start" });
   };
   window.addEventListener("hashchange", follow);
   filters.hidden = false;

@@ -69,6 +69,21 @@ addEventListener("load", () => setTimeout(() => {
   filters.elements.words.value = "no such words";
   filters.dispatchEvent(new Event("input", { bubbles: true }));
   expect(rows().length === 0 && count().startsWith("0 of 0"), "something meets a filter that nothing meets");
+  // A box shows and hides a column.
+  const box = document.querySelector(".columns input:not(:checked)");
+  const isShown = () => getComputedStyle(table.tHead.rows[0].cells[Number(box.id.slice(1)) - 1]).display !== "none";
+  const before = isShown();
+  box.click();
+  expect(!before && isShown(), "a box does not show its column");
+  box.click();
+  // A cause leads to its results.
+  const cause = document.querySelector("a[data-cause]");
+  if (cause) {
+    cause.click();
+    expect(rows().length > 0 && rows().every((row) => row.dataset.code === cause.dataset.cause), "a cause shows others");
+  }
+  // Nothing is wider than the page.
+  expect(document.documentElement.scrollWidth <= document.documentElement.clientWidth, "the page scrolls sideways");
   filters.reset();
   setTimeout(() => {
     expect(rows().length === first, "without a filter others are shown than at first");

@@ -23,6 +23,10 @@ pub struct Place {
 }
 
 impl Place {
+    fn area(&self) -> f32 {
+        self.width * self.height
+    }
+
     /// The largest place for a panel inside, at its upper left corner.
     fn fitted(self, panel: &Panel) -> Self {
         let aspect = panel.aspect();
@@ -51,17 +55,25 @@ impl ProofPicture {
     /// The place of each panel's picture in an area of this size, in the order of [`Self::panels`]; titles stand
     /// right above. The others stand below the large panel or to its right, wherever it becomes larger.
     pub fn places(&self, width: f32, height: f32) -> Vec<Place> {
+        self.better(width, height, worth)
+    }
+
+    /// The places on a page of this width, and the height that they take: those that fill more of it.
+    pub fn on_page(&self, width: f32) -> (Vec<Place>, f32) {
+        const MOST: f32 = 1.2;
+        let filled =
+            |places: &[Place]| places.iter().map(Place::area).sum::<f32>() / bottom(places);
+        let places = self.better(width, MOST * width, filled);
+        let height = bottom(&places).ceil();
+        (places, height)
+    }
+
+    fn better(&self, width: f32, height: f32, worth: impl Fn(&[Place]) -> f32) -> Vec<Place> {
         let all = Place {
             left: 0.0,
             top: 0.0,
             width,
             height,
-        };
-        // A small panel counts less: it may be small.
-        let worth = |places: &[Place]| -> f32 {
-            let area = |place: &Place| place.width * place.height;
-            let small: f32 = places.iter().skip(1).map(area).sum();
-            places.first().map_or(0.0, area) + 0.5 * small
         };
         let (below, beside) = (self.stacked(all), self.side_by_side(all));
         if worth(&below) > worth(&beside) {
@@ -69,14 +81,6 @@ impl ProofPicture {
         } else {
             beside
         }
-    }
-
-    /// The height that fits a width.
-    pub fn height_for(&self, width: f32) -> f32 {
-        const MOST: f32 = 1.2;
-        let places = self.places(width, MOST * width);
-        let bottoms = places.iter().map(|place| place.top + place.height);
-        bottoms.fold(1.0, f32::max).ceil()
     }
 
     fn side_by_side(&self, all: Place) -> Vec<Place> {
@@ -158,6 +162,18 @@ impl ProofPicture {
         }
         places
     }
+}
+
+/// What places show: their area. A small panel counts half, because it may be small.
+fn worth(places: &[Place]) -> f32 {
+    let small: f32 = places.iter().skip(1).map(Place::area).sum();
+    places.first().map_or(0.0, Place::area) + 0.5 * small
+}
+
+/// The lower end of the lowest place.
+fn bottom(places: &[Place]) -> f32 {
+    let bottoms = places.iter().map(|place| place.top + place.height);
+    bottoms.fold(1.0, f32::max)
 }
 
 /// Panels below each other that share a height, each as wide as it may be.

@@ -2,7 +2,7 @@
 
 use image::{GrayImage, Rgb, RgbImage};
 
-use super::{ColorScale, Panel, ProofCase, ProofPicture, Thing, responsible};
+use super::{ColorScale, Panel, ProofCase, ProofPicture, Thing, is_near, responsible};
 use crate::cost::Explanation;
 use crate::diagnosis::MapOverlay;
 use crate::estimator::{self, Estimator};
@@ -18,7 +18,9 @@ use crate::render::Comparison;
 const BETWEEN: usize = 40;
 const BEYOND: usize = 8;
 /// Size of the curve of costs \[px\].
-const CURVE: (u32, u32) = (640, 150);
+const CURVE: (u32, u32) = (640, 170);
+/// What is nearer to the reference than this has one label with it \[cells\].
+const SAME_CELLS: f32 = 0.4;
 
 /// What the cost says at a pose.
 struct Seen {
@@ -46,7 +48,7 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
     match (overlay, &truth, &result) {
         (MapOverlay::Preference, Some(truth), Some(result)) => {
             let parts = picture::preference(query, &result.comparison, &truth.comparison);
-            let title = "Which parts prefer which pose: orange the result, blue the truth";
+            let title = "Orange prefers the result, blue the truth";
             beside.extend(parts.map(|parts| Panel::new(title, parts)));
         }
         (MapOverlay::Flat, ..) => beside.extend(histogram(truth.as_ref().or(result.as_ref()))),
@@ -171,18 +173,23 @@ fn map(
         }
         _ => seen.label(),
     };
-    panel.mark(
-        Thing::Reference,
-        cell_place(lattice, &Offset::default()),
-        "reference",
-    );
+    let at_reference = cell_place(lattice, &Offset::default());
+    let at_truth = truth.map(|truth| cell_place(lattice, &place(&truth.world_from_query)));
+    let is_same = at_truth.is_some_and(|at| is_near(at, at_reference, SAME_CELLS));
+    let label_of_reference = if is_same { "" } else { "reference" };
+    panel.mark(Thing::Reference, at_reference, label_of_reference);
     if let Some(result) = result {
         let at = cell_place(lattice, &place(&result.world_from_query));
         panel.marks.push(case.result_mark(at, label(result)));
     }
-    if let Some(truth) = truth {
-        let at = cell_place(lattice, &place(&truth.world_from_query));
-        panel.mark(Thing::Truth, at, label(truth));
+    if let (Some(truth), Some(at)) = (truth, at_truth) {
+        let label = label(truth);
+        let label = if is_same {
+            format!("{label}, at the reference")
+        } else {
+            label
+        };
+        panel.mark(Thing::Truth, at, label);
     }
     panel
 }
@@ -337,12 +344,33 @@ fn curve(
     let x = |step: f64| 70.0 + (width - 150.0) * (step / steps as f64) as f32;
     let y = |cost: f64| {
         let share = (cost - least) / (most - least).max(f64::MIN_POSITIVE);
-        height - 24.0 - (height - 52.0) * share as f32
+        height - 44.0 - (height - 72.0) * share as f32
     };
-    let length_m = (to.translation.vector - from.translation.vector).norm();
+    let length_m = (to.translation.vector - from.translation.vector)
+        .norm()
+        .max(f64::MIN_POSITIVE);
     let title =
-        format!("Cost on the line from the result to the truth ({length_m:.2} m), lower is better");
+        format!("Cost on the way from the result to the truth ({length_m:.2} m), lower is better");
     let mut panel = Panel::plain(title, CURVE.0, CURVE.1);
+    let at_metres = |metres: f64| x(BEYOND as f64 + BETWEEN as f64 * metres / length_m);
+    for metres in ticks(length_m * (BEYOND + BETWEEN) as f64 / BETWEEN as f64) {
+        let at = at_metres(metres);
+        let (top, bottom) = (height - 36.0, height - 30.0);
+        panel.line([0x90; 3], 1.0, [[at, top], [at, bottom]]);
+        panel.mark(
+            Thing::Words,
+            [at - 8.0, height - 16.0],
+            format!("{metres} m"),
+        );
+    }
+    let ends = [
+        (BEYOND, palette::grade(case.result.grade)),
+        (BEYOND + BETWEEN, palette::TRUTH),
+    ];
+    for (step, color) in ends {
+        let at = x(step as f64);
+        panel.line(color, 1.0, [[at, 12.0], [at, height - 33.0]]);
+    }
     for cost in [least, most] {
         panel.line(
             [0x50; 3],
@@ -372,6 +400,22 @@ fn curve(
         }
     }
     Some(panel)
+}
+
+/// Round distances from 0 up to this one \[m\], at most seven.
+pub(super) fn ticks(most_m: f64) -> Vec<f64> {
+    const STEPS_M: [f64; 15] = [
+        0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0,
+    ];
+    let Some(step_m) = STEPS_M.into_iter().find(|step| most_m / step <= 6.0) else {
+        return Vec::new();
+    };
+    let count = (most_m / step_m).floor() as u32;
+    // In whole centimetres: 3 · 0.1 would read 0.30000000000000004.
+    let round = |metres: f64| (metres * 100.0).round() / 100.0;
+    (0..=count)
+        .map(|step| round(f64::from(step) * step_m))
+        .collect()
 }
 
 /// A cost with three digits that count.

@@ -26,6 +26,8 @@ const ENLARGED: u32 = 6;
 const PATCHES: usize = 4;
 /// Position of inliers among the states of features.
 const INLIER: usize = 4;
+/// Matches without a depth.
+const NO_DEPTH: Color = [0xFF; 3];
 /// What is drawn but does not count.
 const FAINT: Color = [0x70; 3];
 
@@ -205,9 +207,17 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         .collect();
     doubtful.retain(|one| one.state.index() >= 2);
     doubtful.sort_by(|a, b| spread(b).total_cmp(&spread(a)));
+    let missing = doubtful.iter().filter(|one| one.point.is_none()).count();
+    let with_depth = doubtful.len() - missing;
+    let judged = match case.truth {
+        Some(_) => "false (orange)",
+        None => "with a depth (orange)",
+    };
     let reference = &case.problem.reference;
     let mut large = Panel::new(
-        "Depths of the cloud on the reference photo, and the matches without a right depth",
+        format!(
+            "Depths of the cloud. Matches: {with_depth} {judged}, {missing} without a depth (white)"
+        ),
         cloud_picture(
             &reference.photo,
             &reference.intrinsics,
@@ -216,7 +226,11 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         ),
     );
     for one in &doubtful {
-        large.mark(Thing::Dot(palette::ESTIMATE), place(one.reference), "");
+        let color = match one.point {
+            Some(_) => palette::ESTIMATE,
+            None => NO_DEPTH,
+        };
+        large.mark(Thing::Dot(color), place(one.reference), "");
     }
     let beside = doubtful
         .iter()
@@ -225,7 +239,7 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     Some(ProofPicture {
         beside: beside.collect(),
         large,
-        below: None,
+        below: Some(depth_legend()),
     })
 }
 
@@ -245,7 +259,7 @@ fn depth_patch(photo: &RgbImage, one: &Matched<'_>) -> Panel {
         image::imageops::FilterType::Nearest,
     );
     let title = match one.depth_range_m {
-        Some((near, far)) => format!("Depths {near:.1} to {far:.1} m around this match"),
+        Some((near, far)) => format!("{near:.1} to {far:.1} m around this match"),
         None => "No depth near this match".to_owned(),
     };
     let mut panel = Panel::new(title, large);
@@ -332,9 +346,29 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let result = found.map(|pose| on_query("result", &pose));
     Some(ProofPicture {
         large,
-        below: None,
+        below: Some(depth_legend()),
         beside: truth.into_iter().chain(result).collect(),
     })
+}
+
+/// The colours of depths, with some of them in metres.
+fn depth_legend() -> Panel {
+    const SIZE: (u32, u32) = (560, 44);
+    const STEPS: usize = 96;
+    const DEPTHS_M: [f64; 6] = [2.0, 5.0, 10.0, 20.0, 40.0, 80.0];
+    let (left, length) = (12.0, SIZE.0 as f32 - 60.0);
+    let mut panel = Panel::plain("The colours of the depths", SIZE.0, SIZE.1);
+    let x = |share: f64| left + length * share as f32;
+    for step in 0..STEPS {
+        let [from, to] = [step, step + 1].map(|end| end as f64 / STEPS as f64);
+        let color = palette::turbo((from + to) / 2.0);
+        panel.line(color, 12.0, [[x(from), 12.0], [x(to), 12.0]]);
+    }
+    for depth_m in DEPTHS_M {
+        let at = x(palette::depth_share(depth_m));
+        panel.mark(Thing::Words, [at - 6.0, 33.0], format!("{depth_m} m"));
+    }
+    panel
 }
 
 /// A darkened photo with the points of the reference's cloud in the colours of their depths, near ones above.

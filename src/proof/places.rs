@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::{Panel, ProofCase, ProofPicture, Thing};
+use super::{Panel, ProofCase, ProofPicture, Thing, is_near};
 use crate::event::{ReferencesFused, ReferencesRanked};
 use crate::geometry::Pose;
 use crate::palette;
@@ -13,6 +13,8 @@ const SIDE: u32 = 560;
 const BORDER: f64 = 40.0;
 /// Half of what a map shows at least \[m\].
 const LEAST_REACH_M: f64 = 2.0;
+/// What is nearer to the reference than this has one label with it \[px\].
+const SAME_PX: f32 = 8.0;
 /// Ranked frames that are shown.
 const RANKED: usize = 4;
 
@@ -85,14 +87,29 @@ impl Map {
         self.panel.mark(thing, at, label);
     }
 
-    /// The result and the truth.
-    fn found(&mut self, case: &ProofCase<'_>, result: Option<&Pose>, truth: Option<&Pose>) {
+    /// The reference, the result and the truth. If reference and truth coincide, they share a label.
+    fn cameras(
+        &mut self,
+        case: &ProofCase<'_>,
+        name: &str,
+        result: Option<&Pose>,
+        truth: Option<&Pose>,
+    ) {
+        let origin = self.place([0.0, 0.0]);
+        let is_same = truth.is_some_and(|pose| is_near(self.place(ground(pose)), origin, SAME_PX));
+        let of_truth = if is_same {
+            "truth, at the reference"
+        } else {
+            "truth"
+        };
+        let of_reference = if is_same { "" } else { name };
+        self.camera(Thing::Reference, &Pose::identity(), of_reference);
         let grade = palette::grade(case.result.grade);
         if let Some(pose) = result {
             self.camera(Thing::Result(grade), pose, "result");
         }
         if let Some(pose) = truth {
-            self.camera(Thing::Truth, pose, "truth");
+            self.camera(Thing::Truth, pose, of_truth);
         }
     }
 
@@ -138,12 +155,12 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
     if is_alone {
         map.circle(radius_m);
     }
-    map.camera(Thing::Reference, &Pose::identity(), &problem.reference.name);
+    let name = format!("reference {}", problem.reference.name);
     for (share, pose) in &each {
         let label = format!("{} alone, weight {:.2}", share.reference, share.weight);
         map.camera(Thing::Dot(palette::UNDECIDED), pose, &label);
     }
-    map.found(case, result.as_ref(), truth.as_ref());
+    map.cameras(case, &name, result.as_ref(), truth.as_ref());
     let photo = |photo| picture::photo(photo).into_rgb8();
     ProofPicture {
         large: map.panel,
@@ -168,13 +185,12 @@ pub(super) fn from_above(case: &ProofCase<'_>, points: &[Point3<f64>]) -> Panel 
         .pose()
         .map(|pose| case.problem.reference_from_query(&pose));
     places.extend(truth.iter().chain(&result).map(ground));
-    let mut map = Map::around("Their points from above", &places);
+    let mut map = Map::around("The points of the inliers from above", &places);
     for point in points {
         let at = map.place([point.x, point.z]);
         map.panel.mark(Thing::Dot(palette::TRUTH), at, "");
     }
-    map.camera(Thing::Reference, &Pose::identity(), "reference");
-    map.found(case, result.as_ref(), truth.as_ref());
+    map.cameras(case, "reference", result.as_ref(), truth.as_ref());
     map.panel
 }
 

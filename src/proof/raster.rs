@@ -23,6 +23,9 @@ const FONT_PX: f32 = 13.0;
 const LINE: f32 = 19.0;
 /// Half the size of a mark \[px\].
 const MARK: f64 = 7.0;
+/// Length of a bar of colours, and the height of its ground \[px\].
+const SCALE_BAR: f32 = 90.0;
+const SCALE_HEIGHT: f32 = 24.0;
 
 static FONT: LazyLock<FontData> = LazyLock::new(|| {
     let bytes: &'static [u8] = epaint_default_fonts::UBUNTU_LIGHT;
@@ -35,9 +38,9 @@ impl ProofPicture {
         let width = width.clamp(200, 4096);
         let lines = wrapped(sentence, width as f32 - 8.0);
         let head = LINE * lines.len() as f32;
-        let height = ((head + self.height_for(width as f32)) as u32).clamp(1, 8192);
+        let (mut places, height) = self.on_page(width as f32);
+        let height = ((head + height) as u32).clamp(1, 8192);
         let mut canvas = RgbImage::from_pixel(width, height, Rgb(GROUND));
-        let mut places = self.places(width as f32, height as f32 - head);
         for place in &mut places {
             place.top += head;
         }
@@ -58,7 +61,8 @@ impl ProofPicture {
             painter.words(line, [4.0, LINE * row as f32 + 14.0], WORDS);
         }
         for (panel, place) in self.panels().zip(&places) {
-            painter.panel(panel, place);
+            let end = title_end(place, &places, width as f32);
+            painter.panel(panel, place, end);
         }
         painter.lay_over(&mut canvas);
         canvas
@@ -89,8 +93,10 @@ struct Painter {
 }
 
 impl Painter {
-    fn panel(&mut self, panel: &Panel, place: &Place) {
-        self.words(&panel.title, [place.left, place.top - 5.0], WORDS);
+    /// Draws all of a panel but its picture. The title ends at `end`.
+    fn panel(&mut self, panel: &Panel, place: &Place, end: f32) {
+        let title = elided(&panel.title, end - place.left);
+        self.words(&title, [place.left, place.top - 5.0], WORDS);
         let scale = [
             place.width / panel.picture.width().max(1) as f32,
             place.height / panel.picture.height().max(1) as f32,
@@ -116,7 +122,18 @@ impl Painter {
             }
             self.stroke(&path, line.color, line.width.into());
         }
+        let scale_corner = panel.scale.as_ref().map(|scale| {
+            let size = [scale_width(scale), SCALE_HEIGHT];
+            free_corner(
+                place,
+                size,
+                panel.marks.iter().map(|mark| on_canvas(mark.at)),
+            )
+        });
         let mut taken: Vec<[f32; 4]> = Vec::new();
+        if let (Some(scale), Some([left, top])) = (&panel.scale, scale_corner) {
+            taken.push([left, top + 16.0, scale_width(scale), SCALE_HEIGHT]);
+        }
         for mark in &panel.marks {
             self.mark(mark, on_canvas(mark.at));
         }
@@ -131,8 +148,8 @@ impl Painter {
             self.label(&mark.label, at, mark.thing != Thing::Words);
         }
         self.context.pop_layer();
-        if let Some(scale) = &panel.scale {
-            self.scale(scale, place);
+        if let (Some(scale), Some(corner)) = (&panel.scale, scale_corner) {
+            self.scale(scale, corner);
         }
     }
 
@@ -198,22 +215,21 @@ impl Painter {
             .fill_glyphs(glyphs.into_iter());
     }
 
-    /// A bar of colours in the lower left corner of a panel.
-    fn scale(&mut self, scale: &ColorScale, place: &Place) {
+    /// A bar of colours with the numbers at its ends.
+    fn scale(&mut self, scale: &ColorScale, corner: [f32; 2]) {
         const STEPS: u32 = 64;
-        let (left, top) = (place.left + 8.0, place.top + place.height - 24.0);
-        let ends = [width_of(&scale.dark), width_of(&scale.bright)];
-        let bar = 90.0;
+        let bar = SCALE_BAR;
         let ground = Rect::new(
-            (left - 4.0).into(),
-            (top - 4.0).into(),
-            (left + ends[0] + ends[1] + bar + 16.0).into(),
-            (top + 20.0).into(),
+            corner[0].into(),
+            corner[1].into(),
+            (corner[0] + scale_width(scale)).into(),
+            (corner[1] + SCALE_HEIGHT).into(),
         );
+        let [left, top] = corner.map(|along| along + 4.0);
         self.context.set_paint(AlphaColor::from_rgba8(0, 0, 0, 190));
         self.context.fill_rect(&ground);
         self.words(&scale.dark, [left, top + 12.0], WORDS);
-        let start = left + ends[0] + 6.0;
+        let start = left + width_of(&scale.dark) + 6.0;
         for step in 0..STEPS {
             let [red, green, blue] = palette::viridis((f64::from(step) + 0.5) / f64::from(STEPS));
             self.context
@@ -240,6 +256,40 @@ impl Painter {
             });
         }
     }
+}
+
+/// How wide the ground of a bar of colours is \[px\].
+fn scale_width(scale: &ColorScale) -> f32 {
+    width_of(&scale.dark) + width_of(&scale.bright) + SCALE_BAR + 20.0
+}
+
+/// The upper left end of a box in a corner of a panel that covers no mark; the lower left corner if all do.
+pub(super) fn free_corner(
+    panel: &Place,
+    [width, height]: [f32; 2],
+    marks: impl Iterator<Item = [f32; 2]> + Clone,
+) -> [f32; 2] {
+    const EDGE: f32 = 4.0;
+    let (left, top) = (panel.left + EDGE, panel.top + EDGE);
+    let right = (panel.left + panel.width - EDGE - width).max(left);
+    let bottom = (panel.top + panel.height - EDGE - height).max(top);
+    let corners = [[left, bottom], [right, bottom], [left, top], [right, top]];
+    let room = MARK as f32 + 3.0;
+    let is_free = |corner: &&[f32; 2]| {
+        marks.clone().all(|mark| {
+            let [x, y] = [mark[0] - corner[0], mark[1] - corner[1]];
+            x < -room || x > width + room || y < -room || y > height + room
+        })
+    };
+    *corners.iter().find(is_free).unwrap_or(&corners[0])
+}
+
+/// Where the title above a place has to end: before the next place in the same row.
+fn title_end(place: &Place, places: &[Place], width: f32) -> f32 {
+    const GAP: f32 = 8.0;
+    let rows = |other: &&Place| other.left > place.left && (other.top - place.top).abs() < 20.0;
+    let next = places.iter().filter(rows).map(|other| other.left - GAP);
+    next.fold(width, f32::min)
 }
 
 fn path(lines: &[&[(f64, f64)]]) -> BezPath {

@@ -125,8 +125,7 @@ fn every_verdict_has_a_picture_without_overlap() {
         assert!(drawn.len() >= least, "{method}: {}", drawn.len());
         for (code, picture) in drawn {
             let width = 960.0;
-            let height = picture.height_for(width);
-            let places = picture.places(width, height);
+            let (places, height) = picture.on_page(width);
             assert_eq!(places.len(), picture.panels().count());
             for (at, one) in places.iter().enumerate() {
                 let ends = [one.left + one.width, one.top + one.height];
@@ -168,4 +167,76 @@ fn a_proof_is_painted_the_same_twice() {
     let first = pictures(&kept, &result);
     let again = pictures(&kept, &result);
     assert_eq!(first[0].1.raster(640, "why"), again[0].1.raster(640, "why"));
+}
+
+/// The scale moves away from a mark, and back to its usual corner where every corner has one.
+#[test]
+fn the_scale_covers_no_mark() {
+    let panel = Place {
+        left: 10.0,
+        top: 20.0,
+        width: 400.0,
+        height: 300.0,
+    };
+    let corner =
+        |marks: &[[f32; 2]]| raster::free_corner(&panel, [150.0, 24.0], marks.iter().copied());
+    let (lower_left, lower_right) = ([14.0, 292.0], [256.0, 292.0]);
+    assert_eq!(corner(&[[200.0, 100.0]]), lower_left);
+    assert_eq!(corner(&[[20.0, 290.0]]), lower_right);
+    let everywhere = [20.0, 400.0].map(|x| [[x, 30.0], [x, 310.0]]);
+    assert_eq!(corner(everywhere.as_flattened()), lower_left);
+}
+
+#[test]
+fn distances_below_a_curve_are_round() {
+    assert_eq!(maps::ticks(17.2), [0.0, 5.0, 10.0, 15.0]);
+    assert_eq!(maps::ticks(0.3), [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3]);
+    assert_eq!(maps::ticks(f64::MIN_POSITIVE), [0.0]);
+}
+
+/// Matches without a depth differ from false ones, and the title counts both.
+#[test]
+fn the_picture_of_depths_counts_its_marks() {
+    let (kept, result) = neighbours(Method::FB);
+    let drawn = pictures(&kept, &result);
+    let (_, picture) = drawn
+        .iter()
+        .find(|(code, _)| *code == "R4")
+        .expect("a picture");
+    let count = |color: Rgb| {
+        let marks = picture.large.marks.iter();
+        marks.filter(|mark| mark.thing == Thing::Dot(color)).count()
+    };
+    let (without, wrong) = (count([0xFF; 3]), count(palette::ESTIMATE));
+    assert!(without > 0 && wrong > 0);
+    let says = format!("Matches: {wrong} false (orange), {without} without a depth (white)");
+    assert!(
+        picture.large.title.ends_with(&says),
+        "{}",
+        picture.large.title
+    );
+}
+
+/// The truth at the reference: one label for both.
+#[test]
+fn reference_and_truth_at_one_place_share_a_label() {
+    let (kept, result) = localized(["street"; 2], ["000001"; 2], 5.0, Method::MI);
+    for (code, picture) in pictures(&kept, &result) {
+        let panels = picture.panels().filter(|panel| {
+            panel
+                .marks
+                .iter()
+                .any(|mark| mark.thing == Thing::Reference)
+        });
+        for panel in panels {
+            let labels: Vec<&str> = panel.marks.iter().map(|mark| mark.label.as_str()).collect();
+            assert!(!labels.contains(&"reference"), "{code}: {labels:?}");
+            assert!(
+                labels
+                    .iter()
+                    .any(|label| label.ends_with("at the reference")),
+                "{code}: {labels:?}"
+            );
+        }
+    }
 }

@@ -17,8 +17,8 @@ use crate::proof::{self, ProofCase, ProofPicture};
 use crate::trace::{Cancelled, Record, Sink};
 
 const THUMBNAIL_WIDTH: u32 = 120;
-/// The width of a proof \[px\], at which its text is readable.
-const PROOF_WIDTH: u32 = 960;
+/// The width of a proof \[px\]: its text is readable on a large screen, and large enough on a phone.
+const PROOF_WIDTH: u32 = 720;
 
 /// A small copy of a photo.
 pub(super) fn thumbnail(photo: &Photo) -> Option<String> {

@@ -650,7 +650,7 @@ fn frames_of_two_scenes_are_told_apart_in_a_recording() {
             _ => None,
         })
         .collect();
-    for words in ["# Query night ", "Against snow ", "reference snow "] {
+    for words in ["# Query night ", "Reference: snow ", "reference snow "] {
         assert!(told.contains(words), "{words}");
     }
 }

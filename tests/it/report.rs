@@ -25,6 +25,18 @@ fn named<'a>(page: &'a str, before: &str, end: char) -> Vec<&'a str> {
         .collect()
 }
 
+/// The page has these words, each after the one before.
+#[track_caller]
+fn has_in_order(page: &str, words: &str) {
+    let mut rest = page;
+    for word in words.split(" ~ ") {
+        let (_, after) = rest
+            .split_once(word)
+            .unwrap_or_else(|| panic!("`{word}` is missing or too early"));
+        rest = after;
+    }
+}
+
 /// Where recordings can be looked at without a viewer of one's own: the version that writes them.
 fn web_viewer() -> String {
     let manifest = text(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
@@ -87,6 +99,26 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     ] {
         has(&page, words);
     }
+
+    // What came of the run is first, what was run is last.
+    has_in_order(
+        &page,
+        "class=\"headline\" ~ id=\"gates\" ~ id=\"methods\" ~ id=\"causes\" ~ id=\"failures\" ~ id=\"queries\" ~ \
+         id=\"plots\" ~ id=\"figures\" ~ id=\"asked\"",
+    );
+    // The bars count every result, with its grade in words.
+    has(
+        &page,
+        "role=\"img\" aria-label=\"FB: ~ no pose\" ~ aria-label=\"MI: ",
+    );
+    // The worst failures are open, the greatest error first; a cause in the table leads to them.
+    let (_, open) = page.split_once("id=\"failures\"").expect("failures");
+    let (open, _) = open.split_once("id=\"queries\"").expect("results");
+    assert!((1..=3).contains(&open.matches(" open>").count()), "{open}");
+    has(open, "class=\"sentence\" ~ class=\"code\"");
+    // Every column has a box, and the first ones are chosen.
+    assert_eq!(page.matches("<input type=\"checkbox\"").count(), 10);
+    assert_eq!(page.matches(" checked autocomplete").count(), 5);
 
     // From the folder alone, on any number of threads: the same bytes.
     sequence

@@ -39,6 +39,14 @@ impl UnknownWord {
     }
 }
 
+/// The first sentence of a text, and the rest. A point inside a number ends no sentence.
+pub fn first_sentence(text: &str) -> (&str, &str) {
+    match text.find(". ") {
+        Some(end) => (&text[..=end], text[end + 1..].trim_start()),
+        None => (text, ""),
+    }
+}
+
 /// The name that is most like a mistyped word, if one is.
 pub fn similar<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     names
@@ -111,6 +119,15 @@ macro_rules! serde_as_text {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_with_a_point_does_not_end_the_first_sentence() {
+        assert_eq!(
+            first_sentence("Cost 0.915 at 5.08 m. The lowest is 0.929."),
+            ("Cost 0.915 at 5.08 m.", "The lowest is 0.929.")
+        );
+        assert_eq!(first_sentence("No pose"), ("No pose", ""));
+    }
 
     #[test]
     fn an_unknown_word_is_told_which_there_are() {

@@ -91,9 +91,9 @@ fn table(event: &ReferencesFused, method: Method) -> String {
     let is_joint = event.shares.iter().any(|share| share.support.is_some());
     if event.pose.is_none() {
         text += if is_joint {
-            "\nTogether the references give no pose.\n"
+            "\nThe references together give no pose.\n"
         } else {
-            "\nEvery reference with a weight failed.\n"
+            "\nNo reference with a weight gives a pose.\n"
         };
     }
     text + "\n"

@@ -2,12 +2,13 @@
 
 use super::Identity;
 use super::scene::Origin;
-use crate::diagnosis::Grade;
+use crate::diagnosis::{Grade, PoseConfidence};
 use crate::geometry::PoseError;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::table::{Align, Table};
+use posescope_core::text::first_sentence;
 
 /// The report on one query so far.
 pub(super) fn markdown(
@@ -23,7 +24,7 @@ pub(super) fn markdown(
             .map(|name| identity.reference_label(name))
             .collect();
         text += &format!(
-            "# Query {}\n\nAgainst {}, within {} m, seed {}.\n\n",
+            "# Query {}\n\nReference: {}. Search radius: {} m. Seed: {}.\n\n",
             identity.query_label(&problem.query.name),
             names.join(", "),
             problem.uncertainty_radius_m,
@@ -37,29 +38,44 @@ pub(super) fn markdown(
     text += &costs_at_poses(results);
     let degraded = identity.degraded;
     if !degraded.is_none() {
-        text += &format!("The photo of the query was degraded before: `{degraded}`.\n\n");
+        text += &format!("The query photo was degraded first: `{degraded}`.\n\n");
     }
     text += &changes(&identity.configuration);
     let Origin(origin) = origin;
     text += &format!(
-        "\nThe world is drawn relative to the first reference: add ({:.3}, {:.3}, {:.3}) m for \
+        "\nPositions are relative to the first reference. Add ({:.3}, {:.3}, {:.3}) m to get \
          world coordinates. Axes: x right, y down, z forward.\n",
         origin.x, origin.y, origin.z
     );
     text
 }
 
-/// The failures in sentences: primary verdict, consequences and remedies of each method.
+/// The failures in sentences: primary verdict, other verdicts and remedies of each method.
 fn story(results: &[QueryResult]) -> String {
     let mut text = String::new();
     for result in results.iter().filter(|result| !result.diagnosis.is_empty()) {
-        text += &format!("**{}**\n\n", result.headline());
+        text += &failure(result);
         for paragraph in result.paragraphs() {
             text += &format!("- {paragraph}\n");
         }
         text += "\n";
     }
     text
+}
+
+/// Method and error, and the primary verdict: its first sentence, the rest, its code.
+fn failure(result: &QueryResult) -> String {
+    let worth = match &result.error {
+        Some(error) => format!("{} off", error.translation()),
+        None => result.grade.to_string(),
+    };
+    let name = result.method_name();
+    let Some(primary) = result.diagnosis.first() else {
+        return format!("### {name}: {worth}\n\n");
+    };
+    let (first, rest) = first_sentence(&primary.text);
+    let rest = [rest, primary.code.name()].join(" ");
+    format!("### {name}: {worth}\n\n**{first}** {}\n\n", rest.trim())
 }
 
 fn errors(results: &[QueryResult]) -> String {
@@ -84,7 +100,7 @@ fn errors(results: &[QueryResult]) -> String {
             error.map_or("–".to_owned(), part)
         };
         let confidence = result.confidence.as_ref();
-        let confidence = confidence.map(|one| format!("{} {:.2}", one.word, one.probability));
+        let confidence = confidence.map(PoseConfidence::likely);
         table.push([
             result.method_name(),
             part(PoseError::translation),
@@ -98,7 +114,7 @@ fn errors(results: &[QueryResult]) -> String {
     let mut text = table.to_markdown();
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
-        text += &format!("\nThe first reference itself, from the truth: {error}.\n");
+        text += &format!("\nDistance of the first reference from the truth: {error}.\n");
     }
     text + "\n"
 }

@@ -160,7 +160,7 @@ fn table(ranking: &ReferenceRanking, truth: Option<&Pose>) -> String {
         Criterion::Matches => "score (feature matches)",
     };
     let mut text = format!(
-        "# Ranked references\n\nThe first {} of {} candidates are the references.\n\n\
+        "# Ranked references\n\nThe first {} of {} candidates are used as references.\n\n\
          | rank | frame | {what} | inliers | verified | from the truth \\[m\\] | reference |\n\
          |--:|:--|--:|--:|:--|--:|:--|\n",
         ranking.chosen, ranking.candidates

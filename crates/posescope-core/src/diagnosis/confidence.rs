@@ -169,6 +169,15 @@ impl PoseConfidence {
         }
     }
 
+    /// The probability as people read it, with the glyph of a low one before it.
+    pub fn likely(&self) -> String {
+        let percent = percent(self.probability);
+        match self.word {
+            Confidence::Low => format!("{} {percent}", Confidence::Low.glyph()),
+            _ => percent,
+        }
+    }
+
     /// That of the pose of an outcome; `None` without a pose, and for a method that was not calibrated.
     pub fn of(
         problem: &Problem,
@@ -337,5 +346,7 @@ mod tests {
     fn a_limit_that_was_missed_does_not_read_as_reached() {
         let texts = [0.003, 0.4999, 0.9499, 1.0].map(percent);
         assert_eq!(texts, ["under 1 %", "49 %", "94 %", "100 %"]);
+        let likely = [0.34, 0.5].map(|probability| PoseConfidence::new(probability).likely());
+        assert_eq!(likely, ["◆ 34 %", "50 %"]);
     }
 }

@@ -51,10 +51,10 @@ impl QueryResult {
             paragraphs.push(format!("helped: {args} ({})", helped.error));
         }
         if explanation.helped.is_empty() {
-            paragraphs.push(format!(
-                "none of the {} remedies tried helped",
-                explanation.runs
-            ));
+            paragraphs.push(match explanation.runs {
+                1 => "the one remedy that was tried did not help".to_owned(),
+                runs => format!("none of the {runs} remedies that were tried helped"),
+            });
         }
         if !explanation.complete {
             paragraphs.push("stopped before all remedies were tried".to_owned());
