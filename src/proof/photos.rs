@@ -119,7 +119,9 @@ impl ProofCase<'_> {
 
 /// Both photos with inliers and true matches, and how many features passed each step.
 pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
-    let matches = Matches::of(case)?;
+    let Some(matches) = Matches::of(case) else {
+        return keypoints(case);
+    };
     let (canvas, top) = picture::stacked(&case.problem.query.photo, &case.problem.reference.photo);
     let title = if case.truth.is_some() {
         "Query above reference; green: true matches, orange: false inliers"
@@ -152,6 +154,31 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     Some(ProofPicture {
         large: panel,
         below: Some(funnel(&matches)),
+        beside: Vec::new(),
+    })
+}
+
+/// Both photos with their keypoints, where nothing was matched.
+fn keypoints(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let (canvas, top) = picture::stacked(&case.problem.query.photo, &case.problem.reference.photo);
+    let mut panel = Panel::new("", canvas.into_rgb8());
+    let mut counts = [None; 2];
+    for event in case.all::<FeaturesDetected>() {
+        let (at, down) = match event.side {
+            Side::Query => (0, 0.0),
+            Side::Reference => (1, top as f32),
+        };
+        counts[at] = Some(event.features.keypoints.len());
+        for keypoint in &event.features.keypoints {
+            let [x, y] = place(keypoint);
+            panel.mark(Thing::Dot(palette::STATES[1]), [x, y + down], "");
+        }
+    }
+    let [query, reference] = [counts[0]?, counts[1].unwrap_or(0)];
+    panel.title = format!("Query above reference: {query} and {reference} keypoints");
+    Some(ProofPicture {
+        large: panel,
+        below: None,
         beside: Vec::new(),
     })
 }

@@ -116,6 +116,33 @@ fn pictures(kept: &Kept, result: &QueryResult) -> Vec<(&'static str, ProofPictur
     drawn.collect()
 }
 
+/// Where nothing was matched, both photos show what was found in them.
+#[test]
+fn keypoints_without_matches_have_a_picture() {
+    let (kept, mut result) = neighbours(Method::FB);
+    let records = kept.history.records().iter().cloned();
+    let is_detected = |record: &Record| record.event.kind() == Kind::FeaturesDetected;
+    let detected: Vec<Record> = records.filter(is_detected).collect();
+    result.diagnosis = vec![crate::diagnosis::Diagnosis {
+        code: crate::diagnosis::Code::R2,
+        text: String::new(),
+        evidence: Default::default(),
+    }];
+    let case = ProofCase {
+        problem: &kept.problems[0],
+        records: &detected,
+        result: &result,
+        truth: kept.truth.as_ref(),
+        params: &Params::default(),
+    };
+    let large = ProofPicture::of(&case).expect("a picture").large;
+    let counts = result.counts.expect("features were used");
+    let (query, reference) = (counts.query_keypoints, counts.reference_keypoints);
+    let title = format!("Query above reference: {query} and {reference} keypoints");
+    assert_eq!(large.title, title);
+    assert_eq!(large.marks.len(), query + reference);
+}
+
 /// A picture for every verdict that a method can get, none of whose panels leaves the picture or lies on another.
 #[test]
 fn every_verdict_has_a_picture_without_overlap() {
