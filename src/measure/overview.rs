@@ -89,9 +89,12 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     let is_measured = results
         .iter()
         .any(|result| matches!(result.grade, Grade::Right | Grade::Wrong));
-    let worth = |bar: &Bar| match is_measured {
-        true => bar.count(Grade::Right),
-        false => bar.total() - bar.count(Grade::NoPose),
+    let worth = |bar: &Bar| {
+        if is_measured {
+            bar.count(Grade::Right)
+        } else {
+            bar.total() - bar.count(Grade::NoPose)
+        }
     };
     // Of equal ones the first.
     let Some(best) = bars.iter().rev().max_by_key(|bar| worth(bar)) else {
