@@ -128,7 +128,7 @@ awk -v before="$folder/before" -v behind="$folder/behind" '
 
 # Opens the page at this address and says what became of it.
 check() {
-    "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$folder/profile" \
+    "$browser" --headless --no-sandbox --disable-gpu --window-size=420,900 --user-data-dir="$folder/profile" \
         --virtual-time-budget=20000 --dump-dom "$1" >"$folder/dom.html" 2>"$folder/said" || true
     local told
     told=$(grep -o '<pre id="checked">[^<]*' "$folder/dom.html" | sed 's/<pre id="checked">//; s/&quot;/"/g' || true)

@@ -106,10 +106,7 @@ pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
         large: panel("result", pose)?,
         below: None,
         beside: [
-            panel(
-                "result, with the truth's height, pitch and roll",
-                pose * off_plane,
-            ),
+            panel("result with true height, pitch, roll", pose * off_plane),
             panel("truth", *truth),
         ]
         .into_iter()

@@ -226,6 +226,27 @@ fn changes(configuration: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::{Code, Diagnosis};
+
+    #[test]
+    fn a_failure_begins_with_its_error_and_first_sentence_and_ends_with_its_code() {
+        let result = serde_json::json!({
+            "schema": crate::localize::SCHEMA, "scene": "street", "query": "1", "references": ["2"],
+            "method": "mi", "seed": 0, "status": "ok", "grade": "wrong",
+            "error": {"translation_m": 12.5, "rotation_deg": 1.0, "max_euler_deg": 1.0}
+        });
+        let mut result: QueryResult = serde_json::from_value(result).expect("a result");
+        assert_eq!(failure(&result), "### mi: 12.500 m off\n\n");
+        result.diagnosis = vec![Diagnosis {
+            code: Code::D3,
+            text: "The search missed it: cost 0.9. The right cell is 5th.".to_owned(),
+            evidence: Default::default(),
+        }];
+        assert_eq!(
+            failure(&result),
+            "### mi: 12.500 m off\n\n**The search missed it: cost 0.9.** The right cell is 5th. D3\n\n"
+        );
+    }
 
     #[test]
     fn only_the_parameters_that_differ_are_listed() {
