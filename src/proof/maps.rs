@@ -82,37 +82,70 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
     })
 }
 
-/// The views from the result as it is, and with the height, pitch and roll of the truth.
+/// The true place with the height, pitch and roll of the reference, as the search knows it, against the truth itself;
+/// cut out where the map is seen.
 pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let (pose, truth) = (case.pose()?, case.truth?);
     let method = responsible(case.result)?;
     let estimator = estimator::find(method)?.make(case.params);
     let reference_from_truth = case.problem.reference_from_query(truth);
     let on_plane = Offset::of(&reference_from_truth).reference_from_camera();
-    let off_plane = on_plane.inverse() * reference_from_truth;
     let query = &case.problem.query.photo.gray;
-    let panel = |label, world_from_query: Pose| {
-        let comparison = estimator.compare_at(case.problem, &world_from_query)?;
-        Some(view_panel(
-            query,
-            &Seen {
-                comparison,
-                label,
-                world_from_query,
-            },
-        ))
+    let seen = |label, world_from_query: Pose| {
+        Some(Seen {
+            comparison: estimator.compare_at(case.problem, &world_from_query)?,
+            label,
+            world_from_query,
+        })
     };
+    let frozen = seen(
+        "true place, with the reference's height, pitch and roll",
+        case.problem.world_from_query(&on_plane),
+    )?;
+    let free = seen("truth", *truth)?;
+    let cut = centre_of(&free.comparison.view);
+    let frozen = cut_out(view_panel(query, &frozen), cut);
+    let freed = on_plane.inverse() * reference_from_truth;
+    let turned = freed.rotation.scaled_axis();
+    let mut large = cut_out(view_panel(query, &free), cut);
+    large.title += &format!(
+        "; it is {:.2} m higher, pitched by {:.2}° and rolled by {:.2}°",
+        -freed.translation.y,
+        turned.x.to_degrees(),
+        turned.z.to_degrees(),
+    );
+    let result = seen("result", pose).map(|result| view_panel(query, &result));
     Some(ProofPicture {
-        large: panel("result", pose)?,
+        large,
         below: None,
-        beside: [
-            panel("result with true height, pitch, roll", pose * off_plane),
-            panel("truth", *truth),
-        ]
-        .into_iter()
-        .flatten()
-        .collect(),
+        beside: [frozen].into_iter().chain(result).collect(),
     })
+}
+
+/// The mean place of the covered pixels \[px\].
+fn centre_of(view: &crate::render::SyntheticView) -> [f64; 2] {
+    let count = view.pixels.len().max(1) as f64;
+    let sum = view.pixels.iter().fold([0.0; 2], |sum, pixel| {
+        let (x, y) = (pixel.index % view.width, pixel.index / view.width);
+        [sum[0] + f64::from(x), sum[1] + f64::from(y)]
+    });
+    sum.map(|sum| sum / count)
+}
+
+/// The part of a panel's picture around a place: a third of each side, where small shifts are seen.
+fn cut_out(panel: Panel, [x, y]: [f64; 2]) -> Panel {
+    let (width, height) = panel.picture.dimensions();
+    let part = [(width / 3).max(1), (height / 3).max(1)];
+    let corner = |at: f64, part: u32, whole: u32| {
+        let from = (at as u32).saturating_sub(part / 2);
+        from.min(whole - part)
+    };
+    let (left, top) = (corner(x, part[0], width), corner(y, part[1], height));
+    let cut = image::imageops::crop_imm(panel.picture.as_ref(), left, top, part[0], part[1]);
+    Panel {
+        picture: std::sync::Arc::new(cut.to_image()),
+        ..panel
+    }
 }
 
 fn map(
@@ -161,6 +194,31 @@ fn map(
             });
             panel.line(palette::ESTIMATE, 2.5, around);
             panel.title += &format!(", searched within {radius_m} m");
+            let turn_deg = case.params.grid.yaw_range_deg;
+            let truth = case.truth.map(place);
+            let turned = truth.map_or(0.0, |truth| truth.yaw_rad.to_degrees());
+            if turned.abs() > turn_deg {
+                panel.title += &format!(
+                    " and {turn_deg}°; the truth is turned by {:.0}°",
+                    turned.abs()
+                );
+            }
+            // Headings: those that are searched, from the reference, and that of the truth.
+            let heading = |from: &Offset, yaw_rad: f64| {
+                let tip = Offset {
+                    right_m: from.right_m - 0.4 * radius_m * yaw_rad.sin(),
+                    forward_m: from.forward_m + 0.4 * radius_m * yaw_rad.cos(),
+                    yaw_rad: 0.0,
+                };
+                [cell_place(lattice, from), cell_place(lattice, &tip)]
+            };
+            for side in [-1.0, 1.0] {
+                let edge = heading(&Offset::default(), side * turn_deg.to_radians());
+                panel.line([0xFF; 3], 1.5, edge);
+            }
+            if let Some(truth) = &truth {
+                panel.line(palette::TRUTH, 2.5, heading(truth, truth.yaw_rad));
+            }
         }
         MapOverlay::Preference | MapOverlay::Coverage | MapOverlay::Flat => {}
     }
