@@ -232,7 +232,7 @@ mod tests {
     fn a_failure_begins_with_its_error_and_first_sentence_and_ends_with_its_code() {
         let result = serde_json::json!({
             "schema": crate::localize::SCHEMA, "scene": "street", "query": "1", "references": ["2"],
-            "method": "mi", "seed": 0, "status": "ok", "grade": "wrong",
+            "method": "mi", "seed": 0, "status": "ok", "grade": "wrong", "diagnosis": [],
             "error": {"translation_m": 12.5, "rotation_deg": 1.0, "max_euler_deg": 1.0}
         });
         let mut result: QueryResult = serde_json::from_value(result).expect("a result");
