@@ -7,7 +7,7 @@ use super::View;
 use super::legend::{plot_shape, result};
 use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesFused};
-use crate::fusion::{Share, ShareOutcome};
+use crate::fusion::ShareOutcome;
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::palette;
@@ -99,7 +99,11 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {
             ui.label(share.matches.to_string());
             ui.label(error(context, share.pose.as_ref()));
             for fusion in fused {
-                weight(ui, &fusion.shares[index]);
+                let share = &fusion.shares[index];
+                let weight = ui.label(share.words());
+                if let Some(support) = share.support {
+                    weight.on_hover_text(support.words());
+                }
             }
             ui.end_row();
         }
@@ -111,30 +115,6 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {
         }
         ui.end_row();
     });
-}
-
-/// The weight of a reference, or why it has none.
-fn weight(ui: &mut Ui, share: &Share) {
-    let percent = format!("{:.0} %", 100.0 * share.weight);
-    let (words, help) = match share.outcome {
-        ShareOutcome::Kept => (percent, "Its share of the fused pose"),
-        ShareOutcome::Outvoted => (
-            format!("{percent}, outvoted"),
-            "Alone it puts the query more than 1 m away from the fused pose",
-        ),
-        ShareOutcome::Dropped => ("left out".to_owned(), "The fusion gives it no weight"),
-        ShareOutcome::Failed => ("× failed".to_owned(), "It had a weight, but no pose"),
-        ShareOutcome::Unsupportive => (share.words(), "It does not support the fused pose"),
-        ShareOutcome::FallbackUnneeded => (
-            share.words(),
-            "Its pose is that of the hybrid's second method; another reference has one of the first",
-        ),
-    };
-    let support = share
-        .support
-        .map(|support| format!(": {}", support.words()));
-    let help = format!("{help}{}", support.unwrap_or_default());
-    ui.label(words).on_hover_text(help);
 }
 
 /// Seen from above, in the frame of the first reference: references, what each gives alone (larger with more
@@ -180,7 +160,7 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
                 let (name, thing) = if has_weight {
                     ("◇ alone", result(context, pose))
                 } else {
-                    ("◇ alone, left out", Thing::Result(palette::NO_POSE))
+                    ("◇ alone, not used", Thing::Result(palette::NO_POSE))
                 };
                 let radius = 3.0 + 4.0 * share.weight.sqrt() as f32;
                 mark(plot, name, pose, thing, radius);

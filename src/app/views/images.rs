@@ -8,7 +8,7 @@ mod progress;
 mod truth;
 mod visible;
 
-use egui::{Response, Ui, UiBuilder};
+use egui::{Rect, Response, Ui, UiBuilder, vec2};
 
 use self::detail::{Detail, Subject};
 use self::marks::draw_truth;
@@ -67,10 +67,6 @@ impl View for ImagesView {
         let area = ui.available_rect_before_wrap();
         let (photos, chips) = area.split_top_bottom_at_y(area.bottom() - funnel::HEIGHT - GAP);
         let chips = chips.with_min_y(chips.top() + GAP);
-        let (photos, panel) = match selected {
-            Some(_) => pair::split(photos, [query.size_vec2(), reference.size_vec2()]),
-            None => (photos, None),
-        };
         let names = [
             format!("query photo {}", problem.query.name),
             format!("reference photo {}", problem.reference.name),
@@ -105,7 +101,7 @@ impl View for ImagesView {
         }
         pair.name(ui, captions);
 
-        if let (Some(feature), Some((panel, is_wide))) = (selected, panel) {
+        if let Some(feature) = selected.filter(|_| photos.width() > 2.0 * detail::SIZE.x) {
             let subject = Subject {
                 feature,
                 progress: &progress,
@@ -114,10 +110,16 @@ impl View for ImagesView {
                 truth,
                 depth_radius_px: context.run.params.fb.depth_radius_px,
             };
-            ui.scope_builder(UiBuilder::new().max_rect(panel), |ui| {
-                ui.shrink_clip_rect(panel);
-                self.detail.ui(ui, context, &subject, is_wide);
-            });
+            // On the side where the match is not. Making room for it would move the photos under the pointer.
+            let keypoint = &progress.query()[feature];
+            let at = pair.at[0].on_screen([keypoint.x, keypoint.y]);
+            let corner = if at.x < photos.center().x {
+                photos.right_bottom() - detail::SIZE
+            } else {
+                photos.left_bottom() - vec2(0.0, detail::SIZE.y)
+            };
+            let panel = Rect::from_min_size(corner, detail::SIZE);
+            self.detail.ui(ui, context, &subject, panel);
         }
         ui.scope_builder(UiBuilder::new().max_rect(chips), |ui| {
             if kinds.is_empty() {

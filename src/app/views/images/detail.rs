@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use egui::{Button, Color32, Grid, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
+use egui::{
+    Button, Color32, Grid, Rect, Role, Sense, TextureHandle, Ui, UiBuilder, Vec2, WidgetInfo, vec2,
+};
 use nalgebra::Point2;
 
 use super::marks::{color, draw_truth, mark, position};
@@ -17,10 +19,8 @@ use crate::problem::{Problem, ReferenceTuple};
 
 /// Side of a patch on the screen \[points\].
 const PATCH: f32 = 112.0;
-/// Room beside the photos: two patches with the numbers below \[points\].
-pub(super) const TALL: Vec2 = vec2(2.0 * PATCH + 10.0, 300.0);
-/// Room below the photos: two patches with the numbers beside them \[points\].
-pub(super) const WIDE: Vec2 = vec2(520.0, 144.0);
+/// Room for two patches with the numbers below \[points\].
+pub(super) const SIZE: Vec2 = vec2(2.0 * PATCH + 20.0, 306.0);
 /// LiDAR points are shown within this distance of the reference keypoint \[px\].
 const LIDAR_RADIUS_PX: f64 = 15.0;
 /// Half the side of a patch in scales: a little more than the window of the descriptor, 20 scales.
@@ -90,24 +90,25 @@ impl Subject<'_> {
 }
 
 impl Detail {
-    /// Both patches with the numbers below them, or beside them where it `is_wide`.
+    /// Both patches with the numbers below them, on the photos.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
         subject: &Subject<'_>,
-        is_wide: bool,
+        area: Rect,
     ) {
-        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
-        if is_wide {
-            ui.horizontal_top(|ui| {
-                self.patches(ui, subject);
-                ui.vertical(|ui| numbers(ui, context, subject));
-            });
-        } else {
+        // What lies below is not pointed at.
+        ui.interact(area, ui.scope_id().with("details"), Sense::click());
+        let (fill, stroke) = (ui.visuals().panel_fill, ui.visuals().window_stroke);
+        ui.painter()
+            .rect(area, 4.0, fill, stroke, egui::StrokeKind::Inside);
+        ui.scope_builder(UiBuilder::new().max_rect(area.shrink(8.0)), |ui| {
+            ui.shrink_clip_rect(area);
+            ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
             ui.horizontal_top(|ui| self.patches(ui, subject));
             numbers(ui, context, subject);
-        }
+        });
     }
 
     fn patches(&mut self, ui: &mut Ui, subject: &Subject<'_>) {

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use egui::{Color32, Rect, Response, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 use super::GAP;
-use super::detail;
 use crate::app::ViewContext;
 use crate::app::textures::color_image;
 use crate::app::views::canvas::{self, PanZoom, Placement};
@@ -87,33 +86,6 @@ fn place(area: Rect, [query, reference]: [Vec2; 2], pan_zoom: &PanZoom) -> [Plac
     }
 }
 
-/// The part for the photos and that for the details of a match, below or beside them: where the photos stay larger.
-/// Details below the photos are wide. A small area has no room for details.
-pub(super) fn split(area: Rect, sizes: [Vec2; 2]) -> (Rect, Option<(Rect, bool)>) {
-    let [beside, below] = [detail::TALL, detail::WIDE].map(|size| {
-        let rest = area.size() - size - Vec2::splat(GAP);
-        (rest.x, rest.y)
-    });
-    let is_wide_enough = area.width() >= detail::WIDE.x;
-    let right = area.split_left_right_at_x(area.left() + beside.0);
-    let lower = area.split_top_bottom_at_y(area.top() + below.1);
-    let scale = |photos: Rect| place(photos, sizes, &PanZoom::default())[0].scale;
-    let is_below = is_wide_enough && below.1 > 0.0 && scale(lower.0) >= scale(right.0);
-    if is_below {
-        (
-            lower.0,
-            Some((lower.1.with_min_y(lower.1.top() + GAP), true)),
-        )
-    } else if beside.0 > detail::TALL.x {
-        (
-            right.0,
-            Some((right.1.with_min_x(right.1.left() + GAP), false)),
-        )
-    } else {
-        (area, None)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,18 +108,8 @@ mod tests {
     }
 
     #[test]
-    fn details_go_where_they_leave_the_photos_larger() {
-        let (photos, details) = split(area(700.0, 800.0), [KITTI; 2]);
-        assert!(details.is_some_and(|(area, is_wide)| area.top() > photos.bottom() && is_wide));
-        let (photos, details) = split(area(1300.0, 500.0), [KITTI; 2]);
-        assert!(details.is_some_and(|(area, is_wide)| area.left() > photos.right() && !is_wide));
-    }
-
-    #[test]
     fn an_area_without_room_is_no_trouble() {
-        let (photos, details) = split(area(0.0, 0.0), [KITTI; 2]);
-        assert_eq!(details, None);
-        let [_, at] = place(photos, [KITTI; 2], &PanZoom::default());
+        let [_, at] = place(area(0.0, 0.0), [KITTI; 2], &PanZoom::default());
         assert!(at.scale.is_finite() && at.visible().min.x.is_finite());
     }
 }
