@@ -79,8 +79,9 @@ impl View for ImagesView {
 
         let is_shown = |feature| selected == Some(feature) || self.shown[kinds[feature]];
         let is_false = |feature| {
-            let truth = true_match(context, &progress, problem, feature);
-            kinds[feature] == INLIER && truth.is_some_and(|truth| truth.is_true() == Some(false))
+            kinds[feature] == INLIER
+                && true_match(context, &progress, problem, feature)
+                    .is_some_and(|truth| truth.is_true() == Some(false))
         };
         let visible = VisibleFeatures::new(&progress, &kinds, &pair.at, is_shown, is_false);
         let hovered = point_at(ui, context, &visible, &progress, &pair.over);

@@ -22,9 +22,12 @@ impl View for LogView {
             .filter_map(|(at, record)| {
                 let indent = record.depth.saturating_sub(1);
                 let (indent, words) = match &record.event {
-                    Event::StageStarted(started) => (indent, started.stage.name().to_owned()),
+                    Event::StageStarted(started) => {
+                        (indent, started.stage.name().replace('_', " "))
+                    }
                     Event::StageEnded(ended) if !ended.succeeded => {
-                        (indent, format!("{} stopped here", ended.stage.name()))
+                        let name = ended.stage.name().replace('_', " ");
+                        (indent, format!("{name} stopped here"))
                     }
                     event => (indent + 1, narration::sentence(event)?),
                 };

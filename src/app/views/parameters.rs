@@ -70,7 +70,8 @@ impl ParametersView {
             };
             if group != of {
                 group = of;
-                ui.heading(group);
+                ui.add_space(6.0);
+                ui.strong(group);
                 let help = "Localise the photo as it was taken";
                 if group == PHOTO
                     && !degradation.is_none()

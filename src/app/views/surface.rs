@@ -16,7 +16,6 @@ use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::DenseSurface;
 
-use dense::DenseSteps;
 use maps::{CostMap, LEFT_AXIS, LOWER_AXIS, MapContent, progress};
 use marks::{MapMark, legend};
 use scale::Scale;
@@ -39,7 +38,6 @@ const PLOT: f32 = 168.0;
 #[derive(Default)]
 pub struct SurfaceView {
     map: CostMap,
-    dense: DenseSteps,
     /// Whether this view sent the pose under the pointer.
     is_hovering: bool,
 }
@@ -69,7 +67,7 @@ impl SurfaceView {
         search: &Search<'_>,
     ) -> Option<Pose> {
         let is_narrow = ui.available_width() < NARROW;
-        let dense = self.dense(context, search);
+        let dense = dense(context, search);
         let scale = match dense {
             Some(dense) => Scale::of_dense(dense, search),
             None => Scale::of(context.run, search),
@@ -91,7 +89,7 @@ impl SurfaceView {
             Readout::reserve(ui)
         });
         if !is_narrow {
-            self.dense.ui(ui, context, search);
+            dense::ui(ui, context, search);
         }
 
         let room = ui.available_size();
@@ -133,16 +131,12 @@ impl SurfaceView {
         let on_map = under_pointer.map(|(pose, _)| pose);
         on_map.or(pointed_at).or(on_line)
     }
+}
 
-    /// The dense map, if it is shown; it is requested in each frame.
-    fn dense<'a>(
-        &self,
-        context: &ViewContext<'a>,
-        search: &Search<'_>,
-    ) -> Option<&'a DenseSurface> {
-        let wanted = self.dense.wanted(context, search)?;
-        context.send(Command::FillDenseMap(wanted));
-        let map = context.dense_map(search.method)?;
-        map.surface().ok().filter(|_| *map.ask() == wanted)
-    }
+/// The dense map, if it is shown; it is requested in each frame.
+fn dense<'a>(context: &ViewContext<'a>, search: &Search<'_>) -> Option<&'a DenseSurface> {
+    let wanted = dense::wanted(context, search)?;
+    context.send(Command::FillDenseMap(wanted));
+    let map = context.dense_map(search.method)?;
+    map.surface().ok().filter(|_| *map.ask() == wanted)
 }

@@ -51,18 +51,13 @@ impl<'a> FeatureProgress<'a> {
                 None => matches!(entry.parts, Parts::Features),
             })
         };
-        let part = match context.method().filter(|&here| with_features(here)) {
-            Some(here) => context.part_of(here),
-            None => {
-                let asked = context.setup.task.protocol.methods.iter().copied();
-                asked
-                    .filter(|&method| with_features(method))
-                    .find_map(|method| context.part_of(method))
-            }
-        };
-        part.map_or_else(Self::default, |(span, cursor)| {
-            Self::until(context.run, span, cursor)
-        })
+        let asked = context.setup.task.protocol.methods.iter().copied();
+        let mut methods = context.method().into_iter().chain(asked);
+        methods
+            .find_map(|method| with_features(method).then(|| context.part_of(method))?)
+            .map_or_else(Self::default, |(span, cursor)| {
+                Self::until(context.run, span, cursor)
+            })
     }
 
     fn until(run: &'a Run, span: &Span, cursor: usize) -> Self {
