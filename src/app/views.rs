@@ -24,7 +24,6 @@ mod retrieval;
 mod space;
 mod surface;
 mod synthetic;
-mod thumbnail;
 
 use eframe::egui_wgpu::RenderState;
 

@@ -1,5 +1,6 @@
 //! Queries whose photos are made worse: on the command line, in run folders and in the window.
 
+use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
 use image::imageops;
 use posescope::app::{Command, Setup};
@@ -95,7 +96,8 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     let mut window = finished(setup());
     let taken = query_photo(&app(&window).setup);
     send(&mut window, Command::ShowView("parameters"));
-    window.get_by_label("Photo: invert").click_accesskit();
+    let invert = window.get_by_role_and_label(Role::CheckBox, "invert");
+    invert.click_accesskit();
     window.run_steps(2);
     finish(&mut window);
     let state = app(&window);
@@ -114,7 +116,7 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     window.state_mut().send(Command::SaveSession(path.clone()));
     window.step();
     // The strength of a step is set as assistive technology does it.
-    let gamma = window.get_by_label("Photo: gamma");
+    let gamma = window.get_by_role_and_label(Role::SpinButton, "gamma");
     gamma.set_value_accesskit(0.5);
     window.run_steps(2);
     run_until_idle(&mut window);

@@ -99,7 +99,8 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
     let states = latest::<FeaturesClassified>(&window).states;
     let count = |name: &str| states.iter().filter(|state| state.name() == name).count();
     for name in FeatureState::NAMES {
-        window.get_by_label_contains(&format!("{name}: {}, ", count(name)));
+        let words = name.replace('_', " ");
+        window.get_by_label_contains(&format!("{words}: {}, ", count(name)));
     }
     assert!(window.query_by_label_contains("undecided: ").is_none());
 
@@ -120,7 +121,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
     window.get_by_label(&label).click_secondary();
     window.run_steps(2);
     window.get_by_label(&label);
-    window.get_by_label(&format!("no_depth: {}, hidden", count("no_depth")));
+    window.get_by_label(&format!("no depth: {}, hidden", count("no_depth")));
 }
 
 #[test]
@@ -129,24 +130,28 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
     assert_eq!(app(&window).options.selected_feature, Some(feature));
-    window.get_by_label(&format!("query feature {feature}: inlier"));
+    window.get_by_label(&format!("Feature {feature}: inlier"));
 
     let decisions = latest::<MatchesDecided>(&window).decisions;
     let found = decisions[feature].expect("a match");
-    window.get_by_label(&format!("ratio {:.4}", found.ratio));
-    window.get_by_label(&format!("distance {:.4}", found.distance));
     let lifted = latest::<DepthsLifted>(&window).matches;
     let lifted = lifted.iter().find(|l| l.query == feature).expect("lifted");
-    window.get_by_label(&format!("LiDAR {:.2} px away", lifted.lidar_distance_px));
     let (least, greatest) = lifted.depth_range_m.expect("a depth");
-    window.get_by_label(&format!("depths {least:.2} … {greatest:.2} m"));
-    let p = lifted.point.expect("a point");
-    window.get_by_label(&format!("3-D point ({:.2}, {:.2}, {:.2}) m", p.x, p.y, p.z));
     let states = latest::<FeaturesClassified>(&window).states;
     let FeatureState::Inlier { residual_px } = states[feature] else {
         panic!("an inlier");
     };
-    window.get_by_label(&format!("residual {residual_px:.2} px"));
+    for number in [
+        format!("{:.3}", found.ratio),
+        format!("{:.3}", found.distance),
+        format!("{:.2} px", lifted.lidar_distance_px),
+        format!("{least:.2} … {greatest:.2} m"),
+        format!("{:.2} m", lifted.point.expect("a point").z),
+        format!("{residual_px:.2} px"),
+    ] {
+        let mut said = window.query_all_by_label(&number);
+        assert!(said.next().is_some(), "{number}");
+    }
     window.get_by_label("query patch");
     window.get_by_label("reference patch");
 
@@ -156,52 +161,22 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
 }
 
 #[test]
-fn the_epipolar_line_of_a_true_match_passes_through_its_query_keypoint() {
+fn a_match_is_compared_with_the_truth_while_the_truth_is_shown() {
     let mut window = finished(Method::FB, "images");
     let (feature, _) = lonely_inlier(&window);
     order(&mut window, Command::SelectFeature(Some(feature)));
-    window.get_by_label_contains("true match: ");
-    let node = window.get_by_label_contains("epipolar line ");
-    let words = node.accesskit_node().value().expect("a label");
-    let distance: f64 = words
-        .trim_start_matches("epipolar line ")
-        .trim_end_matches(" px off")
-        .parse()
-        .expect("a distance");
-    assert!(distance <= 1.0, "{words}");
+    window.get_by_label("true match");
+    window.get_by_label("Off the epipolar line");
     order(&mut window, Command::ShowTruth);
-    assert!(window.query_by_label_contains("epipolar line ").is_none());
-    assert!(window.query_by_label_contains("true match: ").is_none());
+    assert!(window.query_by_label("true match").is_none());
+    assert!(window.query_by_label("Off the epipolar line").is_none());
 }
 
 #[test]
-fn only_differences_leaves_the_features_that_ended_in_another_state() {
+fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
     let mut window = finished(Method::FB, "images");
-    order(&mut window, Command::OnlyDifferences);
-    window.get_by_label("Differences need another run: keep one as A (P)");
-    order(&mut window, Command::Pin);
-    let before = latest::<FeaturesClassified>(&window).states;
-    let (key, value) = ("fb.ratio".to_owned(), "0.6".to_owned());
-    order(&mut window, Command::SetParam { key, value });
-    finish(&mut window);
-    order(&mut window, Command::SelectMethod(Method::FB));
-    let after = latest::<FeaturesClassified>(&window).states;
-    let pairs = before.iter().zip(after.iter());
-    let differ = pairs.filter(|(a, b)| a.name() != b.name()).count();
-    assert!(differ > 0, "a stricter ratio test throws features out");
-    let words = format!("{differ} features end in another state than in the other run");
-    window.get_by_label(&words);
-}
-
-#[test]
-fn linked_photos_zoom_together_and_a_double_click_shows_them_whole() {
-    let mut window = finished(Method::FB, "images");
+    let (feature, whole) = lonely_inlier(&window);
     let area = window.get_by_label("query photo 000001").rect();
-    let whole = |window: &Harness<'_, App>| {
-        let button = window.get_by_label("Whole photos");
-        button.accesskit_node().is_disabled()
-    };
-    assert!(whole(&window));
     window.hover_at(area.center());
     window.step();
     window.event(egui::Event::MouseWheel {
@@ -214,10 +189,19 @@ fn linked_photos_zoom_together_and_a_double_click_shows_them_whole() {
     for _ in 0..20 {
         window.step();
     }
-    assert!(!whole(&window));
-    window.get_by_label("Whole photos").click();
-    window.run_steps(2);
-    assert!(whole(&window));
+    // The match is elsewhere on the screen, so a click at its old place does not select it.
+    click(&mut window, whole);
+    assert_ne!(app(&window).options.selected_feature, Some(feature));
+    order(&mut window, Command::SelectFeature(None));
+    // Each step of the test takes a quarter of a second; these clicks are one second apart, the one before is earlier.
+    window
+        .ctx
+        .options_mut(|options| options.input_options.max_double_click_delay = 1.3);
+    click(&mut window, area.center());
+    click(&mut window, area.center());
+    order(&mut window, Command::SelectFeature(None));
+    click(&mut window, whole);
+    assert_eq!(app(&window).options.selected_feature, Some(feature));
 }
 
 #[test]

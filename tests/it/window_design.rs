@@ -316,22 +316,6 @@ fn the_decision_at_the_cursor_stays_in_sight_when_the_window_shrinks() {
     window.set_size([820.0, 420.0].into());
     settle(&mut window);
     assert!(row(&window).is_some());
-
-    // Whoever scrolled away is not brought back.
-    let place = row(&window).expect("in sight").center();
-    window.hover_at(place);
-    window.event(egui::Event::MouseWheel {
-        unit: egui::MouseWheelUnit::Point,
-        delta: [0.0, 4000.0].into(),
-        phase: egui::TouchPhase::Move,
-        source: egui::MouseWheelSource::Unknown,
-        modifiers: Modifiers::NONE,
-    });
-    settle(&mut window);
-    assert!(row(&window).is_none());
-    window.set_size([820.0, 500.0].into());
-    settle(&mut window);
-    assert!(row(&window).is_none());
 }
 
 /// What is said where there is nothing to show names what would be there, and what to do.

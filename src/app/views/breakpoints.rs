@@ -16,8 +16,8 @@ impl View for BreakpointsView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let breakpoints = context.setup.task.breakpoints.iter();
         let breakpoints: Vec<String> = breakpoints.map(ToString::to_string).collect();
+        let mut wanted = breakpoints.clone();
         let parsed = self.text.parse::<Breakpoint>();
-        let mut is_added = false;
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.text).hint_text("inliers < 10");
             let response = ui.add(edit.desired_width(180.0));
@@ -27,58 +27,50 @@ impl View for BreakpointsView {
             let entered =
                 response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
             let button = ui.add_enabled(parsed.is_ok(), egui::Button::new("Add"));
-            is_added = parsed.is_ok() && (entered || button.clicked());
+            if parsed.is_ok() && (entered || button.clicked()) {
+                wanted.push(std::mem::take(&mut self.text).trim().to_owned());
+            }
         });
-        if is_added {
-            let mut all = breakpoints.clone();
-            all.push(std::mem::take(&mut self.text).trim().to_owned());
-            context.send(Command::SetBreakpoints(all));
-        } else if let (Err(error), false) = (&parsed, self.text.trim().is_empty()) {
+        if let (Err(error), false) = (&parsed, self.text.trim().is_empty()) {
             ui.weak(error.to_string());
         }
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            for (index, breakpoint) in breakpoints.iter().enumerate() {
+            for breakpoint in &breakpoints {
                 ui.horizontal(|ui| {
-                    let help = format!("Remove {breakpoint}");
-                    let remove = ui.small_button("×").on_hover_text(&help);
-                    remove
-                        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &help));
-                    if remove.clicked() {
-                        let mut all = breakpoints.clone();
-                        all.remove(index);
-                        context.send(Command::SetBreakpoints(all));
+                    let remove = ui.small_button("×").on_hover_text("Remove");
+                    if remove
+                        .accessible_name(format!("Remove {breakpoint}"))
+                        .clicked()
+                    {
+                        wanted.retain(|other| other != breakpoint);
                     }
                     ui.monospace(breakpoint);
                 });
             }
             if breakpoints.is_empty() {
-                ui.weak("None: a run goes through to its end");
+                ui.weak("None: the run goes to its end");
             }
-            ui.separator();
             ui.collapsing("Stages", |ui| {
                 for stage in Breakpoint::stages() {
-                    let is_set = breakpoints.iter().any(|text| text == stage);
-                    let mut state = is_set;
-                    if ui.checkbox(&mut state, stage).clicked() {
-                        let mut all = breakpoints.clone();
-                        if is_set {
-                            all.retain(|text| text != stage);
-                        } else {
-                            all.push(stage.to_owned());
-                        }
-                        context.send(Command::SetBreakpoints(all));
+                    let mut is_set = wanted.iter().any(|text| text == stage);
+                    if ui.checkbox(&mut is_set, stage).changed() {
+                        wanted.retain(|text| text != stage);
+                        wanted.extend(is_set.then(|| stage.to_owned()));
                     }
                 }
             });
-            ui.collapsing("Numbers that can be watched", |ui| {
+            ui.collapsing("Numbers", |ui| {
+                ui.weak("A method in front narrows it down: mi.coverage < 0.1");
                 for (name, about) in Breakpoint::quantities() {
                     ui.horizontal_wrapped(|ui| {
                         ui.monospace(name);
                         ui.weak(about);
                     });
                 }
-                ui.weak("A method before it narrows it down: mi.coverage < 0.1");
             });
         });
+        if wanted != breakpoints {
+            context.send(Command::SetBreakpoints(wanted));
+        }
     }
 }

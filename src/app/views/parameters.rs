@@ -1,15 +1,17 @@
-//! Every parameter with unit, range, help and a way back to its default.
-
-mod degradation;
+//! Every parameter with unit, range, help and a way back to its default; and how the query's photo is degraded.
 
 use std::ops::RangeInclusive;
 
-use egui::{ComboBox, DragValue, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Align, Button, ComboBox, DragValue, Id, Layout, RichText, ScrollArea, TextEdit, Ui};
 
 use super::View;
 use crate::app::{Command, ViewContext};
-use crate::describe::{About, Choice, Described, ParamVisitor};
+use crate::describe::{Described, Domain, Value};
+use crate::image::Degradation;
 use crate::params::Params;
+
+/// The group of the steps that degrade the photo.
+const PHOTO: &str = "query photo";
 
 /// The list of parameters.
 #[derive(Default)]
@@ -19,10 +21,9 @@ pub struct ParametersView {
 
 impl View for ParametersView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let present = context.is_present();
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.filter).hint_text("Filter (/)");
-            let response = ui.add(edit.desired_width(150.0));
+            let response = ui.add(edit.desired_width(120.0));
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Filter parameters")
             });
@@ -35,233 +36,154 @@ impl View for ParametersView {
                 context.send(Command::ResetParams);
             }
         });
-        let mut params = if present {
-            context.setup.task.params.clone()
-        } else {
-            context.run.params.clone()
-        };
-        let other = context.other_run().map(|run| run.params.clone());
-        let reference = other.clone().unwrap_or_default();
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.add_enabled_ui(present, |ui| {
-                degradation::sliders(ui, context, &self.filter);
-                self.list(ui, context, &mut params, &reference, other.is_some());
-            });
+        let area = ScrollArea::vertical().id_salt("list").auto_shrink(false);
+        area.show(ui, |ui| {
+            ui.add_enabled_ui(context.is_present(), |ui| self.list(ui, context));
         });
     }
 }
 
 impl ParametersView {
-    fn list(
-        &self,
-        ui: &mut Ui,
-        context: &ViewContext<'_>,
-        params: &mut Params,
-        reference: &Params,
-        is_compared: bool,
-    ) {
-        let rows = params.list();
-        let defaults = Params::default().list();
-        let references = reference.list();
-        let filter = self.filter.to_lowercase();
-        let is_shown = |index: usize| {
-            let row = &rows[index];
-            let differs = row.value != references[index].value;
-            (row.key.to_lowercase().contains(&filter)
-                || row.about.help().to_lowercase().contains(&filter))
-                && (differs || !context.options.only_differences)
+    fn list(&self, ui: &mut Ui, context: &ViewContext<'_>) {
+        let params = if context.is_present() {
+            &context.setup.task.params
+        } else {
+            &context.run.params
         };
-        let shown: Vec<bool> = (0..rows.len()).map(is_shown).collect();
-        if !shown.contains(&true) {
+        let degradation = context.setup.task.protocol.degrade;
+        let rows = all(&degradation, params);
+        let default = Params::default();
+        let defaults = all(&Degradation::default(), &default);
+        let other = context.other_run().map_or(&default, |run| &run.params);
+        let others = all(&Degradation::default(), other);
+        let filter = self.filter.to_lowercase();
+        let is_meant = |row: &Described| {
+            let words = format!("{} {}", row.key, row.about.help());
+            words.to_lowercase().contains(&filter)
+        };
+        let mut group = "";
+        for ((row, default), other) in rows.iter().zip(&defaults).zip(&others) {
+            let differs = row.value != other.value || !context.options.only_differences;
+            let Some((of, name)) = row.key.split_once('.').filter(|_| differs && is_meant(row))
+            else {
+                continue;
+            };
+            if group != of {
+                group = of;
+                ui.add_space(6.0);
+                ui.strong(group);
+                let help = "Localise the photo as it was taken";
+                if group == PHOTO
+                    && !degradation.is_none()
+                    && ui.small_button("As taken").on_hover_text(help).clicked()
+                {
+                    context.send(Command::Degrade(Degradation::default()));
+                }
+            }
+            let Some(value) = edited(ui, name, row, &default.value) else {
+                continue;
+            };
+            let mut wanted = degradation;
+            if group != PHOTO {
+                let key = row.key.clone();
+                context.send(Command::SetParam { key, value });
+            } else if wanted.set(name, &value).is_ok() {
+                context.send(Command::Degrade(wanted));
+            }
+        }
+        if group.is_empty() {
             ui.weak("No parameter matches");
         }
-        let mut index = 0;
-        params.visit_groups(|group, described| {
-            let mut editor = Editor {
-                ui,
-                context,
-                group,
-                index: &mut index,
-                shown: &shown,
-                defaults: &defaults,
-                references: is_compared.then_some(&references),
-                is_titled: false,
-            };
-            described.visit(&mut editor);
-        });
     }
 }
 
-/// Draws one row per parameter and asks for the change.
-struct Editor<'a, 'b> {
-    ui: &'a mut Ui,
-    context: &'a ViewContext<'b>,
-    group: &'static str,
-    index: &'a mut usize,
-    shown: &'a [bool],
-    defaults: &'a [Described],
-    references: Option<&'a Vec<Described>>,
-    is_titled: bool,
+/// The steps of a degradation and all parameters.
+fn all(degradation: &Degradation, params: &Params) -> Vec<Described> {
+    let steps = degradation.steps().into_iter().map(|step| Described {
+        key: format!("{PHOTO}.{}", step.key),
+        ..step
+    });
+    steps.chain(params.list()).collect()
 }
 
-impl Editor<'_, '_> {
-    /// One row; `edit` draws the widget and answers the new value, once a person is done with it.
-    fn row(
-        &mut self,
-        about: About,
-        present: String,
-        range: String,
-        edit: impl FnOnce(&mut Ui, egui::Id) -> Option<String>,
-    ) {
-        let index = *self.index;
-        *self.index += 1;
-        if !self.shown[index] {
-            return;
-        }
-        if !self.is_titled {
-            self.is_titled = true;
-            self.ui.heading(self.group);
-        }
-        let Self {
-            ui,
-            context,
-            group,
-            defaults,
-            references,
-            ..
-        } = self;
-        let key = format!("{group}.{}", about.name);
-        let default = defaults[index].value.to_string();
-        let help = format!("{}\n{key}, {range}, default {default}", about.help());
-        ui.horizontal(|ui| {
-            let is_default = present == default;
-            let name = RichText::new(about.name);
-            let name = if is_default { name } else { name.strong() };
-            let label = ui.label(name).on_hover_text(&help);
-            if let Some(references) = references
-                && references[index].value.to_string() != present
-            {
-                ui.label("≠")
-                    .on_hover_text(format!("the other run: {}", references[index].value));
-            }
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let reset = egui::Button::new("↺").small();
-                let reset = ui.add_enabled(!is_default, reset);
-                if reset.on_hover_text(format!("Back to {default}")).clicked() {
-                    context.send(Command::SetParam {
-                        key: key.clone(),
-                        value: default.clone(),
-                    });
-                }
-                if let Some(value) = edit(ui, label.id)
-                    && value != present
-                {
-                    context.send(Command::SetParam { key, value });
-                }
-            });
-        });
-    }
-}
-
-/// Whether a person has finished with a number: not while they drag or type.
-fn is_done(response: &egui::Response) -> bool {
-    response.drag_stopped()
-        || response.lost_focus()
-        || (response.changed() && !response.dragged() && !response.has_focus())
-}
-
-fn suffix(unit: &str) -> String {
-    match unit {
+/// A row; answers the new value, once the user is done with it.
+fn edited(ui: &mut Ui, name: &str, row: &Described, default: &Value) -> Option<String> {
+    let suffix = match row.about.unit {
         "" => String::new(),
         unit => format!(" {unit}"),
-    }
-}
-
-impl ParamVisitor for Editor<'_, '_> {
-    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
-        let words = format!("{} … {}{}", range.start(), range.end(), suffix(about.unit));
-        self.row(about, value.to_string(), words, |ui, label| {
-            let memory = ui.scope_id().with(about.name);
-            let mut edited = ui.data(|data| data.get_temp(memory)).unwrap_or(*value);
-            let speed = 0.002 * (range.end() - range.start()).min(50.0);
-            let drag = DragValue::new(&mut edited)
-                .range(range)
-                .speed(speed)
-                .max_decimals(6)
-                .suffix(suffix(about.unit))
-                .update_while_editing(false);
-            let response = ui.add(drag).labelled_by(label);
-            remember(ui, memory, &response, edited);
-            is_done(&response).then(|| edited.to_string())
-        });
-    }
-
-    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
-        let words = format!("{} … {}{}", range.start(), range.end(), suffix(about.unit));
-        self.row(about, value.to_string(), words, |ui, label| {
-            let memory = ui.scope_id().with(about.name);
-            let mut edited = ui.data(|data| data.get_temp(memory)).unwrap_or(*value);
-            let drag = DragValue::new(&mut edited)
-                .range(range)
-                .speed(0.1)
-                .suffix(suffix(about.unit))
-                .update_while_editing(false);
-            let response = ui.add(drag).labelled_by(label);
-            remember(ui, memory, &response, edited);
-            is_done(&response).then(|| edited.to_string())
-        });
-    }
-
-    fn flag(&mut self, about: About, value: &mut bool) {
-        let present = *value;
-        self.row(
-            about,
-            present.to_string(),
-            "yes or no".to_owned(),
-            |ui, label| {
-                let mut edited = present;
-                let response = ui.checkbox(&mut edited, "").labelled_by(label);
-                response.clicked().then(|| edited.to_string())
-            },
-        );
-    }
-
-    fn choice(&mut self, about: About, value: &mut dyn Choice) {
-        let names = value.names();
-        let present = names[value.index()];
-        let words = format!("one of {}", names.join(", "));
-        // Groups may have parameters of one name.
-        let salt = (self.group, about.name);
-        self.row(about, present.to_owned(), words, |ui, label| {
-            let mut chosen = None;
-            let shown = ComboBox::from_id_salt(salt)
-                .selected_text(present)
-                .show_ui(ui, |ui| {
-                    for name in names {
-                        if ui.selectable_label(*name == present, *name).clicked() {
-                            chosen = Some((*name).to_owned());
+    };
+    let (about, domain) = (row.about.help(), &row.domain);
+    let help = format!("{about}\n{}: {domain}{suffix}, default {default}", row.key);
+    let is_default = row.value == *default;
+    let show = |ui: &mut Ui| {
+        let text = RichText::new(name);
+        let text = if is_default { text } else { text.strong() };
+        let label = ui.label(text).on_hover_text(help).id;
+        let values = Layout::right_to_left(Align::Center);
+        let value = ui.with_layout(values, |ui| {
+            let reset = ui.add_enabled(!is_default, Button::new("↺").small());
+            if reset.on_hover_text(format!("Back to {default}")).clicked() {
+                return Some(default.to_string());
+            }
+            match (&row.value, &row.domain) {
+                (Value::Number(value), Domain::Number(range)) => {
+                    number(ui, label, *value, range.clone(), (6, &suffix))
+                }
+                (Value::Count(value), Domain::Count(range)) => {
+                    let range = *range.start() as f64..=*range.end() as f64;
+                    number(ui, label, *value as f64, range, (0, &suffix))
+                }
+                (Value::Flag(value), _) => {
+                    let mut value = *value;
+                    let response = ui.checkbox(&mut value, "").labelled_by(label);
+                    response.changed().then(|| value.to_string())
+                }
+                (Value::Choice(value), Domain::Choice(names)) => {
+                    let mut chosen = *value;
+                    let shown = ComboBox::from_id_salt(&row.key).width(70.0);
+                    let shown = shown.selected_text(*value).show_ui(ui, |ui| {
+                        for name in *names {
+                            ui.selectable_value(&mut chosen, name, *name);
                         }
-                    }
-                });
-            shown.response.labelled_by(label);
-            chosen
+                    });
+                    shown.response.labelled_by(label);
+                    Some(chosen.to_owned())
+                }
+                _ => None,
+            }
         });
-    }
+        value.inner.filter(|value| *value != row.value.to_string())
+    };
+    ui.push_id(&row.key, |ui| ui.horizontal(show).inner).inner
 }
 
-/// While a number is dragged it is the editor's own; the run hears of it in the end.
-fn remember<T: Clone + Send + Sync + 'static>(
-    ui: &Ui,
-    memory: egui::Id,
-    response: &egui::Response,
-    edited: T,
-) {
+/// A number to drag or to type. While the user does, the value is kept here; the run gets it in the end.
+fn number(
+    ui: &mut Ui,
+    label: Id,
+    value: f64,
+    range: RangeInclusive<f64>,
+    (decimals, suffix): (usize, &str),
+) -> Option<String> {
+    let memory = ui.scope_id().with("dragged");
+    let mut edited = ui.data(|data| data.get_temp(memory)).unwrap_or(value);
+    let speed = 0.002 * (range.end() - range.start()).min(50.0);
+    let drag = DragValue::new(&mut edited)
+        .range(range)
+        .speed(if decimals == 0 { 0.1 } else { speed })
+        .max_decimals(decimals)
+        .suffix(suffix)
+        .update_while_editing(false);
+    let response = ui.add(drag).labelled_by(label);
     let is_edited = response.dragged() || response.has_focus();
     ui.data_mut(|data| {
         if is_edited {
             data.insert_temp(memory, edited);
         } else {
-            data.remove::<T>(memory);
+            data.remove::<f64>(memory);
         }
     });
+    let is_done =
+        response.drag_stopped() || response.lost_focus() || (response.changed() && !is_edited);
+    is_done.then(|| edited.to_string())
 }

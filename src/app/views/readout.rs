@@ -1,9 +1,9 @@
-//! A line above a picture that tells what is under the pointer.
+//! A line above a picture that says what is under the pointer.
 
-use egui::{Align, Label, Rect, RichText, TextStyle, Ui, UiBuilder, vec2};
+use egui::{Align, Label, Rect, Response, RichText, TextStyle, Ui, UiBuilder, vec2};
 
-/// Room for the line. What is under the pointer is known only when the picture is drawn, but is
-/// told above it, where it stays in its place.
+/// Room for the line. What is under the pointer is known only when the picture is drawn, but it is
+/// written above it, where it stays in its place.
 pub(super) struct Readout(Rect);
 
 impl Readout {
@@ -13,12 +13,12 @@ impl Readout {
     }
 
     /// Writes what is under the pointer, or else what could be done.
-    pub(super) fn say(self, ui: &mut Ui, words: Option<&str>, otherwise: &str) {
+    pub(super) fn say(self, ui: &mut Ui, words: Option<&str>, otherwise: &str) -> Response {
         let text = match words {
             Some(words) => RichText::new(words).strong(),
             None => RichText::new(otherwise).weak(),
         };
         let mut line = ui.new_child(UiBuilder::new().max_rect(self.0));
-        line.add(Label::new(text).truncate().halign(Align::LEFT));
+        line.add(Label::new(text).truncate().halign(Align::LEFT))
     }
 }

@@ -1,11 +1,10 @@
-//! The references of the query: how they are chosen, which frames could be, what is made of several.
+//! The references of the query: how they are chosen, which frames could be, and how their poses are fused.
 
-use egui::{ComboBox, DragValue, RichText, ScrollArea, Ui};
+use egui::{ComboBox, DragValue, Image, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
 
 use super::View;
 use super::queries::dots;
-use super::thumbnail::{THUMBNAIL, thumbnail};
-use crate::app::{Command, ReferencePick, ViewContext, theme};
+use crate::app::{Command, ReferencePick, ViewContext};
 use crate::event::Side;
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
@@ -18,187 +17,141 @@ const WAYS: [(&str, Selection); 4] = [
     ("most matches", Selection::Matched(1)),
     ("by the index", Selection::Retrieved(1)),
 ];
+/// Size of the picture of a frame \[points\].
+const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 
 /// The frames around a query, and which of them are its references.
 #[derive(Default)]
 pub struct ReferencesView {
-    nearby: Option<Nearby>,
-}
-
-/// Frames that could be references of a query.
-struct Nearby {
-    query: usize,
-    radius_m: f64,
-    scene: String,
-    frames: Vec<usize>,
+    /// Frames that could be references, for a query, a radius \[m\] and a scene. Looking for them in a long
+    /// scene at every frame would be too slow.
+    nearby: Option<((usize, f64, String), Vec<usize>)>,
 }
 
 impl View for ReferencesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        choice(ui, context);
-        fusions(ui, context);
+        ui.horizontal_wrapped(|ui| choice(ui, context));
+        ui.horizontal_wrapped(|ui| fusions(ui, context));
         ui.separator();
         let setup = context.setup;
-        let nearby = self.nearby(context);
-        let (frames, radius_m) = (&nearby.frames, nearby.radius_m);
-        // Those that were named may be farther away than the radius.
-        let mut shown: Vec<usize> = setup.chosen.frames.clone();
-        shown.extend(frames.iter().filter(|f| !setup.chosen.frames.contains(f)));
-        ui.weak(format!(
-            "{} of {} frames within {} m",
-            setup.chosen.frames.len(),
-            frames.len(),
-            radius_m
-        ));
-        ScrollArea::vertical().auto_shrink(false).show_rows(
-            ui,
-            THUMBNAIL.y,
-            shown.len(),
-            |ui, rows| {
-                for &frame in &shown[rows] {
-                    row(ui, context, frame);
-                }
-            },
-        );
-    }
-}
-
-impl ReferencesView {
-    /// Looking for them in a long scene at every frame would be too slow.
-    fn nearby(&mut self, context: &ViewContext<'_>) -> &Nearby {
-        let setup = context.setup;
         let radius_m = setup.task.reach_m();
-        let is_known = self.nearby.as_ref().is_some_and(|nearby| {
-            nearby.query == setup.query
-                && nearby.radius_m == radius_m
-                && nearby.scene == setup.references.name()
+        let key = (setup.query, radius_m, setup.references.name().to_owned());
+        let known = self.nearby.take().filter(|(of, _)| *of == key);
+        let (_, frames) = self
+            .nearby
+            .insert(known.unwrap_or_else(|| (key, setup.candidates(setup.query))));
+        // Those that were named may be farther away than the radius.
+        let chosen = &setup.chosen.frames;
+        let mut shown: Vec<usize> = chosen.clone();
+        shown.extend(frames.iter().filter(|frame| !chosen.contains(frame)));
+        let (used, all) = (chosen.len(), frames.len());
+        ui.weak(format!("{used} of {all} frames within {radius_m} m"));
+        let area = ScrollArea::vertical().auto_shrink(false);
+        area.show_rows(ui, THUMBNAIL.y, shown.len(), |ui, rows| {
+            for &frame in &shown[rows] {
+                ui.horizontal(|ui| row(ui, context, frame));
+            }
         });
-        let nearby = self.nearby.take().filter(|_| is_known);
-        self.nearby.insert(nearby.unwrap_or_else(|| Nearby {
-            query: setup.query,
-            radius_m,
-            scene: setup.references.name().to_owned(),
-            frames: setup.candidates(setup.query),
-        }))
     }
 }
 
 fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
     let setup = context.setup;
-    let name = |pick: ReferencePick| match pick {
-        ReferencePick::ByHand => "by hand",
-        ReferencePick::By(selection) => WAYS
-            .iter()
-            .find(|(_, way)| way.with_count(1) == selection.with_count(1))
-            .map_or("", |(name, _)| name),
+    let (present, count) = match setup.pick() {
+        ReferencePick::ByHand => ("by hand", setup.chosen.frames.len()),
+        ReferencePick::By(selection) => {
+            let is_same = |(_, way): &&(&str, Selection)| *way == selection.with_count(1);
+            let way = WAYS.iter().find(is_same);
+            (way.map_or("", |(name, _)| name), selection.count())
+        }
     };
-    ui.horizontal(|ui| {
-        let count = match setup.pick() {
-            ReferencePick::ByHand => setup.chosen.frames.len(),
-            ReferencePick::By(selection) => selection.count(),
-        };
-        let label = ui.label("Choose");
-        ComboBox::from_id_salt("way")
-            .selected_text(name(setup.pick()))
-            .show_ui(ui, |ui| {
-                let ways = WAYS.map(|(_, way)| ReferencePick::By(way.with_count(count.max(1))));
-                for pick in ways.into_iter().chain([ReferencePick::ByHand]) {
-                    if ui
-                        .selectable_label(setup.pick() == pick, name(pick))
-                        .clicked()
-                    {
-                        context.send(Command::PickReferences(pick));
-                    }
-                }
-            })
-            .response
-            .labelled_by(label.id);
-        if let ReferencePick::By(selection) = setup.pick() {
-            let mut wanted = count;
-            let drag = DragValue::new(&mut wanted)
-                .range(1..=20)
-                .update_while_editing(false);
-            let response = ui.add(drag).on_hover_text("How many references");
-            let is_done = !response.dragged() || response.drag_stopped();
-            if wanted != count && is_done {
-                let pick = ReferencePick::By(selection.with_count(wanted));
+    let label = ui.label("Choose");
+    let ways = ComboBox::from_id_salt("way").selected_text(present);
+    let ways = ways.show_ui(ui, |ui| {
+        let ways = WAYS.map(|(name, way)| (name, ReferencePick::By(way.with_count(count.max(1)))));
+        for (name, pick) in ways.into_iter().chain([("by hand", ReferencePick::ByHand)]) {
+            if ui.selectable_label(name == present, name).clicked() {
                 context.send(Command::PickReferences(pick));
             }
         }
     });
+    ways.response.labelled_by(label.id);
+    if let ReferencePick::By(selection) = setup.pick() {
+        let mut wanted = count;
+        let drag = DragValue::new(&mut wanted)
+            .range(1..=20)
+            .update_while_editing(false);
+        let response = ui.add(drag).on_hover_text("How many references");
+        if wanted != count && (!response.dragged() || response.drag_stopped()) {
+            let pick = ReferencePick::By(selection.with_count(wanted));
+            context.send(Command::PickReferences(pick));
+        }
+    }
 }
 
 fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
-    let setup = context.setup;
-    ui.horizontal(|ui| {
-        ui.label("Fuse");
-        let present = &setup.task.protocol.fusions;
-        for fusion in Fusion::all() {
-            let is_on = present.contains(&fusion);
-            let response = ui.selectable_label(is_on, fusion.name);
-            if response.on_hover_text(fusion.about).clicked() {
-                // In the order of the registry.
-                let wanted = Fusion::all().filter(|other| {
-                    if *other == fusion {
-                        !is_on
-                    } else {
-                        present.contains(other)
-                    }
-                });
-                context.send(Command::SetFusions(wanted.collect()));
-            }
+    ui.label("Fuse");
+    let present = &context.setup.task.protocol.fusions;
+    for fusion in Fusion::all() {
+        let is_on = present.contains(&fusion);
+        let response = ui.selectable_label(is_on, fusion.name);
+        if response.on_hover_text(fusion.about).clicked() {
+            // In the order of the registry.
+            let is_wanted = |other: &Fusion| present.contains(other) != (*other == fusion);
+            context.send(Command::SetFusions(
+                Fusion::all().filter(is_wanted).collect(),
+            ));
         }
-    });
+    }
 }
 
 fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
     let setup = context.setup;
     let name = &setup.references.frames()[frame];
-    ui.horizontal(|ui| {
-        let mut is_used = setup.chosen.frames.contains(&frame);
-        let checkbox = ui.checkbox(&mut is_used, "");
-        checkbox
-            .widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_used, name));
-        if checkbox.changed() {
-            let mut frames = setup.chosen.frames.clone();
-            if is_used {
-                frames.push(frame);
-            } else {
-                frames.retain(|other| *other != frame);
-            }
-            context.send(Command::SetReferences(frames));
-        }
-        thumbnail(ui, context, Side::Reference, frame);
-        ui.vertical(|ui| {
-            ui.label(
-                RichText::new(name)
-                    .monospace()
-                    .color(theme::text(ui.visuals(), theme::REFERENCE)),
+    let mut frames = setup.chosen.frames.clone();
+    let mut is_used = frames.contains(&frame);
+    let checkbox = ui.checkbox(&mut is_used, "");
+    checkbox.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_used, name));
+    if checkbox.changed() {
+        frames.retain(|other| *other != frame);
+        frames.extend(is_used.then_some(frame));
+        context.send(Command::SetReferences(frames));
+    }
+    match context.queries.thumbnail(Side::Reference, frame) {
+        Some(texture) => {
+            ui.add(
+                Image::new(texture)
+                    .fit_to_exact_size(THUMBNAIL)
+                    .alt_text(name),
             );
-            ui.horizontal(|ui| {
-                let results: Vec<QueryResult> = context
-                    .run
-                    .results()
-                    .filter(|result| result.fusion.is_none() && result.references == [name.clone()])
-                    .cloned()
-                    .collect();
-                dots(ui, context, &results);
-                if let Some(words) = distance(context, frame) {
-                    ui.weak(words);
-                }
+        }
+        None => {
+            let (rect, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
+            ui.painter()
+                .rect_filled(rect, 2.0, ui.visuals().faint_bg_color);
+        }
+    }
+    ui.vertical(|ui| {
+        ui.label(RichText::new(name).monospace());
+        ui.horizontal(|ui| {
+            let results = context.run.results().filter(|result| {
+                result.fusion.is_none() && result.references == std::slice::from_ref(name)
             });
+            let results: Vec<QueryResult> = results.cloned().collect();
+            dots(ui, context, &results);
+            if let Some(words) = distance(context, frame) {
+                ui.weak(words);
+            }
         });
     });
 }
 
-/// How far a reference is from the query, which tells the truth.
+/// How far a reference is from the query, which reveals the truth.
 fn distance(context: &ViewContext<'_>, frame: usize) -> Option<String> {
     let setup = context.setup;
     let reference = setup.references.pose(frame)?;
     let query = setup.queries.pose(setup.query)?;
     let error = PoseError::between(&query, &reference);
-    context
-        .options
-        .shows_truth
-        .then(|| format!("{}, {} away", error.translation(), error.rotation()))
+    let words = format!("{}, {} away", error.translation(), error.rotation());
+    context.options.shows_truth.then_some(words)
 }

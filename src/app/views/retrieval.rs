@@ -1,34 +1,34 @@
-//! The frames that resemble the query: in their order, with scores and what verification found.
+//! The frames that resemble the query: their ranks and scores, and what in them lies alike.
 
-use egui::{Color32, Grid, RichText, ScrollArea, Ui, pos2, vec2};
+use egui::{Grid, RichText, ScrollArea, Ui};
 
 use super::View;
-use super::canvas::{PanZoom, Placement, tag};
-use super::images::Arrangement;
+use super::canvas::PanZoom;
+use super::images::{PhotoPair, photo};
 use super::mesh_painter::{MarkShape, MeshPainter};
-use crate::app::textures::color_image;
 use crate::app::{ViewContext, theme};
 use crate::event::{Event, ReferencesRanked};
 use crate::geometry::PoseError;
-use crate::picture;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 use crate::session::Part;
 
-/// Rows of the table that are seen at once \[points\].
-const TABLE_HEIGHT: f32 = 170.0;
+/// Height of the ranking \[points\].
+const TABLE_HEIGHT: f32 = 150.0;
 
-/// The ranking, and one of its frames beside the query.
+/// The query above or beside a ranked frame, with the ranking below.
 #[derive(Default)]
 pub struct RetrievalView {
-    looked_at: usize,
+    /// The position of the selected frame in the ranking.
+    selected: usize,
+    pan_zoom: PanZoom,
 }
 
 impl View for RetrievalView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let Some(event) = told(context) else {
+        let Some(event) = ranked(context) else {
             ui.weak(
-                "The references were not chosen by what they look like. Choose those with the most \
-                 matches, or those that the index ranks, in the view References.",
+                "No ranking: nothing chose the references by what they look like. Choose \"most matches\" or \
+                 \"by the index\" in the list of references.",
             );
             return;
         };
@@ -41,24 +41,21 @@ impl View for RetrievalView {
             "{} of {} frames are references, ranked {how}",
             ranking.chosen, ranking.candidates
         ));
-        self.looked_at = self.looked_at.min(ranking.frames.len().saturating_sub(1));
-        ScrollArea::both()
-            .auto_shrink([false, true])
-            .max_height(TABLE_HEIGHT)
-            .show(ui, |ui| self.table(ui, context, event));
-        ui.separator();
-        if let Some(frame) = ranking.frames.get(self.looked_at) {
-            photos(ui, context, event, self.looked_at, frame);
+        self.selected = self.selected.min(ranking.frames.len().saturating_sub(1));
+        if let Some(frame) = ranking.frames.get(self.selected) {
+            self.photos(ui, context, event, frame);
         }
+        let area = ScrollArea::both().auto_shrink(false);
+        area.show(ui, |ui| self.table(ui, context, event));
     }
 }
 
 /// The ranking of the run, once the cursor has come so far.
-fn told<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
+fn ranked<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
     let span = context.run.span_of(Part::Retrieval)?;
     let end = span.records.end.min(context.cursor + 1);
-    let records = &context.run.records()[span.records.start.min(end)..end];
-    records.iter().find_map(|record| match &record.event {
+    let mut records = context.run.records().get(span.records.start..end)?.iter();
+    records.find_map(|record| match &record.event {
         Event::ReferencesRanked(event) => Some(event),
         _ => None,
     })
@@ -77,35 +74,74 @@ impl RetrievalView {
             }
             ui.end_row();
             for (index, frame) in ranking.frames.iter().enumerate() {
-                let name = RichText::new(&frame.name).monospace();
-                let is_looked_at = index == self.looked_at;
-                let name = if index < ranking.chosen && !is_looked_at {
-                    name.color(theme::text(ui.visuals(), theme::REFERENCE))
-                        .strong()
-                } else {
-                    name
-                };
+                let is_selected = index == self.selected;
+                let mut name = RichText::new(&frame.name).monospace();
+                if index < ranking.chosen && !is_selected {
+                    name = name.color(theme::text(ui.visuals(), theme::REFERENCE));
+                }
                 ui.label((index + 1).to_string());
-                if ui.selectable_label(is_looked_at, name).clicked() {
-                    self.looked_at = index;
+                if ui.selectable_label(is_selected, name).clicked() {
+                    self.selected = index;
                 }
                 ui.label(match ranking.criterion {
                     Criterion::Words => format!("{:.3}", frame.ranked.score),
                     Criterion::Matches => format!("{:.0}", frame.ranked.score),
                 });
-                ui.label(geometry(frame));
+                ui.label(match &frame.ranked.geometry {
+                    Geometry::Unchecked => "–".to_owned(),
+                    Geometry::Refused => "× too few".to_owned(),
+                    Geometry::Verified(found) => format!("{} words", found.inliers),
+                });
                 ui.label(distance(context, frame));
                 ui.end_row();
             }
         });
     }
-}
 
-fn geometry(frame: &RankedReference) -> String {
-    match &frame.ranked.geometry {
-        Geometry::Unchecked => "–".to_owned(),
-        Geometry::Refused => "× too few".to_owned(),
-        Geometry::Verified(found) => format!("{} words", found.inliers),
+    /// The query and a ranked frame, with lines between what lies alike.
+    fn photos(
+        &mut self,
+        ui: &mut Ui,
+        context: &ViewContext<'_>,
+        event: &ReferencesRanked,
+        frame: &RankedReference,
+    ) {
+        let loaded = context.run.loaded.as_deref();
+        let Some(problem) = loaded.and_then(|loaded| loaded.problems.first()) else {
+            return;
+        };
+        let Some(Some(of_frame)) = event.photos.get(self.selected) else {
+            ui.weak("There is no picture of this frame");
+            return;
+        };
+        let room = ui.available_rect_before_wrap();
+        let area = room.with_max_y((room.bottom() - TABLE_HEIGHT).max(room.top() + 80.0));
+        let [query, reference] =
+            [&problem.query.photo, of_frame].map(|source| photo(ui, context, source));
+        let found = frame.ranked.verification();
+        let matches = found.map_or(&[][..], |found| &found.matches);
+        let names = [
+            format!("query photo {}", problem.query.name),
+            format!("{} matches with {}", matches.len(), frame.name),
+        ];
+        let pair = PhotoPair::show(ui, area, [&query, &reference], names, &mut self.pan_zoom);
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
+        let color = theme::state(4);
+        for found in matches {
+            let pixels = [&found.query_pixel, &found.reference_pixel];
+            let [from, to] =
+                [0, 1].map(|side| pair.at[side].on_screen(pixels[side].cast::<f32>().into()));
+            mesh.line(from, to, 1.0, color.gamma_multiply(0.6));
+            mesh.mark(MarkShape::Ring, from, 3.0, color);
+            mesh.mark(MarkShape::Ring, to, 3.0, color);
+        }
+        mesh.paint_on(&ui.painter_at(area));
+        let rank = self.selected + 1;
+        pair.name(
+            ui,
+            ["Query".to_owned(), format!("Rank {rank}: {}", frame.name)],
+        );
+        ui.advance_cursor_after_rect(area);
     }
 }
 
@@ -117,62 +153,4 @@ fn distance(context: &ViewContext<'_>, frame: &RankedReference) -> String {
         }
         _ => "–".to_owned(),
     }
-}
-
-/// The query and a ranked frame, with lines between what lies alike.
-fn photos(
-    ui: &mut Ui,
-    context: &ViewContext<'_>,
-    event: &ReferencesRanked,
-    index: usize,
-    frame: &RankedReference,
-) {
-    let loaded = context.run.loaded.as_deref();
-    let Some(problem) = loaded.and_then(|loaded| loaded.problems.first()) else {
-        return;
-    };
-    let Some(Some(photo)) = event.photos.get(index) else {
-        ui.weak("There is no picture of this frame");
-        return;
-    };
-    let (ctx, textures) = (ui.ctx(), context.textures);
-    let query = textures.of(ctx, "photo", &problem.query, |query| {
-        color_image(&picture::photo(&query.photo))
-    });
-    let reference = textures.of(ctx, "photo", photo, |photo| {
-        color_image(&picture::photo(photo))
-    });
-    let room = ui.available_size().max(vec2(80.0, 80.0));
-    let (area, response) = ui.allocate_exact_size(room, egui::Sense::hover());
-    let found = frame.ranked.verification();
-    let matches = found.map_or(&[][..], |found| &found.matches);
-    response.widget_info(|| {
-        let name = format!("{} matches with {}", matches.len(), frame.name);
-        egui::WidgetInfo::labeled(egui::Role::Image, true, name)
-    });
-    let sizes = [query.size_vec2(), reference.size_vec2()];
-    let arrangement = Arrangement::new(area, sizes[0], sizes[1]);
-    let pan_zoom = PanZoom::default();
-    let of_query = arrangement.place(0, &pan_zoom, sizes[0]);
-    let of_reference = arrangement.place(1, &pan_zoom, sizes[1]);
-    of_query.paint(ui.painter(), query.id(), Color32::WHITE);
-    of_reference.paint(ui.painter(), reference.id(), Color32::WHITE);
-    let spot = |at: &Placement, pixel: &nalgebra::Point2<f64>| {
-        at.on_screen([pixel.x as f32, pixel.y as f32])
-    };
-    let mut mesh = MeshPainter::new(ui.pixels_per_point());
-    let color = theme::state(4);
-    for pair in matches {
-        let from = spot(&of_query, &pair.query_pixel);
-        let to = spot(&of_reference, &pair.reference_pixel);
-        mesh.line(from, to, 1.0, color.gamma_multiply(0.6));
-        mesh.mark(MarkShape::Ring, from, 3.0, color);
-        mesh.mark(MarkShape::Ring, to, 3.0, color);
-    }
-    mesh.paint_on(ui.painter());
-    let corner = |at: &Placement| at.visible().min + vec2(4.0, 4.0);
-    tag(ui.painter(), corner(&of_query), "query", theme::ESTIMATE);
-    let name = format!("rank {}: {}", index + 1, frame.name);
-    let at = corner(&of_reference);
-    tag(ui.painter(), pos2(at.x, at.y), &name, theme::REFERENCE);
 }

@@ -15,168 +15,128 @@ use super::readout::Readout;
 use crate::app::{Command, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::DenseSurface;
-use crate::method::Method;
 
-use dense::DenseSteps;
-use maps::{CostMap, MapContent, progress};
+use maps::{CostMap, LEFT_AXIS, LOWER_AXIS, MapContent, progress};
 use marks::{MapMark, legend};
 use scale::Scale;
 use search::Search;
 
 /// How to use the map.
-const HELP: &str = "Click, drag: camera; wheel: zoom; Shift+drag: pan";
-
+const HELP: &str = "Click or drag on the map takes the camera there. The wheel zooms, Shift and drag moves the map.";
+/// Below this width there is room for the map alone \[points\].
+const NARROW: f32 = 420.0;
 /// The smallest and the largest width of the legend beside the map \[points\].
-const LEGEND: f32 = 132.0;
+const LEGEND: f32 = 160.0;
 const WIDE_LEGEND: f32 = 260.0;
+/// The smallest side of the map \[points\].
+const SMALLEST: f32 = 100.0;
+/// Height of the plot below the map with its words \[points\].
+const PLOT: f32 = 168.0;
 
-/// The map of a direct method's search, and slices through its minimum.
+/// The map of a direct method's search; below it the cost from result to truth or, while they are not both known,
+/// slices through the minimum.
 #[derive(Default)]
 pub struct SurfaceView {
-    /// The method that was asked for; that at the cursor otherwise.
-    method: Option<Method>,
-    /// The method at the cursor when `method` was asked for.
-    asked_at: Option<Method>,
     map: CostMap,
-    dense: DenseSteps,
     /// Whether this view sent the pose under the pointer.
     is_hovering: bool,
 }
 
 impl View for SurfaceView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let method = self.method(context);
-        let mut pointed_at = None;
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            let search = Search::at(context, method);
-            self.head(ui, context, method, search.as_ref());
-            let Some(search) = search else {
+        let pointed_at = match Search::at(context, context.direct_method()) {
+            Some(search) => self.content(ui, context, &search),
+            None => {
                 ui.weak("Nothing is searched yet. Run PM (2) or MI (3), which search for the lowest cost");
-                return;
-            };
-            pointed_at = self.content(ui, context, &search);
-        });
-        self.hover(context, pointed_at);
+                None
+            }
+        };
+        // The pose under the pointer is sent when it comes and when it leaves.
+        if (pointed_at.is_some() || self.is_hovering) && context.hovered() != pointed_at {
+            context.send(Command::Hover(pointed_at));
+        }
+        self.is_hovering = pointed_at.is_some();
     }
 }
 
 impl SurfaceView {
-    /// The method that is shown. The user's choice holds until the cursor comes to another method.
-    fn method(&mut self, context: &ViewContext<'_>) -> Method {
-        if self.asked_at != context.method() {
-            self.asked_at = context.method();
-            self.method = None;
-        }
-        self.method.unwrap_or_else(|| context.direct_method())
-    }
-
-    fn head(
-        &mut self,
-        ui: &mut Ui,
-        context: &ViewContext<'_>,
-        shown: Method,
-        search: Option<&Search<'_>>,
-    ) {
-        ui.horizontal_wrapped(|ui| {
-            for method in context.direct_methods() {
-                let name = method.name().to_uppercase();
-                let button = ui.selectable_label(method == shown, name);
-                if button.on_hover_text("Show this method's search").clicked() {
-                    self.method = Some(method);
-                }
-            }
-            let Some(search) = search else { return };
-            ui.separator();
-            self.map.switch(ui);
-            dense::switch(ui, context);
-            if let Some(around) = search.span.part.method().filter(|around| *around != shown) {
-                ui.weak(format!("inside {}", around.label()));
-            }
-            match search.lattices.last() {
-                Some(searched) => ui.weak(progress(searched)),
-                None => ui.weak("no position tried yet"),
-            };
-        });
-    }
-
     fn content(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
         search: &Search<'_>,
     ) -> Option<Pose> {
-        let width = ui.available_width();
-        let floor = context.run.params.grid.coverage_floor;
-        self.dense.ui(ui, context, search);
-        let dense = self.dense(context, search);
+        let is_narrow = ui.available_width() < NARROW;
+        let dense = dense(context, search);
         let scale = match dense {
             Some(dense) => Scale::of_dense(dense, search),
             None => Scale::of(context.run, search),
         };
         let marks = MapMark::all(context, search, dense);
+        let line = line::wanted(context, search);
         let shown = MapContent {
             search,
             dense,
             scale: &scale,
             marks: &marks,
-            line: line::wanted(context, search)
-                .map(|line| [line.from, line.to].map(|pose| search.offset(&pose))),
+            line: line.map(|line| [line.from, line.to].map(|pose| search.offset(&pose))),
         };
-        let readout = Readout::reserve(ui);
-        // Beside the map where there is room, below it elsewhere.
-        let mut pointed_at = None;
-        let mut has_legend = false;
-        let under_pointer = ui
-            .horizontal_top(|ui| {
-                let (under_pointer, map_width) =
-                    ui.vertical(|ui| self.map.ui(ui, context, &shown)).inner;
-                has_legend = width - map_width > LEGEND;
-                if has_legend {
-                    ui.vertical(|ui| {
-                        let room = ui.available_width().min(WIDE_LEGEND);
-                        ui.set_max_width(room);
-                        self.map.colours(ui, &scale, room, floor);
-                        pointed_at = legend(ui, context, &marks, egui::TextWrapMode::Wrap);
-                    });
-                }
-                under_pointer
-            })
-            .inner;
-        let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
-        readout.say(ui, words, HELP);
-        if !has_legend {
-            self.map.colours(ui, &scale, width, floor);
-            pointed_at = legend(ui, context, &marks, egui::TextWrapMode::Extend);
+        let readout = ui.horizontal(|ui| {
+            if !is_narrow {
+                self.map.switch(ui);
+                dense::switch(ui, context);
+            }
+            Readout::reserve(ui)
+        });
+        if !is_narrow {
+            dense::ui(ui, context, search);
         }
-        ui.separator();
-        let on_line = line::ui(ui, context, search, width);
-        ui.separator();
-        slices::ui(ui, context, search, width);
+
+        let room = ui.available_size();
+        let has_plot = !is_narrow && room.y > 2.5 * PLOT;
+        let beside = if is_narrow { 0.0 } else { LEGEND };
+        let below = if has_plot { PLOT } else { 0.0 };
+        let side = (room.x - beside - LEFT_AXIS).min(room.y - below - LOWER_AXIS);
+        let mut pointed_at = None;
+        let under_pointer = ui.horizontal_top(|ui| {
+            let under_pointer = self.map.ui(ui, context, &shown, side.max(SMALLEST));
+            if !is_narrow {
+                ui.vertical(|ui| {
+                    ui.set_max_width(ui.available_width().min(WIDE_LEGEND));
+                    self.map.colours(ui, context, &scale);
+                    let area = ScrollArea::vertical().id_salt("legend");
+                    let legend = area.show(ui, |ui| legend(ui, context, &marks));
+                    pointed_at = legend.inner;
+                });
+            }
+            under_pointer
+        });
+        let under_pointer = under_pointer.inner;
+        let otherwise = match (is_narrow, search.lattices.last()) {
+            (true, _) => self.map.caption(search, &scale),
+            (false, Some(searched)) => progress(searched),
+            (false, None) => "no position tried yet".to_owned(),
+        };
+        let words = under_pointer.as_ref().map(|(_, words)| words.as_str());
+        readout.inner.say(ui, words, &otherwise).on_hover_text(HELP);
+
+        let on_line = match line {
+            _ if !has_plot => None,
+            Some(line) => line::ui(ui, context, search, line),
+            None => {
+                slices::ui(ui, context, search);
+                None
+            }
+        };
         let on_map = under_pointer.map(|(pose, _)| pose);
         on_map.or(pointed_at).or(on_line)
     }
+}
 
-    /// The dense map, if it is shown; it is requested in each frame.
-    fn dense<'a>(
-        &self,
-        context: &ViewContext<'a>,
-        search: &Search<'_>,
-    ) -> Option<&'a DenseSurface> {
-        let wanted = self.dense.wanted(context, search)?;
-        context.send(Command::FillDenseMap(wanted));
-        let map = context.dense_map(search.method)?;
-        map.surface().ok().filter(|_| *map.ask() == wanted)
-    }
-
-    /// Sends the pose under the pointer when it comes and when it leaves.
-    fn hover(&mut self, context: &ViewContext<'_>, pointed_at: Option<Pose>) {
-        if pointed_at.is_some() {
-            if context.hovered() != pointed_at {
-                context.send(Command::Hover(pointed_at));
-            }
-        } else if self.is_hovering {
-            context.send(Command::Hover(None));
-        }
-        self.is_hovering = pointed_at.is_some();
-    }
+/// The dense map, if it is shown; it is requested in each frame.
+fn dense<'a>(context: &ViewContext<'a>, search: &Search<'_>) -> Option<&'a DenseSurface> {
+    let wanted = dense::wanted(context, search)?;
+    context.send(Command::FillDenseMap(wanted));
+    let map = context.dense_map(search.method)?;
+    map.surface().ok().filter(|_| *map.ask() == wanted)
 }

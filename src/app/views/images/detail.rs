@@ -1,25 +1,26 @@
-//! One feature from near: both patches, and every number that was told about it.
+//! One match from near: both patches, and the numbers that decided it.
 
 use std::sync::Arc;
 
-use egui::{Button, Color32, Rect, RichText, Role, ScrollArea, Sense, Ui, Vec2, WidgetInfo, vec2};
+use egui::{
+    Button, Color32, Grid, Rect, Role, Sense, TextureHandle, Ui, UiBuilder, Vec2, WidgetInfo, vec2,
+};
 use nalgebra::Point2;
 
-use super::arrangement::PATCH;
-use super::lidar::{self, SeenPoint};
 use super::marks::{color, draw_truth, mark, position};
-use super::photos::{PhotoTexture, Photos};
-use super::progress::{FeatureProgress, UNDECIDED, name};
+use super::progress::{FeatureProgress, UNDECIDED, error_px, name};
 use super::truth::TrueMatch;
 use crate::app::views::canvas::Placement;
-use crate::app::views::legend;
 use crate::app::views::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext, theme};
-use crate::features::FeatureState;
-use crate::features::Keypoint;
+use crate::features::{FeatureState, Keypoint};
 use crate::palette;
 use crate::problem::{Problem, ReferenceTuple};
 
+/// Side of a patch on the screen \[points\].
+const PATCH: f32 = 112.0;
+/// Room for two patches with the numbers below \[points\].
+pub(super) const SIZE: Vec2 = vec2(2.0 * PATCH + 20.0, 306.0);
 /// LiDAR points are shown within this distance of the reference keypoint \[px\].
 const LIDAR_RADIUS_PX: f64 = 15.0;
 /// Half the side of a patch in scales: a little more than the window of the descriptor, 20 scales.
@@ -27,93 +28,61 @@ const HALF_PATCH_SCALES: f32 = 11.0;
 /// Half the side of a patch is not below this \[px\]: the LiDAR points fit in.
 const LEAST_HALF_PATCH_PX: f32 = 16.0;
 
-/// The selected feature, with what was worked out to show it.
+/// The LiDAR points around the keypoint that was shown last.
 #[derive(Default)]
 pub(super) struct Detail {
-    /// The points around a reference keypoint.
     seen: Option<(Arc<ReferenceTuple>, Point2<f64>, Vec<SeenPoint>)>,
 }
 
-/// What the panel is about.
+/// A point of the scan: its pixel in the reference \[px\] and its depth \[m\].
+type SeenPoint = (Point2<f64>, f64);
+
+/// What the details are about.
 pub(super) struct Subject<'a> {
     pub(super) feature: usize,
     pub(super) progress: &'a FeatureProgress<'a>,
     pub(super) problem: &'a Problem,
-    pub(super) photos: &'a Photos,
+    pub(super) photos: [&'a TextureHandle; 2],
     /// What the ground truth says, if it is shown.
     pub(super) truth: Option<TrueMatch>,
-    /// The inlier threshold \[px\].
-    pub(super) inlier_px: f64,
     /// Points within this distance of the keypoint give its depth \[px\].
     pub(super) depth_radius_px: f64,
 }
 
 impl Subject<'_> {
-    fn query(&self) -> &Keypoint {
-        &self.progress.query()[self.feature]
-    }
-
     fn reference(&self) -> Option<&Keypoint> {
         let found = self.progress.matched(self.feature)?;
         self.progress.reference().get(found.reference)
     }
 
-    fn kind(&self) -> usize {
-        let state = self.progress.state(self.feature);
-        state.map_or(UNDECIDED, |state| state.index())
-    }
-
-    /// Every number that was told about the feature, a line each: about its match, its depth, and how
-    /// poses explain it.
-    fn facts(&self) -> [(&'static str, Vec<String>); 3] {
-        [
-            ("Match", self.about_match()),
-            ("Depth", self.about_depth()),
-            ("Pose", self.about_pose()),
-        ]
-    }
-
-    fn about_match(&self) -> Vec<String> {
-        let Some(found) = self.progress.matched(self.feature) else {
-            return Vec::new();
-        };
-        vec![
-            format!("ratio {:.4}", found.ratio),
-            format!("distance {:.4}", found.distance),
-            format!("reference feature {}", found.reference),
-        ]
-    }
-
-    fn about_depth(&self) -> Vec<String> {
-        let Some(lifted) = self.progress.lifted(self.feature) else {
-            return Vec::new();
-        };
-        let mut facts = vec![format!("LiDAR {:.2} px away", lifted.lidar_distance_px)];
-        if let Some((least, greatest)) = lifted.depth_range_m {
-            facts.push(format!("depths {least:.2} … {greatest:.2} m"));
-        }
-        facts.push(match &lifted.point {
-            Some(p) => format!("3-D point ({:.2}, {:.2}, {:.2}) m", p.x, p.y, p.z),
-            None => "no 3-D point".to_owned(),
-        });
-        facts
-    }
-
-    fn about_pose(&self) -> Vec<String> {
+    /// The numbers of the match, each with its name.
+    fn facts(&self) -> Vec<(&'static str, String)> {
         let mut facts = Vec::new();
-        match self.progress.state(self.feature) {
-            Some(FeatureState::Outlier { residual_px }) if residual_px.is_infinite() => {
-                facts.push("no pose to explain it".to_owned());
+        if let Some(found) = self.progress.matched(self.feature) {
+            facts.push(("Ratio to second best", format!("{:.3}", found.ratio)));
+            facts.push(("Descriptor distance", format!("{:.3}", found.distance)));
+        }
+        if let Some(lifted) = self.progress.lifted(self.feature) {
+            let depth = lifted.point.map(|point| format!("{:.2} m", point.z));
+            facts.push(("Depth", depth.unwrap_or_else(|| "none".to_owned())));
+            if let Some((least, greatest)) = lifted.depth_range_m {
+                facts.push(("Depths around it", format!("{least:.2} … {greatest:.2} m")));
             }
-            Some(FeatureState::Outlier { residual_px } | FeatureState::Inlier { residual_px }) => {
-                facts.push(format!("residual {residual_px:.2} px"));
-            }
-            _ => {}
+            let distance = format!("{:.2} px", lifted.lidar_distance_px);
+            facts.push(("Nearest LiDAR point", distance));
+        }
+        if let Some(FeatureState::Outlier { residual_px } | FeatureState::Inlier { residual_px }) =
+            self.progress.state(self.feature)
+        {
+            facts.push(("Reprojection error", error_px(residual_px)));
         }
         if let Some(truth) = &self.truth {
-            facts.push(truth.verdict(self.inlier_px));
+            facts.push(("By the truth", truth.verdict().to_owned()));
+            if let Some(distance) = truth.place_px {
+                facts.push(("Off at the truth", format!("{distance:.2} px")));
+            }
             if let Some(distance) = truth.line_px {
-                facts.push(format!("epipolar line {distance:.2} px off"));
+                facts.push(("Off the epipolar line", format!("{distance:.2} px")));
             }
         }
         facts
@@ -121,193 +90,199 @@ impl Subject<'_> {
 }
 
 impl Detail {
-    /// The panel; where it `is_wide`, its words are beside the patches.
+    /// Both patches with the numbers below them, on the photos.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
         subject: &Subject<'_>,
-        is_wide: bool,
+        area: Rect,
     ) {
-        const LEGEND: f32 = 190.0;
-        ui.horizontal(|ui| {
-            heading(ui, context, subject);
-            if is_wide {
-                legend::depth_bar(ui, LEGEND);
-                ui.weak("LiDAR depth");
-            }
-        });
-        if is_wide {
-            ui.horizontal_top(|ui| {
-                self.patches(ui, subject);
-                ui.vertical(|ui| words(ui, context, subject));
-            });
-        } else {
+        // What lies below is not pointed at.
+        ui.interact(area, ui.scope_id().with("details"), Sense::click());
+        let (fill, stroke) = (ui.visuals().panel_fill, ui.visuals().window_stroke);
+        ui.painter()
+            .rect(area, 4.0, fill, stroke, egui::StrokeKind::Inside);
+        ui.scope_builder(UiBuilder::new().max_rect(area.shrink(8.0)), |ui| {
+            ui.shrink_clip_rect(area);
+            ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
             ui.horizontal_top(|ui| self.patches(ui, subject));
-            legend::depth_bar(ui, LEGEND.min(ui.available_width()));
-            words(ui, context, subject);
-        }
+            numbers(ui, context, subject);
+        });
     }
 
     fn patches(&mut self, ui: &mut Ui, subject: &Subject<'_>) {
-        let query = subject.query();
+        let query = &subject.progress.query()[subject.feature];
         let reference = subject.reference();
         // The same number of scales in both, so that a true match looks the same.
         let least = reference.map_or(query.scale, |other| other.scale.min(query.scale));
         let scales = HALF_PATCH_SCALES.max(LEAST_HALF_PATCH_PX / least.max(0.1));
-        let photos = subject.photos;
-
-        let at = patch(
-            ui,
-            "query patch",
-            query,
-            scales * query.scale,
-            &photos.query,
-        );
-        if let (Some(at), Some(truth)) = (at, &subject.truth) {
-            let painter = at.painter(ui.painter());
-            let mut mesh = MeshPainter::new(ui.pixels_per_point());
+        let [query_photo, reference_photo] = subject.photos;
+        let at = patch(ui, "query patch", query, scales, query_photo);
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
+        if let Some(truth) = &subject.truth {
             draw_truth(&mut mesh, &at, &subject.problem.query.intrinsics, truth);
-            mesh.paint_on(&painter);
+            mesh.paint_on(&at.painter(ui.painter()));
         }
-
         let Some(reference) = reference else {
-            ui.weak("The reference\nhas no feature");
+            ui.weak("Nothing to match");
             return;
         };
-        let half = scales * reference.scale;
-        let at = patch(ui, "reference patch", reference, half, &photos.reference);
-        if let Some(at) = at {
-            self.lidar(ui, subject, reference, &at);
-        }
+        let at = patch(ui, "reference patch", reference, scales, reference_photo);
+        let tuple = &subject.problem.reference;
+        self.draw_lidar(&mut mesh, tuple, &reference.pixel(), &at);
+        let radius = subject.depth_radius_px as f32 * at.scale;
+        let middle = at.on_screen(position(reference));
+        mesh.ring(middle, radius, 1.0, Color32::WHITE.gamma_multiply(0.8));
+        mesh.paint_on(&at.painter(ui.painter()));
     }
 
-    fn lidar(&mut self, ui: &Ui, subject: &Subject<'_>, keypoint: &Keypoint, at: &Placement) {
-        let (tuple, pixel) = (&subject.problem.reference, keypoint.pixel());
-        let is_known = self
-            .seen
-            .as_ref()
-            .is_some_and(|(of, around, _)| Arc::ptr_eq(of, tuple) && *around == pixel);
-        if !is_known {
-            let seen = lidar::around(tuple, &pixel, LIDAR_RADIUS_PX);
-            self.seen = Some((Arc::clone(tuple), pixel, seen));
-        }
-        let mut mesh = MeshPainter::new(ui.pixels_per_point());
+    /// Draws the LiDAR points around a pixel in the colours of their depths.
+    fn draw_lidar(
+        &mut self,
+        mesh: &mut MeshPainter,
+        tuple: &Arc<ReferenceTuple>,
+        pixel: &Point2<f64>,
+        at: &Placement,
+    ) {
+        let known = self.seen.take();
+        let known = known.filter(|(of, around, _)| Arc::ptr_eq(of, tuple) && around == pixel);
+        let (_, _, seen) = self.seen.insert(known.unwrap_or_else(|| {
+            let seen = lidar_around(tuple, pixel, LIDAR_RADIUS_PX);
+            (Arc::clone(tuple), *pixel, seen)
+        }));
         let radius = (0.35 * at.scale).clamp(1.5, 4.0);
-        let seen = self.seen.iter().flat_map(|(_, _, seen)| seen);
-        for (rank, point) in seen.enumerate() {
-            let place = at.on_screen(point.pixel.cast::<f32>().into());
-            let color = theme::rgb(palette::depth(point.depth_m));
+        for (rank, (pixel, depth_m)) in seen.iter().enumerate() {
+            let place = at.on_screen(pixel.cast::<f32>().into());
             mesh.disc(place, radius + 0.8, Color32::from_black_alpha(150));
-            mesh.disc(place, radius, color);
+            mesh.disc(place, radius, theme::rgb(palette::depth(*depth_m)));
             if rank == 0 {
                 mesh.ring(place, radius + 2.0, 1.2, Color32::WHITE);
             }
         }
-        let radius = subject.depth_radius_px as f32 * at.scale;
-        let middle = at.on_screen(position(keypoint));
-        mesh.ring(middle, radius, 1.0, Color32::WHITE.gamma_multiply(0.8));
-        mesh.paint_on(&at.painter(ui.painter()));
     }
 }
 
-fn heading(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
-    let kind = subject.kind();
-    let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
-    let mut mesh = MeshPainter::new(ui.pixels_per_point());
-    mesh.mark(mark(kind), rect.center(), 4.5, color(kind));
-    mesh.paint_on(ui.painter());
-    ui.strong(format!("query feature {}: {}", subject.feature, name(kind)));
-    let close = ui.add(Button::new("×").small()).on_hover_text("Close");
-    if close.accessible_name("Close feature").clicked() {
-        context.send(Command::SelectFeature(None));
+/// What the match is, and its numbers.
+fn numbers(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
+    let state = subject.progress.state(subject.feature);
+    let kind = state.map_or(UNDECIDED, |state| state.index());
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
+        let mut mesh = MeshPainter::new(ui.pixels_per_point());
+        mesh.mark(mark(kind), rect.center(), 4.5, color(kind));
+        mesh.paint_on(ui.painter());
+        ui.strong(format!("Feature {}: {}", subject.feature, name(kind)));
+        let close = ui.add(Button::new("×").small()).on_hover_text("Close");
+        if close.accessible_name("Close feature").clicked() {
+            context.send(Command::SelectFeature(None));
+        }
+    });
+    if let Some(FeatureState::NotUnique { rival }) = state {
+        let help = "The reference feature resembles this query feature more; click to select it";
+        let link = ui.link(format!("Nearer to query feature {rival}"));
+        if link.on_hover_text(help).clicked() {
+            context.send(Command::SelectFeature(Some(rival)));
+        }
     }
-}
-
-fn words(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
-    let area = ScrollArea::vertical().id_salt("facts").auto_shrink(false);
-    area.show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 2.0;
-        let [matching, depth, pose] = subject.facts();
-        ui.horizontal_top(|ui| {
-            ui.vertical(|ui| {
-                group(ui, &matching);
-                rival(ui, context, subject);
-            });
-            ui.add_space(8.0);
-            ui.vertical(|ui| group(ui, &depth));
-        });
-        group(ui, &pose);
+    let grid = Grid::new("facts").num_columns(2).min_row_height(0.0);
+    grid.spacing(vec2(10.0, 2.0)).show(ui, |ui| {
+        for (name, value) in subject.facts() {
+            ui.weak(name);
+            ui.label(value);
+            ui.end_row();
+        }
     });
 }
 
-fn group(ui: &mut Ui, (title, facts): &(&str, Vec<String>)) {
-    if facts.is_empty() {
-        return;
-    }
-    ui.label(RichText::new(*title).small().weak());
-    for fact in facts {
-        ui.label(fact);
-    }
-}
-
-/// The query feature that the nearest reference feature resembles more.
-fn rival(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
-    let Some(FeatureState::NotUnique { rival }) = subject.progress.state(subject.feature) else {
-        return;
-    };
-    let help = "The reference feature resembles this query feature more; click to look at it";
-    let link = ui.link(format!("rival: query feature {rival}"));
-    if link.on_hover_text(help).clicked() {
-        context.send(Command::SelectFeature(Some(rival)));
-    }
-}
-
-/// The surroundings of a keypoint, magnified, with a circle of its scale and the descriptor's window.
+/// The surroundings of a keypoint, magnified. The crosshair has the keypoint's direction and reaches as far as the
+/// descriptor; the circle is its scale.
 fn patch(
     ui: &mut Ui,
     name: &str,
     keypoint: &Keypoint,
-    half: f32,
-    photo: &PhotoTexture,
-) -> Option<Placement> {
+    half_scales: f32,
+    photo: &TextureHandle,
+) -> Placement {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(PATCH), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
     response.on_hover_text(format!(
-        "{name}: scale {:.1} px; the square is what the descriptor saw",
+        "{name}: scale {:.1} px; the crosshair reaches as far as the descriptor. Dots are LiDAR points by depth",
         keypoint.scale
     ));
-    if !ui.is_rect_visible(rect) {
-        return None;
-    }
-    let at = Placement::around(position(keypoint), half, rect, photo.size());
-    ui.painter()
-        .rect_filled(rect, 0.0, theme::rgb(palette::NOTHING));
+    let half = half_scales * keypoint.scale;
+    let at = Placement::around(position(keypoint), half, rect, photo.size_vec2());
+    let nothing = theme::rgb(palette::NOTHING);
+    ui.painter().rect_filled(rect, 0.0, nothing);
     at.paint(ui.painter(), photo.id(), Color32::WHITE);
     let mut mesh = MeshPainter::new(ui.pixels_per_point());
-    let middle = rect.center();
-    let radius = (keypoint.scale * at.scale).max(2.0);
+    let (middle, scale) = (rect.center(), keypoint.scale * at.scale);
+    let turn = egui::emath::Rot2::from_angle(keypoint.angle);
     for (width, color) in [(3.0, Color32::from_black_alpha(120)), (1.4, Color32::WHITE)] {
-        mesh.ring(middle, radius, width, color);
-        let reach = 10.0 * keypoint.scale * at.scale;
-        let corner = |x: f32, y: f32| {
-            let turn = egui::emath::Rot2::from_angle(keypoint.angle);
-            middle + turn * (reach * vec2(x, y))
-        };
-        let corners =
-            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| corner(x, y));
-        for side in 0..4 {
-            mesh.line(corners[side], corners[(side + 1) % 4], 0.5 * width, color);
+        mesh.ring(middle, scale.max(2.0), width, color);
+        for arm in [Vec2::RIGHT, Vec2::LEFT, Vec2::UP, Vec2::DOWN] {
+            let arm = turn * (scale * arm);
+            mesh.line(middle + 2.5 * arm, middle + 10.0 * arm, 0.6 * width, color);
         }
     }
-    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-    mesh.paint_on(&painter);
-    outline(ui, rect);
-    Some(at)
+    mesh.paint_on(&ui.painter().with_clip_rect(rect.intersect(ui.clip_rect())));
+    at
 }
 
-fn outline(ui: &Ui, rect: Rect) {
-    let stroke = ui.visuals().widgets.noninteractive.bg_stroke;
-    ui.painter()
-        .rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
+/// The points within a radius \[px\] of a pixel, the nearest to it first.
+fn lidar_around(tuple: &ReferenceTuple, pixel: &Point2<f64>, radius_px: f64) -> Vec<SeenPoint> {
+    let points = tuple.cloud.points.iter();
+    let seen = points.filter_map(|point| {
+        let seen = tuple.intrinsics.project(&point.cast())?;
+        Some((seen, f64::from(point.z)))
+    });
+    let distance = |seen: &SeenPoint| (seen.0 - pixel).norm_squared();
+    let mut seen: Vec<SeenPoint> = seen
+        .filter(|seen| distance(seen) <= radius_px * radius_px)
+        .collect();
+    seen.sort_by(|a, b| {
+        let by_distance = distance(a).total_cmp(&distance(b));
+        by_distance.then(a.1.total_cmp(&b.1))
+    });
+    seen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Intrinsics;
+    use crate::cloud::Cloud;
+    use crate::geometry::Pose;
+    use crate::image::{GrayImage, Photo};
+    use crate::memo::Memo;
+
+    #[test]
+    fn only_points_near_the_pixel_and_in_front_are_seen_the_nearest_first() {
+        let intrinsics = Intrinsics {
+            fx: 100.0,
+            fy: 100.0,
+            cx: 50.0,
+            cy: 40.0,
+            width: 101,
+            height: 81,
+        };
+        let at = |x: f64, y: f64, z: f64| intrinsics.unproject(&Point2::new(x, y), z).cast();
+        let mut points = vec![
+            at(20.0, 20.0, 10.0),
+            at(22.0, 20.0, 30.0),
+            at(60.0, 60.0, 5.0),
+        ];
+        points.push(-points[0]);
+        let tuple = ReferenceTuple {
+            name: "reference".to_owned(),
+            photo: Photo::from_gray(GrayImage::new(101, 81)).into(),
+            intrinsics,
+            world_from_camera: Pose::identity(),
+            cloud: Cloud { points },
+            memo: Memo::off(),
+        };
+        let seen = lidar_around(&tuple, &Point2::new(22.5, 20.0), 15.0);
+        let depths: Vec<f64> = seen.iter().map(|(_, depth_m)| depth_m.round()).collect();
+        assert_eq!(depths, [30.0, 10.0]);
+    }
 }

@@ -1,6 +1,7 @@
 //! How features are marked: those of a state, and where the ground truth has them.
 
 use egui::Color32;
+use nalgebra::Point2;
 
 use super::progress::UNDECIDED;
 use super::truth::TrueMatch;
@@ -43,7 +44,7 @@ pub(super) fn draw_truth(
     camera: &Intrinsics,
     truth: &TrueMatch,
 ) {
-    let place = |pixel: &nalgebra::Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
+    let place = |pixel: &Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
     let shade = Color32::from_black_alpha(140);
     if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
         mesh.line(place(&from), place(&to), 3.5, shade);

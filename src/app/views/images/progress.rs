@@ -1,6 +1,5 @@
-//! What FB has told up to the cursor about each query feature.
+//! What FB has reported up to the cursor about each query feature.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::app::ViewContext;
@@ -10,26 +9,31 @@ use crate::event::{Event, Side};
 use crate::features::FeatureState;
 use crate::features::{Features, Keypoint, Match, MatchVerdict};
 use crate::method::Method;
-use crate::session::{Part, Run, Span};
+use crate::session::{Run, Span};
 
-/// Position of "undecided" behind those of [`FeatureState::NAMES`].
+/// Position of the inliers in [`FeatureState::NAMES`].
+pub(super) const INLIER: usize = UNDECIDED - 1;
+/// Position of "undecided" after those of [`FeatureState::NAMES`].
 pub(super) const UNDECIDED: usize = FeatureState::NAMES.len();
 /// The states and "undecided".
 pub(super) const KINDS: usize = UNDECIDED + 1;
 
 /// The name of a state, or of none yet.
 pub(super) fn name(kind: usize) -> &'static str {
-    FeatureState::NAMES
-        .get(kind)
-        .copied()
-        .unwrap_or("undecided")
+    const NAMES: [&str; KINDS] = [
+        "ratio failed",
+        "not unique",
+        "no depth",
+        "outlier",
+        "inlier",
+        "undecided",
+    ];
+    NAMES[kind]
 }
 
 /// The features of both photos, and how far each has come.
 #[derive(Clone, Copy, Default)]
 pub(super) struct FeatureProgress<'a> {
-    /// The estimator whose features these are: FB, or the hybrid around it.
-    pub(super) method: Option<Method>,
     query: Option<&'a Arc<Features>>,
     reference: Option<&'a Arc<Features>>,
     decisions: Option<&'a [Option<Match>]>,
@@ -42,41 +46,22 @@ impl<'a> FeatureProgress<'a> {
     /// not asked to run.
     pub(super) fn at(context: &ViewContext<'a>) -> Self {
         let with_features = |method: Method| {
-            let Some(entry) = estimator::find(method) else {
-                return false;
-            };
-            let inside = entry
-                .hybrid()
-                .is_some_and(|parts| parts.first == Method::FB);
-            inside || matches!(entry.parts, Parts::Features)
+            estimator::find(method).is_some_and(|entry| match entry.hybrid() {
+                Some(parts) => parts.first == Method::FB,
+                None => matches!(entry.parts, Parts::Features),
+            })
         };
-        let part = match context.method().filter(|&here| with_features(here)) {
-            Some(here) => context.part_of(here),
-            None => {
-                let mut asked = context.setup.task.protocol.methods.iter().copied();
-                asked.find_map(|method| with_features(method).then(|| context.part_of(method))?)
-            }
-        };
-        part.map_or_else(Self::default, |(span, cursor)| {
-            Self::until(context.run, span, cursor)
-        })
-    }
-
-    /// The progress at the end of the same estimator and reference in another run.
-    pub(super) fn counterpart(
-        context: &ViewContext<'_>,
-        method: Method,
-        other: &'a Run,
-    ) -> Option<Self> {
-        let span = other.span_of(Part::Reference(method, context.reference()))?;
-        Some(Self::until(other, span, span.records.end.checked_sub(1)?))
+        let asked = context.setup.task.protocol.methods.iter().copied();
+        let mut methods = context.method().into_iter().chain(asked);
+        methods
+            .find_map(|method| with_features(method).then(|| context.part_of(method))?)
+            .map_or_else(Self::default, |(span, cursor)| {
+                Self::until(context.run, span, cursor)
+            })
     }
 
     fn until(run: &'a Run, span: &Span, cursor: usize) -> Self {
-        let mut progress = Self {
-            method: span.part.method(),
-            ..Self::default()
-        };
+        let mut progress = Self::default();
         let end = span.records.end.min(cursor.saturating_add(1));
         for record in &run.records()[span.records.start.min(end)..end] {
             match &record.event {
@@ -117,7 +102,7 @@ impl<'a> FeatureProgress<'a> {
     }
 
     /// Where a query feature has ended as far as it is known; `None` while it may still become an
-    /// inlier. What a test has thrown out is told at once, not only when all is over.
+    /// inlier. A feature that a test rejected is known at once.
     pub(super) fn state(&self, feature: usize) -> Option<FeatureState> {
         if let Some(states) = self.states {
             return states.get(feature).copied();
@@ -148,17 +133,14 @@ impl<'a> FeatureProgress<'a> {
             FeatureState::RatioFailed { ratio } if ratio.is_infinite() => {
                 "nothing to match".to_owned()
             }
-            FeatureState::RatioFailed { ratio } => format!("ratio {ratio:.4}"),
+            FeatureState::RatioFailed { ratio } => format!("ratio {ratio:.3}"),
             FeatureState::NotUnique { rival } => format!("nearer to query feature {rival}"),
             FeatureState::NoDepth { distance_px } => format!("LiDAR {distance_px:.2} px away"),
-            FeatureState::Outlier { residual_px } if residual_px.is_infinite() => {
-                "no pose to explain it".to_owned()
-            }
             FeatureState::Outlier { residual_px } | FeatureState::Inlier { residual_px } => {
-                format!("residual {residual_px:.2} px")
+                error_px(residual_px)
             }
         };
-        format!("{}: {decided_by}", state.name())
+        format!("{}: {decided_by}", name(state.index()))
     }
 
     /// Whether nothing was matched yet.
@@ -172,36 +154,15 @@ impl<'a> FeatureProgress<'a> {
             .map(|feature| self.state(feature).map_or(UNDECIDED, |state| state.index()))
             .collect()
     }
-
-    /// Which query features have ended in another state than in another run, or do not occur in it.
-    /// Features are told apart by their keypoints, because other settings may find others.
-    pub(super) fn differing(&self, other: &FeatureProgress<'_>) -> Vec<bool> {
-        let (mine, theirs) = (self.query(), other.query());
-        let same_keypoints = mine == theirs;
-        let places: HashMap<[u32; 3], usize> = if same_keypoints {
-            HashMap::new()
-        } else {
-            theirs.iter().map(place).zip(0..).collect()
-        };
-        (0..mine.len())
-            .map(|feature| {
-                let Some(state) = self.state(feature) else {
-                    return false;
-                };
-                let twin = if same_keypoints {
-                    Some(feature)
-                } else {
-                    places.get(&place(&mine[feature])).copied()
-                };
-                let there = twin.and_then(|twin| other.state(twin));
-                there.is_none_or(|there| there.index() != state.index())
-            })
-            .collect()
-    }
 }
 
-fn place(keypoint: &Keypoint) -> [u32; 3] {
-    [keypoint.x, keypoint.y, keypoint.scale].map(f32::to_bits)
+/// A reprojection error in words.
+pub(super) fn error_px(residual_px: f64) -> String {
+    if residual_px.is_infinite() {
+        "no pose".to_owned()
+    } else {
+        format!("{residual_px:.2} px")
+    }
 }
 
 #[cfg(test)]
@@ -235,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_feature_is_decided_as_soon_as_a_test_throws_it_out() {
+    fn a_feature_is_decided_as_soon_as_a_test_rejects_it() {
         let query = features(&[1.0, 2.0, 3.0, 4.0, 5.0]);
         let decisions = [
             decision(0, MatchVerdict::Ambiguous),
@@ -260,24 +221,5 @@ mod tests {
         });
         progress.lifted = Some(&lifted);
         assert_eq!(progress.kinds(), [0, 1, 2, UNDECIDED, 0]);
-    }
-
-    #[test]
-    fn differences_are_found_by_keypoint_where_the_settings_found_others() {
-        let (mine, theirs) = (features(&[1.0, 2.0, 3.0]), features(&[2.0, 1.0]));
-        let inlier = FeatureState::Inlier { residual_px: 0.5 };
-        let outlier = FeatureState::Outlier { residual_px: 9.0 };
-        let here = FeatureProgress {
-            query: Some(&mine),
-            states: Some(&[inlier, outlier, inlier]),
-            ..FeatureProgress::default()
-        };
-        let there = FeatureProgress {
-            query: Some(&theirs),
-            states: Some(&[inlier, inlier]),
-            ..FeatureProgress::default()
-        };
-        assert_eq!(here.differing(&there), [false, true, true]);
-        assert_eq!(here.differing(&here), [false; 3]);
     }
 }

@@ -72,6 +72,8 @@ pub(super) struct TrueMatch {
     pub(super) place: Option<Point2<f64>>,
     /// How far the query keypoint is from there \[px\].
     pub(super) place_px: Option<f64>,
+    /// The inlier threshold \[px\].
+    within_px: f64,
 }
 
 impl TrueMatch {
@@ -83,6 +85,7 @@ impl TrueMatch {
         query: &Point2<f64>,
         reference: &Point2<f64>,
         point: Option<&Point3<f64>>,
+        within_px: f64,
     ) -> Self {
         let query_from_reference = problem.reference_from_query(truth).inverse();
         let camera = &problem.query.intrinsics;
@@ -98,36 +101,29 @@ impl TrueMatch {
             line_px: line.map(|line| line.distance_px(query)),
             place,
             place_px: place.map(|place| (place - query).norm()),
+            within_px,
         }
     }
 
-    /// Whether the match is true, as far as that can be told; `within_px` is the inlier threshold.
-    /// A match without a depth is false where its epipolar line is too far; on the line it may be
-    /// either.
-    pub(super) fn is_true(&self, within_px: f64) -> Option<bool> {
+    /// Whether the match is true, as far as is known. A match without a depth is false where its epipolar line
+    /// is too far; on the line it may be either.
+    pub(super) fn is_true(&self) -> Option<bool> {
         match (self.place_px, self.line_px) {
-            (Some(distance), _) => Some(distance <= within_px),
-            (None, Some(distance)) if distance > within_px => Some(false),
+            (Some(distance), _) => Some(distance <= self.within_px),
+            (None, Some(distance)) if distance > self.within_px => Some(false),
             _ => None,
         }
     }
 
     /// What the true pose says of the match, in words.
-    pub(super) fn verdict(&self, within_px: f64) -> String {
-        let seen = self
-            .place_px
-            .map(|distance| format!("{distance:.2} px from where the true pose sees its point"));
-        match (self.is_true(within_px), seen) {
-            (Some(true), Some(seen)) => format!("true match: {seen}"),
-            (Some(false), Some(seen)) => match self.line_px {
-                // It is where some other depth would put it.
-                Some(distance) if distance <= within_px => {
-                    format!("false match or wrong depth: {seen}")
-                }
-                _ => format!("false match: {seen}"),
-            },
-            (Some(false), None) => "false match: off its epipolar line".to_owned(),
-            _ => "on its epipolar line, and no depth to tell more".to_owned(),
+    pub(super) fn verdict(&self) -> &'static str {
+        let is_on_line = self.line_px.is_some_and(|px| px <= self.within_px);
+        match (self.is_true(), is_on_line) {
+            (Some(true), _) => "true match",
+            // It is where another depth would put it.
+            (Some(false), true) => "false match or wrong depth",
+            (Some(false), false) => "false match",
+            (None, _) => "unknown without a depth",
         }
     }
 }
@@ -179,28 +175,18 @@ mod tests {
                 line_px,
                 place: None,
                 place_px,
+                within_px: 3.0,
             };
-            (seen.is_true(3.0), seen.verdict(3.0))
-        };
-        let starts = |(is_true, words): (Option<bool>, String), expected, start: &str| {
-            is_true == expected && words.starts_with(start)
+            (seen.is_true(), seen.verdict())
         };
         let place = judged(Some(2.9), Some(0.1));
-        assert!(starts(place, Some(true), "true match: 2.90 px"));
+        assert_eq!(place, (Some(true), "true match"));
         let along = judged(Some(20.0), Some(0.1));
-        assert!(starts(along, Some(false), "false match or wrong depth: 20"));
+        assert_eq!(along, (Some(false), "false match or wrong depth"));
         let off = judged(Some(20.0), Some(9.0));
-        assert!(starts(off, Some(false), "false match: 20.00 px"));
-        assert!(starts(
-            judged(None, Some(9.0)),
-            Some(false),
-            "false match: off"
-        ));
-        assert!(starts(
-            judged(None, Some(1.0)),
-            None,
-            "on its epipolar line"
-        ));
+        assert_eq!(off, (Some(false), "false match"));
+        assert_eq!(judged(None, Some(9.0)), (Some(false), "false match"));
+        assert_eq!(judged(None, Some(1.0)), (None, "unknown without a depth"));
     }
 
     proptest! {

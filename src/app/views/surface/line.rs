@@ -1,26 +1,30 @@
 //! The cost along the line from the result to the truth.
 
-use egui::{Ui, vec2};
+use egui::Ui;
 use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotPoint, Points, VLine};
 
 use super::scale::number;
 use super::search::Search;
-use crate::app::views::legend::{self, paint_mark, plot_shape};
+use crate::app::views::legend::{plot_shape, result};
 use crate::app::{Command, CostAlong, CostLine, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
 
-/// The line from the method's result to the truth, if both are known and shown. Only the present run is
+/// Height of the plot \[points\].
+const PLOT_HEIGHT: f32 = 124.0;
+
+/// The line from the method's result to the truth, if both are known, shown and differ. Only the present run is
 /// scored again.
 pub(super) fn wanted(context: &ViewContext<'_>, search: &Search<'_>) -> Option<CostLine> {
     if !context.is_present() {
         return None;
     }
-    Some(CostLine {
+    let line = CostLine {
         method: search.method,
         from: context.estimate(search.span.part.method()?)?,
         to: *context.truth()?,
-    })
+    };
+    (line.from != line.to).then_some(line)
 }
 
 /// Draws the costs along the line; answers the pose under the pointer.
@@ -28,34 +32,18 @@ pub(super) fn ui(
     ui: &mut Ui,
     context: &ViewContext<'_>,
     search: &Search<'_>,
-    width: f32,
+    line: CostLine,
 ) -> Option<Pose> {
-    ui.strong("From the result to the truth");
-    let Some(line) = wanted(context, search) else {
-        ui.weak(match (context.options.shows_truth, context.is_present()) {
-            (false, _) => "The truth is hidden (G shows it)",
-            (true, false) => "Drawn for the present run, B",
-            (true, true) => "Appears when there is a result, and the truth is known",
-        });
-        return None;
-    };
-    let Some(along) = known(context, line) else {
+    let along = context.cost_along(line.method);
+    let Some(along) = along.filter(|along| along.line == line) else {
         context.send(Command::TraceLine(line));
-        ui.weak("Computing");
+        ui.weak("Computing the cost from the result to the truth");
         return None;
     };
     let step_m = context.run.params.grid.fine_step_m;
     let profile = Profile::of(along, search.least_covered, step_m);
     ui.label(profile.words());
-    if profile.length <= 0.0 {
-        return None;
-    }
-    draw(ui, context, search, &profile, width)
-}
-
-fn known<'a>(context: &ViewContext<'a>, line: CostLine) -> Option<&'a CostAlong> {
-    let along = context.cost_along(line.method);
-    along.filter(|along| along.line == line)
+    draw(ui, context, search, &profile)
 }
 
 /// The costs along a line, by distance from the result.
@@ -104,24 +92,16 @@ impl Profile {
         costs.find(|(at, _)| *at == way)?.1
     }
 
-    fn way(&self, way: f64) -> String {
-        format!("{way:.2} {}", self.unit)
-    }
-
-    /// Where the cost between the two ends is highest, and that cost.
-    fn highest(&self) -> Option<(f64, f64)> {
+    /// The highest cost between the two ends.
+    fn highest(&self) -> Option<f64> {
         let between = |(way, _): &&(f64, Option<f64>)| (0.0..=self.length).contains(way);
         let known = self.costs.iter().filter(between);
-        let known = known.filter_map(|(way, cost)| Some((*way, (*cost)?)));
-        known.max_by(|a, b| a.1.total_cmp(&b.1))
+        known.filter_map(|(_, cost)| *cost).max_by(f64::total_cmp)
     }
 
     /// What the curve says, in one sentence.
     fn words(&self) -> String {
-        if self.length <= 0.0 {
-            return "The result is the truth".to_owned();
-        }
-        let far = self.way(self.length);
+        let far = format!("{:.2} {}", self.length, self.unit);
         let (Some(result), Some(truth)) = (self.at(0.0), self.at(self.length)) else {
             return if self.is_complete {
                 format!("{far} apart; one of the two poses covers too few pixels")
@@ -129,45 +109,43 @@ impl Profile {
                 format!("{far} apart")
             };
         };
-        let costs = format!(
-            "Cost {} at the result, {} at the truth, {far} away",
-            number(result),
-            number(truth)
-        );
-        let Some((way, highest)) = self.highest().filter(|_| self.is_complete) else {
+        let (from, to) = (number(result), number(truth));
+        let costs = format!("Cost {from} at the result, {to} at the truth, {far} away");
+        let Some(highest) = self.highest().filter(|_| self.is_complete) else {
             return costs;
         };
         if self.unit == "m" && self.length < self.step_m {
-            return format!(
-                "{costs}: nearer than the steps of the search, {} m",
-                self.step_m
-            );
+            let step_m = self.step_m;
+            return format!("{costs}: nearer than the steps of the search, {step_m} m");
         }
-        let wall = number(highest);
-        let lower_end = result.min(truth);
-        if highest <= result.max(truth) {
-            let leads = if truth < result {
-                "it falls from the result to the truth: the search stopped early"
+        let is_missed = truth < result;
+        if highest > result.max(truth) {
+            let wall = number(highest - result.min(truth));
+            let meaning = if is_missed {
+                "the search did not cross this barrier"
             } else {
-                "it falls from the truth to the result: the cost prefers the result"
+                "the cost prefers the result"
             };
-            return format!("{costs}; between them {leads}");
+            return format!("{costs}; it is {wall} higher between them: {meaning}");
         }
-        let meaning = if truth < result {
-            "the search did not cross this barrier"
+        let meaning = if is_missed {
+            "it falls from the result to the truth: the search stopped early"
         } else {
-            "the cost prefers the result"
+            "it falls from the truth to the result: the cost prefers the result"
         };
-        format!(
-            "{costs}; between them it rises to {wall}, {} from the result and {} above the lower end: {meaning}",
-            self.way(way),
-            number(highest - lower_end)
-        )
+        format!("{costs}; {meaning}")
     }
 
-    /// The pose at a distance along the line.
-    fn pose(&self, way: f64) -> Pose {
-        self.line.pose(way / self.length.max(f64::MIN_POSITIVE))
+    /// The stretches of the curve where the cost is known.
+    fn stretches(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
+        let stretches = self.costs.split(|(_, cost)| cost.is_none());
+        let known = stretches.map(|stretch| {
+            let points = stretch.iter();
+            points
+                .filter_map(|(way, cost)| Some([*way, (*cost)?]))
+                .collect()
+        });
+        known.filter(|stretch: &Vec<_>| !stretch.is_empty())
     }
 }
 
@@ -176,9 +154,7 @@ fn draw(
     context: &ViewContext<'_>,
     search: &Search<'_>,
     profile: &Profile,
-    width: f32,
 ) -> Option<Pose> {
-    const HEIGHT: f32 = 150.0;
     let unit = profile.unit;
     let label = |position: &HoverPosition<'_>| match position {
         HoverPosition::NearDataPoint {
@@ -191,41 +167,26 @@ fn draw(
         }
         HoverPosition::Elsewhere { .. } => None,
     };
-    let color = theme::method(search.method);
-    let stretches = profile.costs.split(|(_, cost)| cost.is_none());
-    let stretches: Vec<Vec<[f64; 2]>> = stretches
-        .map(|stretch| {
-            let points = stretch.iter();
-            points
-                .filter_map(|(way, cost)| Some([*way, (*cost)?]))
-                .collect()
-        })
-        .filter(|stretch: &Vec<_>| !stretch.is_empty())
-        .collect();
-    let result = legend::result(context, &profile.line.from);
+    let result = result(context, &profile.line.from);
+    let dashed = LineStyle::dashed_loose();
+    // The truth last, so that nothing hides it.
     let ends = [
         ("result", result, LineStyle::Solid, 0.0),
-        (
-            "truth",
-            Thing::Truth,
-            LineStyle::dashed_loose(),
-            profile.length,
-        ),
+        ("truth", Thing::Truth, dashed, profile.length),
     ];
     let answer = Plot::new(("cost line", profile.length.to_bits()))
-        .width(width)
-        .height(HEIGHT)
+        .height(PLOT_HEIGHT)
         .allow_scroll(false)
         .allow_drag(false)
-        .x_axis_label(format!("from the result [{unit}]"))
+        .x_axis_label(format!("from the result to the truth [{unit}]"))
         .y_axis_label("cost")
         .label_formatter(label)
         .show(ui, |plot| {
-            for (index, stretch) in stretches.into_iter().enumerate() {
-                let line = Line::new(search.method.label(), stretch).color(color);
-                plot.line(line.width(2.0).id(("along", index)));
+            for (index, stretch) in profile.stretches().enumerate() {
+                let line = Line::new(search.method.label(), stretch).width(2.0);
+                let line = line.color(theme::method(search.method));
+                plot.line(line.id(("along", index)));
             }
-            // The truth last, so that nothing hides it.
             for (name, thing, style, way) in ends {
                 let color = theme::rgb(thing.color());
                 let end = VLine::new(name, way).color(color).style(style).width(1.5);
@@ -236,32 +197,22 @@ fn draw(
                 }
             }
         });
-    let spoken = profile.words();
     answer.response.widget_info(|| {
-        let words = format!("Cost from the result to the truth: {spoken}");
+        let words = format!("Cost from the result to the truth: {}", profile.words());
         egui::WidgetInfo::labeled(egui::Role::Image, true, words)
     });
-    key(ui, result);
     let at = answer.response.hover_pos()?;
-    if !answer.transform.frame().contains(at) || profile.length <= 0.0 {
+    if !answer.transform.frame().contains(at) {
         return None;
     }
     let PlotPoint { x: way, .. } = answer.transform.value_from_position(at);
-    let pose = profile.pose(way);
+    let pose = profile
+        .line
+        .pose(way / profile.length.max(f64::MIN_POSITIVE));
     if answer.response.clicked() {
         context.send(Command::TakeCamera(Some(pose)));
     }
     Some(pose)
-}
-
-fn key(ui: &mut Ui, result: Thing) {
-    ui.horizontal_wrapped(|ui| {
-        for (thing, name) in [(result, "result"), (Thing::Truth, "truth")] {
-            let (rect, _) = ui.allocate_exact_size(vec2(14.0, 12.0), egui::Sense::hover());
-            paint_mark(ui.painter(), thing, rect.center(), 4.5);
-            ui.weak(name);
-        }
-    });
 }
 
 #[cfg(test)]
@@ -294,11 +245,7 @@ mod tests {
     #[test]
     fn a_wall_between_result_and_truth_is_told_from_a_slope() {
         let wall = profile(&[0.5, 0.6, 0.7, 0.5, 0.3]).words();
-        assert!(
-            wall.contains("rises to 0.7000, 2.00 m from the result"),
-            "{wall}"
-        );
-        assert!(wall.contains("0.4000 above the lower"), "{wall}");
+        assert!(wall.contains("it is 0.4000 higher"), "{wall}");
         assert!(wall.contains("did not cross"), "{wall}");
         let slope = profile(&[0.5, 0.4, 0.3]).words();
         assert!(

@@ -14,12 +14,9 @@ use crate::proof::Thing;
 use crate::render::Score;
 
 /// The width of the numbers left of the map \[points\].
-const LEFT_AXIS: f32 = 34.0;
+pub(super) const LEFT_AXIS: f32 = 34.0;
 /// The height of the numbers below the map \[points\].
-const LOWER_AXIS: f32 = 30.0;
-
-/// The sides that a map may have \[points\].
-const SIDES: std::ops::RangeInclusive<f32> = 120.0..=480.0;
+pub(super) const LOWER_AXIS: f32 = 30.0;
 
 /// The map with its switch. Each lattice has a texture, which is painted again when its pixels change.
 #[derive(Default)]
@@ -31,10 +28,10 @@ pub(super) struct CostMap {
 /// A cell of a lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cell {
-    /// Position among the layers.
-    layer: usize,
-    cell: usize,
     offset: Offset,
+    /// The side of the cell \[m\].
+    step: f64,
+    score: Option<Score>,
 }
 
 /// What the map is drawn from.
@@ -95,56 +92,62 @@ impl CostMap {
             .on_hover_text(help);
     }
 
-    /// Draws the map. Returns the pose under the pointer with its cost in words, and the map's width.
+    /// Draws the map. Returns the pose under the pointer with its cost in words.
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
         context: &ViewContext<'_>,
         shown: &MapContent<'_>,
-    ) -> (Option<(Pose, String)>, f32) {
-        // As high as the visible part of the view, less what is above and below the map.
-        let room = (ui.available_width() - LEFT_AXIS - 2.0).min(ui.clip_rect().height() - 84.0);
-        let side = room.clamp(*SIDES.start(), *SIDES.end());
+        side: f32,
+    ) -> Option<(Pose, String)> {
         let group = ui.make_persistent_id("maps");
         let images = self.images(ui, shown);
         let answer = plot(ui, shown, self.name(), group, side, images);
-        let at = answer.response.interact_pointer_pos();
-        let at = answer.response.hover_pos().or(at);
+        let response = &answer.response;
+        let at = response.hover_pos().or(response.interact_pointer_pos());
         let pointed_at = at
             .filter(|at| answer.transform.frame().contains(*at))
             .and_then(|at| cell_at(shown, &answer.transform, at));
         let is_panning = ui.input(|input| input.modifiers.shift);
-        let takes_camera = !is_panning
-            && (answer.response.clicked() || answer.response.dragged_by(PointerButton::Primary));
+        let takes_camera =
+            !is_panning && (response.clicked() || response.dragged_by(PointerButton::Primary));
         overlay(ui, shown, &answer.transform, pointed_at);
-        let under_pointer = pointed_at.map(|cell| {
-            let pose = shown.search.pose(&cell.offset);
-            if takes_camera && context.camera() != Some(pose) {
-                context.send(Command::TakeCamera(Some(pose)));
-            }
-            let score = shown.layers()[cell.layer].scores[cell.cell];
-            (pose, readout(shown, score, &cell.offset))
-        });
-        (under_pointer, side + LEFT_AXIS)
+        let cell = pointed_at?;
+        let pose = shown.search.pose(&cell.offset);
+        if takes_camera && context.camera() != Some(pose) {
+            context.send(Command::TakeCamera(Some(pose)));
+        }
+        Some((pose, readout(shown, &cell)))
+    }
+
+    /// What the map shows, in a few words.
+    pub(super) fn caption(&self, search: &Search<'_>, scale: &Scale) -> String {
+        let method = search.method.label();
+        match scale.cost_ends() {
+            _ if self.shows_coverage => format!("Coverage of {method}, yellow is more"),
+            Some([dark, bright]) => format!("{method} cost {bright} (yellow) to {dark}"),
+            None => format!("{method}: no cost yet"),
+        }
     }
 
     /// The meaning of the map's colours.
-    pub(super) fn colours(&self, ui: &mut Ui, scale: &Scale, width: f32, floor: f64) {
+    pub(super) fn colours(&self, ui: &mut Ui, context: &ViewContext<'_>, scale: &Scale) {
+        let width = ui.available_width();
         if self.shows_coverage {
             cost_bar(ui, width, "coverage", &scale.coverage_ends());
             return;
         }
-        match scale.cost_ends() {
-            Some(ends) => cost_bar(ui, width, "cost", &ends),
-            None => {
-                ui.weak("no cost yet");
-            }
-        }
+        let Some(ends) = scale.cost_ends() else {
+            ui.weak("no cost yet");
+            return;
+        };
+        cost_bar(ui, width, "cost", &ends);
         ui.horizontal(|ui| {
             swatch(ui, BELOW_FLOOR);
             let help =
                 "These cells cover less than this share of the reference view and are not eligible";
-            ui.weak(format!("coverage below {:.0} %", 100.0 * floor))
+            let floor = 100.0 * context.run.params.grid.coverage_floor;
+            ui.weak(format!("coverage below {floor:.0} %"))
                 .on_hover_text(help);
         });
     }
@@ -159,45 +162,33 @@ impl CostMap {
             let cost = score.eligible_cost(least_covered);
             cost.map_or(BELOW_FLOOR, |cost| shown.scale.cost(cost))
         };
-        let pictures: Vec<ColorImage> = shown
-            .layers()
-            .into_iter()
-            .map(|layer| picture(layer, color))
-            .collect();
-        let mut images = Vec::new();
-        for (index, (layer, image)) in shown.layers().into_iter().zip(pictures).enumerate() {
-            let id = self.paint(ui, index, image);
-            let Lattice {
-                columns,
-                rows,
-                step,
-                centre,
-                ..
-            } = &layer.lattice;
-            let size = [*columns, *rows].map(|count| (count as f64 * step) as f32);
-            let middle = PlotPoint::new(centre.right_m, centre.forward_m);
-            images.push(PlotImage::new(format!("{index}"), id, middle, size));
-        }
-        images
+        let layers = shown.layers();
+        let pictures: Vec<ColorImage> = layers.iter().map(|layer| picture(layer, color)).collect();
+        let layers = layers.into_iter().zip(pictures).enumerate();
+        layers
+            .map(|(index, (layer, image))| {
+                let id = self.paint(ui, index, image);
+                let lattice = &layer.lattice;
+                let size = [lattice.columns, lattice.rows]
+                    .map(|count| (count as f64 * lattice.step) as f32);
+                let middle = PlotPoint::new(lattice.centre.right_m, lattice.centre.forward_m);
+                PlotImage::new(index.to_string(), id, middle, size)
+            })
+            .collect()
     }
 
     fn paint(&mut self, ui: &Ui, index: usize, image: ColorImage) -> egui::TextureId {
         const OPTIONS: egui::TextureOptions = egui::TextureOptions::NEAREST;
-        match self.painted.get_mut(index) {
-            Some((before, texture)) => {
-                if before.size != image.size || before.pixels != image.pixels {
-                    texture.set(image.clone(), OPTIONS);
-                    *before = image;
-                }
-                texture.id()
-            }
-            None => {
-                let texture = ui.ctx().load_texture("surface", image.clone(), OPTIONS);
-                let id = texture.id();
-                self.painted.push((image, texture));
-                id
-            }
+        if self.painted.len() <= index {
+            let texture = ui.ctx().load_texture("surface", image.clone(), OPTIONS);
+            self.painted.push((image.clone(), texture));
         }
+        let (before, texture) = &mut self.painted[index];
+        if *before != image {
+            texture.set(image.clone(), OPTIONS);
+            *before = image;
+        }
+        texture.id()
     }
 }
 
@@ -258,9 +249,6 @@ fn plot(
         .show(ui, |plot| {
             let wheel = plot.ctx().input(|input| input.smooth_scroll_delta.y);
             if plot.response().hovered() && wheel != 0.0 {
-                // The scroll area around must not scroll too.
-                plot.ctx()
-                    .input_mut(|input| input.smooth_scroll_delta = egui::Vec2::ZERO);
                 plot.zoom_bounds_around_hovered(egui::Vec2::splat((wheel / 200.0).exp()));
             }
             for image in images {
@@ -295,16 +283,10 @@ fn whole(shown: &MapContent<'_>) -> PlotBounds {
     const MARGIN: f64 = 1.04;
     let radius = shown.search.problem.uncertainty_radius_m;
     let half = shown.layers().into_iter().fold(radius, |half, layer| {
-        let Lattice {
-            columns,
-            rows,
-            step,
-            centre,
-            ..
-        } = &layer.lattice;
-        let reach = |middle: f64, count: usize| middle.abs() + 0.5 * count as f64 * step;
-        half.max(reach(centre.right_m, *columns))
-            .max(reach(centre.forward_m, *rows))
+        let lattice = &layer.lattice;
+        let reach = |middle: f64, count: usize| middle.abs() + 0.5 * count as f64 * lattice.step;
+        half.max(reach(lattice.centre.right_m, lattice.columns))
+            .max(reach(lattice.centre.forward_m, lattice.rows))
     });
     PlotBounds::new_symmetrical(MARGIN * half)
 }
@@ -319,32 +301,29 @@ fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Optio
         let is_seen = index == 0 || layer.scores[cell].is_some();
         let offset = shown.offset(layer, cell).filter(|_| is_seen)?;
         Some(Cell {
-            layer: index,
-            cell,
             offset,
+            step: layer.lattice.step,
+            score: layer.scores[cell],
         })
     })
 }
 
-/// The cost and coverage of the cell at an offset, in words.
-fn readout(shown: &MapContent<'_>, score: Option<Score>, offset: &Offset) -> String {
-    let at = match shown.dense {
-        Some(_) => format!("{}, {}", place(offset), heading(offset)),
-        None => place(offset),
-    };
-    let Some(score) = score else {
+/// The cost and coverage of a cell, in words.
+fn readout(shown: &MapContent<'_>, cell: &Cell) -> String {
+    let mut at = place(&cell.offset);
+    if shown.dense.is_some() {
+        at += &format!(", {}", heading(&cell.offset));
+    }
+    let Some(score) = cell.score else {
         return format!("not tried yet at {at}");
     };
-    let cost = match score.cost {
-        Some(cost) => format!("cost {}", number(cost)),
-        None => "no cost".to_owned(),
-    };
+    let cost = score.cost.map_or_else(
+        || "no cost".to_owned(),
+        |cost| format!("cost {}", number(cost)),
+    );
     let coverage = shown.search.coverage(score.covered);
-    let note = if score.covered < shown.search.least_covered {
-        ", below the floor"
-    } else {
-        ""
-    };
+    let is_below = score.covered < shown.search.least_covered;
+    let note = if is_below { ", below the floor" } else { "" };
     format!("{cost}, coverage {coverage:.2} at {at}{note}")
 }
 
@@ -357,23 +336,21 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
         transform.position_from_point(&PlotPoint::new(offset.right_m, offset.forward_m))
     };
     let outline = |offset: &Offset, columns: f64, rows: f64, color: Color32, width: f32| {
-        let size = [
-            columns * transform.dpos_dvalue_x(),
-            rows * transform.dpos_dvalue_y(),
-        ];
-        let size = egui::vec2(size[0].abs() as f32, size[1].abs() as f32);
+        let [width_px, height_px] = [transform.dpos_dvalue_x(), transform.dpos_dvalue_y()];
+        let size = egui::vec2(
+            (columns * width_px).abs() as f32,
+            (rows * height_px).abs() as f32,
+        );
         let rect = Rect::from_center_size(screen(offset), size);
         let stroke = Stroke::new(width, color);
         painter.rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
     };
     let strong = ui.visuals().strong_text_color();
-    for (index, layer) in shown.layers().into_iter().enumerate() {
+    for layer in shown.layers().into_iter().skip(1) {
         let lattice = &layer.lattice;
-        if index > 0 {
-            let (width, height) = (lattice.columns as f64, lattice.rows as f64);
-            let Lattice { centre, step, .. } = lattice;
-            outline(centre, width * step, height * step, Color32::WHITE, 1.0);
-        }
+        let [width, height] =
+            [lattice.columns, lattice.rows].map(|count| count as f64 * lattice.step);
+        outline(&lattice.centre, width, height, Color32::WHITE, 1.0);
     }
     if let Some(hypothesis) = shown.search.hypothesis
         && let Some(searched) = shown.search.positions().last()
@@ -410,9 +387,8 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
             mark.paint(&painter, at, reach);
         }
     }
-    if let Some(cell) = pointed_at {
-        let step = shown.layers()[cell.layer].lattice.step;
-        outline(&cell.offset, step, step, Color32::BLACK, 3.0);
-        outline(&cell.offset, step, step, Color32::WHITE, 1.5);
+    if let Some(Cell { offset, step, .. }) = &pointed_at {
+        outline(offset, *step, *step, Color32::BLACK, 3.0);
+        outline(offset, *step, *step, Color32::WHITE, 1.5);
     }
 }

@@ -1,6 +1,6 @@
 //! Places on the map with their legend.
 
-use egui::{Color32, Painter, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Color32, Painter, Pos2, Rect, Stroke, Ui, vec2};
 
 use super::scale::number;
 use super::search::{Minimum, Search};
@@ -202,42 +202,29 @@ impl MarkKind {
     }
 }
 
-/// The marks in words, which are broken where a mark has a line of its own. Pointing at one shows its
-/// pose, which is returned; a click takes the camera there.
-pub(super) fn legend(
-    ui: &mut Ui,
-    context: &ViewContext<'_>,
-    marks: &[MapMark],
-    wrap_mode: egui::TextWrapMode,
-) -> Option<Pose> {
+/// The marks in words. Pointing at one shows its pose, which is returned; a click takes the camera there.
+pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) -> Option<Pose> {
     let mut pointed_at = None;
-    let rows = |ui: &mut Ui| {
-        // The room for the mark is part of the button, so that both wrap together.
-        ui.spacing_mut().button_padding = vec2(3.4 * RADIUS, 1.0);
-        for mark in marks {
-            // Without a frame a button would have no room beside its words.
-            let button = egui::Button::new(egui::RichText::new(&mark.words).small())
-                .fill(Color32::TRANSPARENT)
-                .stroke(Stroke::NONE)
-                .wrap_mode(wrap_mode);
-            let response = ui.add(button.sense(Sense::click()));
-            let at = pos2(
-                response.rect.left() + 1.5 * RADIUS,
-                response.rect.center().y,
-            );
-            mark.kind.paint(ui.painter(), at, RADIUS);
-            if response.hovered() {
-                pointed_at = Some(mark.pose);
-            }
-            if response.clicked() {
-                context.send(Command::TakeCamera(Some(mark.pose)));
-            }
+    // The room for the mark is part of the button, so that both wrap together.
+    ui.spacing_mut().button_padding = vec2(3.4 * RADIUS, 1.0);
+    for mark in marks {
+        let words = egui::RichText::new(&mark.words).small();
+        // Without a frame a button would have no room beside its words.
+        let button = egui::Button::new(words)
+            .fill(Color32::TRANSPARENT)
+            .stroke(Stroke::NONE)
+            .wrap();
+        let response = ui.add(button);
+        let left = response.rect.left_center();
+        mark.kind
+            .paint(ui.painter(), left + vec2(1.5 * RADIUS, 0.0), RADIUS);
+        if response.hovered() {
+            pointed_at = Some(mark.pose);
         }
-    };
-    match wrap_mode {
-        egui::TextWrapMode::Wrap => ui.vertical(rows),
-        _ => ui.horizontal_wrapped(rows),
-    };
+        if response.clicked() {
+            context.send(Command::TakeCamera(Some(mark.pose)));
+        }
+    }
     pointed_at
 }
 

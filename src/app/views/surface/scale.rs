@@ -10,7 +10,7 @@ use crate::render::Score;
 use crate::session::Run;
 
 /// Costs that differ by less are equal: the search calls them flat.
-pub(super) const LEAST_DIFFERENCE: f64 = 1e-9;
+const LEAST_DIFFERENCE: f64 = 1e-9;
 
 /// The colour of a cell below the coverage floor.
 pub(in crate::app::views) const BELOW_FLOOR: Color32 = Color32::from_gray(110);

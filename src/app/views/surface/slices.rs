@@ -1,12 +1,15 @@
 //! The cost along each axis through the minimum.
 
 use egui::{Color32, Ui};
-use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotUi, VLine};
+use egui_plot::{HoverPosition, Line, LineStyle, Plot, VLine};
 
 use super::scale::number;
 use super::search::{Search, Searched};
 use crate::app::{ViewContext, theme};
 use crate::grid::{Lattice, Offset, Phase};
+
+/// Height of a plot \[points\].
+const PLOT_HEIGHT: f32 = 130.0;
 
 /// What changes along a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,22 +20,12 @@ enum SliceAxis {
 }
 
 impl SliceAxis {
-    const ALL: [Self; 3] = [Self::Right, Self::Forward, Self::Yaw];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Right => "right",
-            Self::Forward => "forward",
-            Self::Yaw => "yaw",
-        }
-    }
-
-    fn unit(self) -> &'static str {
-        match self {
-            Self::Right | Self::Forward => "m",
-            Self::Yaw => "°",
-        }
-    }
+    /// The axes with their names and units.
+    const ALL: [(Self, &'static str, &'static str); 3] = [
+        (Self::Right, "right", "m"),
+        (Self::Forward, "forward", "m"),
+        (Self::Yaw, "yaw", "°"),
+    ];
 
     /// The coordinate along the axis, in its unit.
     fn of(self, offset: &Offset) -> f64 {
@@ -85,27 +78,26 @@ impl SliceAxis {
 }
 
 /// Draws the slices of a search.
-pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>, width: f32) {
-    ui.strong("Slices through the minimum");
+pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
     let marks = marks(ui, context, search);
-    let gap = ui.spacing().item_spacing.x;
-    let width = ((width - 2.0 * gap - 2.0) / 3.0).max(60.0);
-    ui.horizontal_top(|ui| {
-        for along in SliceAxis::ALL {
-            slice(ui, along, width, search, &marks);
+    ui.horizontal_wrapped(|ui| {
+        ui.weak("Cost through the minimum (thin: coarse, thick: fine)");
+        for (name, color, ..) in &marks {
+            ui.colored_label(theme::text(ui.visuals(), *color), *name);
         }
     });
-    ui.horizontal_wrapped(|ui| {
-        ui.weak("thin: coarse, thick: fine");
-        for (name, color, style, _) in &marks {
-            key(ui, *color, *style);
-            ui.weak(*name);
+    let gap = ui.spacing().item_spacing.x;
+    let width = ((ui.available_width() - 2.0 * gap) / 3.0).max(60.0);
+    ui.horizontal_top(|ui| {
+        for axis in SliceAxis::ALL {
+            slice(ui, axis, width, search, &marks);
         }
     });
 }
 
 type LineMark = (&'static str, Color32, LineStyle, Offset);
 
+/// What is marked in the slices, if it is known.
 fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMark> {
     let strong = ui.visuals().strong_text_color();
     let truth = context.truth().map(|pose| search.offset(pose));
@@ -113,19 +105,23 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMar
     let camera = context.camera().map(|pose| search.offset(&pose));
     let [dashed, dotted] = [LineStyle::dashed_loose(), LineStyle::dotted_loose()];
     let marks = [
-        ("truth", theme::TRUTH, dashed, truth),
-        ("hypothesis", strong, LineStyle::Solid, hypothesis),
-        ("camera in hand", theme::CAMERA, dotted, camera),
+        ("╎ truth", theme::TRUTH, dashed, truth),
+        ("│ hypothesis", strong, LineStyle::Solid, hypothesis),
+        ("┊ camera in hand", theme::CAMERA, dotted, camera),
     ];
-    let known = marks.into_iter();
-    known
+    let marks = marks.into_iter();
+    marks
         .filter_map(|(name, color, style, offset)| Some((name, color, style, offset?)))
         .collect()
 }
 
-fn slice(ui: &mut Ui, along: SliceAxis, width: f32, search: &Search<'_>, marks: &[LineMark]) {
-    const HEIGHT: f32 = 130.0;
-    let (name, unit) = (along.name(), along.unit());
+fn slice(
+    ui: &mut Ui,
+    (axis, name, unit): (SliceAxis, &str, &str),
+    width: f32,
+    search: &Search<'_>,
+    marks: &[LineMark],
+) {
     let label = |position: &HoverPosition<'_>| match position {
         HoverPosition::NearDataPoint { position, .. } => {
             let cost = number(position.y);
@@ -135,48 +131,30 @@ fn slice(ui: &mut Ui, along: SliceAxis, width: f32, search: &Search<'_>, marks: 
     };
     let answer = Plot::new(name)
         .width(width)
-        .height(HEIGHT)
+        .height(PLOT_HEIGHT)
         .allow_scroll(false)
         .x_axis_label(format!("{name} [{unit}]"))
         .label_formatter(label)
         .show(ui, |plot| {
             for (name, color, style, offset) in marks {
-                let line = VLine::new(*name, along.of(offset)).color(*color);
+                let line = VLine::new(*name, axis.of(offset)).color(*color);
                 plot.vline(line.style(*style).allow_hover(false));
             }
-            draw(plot, along, search);
+            for (phase, width) in axis.phases().into_iter().zip([1.0, 2.5]) {
+                let searched = search.last(phase);
+                let stretches =
+                    searched.map(|searched| axis.stretches(searched, search.least_covered));
+                for (index, stretch) in stretches.into_iter().flatten().enumerate() {
+                    let line = Line::new(search.method.label(), stretch).width(width);
+                    let line = line.color(theme::method(search.method));
+                    plot.line(line.id((phase, index)));
+                }
+            }
         });
     let name = format!("Cost along {name}");
     answer
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
-}
-
-fn draw(plot: &mut PlotUi<'_>, along: SliceAxis, search: &Search<'_>) {
-    let color = theme::method(search.method);
-    for (phase, width) in along.phases().into_iter().zip([1.0, 2.5]) {
-        let Some(searched) = search.last(phase) else {
-            continue;
-        };
-        let stretches = along.stretches(searched, search.least_covered);
-        for (index, stretch) in stretches.into_iter().enumerate() {
-            let line = Line::new(search.method.label(), stretch);
-            plot.line(line.color(color).width(width).id((phase, index)));
-        }
-    }
-}
-
-/// A piece of a line as the plots draw it.
-fn key(ui: &mut Ui, color: Color32, style: LineStyle) {
-    let (rect, _) = ui.allocate_exact_size(egui::vec2(16.0, 10.0), egui::Sense::hover());
-    let ends = [rect.left_center(), rect.right_center()];
-    let stroke = egui::Stroke::new(2.0, color);
-    let shapes = match style {
-        LineStyle::Solid => vec![egui::Shape::line_segment(ends, stroke)],
-        LineStyle::Dashed { .. } => egui::Shape::dashed_line(&ends, stroke, 5.0, 3.0),
-        LineStyle::Dotted { .. } => egui::Shape::dotted_line(&ends, color, 4.0, 1.2),
-    };
-    ui.painter().extend(shapes);
 }
 
 #[cfg(test)]
