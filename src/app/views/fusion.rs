@@ -83,7 +83,10 @@ fn error(context: &ViewContext<'_>, pose: Option<&Pose>) -> String {
     match (pose, context.truth()) {
         (None, _) => "× no pose".to_owned(),
         (Some(_), None) => "a pose".to_owned(),
-        (Some(pose), Some(truth)) => PoseError::between(truth, pose).to_string(),
+        (Some(pose), Some(truth)) => {
+            let error = PoseError::between(truth, pose);
+            format!("{}, {}", error.translation(), error.rotation())
+        }
     }
 }
 

@@ -222,7 +222,7 @@ fn patch(
         mesh.ring(middle, scale.max(2.0), width, color);
         for arm in [Vec2::RIGHT, Vec2::LEFT, Vec2::UP, Vec2::DOWN] {
             let arm = turn * (scale * arm);
-            mesh.line(middle + 2.5 * arm, middle + 10.0 * arm, 0.6 * width, color);
+            mesh.line(middle + 2.5 * arm, middle + 10.0 * arm, width, color);
         }
     }
     mesh.paint_on(&ui.painter().with_clip_rect(rect.intersect(ui.clip_rect())));

@@ -25,25 +25,25 @@ pub(in crate::app::views) struct Scale {
 }
 
 impl Scale {
+    const EMPTY: Self = Self {
+        costs: None,
+        coverage: 1.0,
+    };
+
     /// The scale of every position that the method scored, after the cursor too: a step must not
     /// change what a colour means.
     pub(in crate::app::views) fn of(run: &Run, search: &Search<'_>) -> Self {
-        let least_covered = search.least_covered;
-        let mut scale = Self {
-            costs: None,
-            coverage: 1.0,
-        };
+        let mut scale = Self::EMPTY;
         let records = run.records().get(search.span.records.clone());
         for record in records.unwrap_or_default() {
             match &record.event {
                 Event::PoseScored(scored) if !scored.phase.is_yaw() => {
-                    scale.take(&scored.score, scored.coverage, least_covered);
+                    scale.take(&scored.score, search);
                 }
                 // A descent emits the surface below it at once.
                 Event::PhaseSearched(searched) if scale.costs.is_none() => {
-                    for score in searched.surface.scores.iter().flatten() {
-                        scale.take(score, search.coverage(score.covered), least_covered);
-                    }
+                    let scores = searched.surface.scores.iter().flatten();
+                    scores.for_each(|score| scale.take(score, search));
                 }
                 _ => {}
             }
@@ -53,21 +53,15 @@ impl Scale {
 
     /// The scale of a dense map, as far as it is filled.
     pub(super) fn of_dense(dense: &DenseSurface, search: &Search<'_>) -> Self {
-        let mut scale = Self {
-            costs: None,
-            coverage: 1.0,
-        };
-        let cheapest = dense.cheapest();
-        for score in cheapest.scores.iter().flatten() {
-            let coverage = search.coverage(score.covered);
-            scale.take(score, coverage, cheapest.least_covered);
-        }
+        let mut scale = Self::EMPTY;
+        let scores = dense.cheapest().scores.iter().flatten();
+        scores.for_each(|score| scale.take(score, search));
         scale
     }
 
-    fn take(&mut self, score: &Score, coverage: f64, least_covered: u32) {
-        self.coverage = self.coverage.max(coverage);
-        if let Some(cost) = score.eligible_cost(least_covered) {
+    fn take(&mut self, score: &Score, search: &Search<'_>) {
+        self.coverage = self.coverage.max(search.coverage(score.covered));
+        if let Some(cost) = score.eligible_cost(search.least_covered) {
             let (least, greatest) = self.costs.unwrap_or((cost, cost));
             self.costs = Some((least.min(cost), greatest.max(cost)));
         }
