@@ -8,6 +8,7 @@ use nalgebra::{Point2, Point3};
 use super::places::from_above;
 use super::{Panel, ProofCase, ProofPicture, Thing};
 use crate::camera::Intrinsics;
+use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
 use crate::event::{
     DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided, MatchesGuided, Side,
 };
@@ -65,7 +66,7 @@ impl<'a> Matches<'a> {
         let states: &'a [FeatureState] = &case.latest::<FeaturesClassified>()?.states;
         let guided = case.latest::<MatchesGuided>().map(|event| &event.matches);
         let lifted = guided.or_else(|| case.latest::<DepthsLifted>().map(|event| &event.matches));
-        let threshold_px = case.params.fb.mlesac.inlier_threshold_px;
+        let threshold_px = TRUE_MATCH_THRESHOLDS * case.params.fb.mlesac.inlier_threshold_px;
         let query_from_reference = case.query_from_reference();
         let camera = &case.problem.query.intrinsics;
         let matched = states.iter().enumerate().filter_map(|(at, &state)| {

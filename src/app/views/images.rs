@@ -20,6 +20,7 @@ use super::View;
 use super::canvas::PanZoom;
 use super::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext};
+use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
 use crate::problem::Problem;
 
 /// How strong features are drawn while the pointer is on another one.
@@ -155,7 +156,7 @@ fn true_match(
         &progress.query().get(feature)?.pixel(),
         &progress.reference().get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
-        context.run.params.fb.mlesac.inlier_threshold_px,
+        TRUE_MATCH_THRESHOLDS * context.run.params.fb.mlesac.inlier_threshold_px,
     ))
 }
 

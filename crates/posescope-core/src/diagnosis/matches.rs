@@ -13,7 +13,7 @@ use crate::solver::{Correspondence, pose_covariance};
 
 /// A match is true if the keypoint is this many inlier thresholds from where the truth puts it: the
 /// truth and the depths are not exact either.
-const THRESHOLDS: f64 = 2.0;
+pub const TRUE_MATCH_THRESHOLDS: f64 = 2.0;
 
 /// How many reference keypoints with a depth, and true matches of them, were left at each stage of FB.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -108,7 +108,7 @@ impl TrueMatches {
         let query_from_reference = truth.inverse();
         let camera = &subject.problem.query.intrinsics;
         let inlier_px = matching.mlesac.inlier_threshold_px;
-        let threshold_px = THRESHOLDS * inlier_px;
+        let threshold_px = TRUE_MATCH_THRESHOLDS * inlier_px;
         let points = lifted_keypoints(subject, matching, reference);
         let predicted: Vec<Option<Point2<f64>>> = points
             .iter()
@@ -335,7 +335,7 @@ impl Epipolar {
     fn explains(&self, reference: &Point2<f64>, query: &Point2<f64>) -> bool {
         let line = self.fundamental * reference.to_homogeneous();
         let distance = line.dot(&query.to_homogeneous()).abs() / line.x.hypot(line.y);
-        distance <= self.threshold_px / THRESHOLDS
+        distance <= self.threshold_px / TRUE_MATCH_THRESHOLDS
     }
 }
 
