@@ -2,6 +2,8 @@
 
 use super::{Panel, ProofPicture};
 
+/// Half the size of a mark \[px\].
+pub const MARK: f32 = 7.0;
 /// Between two panels \[px\].
 const GAP: f32 = 8.0;
 /// Height of a title \[px\].
@@ -196,4 +198,32 @@ fn column_of(panels: &[Panel], column: Place) -> Vec<Place> {
         places.push(place.below_title().fitted(panel));
     }
     places
+}
+
+/// The upper left end of a box in a corner of a panel that covers no mark; the lower left corner if all do.
+pub fn free_corner(
+    panel: &Place,
+    [width, height]: [f32; 2],
+    marks: impl Iterator<Item = [f32; 2]> + Clone,
+) -> [f32; 2] {
+    const EDGE: f32 = 4.0;
+    let (left, top) = (panel.left + EDGE, panel.top + EDGE);
+    let right = (panel.left + panel.width - EDGE - width).max(left);
+    let bottom = (panel.top + panel.height - EDGE - height).max(top);
+    let corners = [[left, bottom], [right, bottom], [left, top], [right, top]];
+    let room = MARK + 3.0;
+    let is_free = |corner: &&[f32; 2]| {
+        marks.clone().all(|mark| {
+            let [x, y] = [mark[0] - corner[0], mark[1] - corner[1]];
+            x < -room || x > width + room || y < -room || y > height + room
+        })
+    };
+    *corners.iter().find(is_free).unwrap_or(&corners[0])
+}
+
+/// Where the title above a place has to end: before the next place in the same row.
+pub fn title_end(place: &Place, places: &[Place], width: f32) -> f32 {
+    let rows = |other: &&Place| other.left > place.left && (other.top - place.top).abs() < 20.0;
+    let next = places.iter().filter(rows).map(|other| other.left - GAP);
+    next.fold(width, f32::min)
 }

@@ -11,6 +11,7 @@ use vello_cpu::kurbo::{BezPath, Circle, Rect, Shape as _, Stroke};
 use vello_cpu::peniko::{Blob, FontData};
 use vello_cpu::{Glyph, Level, Pixmap, RenderContext, RenderSettings, Resources};
 
+use super::layout::{MARK, free_corner, title_end};
 use super::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
 use crate::palette::{self, Rgb as Color};
 
@@ -21,8 +22,6 @@ const WORDS: Color = [0xE8; 3];
 const FONT_PX: f32 = 13.0;
 /// Height of a line of the sentence \[px\].
 const LINE: f32 = 19.0;
-/// Half the size of a mark \[px\].
-const MARK: f64 = 7.0;
 /// Length of a bar of colours, and the height of its ground \[px\].
 const SCALE_BAR: f32 = 90.0;
 const SCALE_HEIGHT: f32 = 24.0;
@@ -155,19 +154,20 @@ impl Painter {
 
     fn mark(&mut self, mark: &Mark, at: [f32; 2]) {
         let (x, y) = (f64::from(at[0]), f64::from(at[1]));
+        let size = f64::from(MARK);
         let shape = match mark.thing {
-            Thing::Reference => Circle::new((x, y), MARK).to_path(0.1),
+            Thing::Reference => Circle::new((x, y), size).to_path(0.1),
             Thing::Truth => path(&[
-                &[(x - MARK, y), (x + MARK, y)],
-                &[(x, y - MARK), (x, y + MARK)],
+                &[(x - size, y), (x + size, y)],
+                &[(x, y - size), (x, y + size)],
             ]),
             Thing::Result(_) => {
                 let corners = [
-                    (x, y - MARK),
-                    (x + MARK, y),
-                    (x, y + MARK),
-                    (x - MARK, y),
-                    (x, y - MARK),
+                    (x, y - size),
+                    (x + size, y),
+                    (x, y + size),
+                    (x - size, y),
+                    (x, y - size),
                 ];
                 path(&[&corners])
             }
@@ -263,35 +263,6 @@ fn scale_width(scale: &ColorScale) -> f32 {
     width_of(&scale.dark) + width_of(&scale.bright) + SCALE_BAR + 20.0
 }
 
-/// The upper left end of a box in a corner of a panel that covers no mark; the lower left corner if all do.
-pub(super) fn free_corner(
-    panel: &Place,
-    [width, height]: [f32; 2],
-    marks: impl Iterator<Item = [f32; 2]> + Clone,
-) -> [f32; 2] {
-    const EDGE: f32 = 4.0;
-    let (left, top) = (panel.left + EDGE, panel.top + EDGE);
-    let right = (panel.left + panel.width - EDGE - width).max(left);
-    let bottom = (panel.top + panel.height - EDGE - height).max(top);
-    let corners = [[left, bottom], [right, bottom], [left, top], [right, top]];
-    let room = MARK as f32 + 3.0;
-    let is_free = |corner: &&[f32; 2]| {
-        marks.clone().all(|mark| {
-            let [x, y] = [mark[0] - corner[0], mark[1] - corner[1]];
-            x < -room || x > width + room || y < -room || y > height + room
-        })
-    };
-    *corners.iter().find(is_free).unwrap_or(&corners[0])
-}
-
-/// Where the title above a place has to end: before the next place in the same row.
-fn title_end(place: &Place, places: &[Place], width: f32) -> f32 {
-    const GAP: f32 = 8.0;
-    let rows = |other: &&Place| other.left > place.left && (other.top - place.top).abs() < 20.0;
-    let next = places.iter().filter(rows).map(|other| other.left - GAP);
-    next.fold(width, f32::min)
-}
-
 fn path(lines: &[&[(f64, f64)]]) -> BezPath {
     let mut path = BezPath::new();
     for line in lines {
@@ -317,7 +288,7 @@ fn label_place(
     if mark.thing == Thing::Words {
         return [at[0], at[1] + 4.5];
     }
-    let gap = MARK as f32 + 6.0;
+    let gap = MARK + 6.0;
     let right = panel.left + panel.width;
     let x = if at[0] + gap + width + 4.0 < right {
         at[0] + gap

@@ -211,7 +211,7 @@ fn the_scale_covers_no_mark() {
         height: 300.0,
     };
     let corner =
-        |marks: &[[f32; 2]]| raster::free_corner(&panel, [150.0, 24.0], marks.iter().copied());
+        |marks: &[[f32; 2]]| layout::free_corner(&panel, [150.0, 24.0], marks.iter().copied());
     let (lower_left, lower_right) = ([14.0, 292.0], [256.0, 292.0]);
     assert_eq!(corner(&[[200.0, 100.0]]), lower_left);
     assert_eq!(corner(&[[20.0, 290.0]]), lower_right);

@@ -279,3 +279,26 @@ fn the_bar_says_how_many_frames_were_looked_at() {
     }
     assert!(is_told);
 }
+
+#[test]
+fn radius_and_seed_are_changed_beside_the_references_and_start_nothing_as_they_are() {
+    let mut window = finished(setup());
+    let (radius_m, seed) = (3.0, 7);
+    window.get_by_label_contains("References: ").click();
+    window.run_steps(3);
+    for label in ["Radius", "Seed", "Radius"] {
+        window.get_by_label(label).focus();
+        window.run_steps(2);
+    }
+    let state = app(&window);
+    assert_eq!(*state.run_state(), RunState::Finished);
+    assert_eq!(state.setup.task.radius_m(), radius_m);
+    window.get_by_label("Seed").focus();
+    window.step();
+    window.get_by_label("Seed").type_text("9");
+    window.step();
+    window.get_by_label("Radius").focus();
+    window.run_steps(3);
+    let seed_now = app(&window).setup.task.protocol.seed;
+    assert_ne!(seed_now, seed);
+}

@@ -5,13 +5,9 @@ use egui::{Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetIn
 use crate::app::textures::{Textures, color_image};
 use crate::app::theme;
 use crate::palette;
-use crate::proof::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
-
-/// Height of a title, and the least between it and the next one \[points\].
-const TITLE: f32 = 18.0;
-const GAP: f32 = 8.0;
-/// Half the size of a mark \[points\].
-const MARK: f32 = 7.0;
+use crate::proof::{
+    ColorScale, MARK, Mark, Panel, Place, ProofPicture, Thing, free_corner, title_end,
+};
 
 /// Draws a proof into the room there is. The large panel takes the place of a small one that is clicked.
 pub(super) fn ui(
@@ -31,12 +27,7 @@ pub(super) fn ui(
         let response = ui.interact(rect, ui.scope_id().with(("panel", index)), Sense::click());
         let title = panel.title.clone();
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &title));
-        let rects = || places.iter().map(|place| on_screen(area, place));
-        // A title may go on to the next panel to the right.
-        let next = rects().filter(|other| other.left() > rect.right() && title_meets(*other, rect));
-        let end = next
-            .map(|other| other.left() - GAP)
-            .fold(area.right(), f32::min);
+        let end = area.left() + title_end(place, &places, area.width());
         draw(ui, textures, panel, rect, end);
         let first_small = 1 + usize::from(shown.below.is_some());
         if let Some(small) = index.checked_sub(first_small) {
@@ -64,12 +55,6 @@ fn on_screen(area: Rect, place: &Place) -> Rect {
     Rect::from_min_size(corner, vec2(place.width, place.height))
 }
 
-/// Whether the title above a panel is as high as another panel with its own title.
-fn title_meets(other: Rect, rect: Rect) -> bool {
-    let title = rect.top() - TITLE..=rect.top();
-    other.top() - TITLE <= *title.end() && *title.start() <= other.bottom()
-}
-
 fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32) {
     let words = ui.visuals().text_color();
     let title = pos2(rect.left(), rect.top() - 3.0);
@@ -94,14 +79,10 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
     for mark in &panel.marks {
         draw_mark(&painter, mark.thing, at(mark.at));
     }
-    labels(
-        &painter,
-        panel.marks.iter().map(|mark| (mark, at(mark.at))),
-        rect,
-    );
-    if let Some(scale) = &panel.scale {
-        color_scale(&painter, scale, rect);
-    }
+    let marks = || panel.marks.iter().map(|mark| (mark, at(mark.at)));
+    let scale = panel.scale.as_ref();
+    let taken = scale.map(|scale| color_scale(&painter, scale, rect, marks().map(|(_, at)| at)));
+    labels(&painter, marks(), rect, taken);
 }
 
 /// Draws a mark in its shape and colour, with a dark edge.
@@ -137,9 +118,14 @@ pub(in crate::app) fn draw_mark(painter: &egui::Painter, thing: Thing, at: Pos2)
 }
 
 /// Labels beside their marks, inside the panel, none upon another.
-fn labels<'a>(painter: &egui::Painter, marks: impl Iterator<Item = (&'a Mark, Pos2)>, panel: Rect) {
+fn labels<'a>(
+    painter: &egui::Painter,
+    marks: impl Iterator<Item = (&'a Mark, Pos2)>,
+    panel: Rect,
+    taken: Option<Rect>,
+) {
     const GAP: f32 = MARK + 6.0;
-    let mut taken: Vec<Rect> = Vec::new();
+    let mut taken: Vec<Rect> = taken.into_iter().collect();
     for (mark, at) in marks.filter(|(mark, _)| !mark.label.is_empty()) {
         let galley = painter.layout_no_wrap(mark.label.clone(), theme::caption(), Color32::WHITE);
         let size = galley.size();
@@ -178,20 +164,30 @@ fn labels<'a>(painter: &egui::Painter, marks: impl Iterator<Item = (&'a Mark, Po
     }
 }
 
-/// What the colours mean, in the lower left corner.
-fn color_scale(painter: &egui::Painter, scale: &ColorScale, panel: Rect) {
+/// What the colours mean, in a corner without a mark. Where it is.
+fn color_scale(
+    painter: &egui::Painter,
+    scale: &ColorScale,
+    panel: Rect,
+    marks: impl Iterator<Item = Pos2> + Clone,
+) -> Rect {
     const BAR: egui::Vec2 = vec2(90.0, 12.0);
     const STEPS: usize = 45;
     let galley =
         |words: &str| painter.layout_no_wrap(words.to_owned(), theme::caption(), Color32::WHITE);
     let (dark, bright) = (galley(&scale.dark), galley(&scale.bright));
     let width = dark.size().x + bright.size().x + BAR.x + 20.0;
-    let corner = pos2(panel.left() + 4.0, panel.bottom() - 22.0);
-    painter.rect_filled(
-        Rect::from_min_size(corner, vec2(width, 18.0)),
-        2.0,
-        Color32::from_black_alpha(190),
-    );
+    let size = vec2(width, 18.0);
+    let place = Place {
+        left: panel.left(),
+        top: panel.top(),
+        width: panel.width(),
+        height: panel.height(),
+    };
+    let [left, top] = free_corner(&place, size.into(), marks.map(|at| [at.x, at.y]));
+    let corner = pos2(left, top);
+    let ground = Rect::from_min_size(corner, size);
+    painter.rect_filled(ground, 2.0, Color32::from_black_alpha(190));
     let start = corner + vec2(dark.size().x + 10.0, 3.0);
     for step in 0..STEPS {
         let color = theme::rgb(palette::viridis((step as f64 + 0.5) / STEPS as f64));
@@ -205,6 +201,7 @@ fn color_scale(painter: &egui::Painter, scale: &ColorScale, panel: Rect) {
     let after = start + vec2(BAR.x + 5.0, -1.0);
     painter.galley(corner + vec2(5.0, 2.0), dark, Color32::WHITE);
     painter.galley(after, bright, Color32::WHITE);
+    ground
 }
 
 /// Words in one line that ends with an ellipsis where they do not fit.

@@ -14,6 +14,7 @@ use crate::app::theme;
 use crate::diagnosis::{Confidence, confidence};
 use crate::localize::QueryResult;
 use crate::session::{Part, RunState, Span};
+use crate::text::first_sentence;
 
 /// Width of a cell, of one among more than four, and of the button \[points\].
 const CELL: f32 = 128.0;
@@ -206,11 +207,9 @@ fn sentence(
 
 /// The first sentence, and the others; without the marks of code, which a page would show.
 pub(in crate::app) fn split(text: &str) -> (String, String) {
-    let text = &text.replace('`', "");
-    match text.split_once(". ") {
-        Some((first, others)) => (format!("{first}."), others.to_owned()),
-        None => (text.to_owned(), String::new()),
-    }
+    let text = text.replace('`', "");
+    let (first, others) = first_sentence(&text);
+    (first.to_owned(), others.to_owned())
 }
 
 /// `Try WORDS NUMBER` in a width: the words end with an ellipsis where they do not fit, the number never does.

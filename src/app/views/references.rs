@@ -32,6 +32,7 @@ impl View for ReferencesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ui.horizontal_wrapped(|ui| choice(ui, context));
         ui.horizontal_wrapped(|ui| fusions(ui, context));
+        ui.horizontal(|ui| numbers(ui, context));
         ui.separator();
         let setup = context.setup;
         let radius_m = setup.task.reach_m();
@@ -86,6 +87,28 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
             let pick = ReferencePick::By(selection.with_count(wanted));
             context.send(Command::PickReferences(pick));
         }
+    }
+}
+
+/// The radius around a query in which references may lie, and the seed of all random choices.
+fn numbers(ui: &mut Ui, context: &ViewContext<'_>) {
+    let (radius_m, seed) = (
+        context.setup.task.radius_m(),
+        context.setup.task.protocol.seed,
+    );
+    let is_done = |response: &egui::Response| response.drag_stopped() || response.lost_focus();
+    let mut wanted = radius_m;
+    let label = ui.label("Radius");
+    let drag = DragValue::new(&mut wanted).range(1.0..=500.0).suffix(" m");
+    let response = ui.add(drag.update_while_editing(false));
+    if is_done(&response.labelled_by(label.id)) && wanted != radius_m {
+        context.send(Command::SetRadius(wanted));
+    }
+    let mut wanted = seed;
+    let label = ui.label("Seed");
+    let drag = DragValue::new(&mut wanted).update_while_editing(false);
+    if is_done(&ui.add(drag).labelled_by(label.id)) && wanted != seed {
+        context.send(Command::SetSeed(wanted));
     }
 }
 
