@@ -1,6 +1,7 @@
 //! Where the parts of the window are: at every size nothing overlaps or wraps, and the canvas has the room.
 
 use egui::Rect;
+use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Command, Setup};
@@ -70,6 +71,19 @@ fn the_canvas_has_the_room_and_the_toolbar_is_one_line_at_every_size() {
         assert!(
             own >= share,
             "{size:?}: the canvas has {own:.3} of the window"
+        );
+        // The proof fills the canvas in one direction, but for its margins and titles.
+        let pictures = window
+            .query_all_by_role(Role::Image)
+            .map(|node| node.rect());
+        let inside = pictures.filter(|rect| canvas.contains_rect(*rect));
+        let filled = inside
+            .fold(Rect::NOTHING, |all, rect| all.union(rect))
+            .size()
+            / canvas.size();
+        assert!(
+            filled.max_elem() > 0.9,
+            "{size:?}: the pictures fill {filled:?} of {canvas:?}"
         );
         let buttons = TOOLBAR.map(|label| (label, rect(&window, label)));
         for ((left, a), (right, b)) in buttons.iter().zip(&buttons[1..]) {

@@ -150,6 +150,37 @@ fn evidence(ui: &mut Ui, found: &Diagnosis) {
         });
 }
 
+/// Fields of evidence whose key says too little, as people read them.
+const NAMES: &[(&str, &str)] = &[
+    ("after", "Of them with a true match"),
+    ("before", "Keypoints that are visible"),
+    ("chance_deviation", "Spread of chance"),
+    ("chance_level", "Cost of shuffled pixels"),
+    ("deviation", "Contrast of the costs"),
+    ("deviations", "Below chance by spreads"),
+    ("explained", "Matches explained as stated"),
+    ("explained_otherwise", "Matches explained otherwise"),
+    ("first_distance_m", "Distance of the first"),
+    ("gain_at_result", "Gain over chance, result"),
+    ("gain_at_truth", "Gain over chance, truth"),
+    ("is_turned", "Turned too far"),
+    ("lost_at", "Most are lost at"),
+    ("lost_in", "Lost in the phase"),
+    ("margin", "Cost above the best cell"),
+    ("missing", "True matches without depth"),
+    ("not_asked", "Method that was not run"),
+    ("overlap", "Share of the cloud in view"),
+    ("passed_over", "Method that was passed over"),
+    ("query", "Keypoints in the query"),
+    ("rank", "Rank of the right cell"),
+    ("ranked", "Frames that were ranked"),
+    ("right", "True matches, right depth"),
+    ("share_of_reference", "Coverage, of the reference's"),
+    ("supports_truth", "Matches that fit the truth"),
+    ("taken", "References that were used"),
+    ("wrong", "True matches, wrong depth"),
+];
+
 /// A field of evidence as people read it: its name, and the unit behind its value.
 fn readable(key: &str) -> (String, &'static str) {
     let units = [("_m", " m"), ("_deg", "°"), ("_px", " px")];
@@ -157,7 +188,12 @@ fn readable(key: &str) -> (String, &'static str) {
         .into_iter()
         .find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, unit)));
     let (name, unit) = found.unwrap_or((key, ""));
-    (capital(&name.replace('_', " ")), unit)
+    let known = NAMES.iter().find(|(known, _)| *known == key);
+    let name = known.map_or_else(
+        || capital(&name.replace('_', " ")),
+        |(_, name)| (*name).to_owned(),
+    );
+    (name, unit)
 }
 
 /// With a capital letter first.
