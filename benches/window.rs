@@ -284,8 +284,9 @@ fn filter_10000_results(bencher: Bencher) {
 fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
     with_window(|window| {
         let mut batch = ManyResults::write(window).open(window);
-        let name = app::views::find(view).expect("a view");
-        batch.state_mut().send(Command::Maximize(Some(name)));
+        let mut entries = app::views::ALL.iter();
+        let entry = entries.find(|entry| entry.name == view).expect("a view");
+        batch.state_mut().send(Command::Maximize(Some(entry.name)));
         batch.run_steps(3);
         bencher.bench_local(|| draw_own(&mut batch));
     });

@@ -86,8 +86,6 @@ pub struct App {
     title: String,
     /// Where the canvas is \[points\].
     canvas: egui::Rect,
-    /// Whether a view that is alone is drawn without a way back, for a picture.
-    is_bare: bool,
 }
 
 impl App {
@@ -110,7 +108,6 @@ impl App {
             lesson: None,
             title: String::new(),
             canvas: egui::Rect::NOTHING,
-            is_bare: false,
         }
     }
 
@@ -166,16 +163,8 @@ impl App {
     /// Draws the window.
     fn content(&mut self, ui: &mut egui::Ui) {
         self.read_keys(ui.ctx());
-        if self.state.options.is_alone && self.is_bare {
-            let view = self.state.options.alone;
-            egui::CentralPanel::default().show(ui, |ui| match view {
-                Some(view) => self.panes.show(ui, view, &self.state, &self.commands),
-                None => frame::canvas::ui(ui, &self.state, &self.commands, &mut self.panes, 9),
-            });
-        } else {
-            self.frame(ui);
-            self.above(ui.ctx());
-        }
+        self.frame(ui);
+        self.above(ui.ctx());
         self.state.textures.end_frame();
         for command in self.commands.take() {
             self.dispatch(command, ui.ctx());

@@ -1,4 +1,4 @@
-//! A picture of the window, or of one view, without a window.
+//! A picture of the window, without a window.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,23 +6,18 @@ use std::time::Duration;
 
 use image::RgbImage;
 
-use super::arrangement::Arrangement;
+use super::App;
 use super::command::Command;
 use super::headless::Painter;
 use super::selection::KnownResults;
 use super::setup::Setup;
 use super::window::WindowError;
-use super::{App, views};
 use crate::method::Method;
 use crate::session::{Part, RunState};
 
 /// What is to be in the picture.
 #[derive(Clone, Debug)]
 pub struct Shot {
-    /// The view that is painted alone; `None` for the whole window.
-    pub view: Option<String>,
-    /// What the window is arranged for.
-    pub arrangement: Arrangement,
     /// The moment of the run.
     pub moment: Moment,
     /// Size of the picture \[px\].
@@ -79,7 +74,7 @@ pub enum ShotError {
     /// The run ended early.
     #[error("{0}")]
     Broken(String),
-    /// The run has no such moment, or the view is none.
+    /// The run has no such moment.
     #[error("{0}")]
     Unknown(String),
     /// The adapter failed.
@@ -90,15 +85,11 @@ pub enum ShotError {
 /// Runs what is set up to its end and paints the window.
 ///
 /// # Errors
-/// [`ShotError`] where there is no such view or moment, nothing to draw with, or bad data.
+/// [`ShotError`] where there is no such moment, nothing to draw with, or bad data.
 pub fn shoot(setup: Setup, results: KnownResults, shot: &Shot) -> Result<RgbImage, ShotError> {
-    let view = match &shot.view {
-        Some(name) => Some(views::find(name).map_err(ShotError::Unknown)?),
-        None => None,
-    };
     let painter = Painter::new(shot.size_px)?;
     let mut window = Window::new(setup, results, shot, &painter);
-    let output = window.shown(view)?;
+    let output = window.shown()?;
     painter.paint(&window.ctx, output).map_err(ShotError::Paint)
 }
 
@@ -118,8 +109,7 @@ impl<'a> Window<'a> {
     fn new(setup: Setup, results: KnownResults, shot: &'a Shot, painter: &'a Painter) -> Self {
         let ctx = egui::Context::default();
         ctx.set_theme(shot.theme);
-        let mut app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
-        app.is_bare = true;
+        let app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
         // Nothing moves in a picture.
         ctx.all_styles_mut(|style| style.animation_time = 0.0);
         Self {
@@ -131,15 +121,10 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// The frame that was asked for, with a view alone in it or the whole window.
-    fn shown(&mut self, view: Option<&'static str>) -> Result<egui::FullOutput, ShotError> {
-        let shot = self.shot;
+    /// The frame that was asked for.
+    fn shown(&mut self) -> Result<egui::FullOutput, ShotError> {
         self.run_to_end()?;
-        self.app.send(Command::Arrange(shot.arrangement));
-        self.go_to(shot.moment)?;
-        if view.is_some() {
-            self.app.send(Command::Maximize(view));
-        }
+        self.go_to(self.shot.moment)?;
         Ok(self.settled())
     }
 

@@ -28,7 +28,6 @@ mod synthetic;
 use eframe::egui_wgpu::RenderState;
 
 use super::view_context::ViewContext;
-use crate::text::UnknownWord;
 
 /// A part of the window.
 pub trait View {
@@ -57,17 +56,6 @@ pub(super) const PARAMETERS: &str = "parameters";
 pub(super) fn name_of(name: &str) -> Option<&'static str> {
     let mut names = ALL.iter().map(|entry| entry.name);
     names.find(|known| *known == name)
-}
-
-/// The view of a name.
-///
-/// # Errors
-/// A line with the names that there are.
-pub fn find(name: &str) -> Result<&'static str, String> {
-    name_of(name).ok_or_else(|| {
-        let known = ALL.iter().map(|entry| entry.name);
-        UnknownWord::among(name, "view", known).to_string()
-    })
 }
 
 /// Every view, in the order of the menu.

@@ -14,8 +14,6 @@ pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<()
     let (setup, results) = view::setup(args, RunMode::Running)?;
     let options = &args.screenshot;
     let shot = Shot {
-        view: options.view.clone(),
-        arrangement: options.layout,
         moment: options.at,
         size_px: options.window,
         scale: options.scale,

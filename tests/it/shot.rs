@@ -28,32 +28,30 @@ fn colours(path: &Path) -> usize {
 }
 
 #[test]
-fn a_view_is_painted_without_a_window() {
+fn the_window_is_painted_without_a_display() {
     let sequence = SmallSequence::write();
-    let path = sequence.path().join("pictures/surface.png");
-    let surface = "pictures/surface.png --view surface --at mi --window 640x400";
-    let said = shot(&sequence, surface);
+    let path = sequence.path().join("pictures/window.png");
+    let asked = "pictures/window.png --at mi --window 900x600";
+    let said = shot(&sequence, asked);
     if is_skipped(&said) {
         return;
     }
     said.ok();
     let picture = image::open(&path).expect("a picture").into_rgb8();
-    assert_eq!(picture.dimensions(), (640, 400));
+    assert_eq!(picture.dimensions(), (900, 600));
     assert!(colours(&path) > 100, "the map has many colours");
 
     // The same again is the same picture; on a light ground it is another one.
     let first = std::fs::read(&path).expect("readable");
-    shot(&sequence, surface).ok();
+    shot(&sequence, asked).ok();
     assert!(std::fs::read(&path).expect("readable") == first);
-    shot(&sequence, &format!("{surface} --light")).ok();
+    shot(&sequence, &format!("{asked} --light")).ok();
     assert!(std::fs::read(&path).expect("readable") != first);
 }
 
 #[test]
 fn what_is_not_there_is_said_in_one_line() {
     let sequence = SmallSequence::write();
-    let said = shot(&sequence, "x.png --view surfaces");
-    assert_eq!(said.code, Some(2), "{}", said.err);
     shot(&sequence, "x.png --window 10x10").fails_with(2, "64 to 8192");
     let said = shot(&sequence, "x.png --at pm");
     if is_skipped(&said) {

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
-use posescope::app::{Arrangement, Moment, views};
+use posescope::app::Moment;
 
 /// Saves a picture of the window instead of opening it.
 #[derive(Debug, Args)]
@@ -47,30 +46,6 @@ pub struct ScreenshotArgs {
     #[arg(long, requires = "screenshot")]
     #[arg(hide_short_help = true)]
     pub light: bool,
-    /// One view of the window, without the bars around it
-    #[arg(
-        long,
-        requires = "screenshot",
-        value_parser = PossibleValuesParser::new(views::ALL.iter().map(|entry| entry.name))
-    )]
-    #[arg(hide = true)]
-    pub view: Option<String>,
-    /// The arrangement of the window
-    #[arg(
-        long,
-        hide = true,
-        requires = "screenshot",
-        default_value = "inspect",
-        value_parser = PossibleValuesParser::new(["inspect", "lecture", "batch"])
-            .try_map(|name: String| arrangement(&name).ok_or("a layout expected"))
-    )]
-    pub layout: Arrangement,
-}
-
-fn arrangement(name: &str) -> Option<Arrangement> {
-    let mut all = Arrangement::ALL.into_iter();
-    all.find(|(_, title, _)| title.eq_ignore_ascii_case(name))
-        .map(|(arrangement, ..)| arrangement)
 }
 
 /// The smallest and the largest side of a picture \[px\].
