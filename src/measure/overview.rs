@@ -107,16 +107,23 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
             "{name} gives a pose for {good} of {total} {queries}. The truth is not known."
         );
     }
-    let mut words = format!("{name} is right for {good} of {total} {queries}.");
+    let mut words = match good {
+        0 if total == 1 => "No method is right for the query.".to_owned(),
+        0 => format!("No method is right for any of {total} {queries}."),
+        _ => format!("{name} is right for {good} of {total} {queries}."),
+    };
+    // Where none is right, all failures count.
+    let is_counted = |result: &QueryResult| good == 0 || label(result) == *name;
+    let whose = if good == 0 { "the" } else { "its" };
     let failed: Vec<&&QueryResult> = results
         .iter()
-        .filter(|result| label(result) == *name && result.grade.is_failure())
+        .filter(|result| is_counted(result) && result.grade.is_failure())
         .collect();
     let mut causes = Vec::new();
     failed.iter().for_each(|result| count(&mut causes, result));
     if let Some((code, times)) = causes.iter().rev().max_by_key(|(_, times)| *times) {
         words += &format!(
-            " Most frequent cause of its failures: {} ({times} of {}).",
+            " Most frequent cause of {whose} failures: {} ({times} of {}).",
             code.title(),
             failed.len()
         );
@@ -170,6 +177,10 @@ mod tests {
             .collect();
         assert_eq!(counts, [("FB", 1, 2), ("MI", 2, 3)]);
         assert_eq!(overview.causes, [(Code::D3, 1)]);
+        let wrong = Overview::of(&[&rows[3], &rows[1]]);
+        let title = Code::D3.title();
+        let words = "No method is right for the query. Most frequent cause of the failures:";
+        assert_eq!(wrong.headline, format!("{words} {title} (1 of 2)."));
         assert_eq!(Overview::of(&[]).headline, "There are no results yet.");
     }
 }
