@@ -15,7 +15,7 @@ use posescope::app::{self, App, Arrangement, Command, KnownResults, Results, Set
 use posescope::cloud::Cloud;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
-use posescope::run::{QueryCamera, ScenePair};
+use posescope::run::ScenePair;
 use posescope::scene::{self, Scene, SceneError};
 use posescope::session::{RunMode, RunState, Task};
 
@@ -205,14 +205,7 @@ impl ManyResults {
             scene_index: 0,
             scene: scene.name().to_owned(),
             query_scene: scene.name().to_owned(),
-            camera: QueryCamera {
-                width: camera.width,
-                height: camera.height,
-                fx: camera.fx,
-                fy: camera.fy,
-                cx: camera.cx,
-                cy: camera.cy,
-            },
+            camera: camera.into(),
             cameras: Vec::new(),
             drawn: Vec::new(),
             queries: Vec::new(),

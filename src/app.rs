@@ -12,6 +12,7 @@ mod action;
 mod adapter;
 mod arrangement;
 mod camera;
+mod changes;
 mod command;
 mod deciding;
 mod dispatch;

@@ -232,7 +232,7 @@ mod tests {
                 }
             }
         }
-        // Black and white are told apart by everyone.
+        // White has the lightness 100 by definition.
         assert!((lab([255; 3], None)[0] - 100.0).abs() < 0.01);
     }
 }

@@ -3,7 +3,7 @@
 use egui::{Align, Button, Layout, RichText, Ui};
 
 use super::command::{Command, Queue};
-use super::frame::storyboard::{part_name, stages_of};
+use super::frame::storyboard::part_name;
 use super::state::AppState;
 use super::theme;
 use crate::event::Stage;
@@ -22,7 +22,7 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let (run, cursor) = (state.shown_run(), state.shown_cursor());
     ui.horizontal_centered(|ui| {
         let span = state.shown_span();
-        let stages = span.map_or(Vec::new(), |span| stages_of(state, span));
+        let stages = span.map_or(Vec::new(), |span| state.stages_of(span));
         let place = stages.iter().position(|bar| bar.records.contains(&cursor));
         let size = egui::vec2(COUNT, ui.available_height());
         ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {

@@ -160,8 +160,10 @@ impl<'a> Window<'a> {
             Moment::Method(method) => {
                 let asked = &self.app.app_state().setup.task.protocol.methods;
                 if !asked.contains(&method) {
+                    let names: Vec<_> = asked.iter().map(|one| one.name()).collect();
                     return Err(ShotError::Unknown(format!(
-                        "{method} is not among the methods that are run; add it to --method"
+                        "{method}: `end`, a step or a method of this run ({}) expected; add it to --method",
+                        names.join(", ")
                     )));
                 }
                 let part = self.app.state.deciding_span(method).map(|span| span.part);

@@ -1,5 +1,7 @@
 //! The application's state: the run, the cursor in it, the camera in hand, what is switched on.
 
+mod shown;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,16 +17,13 @@ use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
 use crate::diagnosis::Grade;
-use crate::event::Stage;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
-use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::params::Params;
-use crate::proof::ProofPicture;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
-use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span, StageBar};
+use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
 
 /// Something to tell the person at the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -350,139 +349,6 @@ impl AppState {
             }
             (None, None) => {}
         }
-    }
-
-    /// Whether a part came to something that needs an explanation.
-    pub(super) fn needs_why(&self, part: Part) -> bool {
-        let span = self
-            .shown_run()
-            .span_of(part)
-            .filter(|span| self.has_come(span));
-        let result = span.and_then(|span| self.shown_result(span));
-        result.is_some_and(|result| result.grade != Grade::Right)
-    }
-
-    /// Whether the run A is shown.
-    pub(super) fn is_showing_kept(&self) -> bool {
-        self.kept.is_some() && self.options.compare_mode == CompareMode::Kept
-    }
-
-    /// The run that is shown: the present one, or A.
-    pub(super) fn shown_run(&self) -> &Run {
-        match &self.kept {
-            Some(kept) if self.is_showing_kept() => &kept.run,
-            _ => self.run(),
-        }
-    }
-
-    /// The cursor in the run that is shown.
-    pub(super) fn shown_cursor(&self) -> usize {
-        match self.kept_cursor() {
-            Some(cursor) if self.is_showing_kept() => cursor,
-            _ => self.cursor(),
-        }
-    }
-
-    /// The part of the run that is shown at the cursor.
-    pub(super) fn shown_span(&self) -> Option<&Span> {
-        self.shown_run().span_at(self.shown_cursor())
-    }
-
-    /// The stage at the cursor that chooses what the canvas shows.
-    pub(super) fn shown_stage(&self) -> Option<Stage> {
-        let (run, cursor) = (self.shown_run(), self.shown_cursor());
-        let here = run.stages_at(cursor).last()?;
-        let Stage::Estimator(_) = here.stage else {
-            return Some(here.stage);
-        };
-        // Between the stages of a method its latest one is shown, at its end the one that gave the result.
-        let inside = |bar: &&StageBar| {
-            here.records.start <= bar.records.start && bar.records.start <= cursor
-        };
-        let mut inside = run.stages().iter().filter(inside).rev();
-        let latest = inside.find(|bar| !matches!(bar.stage, Stage::Estimator(_)));
-        latest.or(Some(here)).map(|bar| bar.stage)
-    }
-
-    /// The part that a method is judged by: its fused pose, else that of the selected reference, else its last.
-    pub(super) fn deciding_span(&self, method: Method) -> Option<&Span> {
-        let run = self.shown_run();
-        let reference = run.reference_at(self.shown_cursor());
-        let own = || {
-            let spans = run.spans().iter().filter(|span| self.has_come(span));
-            spans.filter(move |span| span.part.method() == Some(method) && span.result.is_some())
-        };
-        let fused = own().rfind(|span| span.part == Part::Fusion(method));
-        let here = || own().find(|span| span.part == Part::Reference(method, reference));
-        fused.or_else(here).or_else(|| own().next_back())
-    }
-
-    /// The result of a part with nothing in it that is hidden.
-    pub(super) fn shown_result(&self, span: &Span) -> Option<QueryResult> {
-        Some(span.result.as_ref()?.shown(self.options.shows_truth))
-    }
-
-    /// What an earlier run found for the method of a part, with nothing in it that is hidden.
-    pub(super) fn known_result(&self, part: Part) -> Option<QueryResult> {
-        let known = self.results.get(&self.setup.query)?;
-        let result = known
-            .iter()
-            .rfind(|result| Some(result.method) == part.method())?;
-        Some(result.shown(self.options.shows_truth))
-    }
-
-    /// The same result in the other run, with nothing in it that is hidden.
-    pub(super) fn other_result(&self, result: &QueryResult) -> Option<QueryResult> {
-        let kept = self.kept.as_ref()?;
-        let other = if self.is_showing_kept() {
-            self.run()
-        } else {
-            &kept.run
-        };
-        let is_same = |other: &&QueryResult| {
-            other.method == result.method
-                && other.fusion == result.fusion
-                && other.references == result.references
-        };
-        let found = other.results().find(is_same)?;
-        Some(found.shown(self.options.shows_truth))
-    }
-
-    /// Whether a record is known at the cursor: in a lecture what comes later is not.
-    pub(super) fn has_begun(&self, record: usize) -> bool {
-        !self.options.hides_future || record <= self.shown_cursor()
-    }
-
-    /// Whether a page of a lesson chooses what the canvas shows.
-    pub(super) fn is_presenting(&self) -> bool {
-        self.options.presented.is_some()
-    }
-
-    fn shown_pictures(&self) -> &RunPictures {
-        match &self.kept {
-            Some(kept) if self.is_showing_kept() => &kept.pictures,
-            _ => &self.pictures,
-        }
-    }
-
-    /// The small picture of a stage of the run that is shown, once it is made.
-    pub(super) fn thumbnail(
-        &self,
-        part: &std::ops::Range<usize>,
-        stage: &std::ops::Range<usize>,
-    ) -> Option<egui::TextureHandle> {
-        self.shown_pictures()
-            .thumbnail(self.shown_run(), part, stage)
-    }
-
-    /// The picture that proves the result of a part, once it is made.
-    pub(super) fn proof(&self, part: Part) -> Option<&Arc<ProofPicture>> {
-        self.shown_pictures().proof(part)
-    }
-
-    /// Whether proofs are still being made.
-    pub(super) fn is_proving(&self) -> bool {
-        self.shown_pictures().is_proving() || self.session.is_alive()
     }
 
     fn on_run_end(&mut self) {

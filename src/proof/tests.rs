@@ -61,7 +61,7 @@ fn neighbours(method: Method) -> (Kept, QueryResult) {
     localized(["street"; 2], ["000001", "000000"], 5.0, method)
 }
 
-/// Saves the picture for a look at it, if somebody names a folder.
+/// Saves the picture as a PNG in the folder that `POSESCOPE_PAINT` names.
 fn paint(name: &str, picture: &ProofPicture) {
     if let Some(folder) = std::env::var_os("POSESCOPE_PAINT") {
         let path = std::path::Path::new(&folder).join(format!("{name}.png"));

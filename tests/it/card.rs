@@ -63,6 +63,22 @@ fn a_run_that_ends_opens_at_the_cause() {
     assert_eq!(span.part, Part::Reference(Method::FB, 0));
     let right = finished(setup());
     assert!(!app(&right).options.shows_why);
+
+    // A method that is right is passed over.
+    let mut second = setup();
+    second.task.protocol.methods = vec![Method::FB, Method::MI];
+    second.task.protocol.right = "0.4m,5deg".parse().expect("a tolerance");
+    for assignment in ["grid.coarse_step=3", "grid.fine_range=0.2"] {
+        second.task.params.assign(assignment).expect("a parameter");
+    }
+    let second = finished(second);
+    let grades = results(&second);
+    let grades: Vec<Grade> = grades.iter().map(|result| result.grade).collect();
+    assert_eq!(grades, [Grade::Right, Grade::Wrong]);
+    let state = app(&second);
+    assert!(state.options.shows_why);
+    let span = state.run().span_at(state.cursor()).expect("a part");
+    assert_eq!(span.part, Part::Reference(Method::MI, 0));
 }
 
 #[test]

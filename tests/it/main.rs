@@ -52,6 +52,7 @@ mod shot;
 mod small_sequence;
 mod space;
 mod stored;
+mod storyboard;
 mod sweep;
 mod synth;
 mod tour;

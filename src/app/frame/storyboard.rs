@@ -80,27 +80,9 @@ fn rows(state: &AppState) -> Vec<Row<'_>> {
     parts
         .map(|part| {
             let span = run.span_of(part);
-            let stages = span.map_or(Vec::new(), |span| stages_of(state, span));
+            let stages = span.map_or(Vec::new(), |span| state.stages_of(span));
             Row { part, span, stages }
         })
-        .collect()
-}
-
-/// The stages right below a part of the run, those only that are known at the cursor.
-pub(in crate::app) fn stages_of<'a>(state: &'a AppState, span: &Span) -> Vec<&'a StageBar> {
-    let run = state.shown_run();
-    let inside = |bar: &&StageBar| {
-        span.records.contains(&bar.records.start) && state.has_begun(bar.records.start)
-    };
-    let inside: Vec<&StageBar> = run.stages().iter().filter(inside).collect();
-    // Choosing and fusing are stages themselves.
-    let depth = match span.part {
-        Part::Reference(..) => 2,
-        Part::Retrieval | Part::Fusion(_) => 1,
-    };
-    inside
-        .into_iter()
-        .filter(|bar| bar.depth == depth)
         .collect()
 }
 
@@ -373,7 +355,7 @@ fn scrub(ui: &mut Ui, state: &AppState, commands: &Queue) {
     ui.horizontal_centered(|ui| {
         let span = state.shown_span();
         let method = span.and_then(|span| span.part.method());
-        let stages = span.map_or(Vec::new(), |span| stages_of(state, span));
+        let stages = span.map_or(Vec::new(), |span| state.stages_of(span));
         let bar = stages.into_iter().find(|bar| bar.records.contains(&cursor));
         let title = match (span, bar) {
             (Some(span), Some(bar)) => {

@@ -492,3 +492,41 @@ impl QueryResult {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn with_the_truth_hidden_nothing_is_left_that_needs_it() {
+        let error = json!({"translation_m": 12.5, "rotation_deg": 1.0, "max_euler_deg": 1.0});
+        let finding = |code: &str| json!({"code": code, "text": "A sentence.", "evidence": {}});
+        let result = json!({
+            "schema": SCHEMA, "scene": "street", "query": "000070", "references": ["000062"],
+            "method": "mi", "seed": 0, "status": "ok", "grade": "wrong",
+            "error": error, "initial_error": error,
+            "costs_at_pose": [{"method": "mi", "cost": 0.9, "coverage": 0.1, "truth": 0.8}],
+            "diagnosis": [finding("D2"), finding("D1"), finding("L1")],
+            "explanation": {"helped": [], "runs": 3, "complete": true}
+        });
+        let alone: QueryResult = serde_json::from_value(result).expect("a result");
+        let fused = QueryResult {
+            per_reference: Some(vec![alone.clone()]),
+            ..alone
+        };
+        assert_eq!(fused.shown(true), fused);
+        let hidden = fused.shown(false);
+        let inside = hidden.per_reference.as_ref().expect("kept")[0].clone();
+        for shown in [&hidden, &inside] {
+            assert_eq!(shown.grade, Grade::Unmeasured);
+            assert_eq!((shown.error, shown.initial_error), (None, None));
+            assert_eq!(shown.explanation, None);
+            assert_eq!(shown.costs_at_pose[0].truth, None);
+            assert_eq!(shown.costs_at_pose[0].cost, Some(0.9));
+            let codes: Vec<Code> = shown.diagnosis.iter().map(|one| one.code).collect();
+            assert_eq!(codes, [Code::D1, Code::L1]);
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! How commands change the state: the run, the cursor, the query, its references, the camera.
+
+use super::camera::NamedPose;
+use super::deciding::deciding;
+use super::navigation::Navigation;
+use super::queries::Queries;
+use super::run_pictures::RunPictures;
+use super::setup::ReferencePick;
+use super::state::{AppState, KeptRun};
+use super::view_options::Tab;
+use crate::event::PhaseSearched;
+use crate::geometry::Pose;
+use crate::grid::Phase;
+use crate::image::Degradation;
+use crate::localize::References;
+use crate::method::Method;
+use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
+
+impl AppState {
+    /// Goes on from where the run stands.
+    pub(super) fn resume(&mut self, mode: RunMode) {
+        if !self.session.is_alive() {
+            self.note("The run is over; restart it (Shift+F5)", false);
+            return;
+        }
+        self.navigation.follow();
+        self.session.set_mode(mode);
+    }
+
+    pub(super) fn forward(&mut self, steps: usize) {
+        let last = self.run().len().saturating_sub(1);
+        if self.cursor() < last {
+            self.move_cursor(self.cursor() + steps);
+        } else if matches!(self.run_state(), RunState::Paused { .. }) {
+            self.resume(RunMode::StepInto);
+        }
+    }
+
+    /// Moves all methods by that many of their steps, once lock-step is on.
+    pub(super) fn go_together(&mut self, steps: isize) {
+        // Without it the keys would hide the card and the estimates, and nothing would say why.
+        let Some(here) = self.options.lockstep else {
+            return;
+        };
+        let longest = self.run().spans().iter().map(|span| span.records.len());
+        let last = longest.max().unwrap_or(0).saturating_sub(1);
+        let here = here.min(last);
+        self.options.lockstep = Some(here.saturating_add_signed(steps).min(last));
+    }
+
+    pub(super) fn move_cursor(&mut self, cursor: usize) {
+        self.options.shows_why = false;
+        // The user looks elsewhere by now.
+        self.opens_at_cause = false;
+        self.navigation.move_to(cursor, self.session.run());
+    }
+
+    /// Goes to the end of the next stage of the selected part, or of the one before; after the last stage comes
+    /// why the result is what it is.
+    pub(super) fn next_stage(&mut self, back: bool) {
+        let Some(span) = self.shown_span() else {
+            return;
+        };
+        let (part, cursor) = (span.part, self.shown_cursor());
+        let ends: Vec<usize> = self
+            .stages_of(span)
+            .iter()
+            .map(|bar| bar.records.end - 1)
+            .collect();
+        let next = if back {
+            let before = ends.iter().rev().find(|end| **end < cursor).copied();
+            // From the picture of the cause to the last stage.
+            ends.last()
+                .copied()
+                .filter(|_| self.options.shows_why)
+                .or(before)
+        } else {
+            ends.into_iter().find(|end| *end > cursor)
+        };
+        match next {
+            Some(end) => self.move_cursor(end),
+            None if !back && self.options.hides_future => self.forward(1),
+            None if !back && self.needs_why(part) => self.show_part(part, true),
+            None => {}
+        }
+    }
+
+    /// Shows a view on the canvas, in the inspector or alone, wherever its place is.
+    pub(super) fn show_view(&mut self, name: &'static str) {
+        let tab = match name {
+            super::views::PARAMETERS => Some(Tab::Parameters),
+            "log" => Some(Tab::Log),
+            _ => None,
+        };
+        match tab {
+            Some(tab) => {
+                self.options.tab = tab;
+                self.options.shows_inspector = true;
+            }
+            None => {
+                self.options.shows_why = false;
+                self.options.large = Some((self.shown_stage(), name));
+            }
+        }
+    }
+
+    /// Shows a view on the canvas, or what was there before.
+    pub(super) fn toggle(&mut self, name: &'static str) {
+        let here = (self.shown_stage(), name);
+        if self.options.large == Some(here) {
+            self.options.large = None;
+        } else {
+            self.show_view(name);
+        }
+    }
+
+    pub(super) fn select_method(&mut self, method: Method) {
+        let run = self.run();
+        let here = run.span_at(self.cursor()).map(|span| span.part);
+        let part = match here {
+            // From fusion to fusion, and from a reference to the same one.
+            Some(Part::Fusion(_)) => Part::Fusion(method),
+            _ => Part::Reference(method, run.reference_at(self.cursor())),
+        };
+        let span = run.span_of(part);
+        match span.and_then(|span| span.records.end.checked_sub(1)) {
+            Some(last) => {
+                let why = self.options.shows_why && self.needs_why(part);
+                self.move_cursor(last);
+                self.options.shows_why = why;
+            }
+            None => {
+                let name = method.name().to_uppercase();
+                self.note(format!("{name} has not begun yet"), false);
+            }
+        }
+    }
+
+    pub(super) fn select_query(&mut self, query: usize) {
+        self.setup.go_to(query);
+        self.camera = None;
+        self.start_run(RunMode::Running);
+    }
+
+    /// Localises a query and goes to the step that decided what became of one of its results.
+    pub(super) fn open_result(&mut self, query: usize, result: usize) {
+        let known = self.results.get(&query).and_then(|known| known.get(result));
+        let moment = known.map(deciding);
+        self.select_query(query);
+        if let Some(moment) = moment {
+            self.navigation = Navigation::towards_moment(moment);
+        }
+    }
+
+    /// The next query in the list that is `wanted`, round the end.
+    pub(super) fn next_query(&mut self, back: bool, wanted: impl Fn(&Self, usize) -> bool) {
+        let offered = &self.setup.offered;
+        let here = offered
+            .iter()
+            .position(|query| *query == self.setup.query)
+            .unwrap_or(0);
+        let count = offered.len();
+        let next = (1..=count)
+            .map(|step| if back { count - step } else { step })
+            .map(|step| offered[(here + step) % count])
+            .find(|query| wanted(self, *query));
+        if let Some(query) = next {
+            self.select_query(query);
+        }
+    }
+
+    /// Whether the answer of a method is known to be wrong or missing on a query.
+    pub(super) fn has_failed(&self, query: usize) -> bool {
+        self.first_failure(query).is_some()
+    }
+
+    /// The first wrong or missing answer of a query, by its position among the query's results.
+    pub(super) fn first_failure(&self, query: usize) -> Option<usize> {
+        let mut known = self.results.get(&query)?.iter();
+        known.position(|result| result.grade.is_failure())
+    }
+
+    pub(super) fn next_failure(&mut self, back: bool) {
+        if self.results.keys().any(|query| self.has_failed(*query)) {
+            self.next_query(back, Self::has_failed);
+            let failed = self.first_failure(self.setup.query);
+            if let Some(result) = failed {
+                self.open_result(self.setup.query, result);
+            }
+        } else {
+            self.note("No query is known to fail; run all of them first", false);
+        }
+    }
+
+    pub(super) fn pick_references(&mut self, pick: ReferencePick) {
+        self.stop_queries();
+        match pick {
+            ReferencePick::ByHand => {
+                let chosen = self.setup.chosen.frames.clone();
+                self.setup.choose_by_hand(chosen);
+            }
+            ReferencePick::By(selection) => {
+                self.setup.task.protocol.select(selection);
+                self.setup.chosen = References::default();
+                self.start_run(RunMode::Running);
+            }
+        }
+    }
+
+    pub(super) fn set_references(&mut self, frames: Vec<usize>) {
+        if frames.is_empty() {
+            self.note("A query needs at least one reference", true);
+            return;
+        }
+        self.stop_queries();
+        self.setup.choose_by_hand(frames);
+        self.start_run(RunMode::Running);
+    }
+
+    pub(super) fn degrade(&mut self, degradation: Degradation) {
+        if degradation == self.setup.task.protocol.degrade {
+            return;
+        }
+        self.setup.degrade(degradation);
+        self.restart_run();
+        // Thumbnails show what is localised.
+        self.queries = Queries::new(self.ctx.clone());
+    }
+
+    /// Keeps the present run as A.
+    pub(super) fn keep(&mut self) {
+        self.kept = Some(KeptRun {
+            run: self.run().clone(),
+            cursor: self.cursor(),
+            pictures: RunPictures::new(&self.ctx),
+        });
+    }
+
+    /// Localises with what helped; the run in which it was missing is A.
+    pub(super) fn try_again(&mut self, args: &[String]) {
+        let mut setup = self.setup.clone();
+        if let Err(why) = setup.change(args) {
+            self.note(why, true);
+            return;
+        }
+        self.keep();
+        self.setup = setup;
+        self.restart_run();
+        self.note(
+            format!("Localised with {}; X shows the run before", args.join(" ")),
+            false,
+        );
+    }
+
+    pub(super) fn set_breakpoints(&mut self, texts: Vec<String>) {
+        let parsed: Result<Vec<Breakpoint>, _> = texts.iter().map(|text| text.parse()).collect();
+        match parsed {
+            Ok(breakpoints) => {
+                self.session
+                    .set_breakpoints(Breakpoints::new(breakpoints.iter().cloned()));
+                self.setup.task.breakpoints = breakpoints;
+            }
+            Err(error) => self.note(error.to_string(), true),
+        }
+    }
+
+    pub(super) fn jump_camera(&mut self, target: NamedPose) {
+        let Some(pose) = self.named_pose(target) else {
+            let name = target.name().to_lowercase();
+            self.note(format!("There is no pose for {name} here"), false);
+            return;
+        };
+        self.camera_before = self.camera.or_else(|| self.named_pose(NamedPose::Start));
+        self.camera = Some(pose);
+    }
+
+    /// The pose of a place of the search (`world_from_camera`).
+    pub(super) fn named_pose(&self, target: NamedPose) -> Option<Pose> {
+        let run = self.run();
+        let loaded = run.loaded.as_deref()?;
+        let span = run.span_at(self.cursor());
+        let problem = loaded.problems.get(run.reference_at(self.cursor()))?;
+        let minimum = |wanted: Phase| {
+            let events = run.all_until::<PhaseSearched>(self.cursor());
+            let mut latest = events.rev();
+            let best = latest
+                .find(|(_, event)| event.surface.lattice.phase == wanted)?
+                .1
+                .best?;
+            Some(problem.world_from_query(&best.reference_from_camera()))
+        };
+        match target {
+            NamedPose::Start => Some(problem.reference.world_from_camera),
+            NamedPose::Coarse => minimum(Phase::PositionCoarse),
+            NamedPose::Fine => minimum(Phase::PositionFine),
+            NamedPose::Estimate => {
+                let span = span.filter(|span| self.has_come(span))?;
+                span.result.as_ref()?.pose.as_ref()?.to_pose()
+            }
+            NamedPose::Truth => loaded.truth.filter(|_| self.options.shows_truth),
+            NamedPose::Last => self.camera_before,
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The storyboard and the canvas that follows it: stages by keys, proofs by clicks, and what hides with the truth.
+
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use posescope::app::{App, Command, Setup};
+use posescope::method::Method;
+use posescope::session::{Part, Span};
+
+use crate::walls_scene::GREY;
+use crate::window::{app, finished, is_said, press, send, setup, wait};
+
+const MI: Part = Part::Reference(Method::MI, 0);
+
+fn grey() -> Harness<'static, App> {
+    finished(Setup {
+        query: GREY,
+        ..setup()
+    })
+}
+
+/// The last records of the stages right below a part of the run.
+fn ends(window: &Harness<'_, App>, part: Part) -> Vec<usize> {
+    let run = app(window).run();
+    let span: &Span = run.span_of(part).expect("the method ran");
+    let stages = run.stages().iter();
+    let stages = stages.filter(|bar| bar.depth == 2 && span.records.contains(&bar.records.start));
+    stages.map(|bar| bar.records.end - 1).collect()
+}
+
+#[test]
+fn the_arrows_go_from_stage_to_stage_and_from_the_last_to_the_cause() {
+    let mut window = grey();
+    send(&mut window, Command::ShowPart(MI));
+    let ends = ends(&window, MI);
+    assert!(ends.len() > 1, "{ends:?}");
+    assert!(app(&window).options.shows_why);
+    for end in ends.iter().rev() {
+        press(&mut window, Modifiers::NONE, Key::ArrowUp);
+        assert_eq!(app(&window).cursor(), *end);
+        assert!(!app(&window).options.shows_why);
+    }
+    for end in &ends[1..] {
+        press(&mut window, Modifiers::NONE, Key::ArrowDown);
+        assert_eq!(app(&window).cursor(), *end);
+    }
+    press(&mut window, Modifiers::NONE, Key::ArrowDown);
+    assert!(app(&window).options.shows_why, "the cause comes last");
+}
+
+#[test]
+fn a_stage_is_shown_by_a_click_and_has_a_small_picture() {
+    let mut window = finished(setup());
+    wait(&mut window, |app| !app.app_state().is_working_out());
+    window.run_steps(2);
+    let stage = window.get_by_label_contains("MI coarse: coarse 0.");
+    let cell = stage.rect();
+    let is_picture = |clipped: &egui::epaint::ClippedShape| {
+        let shape = &clipped.shape;
+        let is_image = shape.texture_id() != egui::TextureId::default();
+        is_image && cell.expand(1.0).contains_rect(shape.visual_bounding_rect())
+    };
+    let shapes = &window.output().shapes;
+    assert!(shapes.iter().any(is_picture), "no picture in {cell:?}");
+    stage.click();
+    window.run_steps(3);
+    let state = app(&window);
+    let span = state.run().span_at(state.cursor()).expect("a part");
+    assert_eq!(span.part, MI);
+    assert!(is_said(&window, "Cost map"));
+    press(&mut window, Modifiers::NONE, Key::V);
+    window.run_steps(3);
+    assert!(is_said(&window, "3-D view of"));
+    press(&mut window, Modifiers::NONE, Key::V);
+    window.run_steps(3);
+    assert!(!is_said(&window, "3-D view of"));
+}
+
+#[test]
+fn a_click_on_a_small_picture_of_a_proof_makes_it_large() {
+    let mut window = grey();
+    send(&mut window, Command::ShowPart(MI));
+    wait(&mut window, |app| !app.app_state().is_working_out());
+    window.run_steps(2);
+    let canvas = window.state().canvas();
+    let pictures = |window: &Harness<'_, App>| -> Vec<(egui::Rect, String)> {
+        let nodes = window.query_all_by_role(Role::Image);
+        let nodes = nodes.map(|node| {
+            (
+                node.rect(),
+                node.accesskit_node().label().unwrap_or_default(),
+            )
+        });
+        nodes
+            .filter(|(rect, _)| canvas.contains_rect(*rect))
+            .collect()
+    };
+    let before = pictures(&window);
+    let (small, title) = before.last().expect("a small picture").clone();
+    let first = before[0].1.clone();
+    assert_ne!(first, title);
+    window.get_by_role_and_label(Role::Image, &title).click();
+    window.run_steps(3);
+    let after = pictures(&window);
+    assert_eq!(after[0].1, title);
+    assert!(after[0].0.area() > small.area());
+    assert!(after.iter().any(|(_, title)| *title == first));
+}
+
+#[test]
+fn without_the_truth_the_last_picture_is_what_decided() {
+    let mut window = finished(setup());
+    assert!(
+        !is_said(&window, "MI why: "),
+        "a right pose needs no reason"
+    );
+    assert!(is_said(&window, "MI: ● right"));
+    press(&mut window, Modifiers::NONE, Key::G);
+    window.run_steps(3);
+    assert!(is_said(&window, "MI why: what decided"));
+    for grade in ["● right", "▲ wrong"] {
+        assert!(!is_said(&window, grade), "{grade}");
+    }
+    assert!(
+        is_said(&window, "likely right"),
+        "the confidence stands for the grade"
+    );
+}
