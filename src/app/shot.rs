@@ -177,17 +177,21 @@ impl<'a> Window<'a> {
     /// A frame in which everything that was asked for is there.
     fn settled(&mut self) -> egui::FullOutput {
         /// Sizes are known one frame late, and pictures are asked for in the frame that wants them.
-        const FEWEST: usize = 6;
+        const CALM_FRAMES: usize = 6;
+        let mut calm = 0;
         loop {
             self.app.update(&self.ctx);
             let mut output = self.frame();
             self.painter.take_textures(&mut output);
             let state = self.app.app_state();
-            let is_waiting = state.is_working_out();
-            if !is_waiting && self.frames >= FEWEST {
+            // A picture that has just come changes the layout of the frames after it.
+            calm = if state.is_working_out() { 0 } else { calm + 1 };
+            if calm >= CALM_FRAMES {
                 return output;
             }
-            std::thread::sleep(Self::PAUSE);
+            if calm == 0 {
+                std::thread::sleep(Self::PAUSE);
+            }
         }
     }
 
