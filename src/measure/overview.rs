@@ -183,4 +183,19 @@ mod tests {
         assert_eq!(wrong.headline, format!("{words} {title} (1 of 2)."));
         assert_eq!(Overview::of(&[]).headline, "There are no results yet.");
     }
+
+    #[test]
+    fn causes_stand_by_frequency_and_equal_ones_as_they_occur() {
+        let codes = [Code::R2, Code::D4, Code::D3, Code::D3];
+        let rows: Vec<QueryResult> = codes
+            .into_iter()
+            .map(|code| QueryResult {
+                diagnosis: vec![crate::measure::metrics::tests::finding(code)],
+                ..row("1", "mi", Some(9.0))
+            })
+            .collect();
+        let all: Vec<&QueryResult> = rows.iter().collect();
+        let causes = Overview::of(&all).causes;
+        assert_eq!(causes, [(Code::D3, 2), (Code::R2, 1), (Code::D4, 1)]);
+    }
 }

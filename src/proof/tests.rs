@@ -249,6 +249,25 @@ fn the_picture_of_depths_counts_its_marks() {
     );
 }
 
+/// A camera that is turned further than the search turns: the title says both angles.
+#[test]
+fn a_heading_outside_the_search_is_in_the_title() {
+    let (mut kept, result) = neighbours(Method::MI);
+    let title = |kept: &Kept| {
+        let drawn = pictures(kept, &result);
+        let map = drawn.into_iter().find(|(code, _)| *code == "D4");
+        map.expect("a map").1.large.title
+    };
+    let range_deg = Params::default().grid.yaw_range_deg;
+    let turned = format!("{range_deg}°; the truth is turned by ");
+    let within = title(&kept);
+    assert!(within.ends_with("searched within 5 m"), "{within}");
+    let turn = crate::geometry::yaw(90_f64.to_radians());
+    kept.truth = kept.truth.map(|truth| truth * turn);
+    let outside = title(&kept);
+    assert!(outside.contains(&turned), "{outside}");
+}
+
 /// The truth at the reference: one label for both.
 #[test]
 fn reference_and_truth_at_one_place_share_a_label() {

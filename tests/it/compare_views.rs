@@ -53,6 +53,14 @@ fn two_runs_are_one_table_of_what_became_different() {
         let mut said = window.query_all_by_label(&words);
         assert!(said.next().is_some(), "{words}");
     }
+    // D leaves out what both runs agree on.
+    let rows = |window: &Harness<'_, App>| {
+        ["keypoints", "matches"].map(|field| window.query_by_label(field).is_some())
+    };
+    assert_eq!(rows(&window), [true, true]);
+    press(&mut window, Modifiers::NONE, Key::D);
+    assert_eq!(rows(&window), [false, true]);
+    press(&mut window, Modifiers::NONE, Key::D);
 
     let degradation = "gamma=0.5".parse().expect("a degradation");
     send(&mut window, Command::Degrade(degradation));

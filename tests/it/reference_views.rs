@@ -301,4 +301,9 @@ fn radius_and_seed_are_changed_beside_the_references_and_start_nothing_as_they_a
     window.run_steps(3);
     let seed_now = app(&window).setup.task.protocol.seed;
     assert_ne!(seed_now, seed);
+    window.get_by_label("Radius").type_text("2");
+    window.step();
+    window.get_by_label("Seed").focus();
+    window.run_steps(3);
+    assert_ne!(app(&window).setup.task.radius_m(), radius_m);
 }

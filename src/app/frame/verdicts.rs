@@ -297,3 +297,24 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         commands.send(command);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a remedy that is too long, words go and the number stays.
+    #[test]
+    fn a_number_is_never_cut() {
+        egui::__run_test_ui(|ui| {
+            theme::install(ui.ctx());
+            let text = |width| fitted(ui, "grid.coarse_step_m=0.5", " → 0.12 m", width);
+            assert_eq!(text(1000.0), "Try grid.coarse_step_m=0.5 → 0.12 m");
+            let cut = text(150.0);
+            assert!(
+                cut.starts_with("Try grid") && cut.ends_with("… → 0.12 m"),
+                "{cut}"
+            );
+            assert_eq!(text(1.0), "Try → 0.12 m");
+        });
+    }
+}
