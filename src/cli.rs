@@ -76,7 +76,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         #[cfg(feature = "app")]
         Some(Command::View(args)) => scored(&|| match &args.screenshot.screenshot {
             Some(path) => screenshot::screenshot(args, path, &terminal),
-            None => view::view(args, posescope::session::RunMode::Paused, &terminal),
+            None => view::view(args, &terminal),
         }),
         Some(Command::Lesson(args)) => lesson::lesson(args, &terminal),
         Some(Command::Eval(args)) => scored(&|| eval::eval(args, &terminal)),

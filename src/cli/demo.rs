@@ -41,13 +41,11 @@ pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
 
 #[cfg(feature = "app")]
 fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
-    use posescope::session::RunMode;
-
     if !posescope::app::has_display() {
         return Ok(());
     }
     match Arguments::parse_from(["posescope", "view", SCENE]).command {
-        Some(Command::View(args)) => super::view::view(&args, RunMode::Running, terminal),
+        Some(Command::View(args)) => super::view::view(&args, terminal),
         _ => unreachable!("the words begin with `view`"),
     }
 }

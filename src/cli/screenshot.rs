@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use posescope::app::{self, Shot, ShotError};
-use posescope::session::RunMode;
 
 use super::args::ViewArgs;
 use super::failure::CliError;
@@ -11,7 +10,7 @@ use super::terminal::Terminal;
 use super::view;
 
 pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
-    let (setup, results) = view::setup(args, RunMode::Running)?;
+    let (setup, results) = view::setup(args)?;
     let options = &args.screenshot;
     let shot = Shot {
         moment: options.at,

@@ -18,8 +18,8 @@ use super::run;
 use super::terminal::Terminal;
 
 /// Opens the window, or without a display records the run.
-pub fn view(args: &ViewArgs, mode: RunMode, terminal: &Terminal) -> Result<(), CliError> {
-    let (setup, results) = setup(args, mode)?;
+pub fn view(args: &ViewArgs, terminal: &Terminal) -> Result<(), CliError> {
+    let (setup, results) = setup(args)?;
     let headless = setup.clone();
     match app::open(setup, results) {
         Ok(()) => Ok(()),
@@ -50,9 +50,9 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
 }
 
 /// The setup of the window, and the results that are known already.
-pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), CliError> {
+pub fn setup(args: &ViewArgs) -> Result<(Setup, KnownResults), CliError> {
     let folder = Path::new(&args.scene);
-    let (mut setup, results) = if folder.join("run.toml").is_file() {
+    Ok(if folder.join("run.toml").is_file() {
         of_a_run(args, folder)?
     } else if args.before.is_some() {
         return Err(CliError::Usage(format!(
@@ -61,9 +61,7 @@ pub fn setup(args: &ViewArgs, mode: RunMode) -> Result<(Setup, KnownResults), Cl
         )));
     } else {
         (of_a_scene(args)?, KnownResults::default())
-    };
-    setup.mode = mode;
-    Ok((setup, results))
+    })
 }
 
 /// The results of a run folder for a pair of scenes. Prints how many results belong to other scenes.
@@ -105,7 +103,7 @@ fn setup_of(task: Task, scenes: TaskScenes, offered: Vec<usize>, chosen: Vec<usi
         chosen: chosen.into(),
         index: Arc::new(IndexFile::of(&task)),
         task,
-        mode: RunMode::Paused,
+        mode: RunMode::Running,
         folder: defaults::FOLDER.into(),
     }
 }
