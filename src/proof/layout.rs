@@ -135,7 +135,9 @@ impl ProofPicture {
             .beside
             .iter()
             .map(|panel| cell / panel.aspect() + TITLE);
-        let row_height = tallest.fold(0.0, f32::max).min(0.45 * all.height);
+        // No small panel is higher than the large one.
+        let half = (all.height - below_height - GAP) / 2.0;
+        let row_height = tallest.fold(0.0, f32::max).min(half);
         let large = Place {
             height: (all.height - below_height - row_height - GAP).max(1.0),
             ..all

@@ -349,6 +349,9 @@ pub(super) fn rival_inliers(case: &ProofCase<'_>) -> Option<ProofPicture> {
 
 /// The cloud on the reference's photo, and on the query's where its pose is known.
 pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    if let Some(cameras) = cloud_by_two_cameras(case) {
+        return Some(cameras);
+    }
     let (query, reference) = (&case.problem.query, &case.problem.reference);
     let large = Panel::new(
         "The cloud on the reference photo, coloured by depth",
@@ -376,6 +379,28 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
         large,
         below: Some(depth_legend()),
         beside: truth.into_iter().chain(result).collect(),
+    })
+}
+
+/// Where the verdict names another camera: the cloud on the query's photo, seen from the truth by both.
+fn cloud_by_two_cameras(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let query = &case.problem.query;
+    let named = case.result.diagnosis.first()?.evidence.get("camera")?;
+    let camera: Intrinsics = serde_json::from_value(named.clone()).ok()?;
+    let query_from_reference = case.query_from_reference()?;
+    let seen_by = |what: &str, camera: &Intrinsics| {
+        Panel::new(
+            format!("{what}: {:.0} px", camera.fx),
+            cloud_picture(&query.photo, camera, case, &query_from_reference),
+        )
+    };
+    Some(ProofPicture {
+        large: seen_by(
+            "The cloud on the query photo at the truth, by the stated focal length",
+            &query.intrinsics,
+        ),
+        below: Some(depth_legend()),
+        beside: vec![seen_by("The same by a better focal length", &camera)],
     })
 }
 

@@ -268,6 +268,44 @@ fn a_heading_outside_the_search_is_in_the_title() {
     assert!(outside.contains(&turned), "{outside}");
 }
 
+/// A suspect camera: the photo shows the cloud as it was stated and as another camera would have it.
+#[test]
+fn a_suspect_camera_is_drawn_beside_the_better_one() {
+    let (kept, mut result) = neighbours(Method::FB);
+    let stated = kept.problems[0].query.intrinsics;
+    let other = crate::camera::Intrinsics {
+        fx: 0.8 * stated.fx,
+        fy: 0.8 * stated.fy,
+        ..stated
+    };
+    result.diagnosis = vec![crate::diagnosis::Diagnosis {
+        code: crate::diagnosis::Code::X1,
+        text: String::new(),
+        evidence: serde_json::json!({ "camera": other }),
+    }];
+    let case = ProofCase {
+        problem: &kept.problems[0],
+        records: kept.history.records(),
+        result: &result,
+        truth: kept.truth.as_ref(),
+        params: &Params::default(),
+    };
+    let picture = ProofPicture::of(&case).expect("a picture");
+    let [better] = picture.beside.as_slice() else {
+        panic!("{} panels", picture.beside.len());
+    };
+    let says = |panel: &Panel, camera: &crate::camera::Intrinsics| {
+        let words = format!("{:.0} px", camera.fx);
+        assert!(panel.title.ends_with(&words), "{}", panel.title);
+    };
+    says(&picture.large, &stated);
+    says(better, &other);
+    assert_ne!(picture.large.picture, better.picture);
+    // Two equal photos below each other: the small one is not larger.
+    let places = picture.places(900.0, 560.0);
+    assert!(places[0].width >= places[2].width, "{places:?}");
+}
+
 /// The truth at the reference: one label for both.
 #[test]
 fn reference_and_truth_at_one_place_share_a_label() {
