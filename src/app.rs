@@ -239,7 +239,8 @@ impl App {
                     .resizable(false)
                     .frame(plain(Margin::ZERO))
                     .show(ui, |ui| frame::verdicts::ui(ui, state, commands));
-                below("storyboard", sizes.storyboard)
+                let height = frame::storyboard::height(&state.setup);
+                below("storyboard", sizes.storyboard.min(height))
                     .show(ui, |ui| frame::storyboard::ui(ui, state, commands));
                 if options.shows_queries && sizes.has_sides {
                     Panel::left("queries")

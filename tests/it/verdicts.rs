@@ -101,3 +101,23 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     send(&mut window, Command::Maximize(Some("queries")));
     assert!(is_said(&window, &format!("{failed} of 6 wrong")));
 }
+
+/// Photos of a camera whose focal length is stated too short: the verdict names the camera, not the cloud, although
+/// depths look wrong too.
+#[test]
+fn a_wrong_focal_length_is_named_before_the_cloud() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let said = |line: &str| crate::binary::run_in(folder.path(), line).ok().out;
+    said("synth made --layout toml --condition overcast --every 350 --quiet");
+    let scene = folder.path().join("made/overcast/scene.toml");
+    let lines = crate::binary::text(&scene);
+    let lines = lines.lines().map(|line| match line.split_once(" = ") {
+        Some((name @ ("fx" | "fy"), _)) => format!("{name} = 610\n"),
+        _ => format!("{line}\n"),
+    });
+    crate::binary::write(&scene, lines.collect::<String>());
+    let words = "run street --query-scene made/overcast --query 350 --reference 347 --method fb";
+    let said = said(words);
+    let expected = "X1 The query camera is suspect: its stated focal length is 610 px. With 719 px";
+    crate::binary::has(&said, expected);
+}

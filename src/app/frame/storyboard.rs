@@ -10,6 +10,7 @@ use egui::{
 use super::proof::elided;
 use super::stage;
 use crate::app::command::{Command, Queue};
+use crate::app::setup::Setup;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::diagnosis::Grade;
@@ -25,12 +26,22 @@ const WIDTH: std::ops::RangeInclusive<f32> = 62.0..=118.0;
 /// The highest and the lowest row \[points\].
 const ROW: std::ops::RangeInclusive<f32> = 28.0..=40.0;
 const GAP: f32 = 5.0;
+/// Above and below everything \[points\].
+const MARGINS: f32 = 8.0;
 
 /// A row: a part of the run, with the stages that have begun.
 struct Row<'a> {
     part: Part,
     span: Option<&'a Span>,
     stages: Vec<&'a StageBar>,
+}
+
+/// The height that all rows of a setup take, with the line below them \[points\]. It is the same at every step.
+pub(in crate::app) fn height(setup: &Setup) -> f32 {
+    let protocol = &setup.task.protocol;
+    let fused = usize::from(!protocol.fusions.is_empty());
+    let rows = protocol.methods.len() * (1 + fused) + usize::from(!protocol.is_by_hand());
+    rows.max(2) as f32 * (ROW.end() + GAP) + SCRUB + MARGINS
 }
 
 /// Draws all rows and the line below them.
