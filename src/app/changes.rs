@@ -55,6 +55,15 @@ impl AppState {
         self.navigation.move_to(cursor, self.session.run());
     }
 
+    /// At the end of a part, shows the picture that proves its result, as the storyboard does.
+    pub(super) fn show_why_at_end(&mut self) {
+        let cursor = self.shown_cursor();
+        let at_end = self
+            .shown_span()
+            .filter(|span| span.records.end == cursor + 1);
+        self.options.shows_why = at_end.is_some_and(|span| self.needs_why(span.part));
+    }
+
     /// Goes to the end of the next stage of the selected part, or of the one before; after the last stage comes
     /// why the result is what it is.
     pub(super) fn next_stage(&mut self, back: bool) {

@@ -204,6 +204,7 @@ impl App {
             }
             Command::Arrange(arrangement) => {
                 let is_lecture = arrangement == Arrangement::Lecture;
+                let was_lecture = state.options.layout == Arrangement::Lecture;
                 let options = &mut state.options;
                 options.layout = arrangement;
                 options.hides_future = is_lecture;
@@ -212,6 +213,8 @@ impl App {
                 if is_lecture {
                     options.shows_why = false;
                     self.show_page();
+                } else if was_lecture {
+                    state.show_why_at_end();
                 }
             }
             Command::SwitchTheme => {

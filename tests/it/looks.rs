@@ -7,11 +7,12 @@
 use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command, views};
+use posescope::app::{App, Arrangement, Command, Setup, views};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
 
 use crate::painted::{PaintedWindow, painted};
+use crate::walls_scene::GREY;
 use crate::window::{app, run_until_idle, send, setup, wait};
 
 /// The views whose point is pixels.
@@ -85,6 +86,55 @@ fn every_picture_looks_as_it_did() {
             unlike.extend(compared.err());
         }
     });
+    assert!(unlike.is_empty(), "{}", unlike.join("\n"));
+}
+
+/// Each layout with the outcome of a run, at every size and in both themes.
+#[test]
+fn every_layout_looks_as_it_did() {
+    const SIZES: [[f32; 2]; 4] = [
+        [1000.0, 640.0],
+        [1280.0, 720.0],
+        [1600.0, 1000.0],
+        [2560.0, 1440.0],
+    ];
+    const LAYOUTS: [(Arrangement, &str); 3] = [
+        (Arrangement::Inspect, "inspect"),
+        (Arrangement::Lecture, "lecture"),
+        (Arrangement::Batch, "batch"),
+    ];
+    let setup = Setup {
+        query: GREY,
+        mode: RunMode::Running,
+        ..setup()
+    };
+    let Some(PaintedWindow {
+        mut window,
+        mut judge,
+    }) = painted(setup, SIZES[0])
+    else {
+        return;
+    };
+    wait(&mut window, |app| {
+        let state = app.app_state();
+        *state.run_state() == RunState::Finished && !state.is_working_out()
+    });
+    let mut unlike = Vec::new();
+    for theme in ["dark", "light"] {
+        for (layout, name) in LAYOUTS {
+            send(&mut window, Command::Arrange(layout));
+            for size in SIZES {
+                window.set_size(size.into());
+                // What the size brings into sight asks for its pictures.
+                window.run_steps(3);
+                wait(&mut window, |app| !app.app_state().is_working_out());
+                window.run_steps(4);
+                let name = format!("{name}-{}x{}-{theme}", size[0], size[1]);
+                unlike.extend(judge.compare(&mut window, &name).err());
+            }
+        }
+        window.state_mut().send(Command::SwitchTheme);
+    }
     assert!(unlike.is_empty(), "{}", unlike.join("\n"));
 }
 

@@ -50,6 +50,26 @@ fn the_arrows_go_from_stage_to_stage_and_from_the_last_to_the_cause() {
 }
 
 #[test]
+fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
+    let mut window = grey();
+    send(
+        &mut window,
+        Command::ShowPart(Part::Reference(Method::FB, 0)),
+    );
+    assert!(is_said(&window, "0 and 146 keypoints"));
+    press(&mut window, Modifiers::NONE, Key::F3);
+    assert!(!app(&window).options.shows_why);
+    assert!(is_said(&window, "The query has no keypoints"));
+    press(&mut window, Modifiers::NONE, Key::F2);
+    assert!(app(&window).options.shows_why);
+    // At another step there is no cause to come back to.
+    send(&mut window, Command::MoveCursor(1));
+    press(&mut window, Modifiers::NONE, Key::F3);
+    press(&mut window, Modifiers::NONE, Key::F2);
+    assert!(!app(&window).options.shows_why);
+}
+
+#[test]
 fn a_stage_is_shown_by_a_click_and_has_a_small_picture() {
     let mut window = finished(setup());
     wait(&mut window, |app| !app.app_state().is_working_out());

@@ -13,8 +13,8 @@ use crate::event::Side;
 use crate::session::RunState;
 
 /// Room of the buttons at the right, and of those in the middle \[points\].
-const RIGHT: f32 = 500.0;
-const MIDDLE: f32 = 260.0;
+const RIGHT: f32 = 440.0;
+const MIDDLE: f32 = 232.0;
 
 pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.horizontal_centered(|ui| {
@@ -68,7 +68,10 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.label(RichText::new(setup.query_name()).strong())
         .on_hover_text("The query");
     button(ui, state, commands, "▶", Command::NextQuery { back: false });
-    ui.weak("against");
+    // The names of the references are worth more than the word before them.
+    if ui.available_width() > 170.0 {
+        ui.weak("against");
+    }
     let names: Vec<String> = setup
         .chosen
         .frames

@@ -124,7 +124,9 @@ impl View for ImagesView {
             self.detail.ui(ui, context, &subject, panel);
         }
         ui.scope_builder(UiBuilder::new().max_rect(chips), |ui| {
-            if kinds.is_empty() {
+            if kinds.is_empty() && progress.has_begun() {
+                ui.weak("The query has no keypoints");
+            } else if kinds.is_empty() {
                 ui.weak("No features yet: FB finds them first");
             } else {
                 funnel::ui(ui, &kinds, &mut self.shown);

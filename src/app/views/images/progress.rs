@@ -79,6 +79,11 @@ impl<'a> FeatureProgress<'a> {
         progress
     }
 
+    /// Whether the query's keypoints are known, even if there are none.
+    pub(super) fn has_begun(&self) -> bool {
+        self.query.is_some()
+    }
+
     /// Query keypoints; none before they are detected.
     pub(super) fn query(&self) -> &'a [Keypoint] {
         self.query.map_or(&[], |features| &features.keypoints)
