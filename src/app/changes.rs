@@ -74,7 +74,7 @@ impl AppState {
         let ends: Vec<usize> = self
             .stages_of(span)
             .iter()
-            .map(|bar| bar.records.end - 1)
+            .map(|bar| self.stage_end(span, bar))
             .collect();
         let next = if back {
             let before = ends.iter().rev().find(|end| **end < cursor).copied();

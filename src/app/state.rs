@@ -406,9 +406,12 @@ impl AppState {
         };
         let words = match *explain {
             0 => "Nothing is explained any more",
-            _ => "Results that are wrong are localised again, to see what would have helped",
+            _ => "Trying remedies for the wrong results",
         };
+        let shows_why = self.options.shows_why;
         self.restart_run();
+        // The estimates are at hand: the picture of the cause stays, and only the remedies are new.
+        self.options.shows_why = shows_why;
         self.note(words, false);
     }
 

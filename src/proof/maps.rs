@@ -64,6 +64,8 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
         beside.push(view_panel(query, seen));
     }
     let below = result.as_ref().zip(truth.as_ref());
+    // On the way to a heading that was not searched, the cost says nothing of the search.
+    let below = below.filter(|_| overlay != MapOverlay::Reach || too_far_turned(case).is_none());
     let below = below.and_then(|(result, truth)| curve(case, estimator.as_ref(), result, truth));
     let coarse = case.all::<PhaseSearched>().map(|event| &event.surface);
     let coarse = coarse
@@ -173,12 +175,13 @@ fn map(
     panel.has_cells = true;
     let place =
         |world_from_query: &Pose| Offset::of(&case.problem.reference_from_query(world_from_query));
+    let mut ranked = None;
     match overlay {
         MapOverlay::Ranks => {
             // The verdict ranks the cell nearest to the lowest cost near the truth.
             let named = near_truth(case.result);
             if let Some(right) = named.or_else(|| case.truth.map(place)) {
-                outline_right_cell(&mut panel, surface, &right);
+                ranked = outline_right_cell(&mut panel, surface, &right);
             }
         }
         MapOverlay::Reach | MapOverlay::Rim => {
@@ -193,15 +196,11 @@ fn map(
                 cell_place(lattice, &offset)
             });
             panel.line(palette::ESTIMATE, 2.5, around);
-            panel.title += &format!(", searched within {radius_m} m");
             let turn_deg = case.params.grid.yaw_range_deg;
+            panel.title = format!("Searched within {radius_m} m, ±{turn_deg}° (white)");
             let truth = case.truth.map(place);
-            let turned = truth.map_or(0.0, |truth| truth.yaw_rad.to_degrees());
-            if turned.abs() > turn_deg {
-                panel.title += &format!(
-                    " and {turn_deg}°; the truth is turned by {:.0}°",
-                    turned.abs()
-                );
+            if let Some(turned_deg) = too_far_turned(case) {
+                panel.title += &format!("; truth turned by {turned_deg:.0}° (green)");
             }
             // Headings: those that are searched, from the reference, and that of the truth.
             let heading = |from: &Offset, yaw_rad: f64| {
@@ -239,14 +238,20 @@ fn map(
     }
     if let (Some(truth), Some(at)) = (truth, at_truth) {
         let label = label(truth);
-        let label = if is_same {
-            format!("{label}, at the reference")
-        } else {
-            label
-        };
+        let mut label = label + &ranked.unwrap_or_default();
+        if is_same {
+            label += ", at the reference";
+        }
         panel.mark(Thing::Truth, at, label);
     }
     panel
+}
+
+/// The angle between the headings of truth and reference, where it is more than is searched \[°\].
+fn too_far_turned(case: &ProofCase<'_>) -> Option<f64> {
+    let turned = Offset::of(&case.problem.reference_from_query(case.truth?)).yaw_rad;
+    let turned_deg = turned.to_degrees().abs();
+    (turned_deg > case.params.grid.yaw_range_deg).then_some(turned_deg)
 }
 
 /// The pose near the truth that the verdict speaks of.
@@ -260,13 +265,17 @@ fn near_truth(result: &QueryResult) -> Option<Offset> {
     })
 }
 
-/// The coarse cell at the truth, with its rank among all that may win.
-fn outline_right_cell(panel: &mut Panel, surface: &ScoredLattice, truth: &Offset) {
+/// Outlines the coarse cell at the truth. What its cost is, and its rank among all that may win.
+fn outline_right_cell(
+    panel: &mut Panel,
+    surface: &ScoredLattice,
+    truth: &Offset,
+) -> Option<String> {
     let lattice = &surface.lattice;
     let [x, y] = cell_place(lattice, truth);
     let (left, top) = (x.floor(), y.floor());
     if left < 0.0 || top < 0.0 || left >= lattice.columns as f32 || top >= lattice.rows as f32 {
-        return;
+        return None;
     }
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
     let corners = corners.map(|[across, down]| [left + across, top + down]);
@@ -274,12 +283,13 @@ fn outline_right_cell(panel: &mut Panel, surface: &ScoredLattice, truth: &Offset
     let cell = (lattice.rows - 1 - top as usize) * lattice.columns + left as usize;
     let Some(own) = surface.eligible_cost(cell) else {
         panel.title += ", the right cell covers too little to be ranked";
-        return;
+        return None;
     };
     let costs = (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
     let costs: Vec<f64> = costs.collect();
     let rank = 1 + costs.iter().filter(|cost| **cost < own).count();
     panel.title += &format!(", the right cell is number {rank} of {}", costs.len());
+    Some(format!(" (cell {})", number(own)))
 }
 
 fn cost_scale(surface: &ScoredLattice) -> Option<ColorScale> {
@@ -287,7 +297,7 @@ fn cost_scale(surface: &ScoredLattice) -> Option<ColorScale> {
     let (least, most) = (costs().reduce(f64::min)?, costs().reduce(f64::max)?);
     Some(ColorScale {
         dark: number(most),
-        bright: format!("{} (lowest cost)", number(least)),
+        bright: format!("{} (lowest cell)", number(least)),
     })
 }
 
@@ -334,14 +344,17 @@ impl Seen {
     fn words(&self) -> String {
         match self.comparison.score.cost {
             Some(cost) => format!("{}: cost {}", self.label, number(cost)),
-            None => format!("{}: no cost", self.label),
+            None => self.label.to_owned(),
         }
     }
 
     fn label(&self) -> String {
         match self.comparison.score.cost {
             Some(cost) => format!("{} {}", self.label, number(cost)),
-            None => format!("{}: no cost", self.label),
+            None if self.comparison.score.covered == 0 => {
+                format!("{}, where the map is out of view", self.label)
+            }
+            None => format!("{}: too little of the map in view", self.label),
         }
     }
 }

@@ -228,13 +228,19 @@ fn funnel(matches: &Matches<'_>) -> Panel {
 pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let matches = Matches::of(case)?;
     let spread = |one: &Matched<'_>| one.depth_range_m.map_or(-1.0, |(near, far)| far - near);
-    let mut doubtful: Vec<&Matched<'_>> = matches
+    let doubtful: Vec<&Matched<'_>> = matches
         .all
         .iter()
-        .filter(|one| one.is_true != Some(true))
+        .filter(|one| one.is_true != Some(true) && one.state.index() >= 2)
         .collect();
-    doubtful.retain(|one| one.state.index() >= 2);
-    doubtful.sort_by(|a, b| spread(b).total_cmp(&spread(a)));
+    let scan = ScanPixels::of(case);
+    let nearest: Vec<f64> = doubtful.iter().map(|one| scan.nearest_px(one)).collect();
+    // Wide ranges of depth first; of matches without a depth, those that a point of the cloud lies next to.
+    let mut order: Vec<usize> = (0..doubtful.len()).collect();
+    order.sort_by(|&a, &b| {
+        let by_spread = spread(doubtful[b]).total_cmp(&spread(doubtful[a]));
+        by_spread.then(nearest[a].total_cmp(&nearest[b]))
+    });
     let missing = doubtful.iter().filter(|one| one.point.is_none()).count();
     let with_depth = doubtful.len() - missing;
     let judged = match case.truth {
@@ -260,10 +266,19 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         };
         large.mark(Thing::Dot(color), place(one.reference), "");
     }
-    let beside = doubtful
-        .iter()
-        .take(PATCHES)
-        .map(|one| depth_patch(&large.picture, one));
+    let radius_px = case.params.fb.depth_radius_px;
+    let beside = order.into_iter().take(PATCHES).map(|at| {
+        let one = doubtful[at];
+        let title = match one.depth_range_m {
+            Some((near, far)) if far - near < 0.05 => format!("{near:.1} m around this match"),
+            Some((near, far)) => format!("{near:.1} to {far:.1} m around this match"),
+            None => format!(
+                "No depth within {radius_px} px; the next is {:.1} px away",
+                nearest[at]
+            ),
+        };
+        depth_patch(&large.picture, one, title)
+    });
     Some(ProofPicture {
         beside: beside.collect(),
         large,
@@ -271,7 +286,27 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     })
 }
 
-fn depth_patch(photo: &RgbImage, one: &Matched<'_>) -> Panel {
+/// Where the reference's photo shows the points of its cloud \[px\].
+struct ScanPixels(Vec<Point2<f64>>);
+
+impl ScanPixels {
+    fn of(case: &ProofCase<'_>) -> Self {
+        let reference = &case.problem.reference;
+        let camera = &reference.intrinsics;
+        let points = reference.cloud.points.iter();
+        let seen = points.filter_map(|point| camera.project(&point.cast::<f64>()));
+        Self(seen.filter(|pixel| camera.contains(pixel)).collect())
+    }
+
+    /// How far from a match's keypoint the nearest of them is.
+    fn nearest_px(&self, one: &Matched<'_>) -> f64 {
+        let at = pixel(one.reference);
+        let distances = self.0.iter().map(|seen| (seen - at).norm());
+        distances.fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn depth_patch(photo: &RgbImage, one: &Matched<'_>, title: String) -> Panel {
     let [x, y] = place(one.reference);
     let corner = |at: f32, length: u32| {
         (at as u32)
@@ -286,10 +321,6 @@ fn depth_patch(photo: &RgbImage, one: &Matched<'_>) -> Panel {
         patch.height() * ENLARGED,
         image::imageops::FilterType::Nearest,
     );
-    let title = match one.depth_range_m {
-        Some((near, far)) => format!("{near:.1} to {far:.1} m around this match"),
-        None => "No depth near this match".to_owned(),
-    };
     let mut panel = Panel::new(title, large);
     let at = [x - left as f32, y - top as f32].map(|along| along * ENLARGED as f32);
     for [across, down] in [[1.0, 0.0], [0.0, 1.0]] {
@@ -322,22 +353,34 @@ pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
 /// What the truth explains beside what the result explains.
 pub(super) fn rival_inliers(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let matches = Matches::of(case)?;
-    let panel = |title: String, color: Color, ones: &mut dyn Iterator<Item = &Matched<'_>>| {
+    let panel = |title: String, ones: &mut dyn Iterator<Item = &Matched<'_>>| {
         let mut panel = Panel::new(title, picture::photo(&case.problem.query.photo).into_rgb8());
         for one in ones {
+            let color = if one.is_true == Some(true) {
+                palette::TRUTH
+            } else {
+                palette::ESTIMATE
+            };
             panel.mark(Thing::Dot(color), place(one.query), "");
         }
         panel
     };
     let (of_truth, of_result) = (matches.true_ones().count(), matches.inliers().count());
+    let both = matches.inliers().filter(|one| one.is_true == Some(true));
     let large = panel(
         format!("The truth explains {of_truth} matches"),
-        palette::TRUTH,
         &mut matches.true_ones(),
     );
+    let what = if case.pose().is_some() {
+        "result"
+    } else {
+        "refused pose"
+    };
     let result = panel(
-        format!("The result explains {of_result} matches"),
-        palette::ESTIMATE,
+        format!(
+            "The {what} explains {of_result} matches, {} of them true (green)",
+            both.count()
+        ),
         &mut matches.inliers(),
     );
     Some(ProofPicture {

@@ -259,9 +259,12 @@ fn a_heading_outside_the_search_is_in_the_title() {
         map.expect("a map").1.large.title
     };
     let range_deg = Params::default().grid.yaw_range_deg;
-    let turned = format!("{range_deg}°; the truth is turned by ");
+    let turned = format!("±{range_deg}° (white); truth turned by ");
     let within = title(&kept);
-    assert!(within.ends_with("searched within 5 m"), "{within}");
+    assert_eq!(
+        within,
+        format!("Searched within 5 m, ±{range_deg}° (white)")
+    );
     let turn = crate::geometry::yaw(90_f64.to_radians());
     kept.truth = kept.truth.map(|truth| truth * turn);
     let outside = title(&kept);

@@ -9,7 +9,7 @@ use posescope::method::Method;
 use posescope::session::{Part, Span};
 
 use crate::walls_scene::GREY;
-use crate::window::{app, finished, is_said, press, send, setup, wait};
+use crate::window::{app, finish, finished, is_said, press, send, setup, wait};
 
 const MI: Part = Part::Reference(Method::MI, 0);
 
@@ -26,7 +26,10 @@ fn ends(window: &Harness<'_, App>, part: Part) -> Vec<usize> {
     let span: &Span = run.span_of(part).expect("the method ran");
     let stages = run.stages().iter();
     let stages = stages.filter(|bar| bar.depth == 2 && span.records.contains(&bar.records.start));
-    stages.map(|bar| bar.records.end - 1).collect()
+    let mut ends: Vec<usize> = stages.map(|bar| bar.records.end - 1).collect();
+    // What a method reports after its last stage belongs to that.
+    *ends.last_mut().expect("a stage") = span.records.end - 1;
+    ends
 }
 
 #[test]
@@ -67,6 +70,20 @@ fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
     press(&mut window, Modifiers::NONE, Key::F3);
     press(&mut window, Modifiers::NONE, Key::F2);
     assert!(!app(&window).options.shows_why);
+}
+
+#[test]
+fn remedies_are_tried_beside_the_picture_of_the_cause() {
+    let mut window = grey();
+    let part = Part::Reference(Method::PM, 0);
+    send(&mut window, Command::ShowPart(part));
+    assert!(app(&window).options.shows_why);
+    send(&mut window, Command::Explain);
+    finish(&mut window);
+    let state = app(&window);
+    assert!(state.options.shows_why);
+    let here = state.run().span_at(state.cursor()).map(|span| span.part);
+    assert_eq!(here, Some(part));
 }
 
 #[test]

@@ -276,7 +276,7 @@ fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
     };
     let helped = explanation(&window).expect("it went wrong");
     let words = helped.best().expect("something helped").args.join(" ");
-    let words = words.replace("--set ", "");
+    let words = words.replace("--set ", "").replace("--method ", "");
     assert!(is_said(&window, &format!("Try {words}")), "{words}");
     assert!(app(&window).run().explaining.is_none());
     let line = app(&window).setup.command_line();

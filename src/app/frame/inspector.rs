@@ -9,12 +9,12 @@ use serde_json::Value;
 use super::Panes;
 use super::stage::three_digits;
 use super::storyboard::part_name;
-use super::verdicts::split;
+use super::verdicts::{short, split};
 use crate::app::command::{Command, Queue};
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::view_options::Tab;
-use crate::diagnosis::{Diagnosis, Grade, confidence};
+use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Helped, QueryResult};
 
 pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
@@ -80,12 +80,15 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
     }
     if let Some(known) = &result.confidence {
         ui.add_space(8.0);
-        let words = format!(
+        let mut words = format!(
             "Confidence: {} ({} likely within {} m)",
             known.word,
             confidence::percent(known.probability),
             confidence::WITHIN_M
         );
+        if known.word == Confidence::Trusted && result.grade == Grade::Wrong {
+            words += ", although the pose is wrong";
+        }
         ui.weak(words)
             .on_hover_text("Computed without the truth, from what the method itself leaves behind");
     }
@@ -129,20 +132,24 @@ fn evidence(ui: &mut Ui, found: &Diagnosis) {
     let Value::Object(fields) = &found.evidence else {
         return;
     };
+    const GAP: f32 = 10.0;
     ui.add_space(4.0);
     Grid::new(("evidence", found.code.name()))
         .num_columns(2)
-        .spacing(vec2(10.0, 4.0))
+        .max_col_width((ui.available_width() - GAP) / 2.0)
+        .spacing(vec2(GAP, 4.0))
         .show(ui, |ui| {
             for (key, value) in fields {
                 let text = match value {
                     Value::Number(number) if number.is_u64() => number.to_string(),
                     Value::Number(number) => number.as_f64().map(three_digits).unwrap_or_default(),
+                    // The sentence says it already.
+                    Value::String(text) if found.text.contains(text.as_str()) => continue,
                     Value::String(text) => text.replace('_', " "),
                     Value::Bool(is_so) => if *is_so { "yes" } else { "no" }.to_owned(),
                     Value::Null | Value::Array(_) | Value::Object(_) => continue,
                 };
-                let (name, unit) = readable(key);
+                let (name, unit) = readable(found.code, key);
                 ui.label(name);
                 ui.label(format!("{text}{unit}"));
                 ui.end_row();
@@ -150,13 +157,18 @@ fn evidence(ui: &mut Ui, found: &Diagnosis) {
         });
 }
 
-/// Fields of evidence whose key says too little, as people read them.
+/// Fields of evidence whose key says too little, as people read them; of one verdict, or of all.
 const NAMES: &[(&str, &str)] = &[
     ("after", "Of them with a true match"),
     ("before", "Keypoints that are visible"),
     ("chance_deviation", "Spread of chance"),
     ("chance_level", "Cost of shuffled pixels"),
     ("deviation", "Contrast of the costs"),
+    ("D2.distance_m", "Result to the truth"),
+    ("D3.distance_m", "Pose near the truth, to it"),
+    ("D4.distance_m", "Truth to the reference"),
+    ("D8.distance_m", "Result to the reference"),
+    ("R9.distance_m", "Pose to the reference"),
     ("deviations", "Below chance by spreads"),
     ("explained", "Matches explained as stated"),
     ("explained_otherwise", "Matches explained otherwise"),
@@ -173,7 +185,7 @@ const NAMES: &[(&str, &str)] = &[
     ("passed_over", "Method that was passed over"),
     ("query", "Keypoints in the query"),
     ("rank", "Rank of the right cell"),
-    ("ranked", "Frames that were ranked"),
+    ("ranked", "Frames kept of the ranking"),
     ("right", "True matches, right depth"),
     ("share_of_reference", "Coverage, of the reference's"),
     ("supports_truth", "Matches that fit the truth"),
@@ -182,13 +194,16 @@ const NAMES: &[(&str, &str)] = &[
 ];
 
 /// A field of evidence as people read it: its name, and the unit behind its value.
-fn readable(key: &str) -> (String, &'static str) {
+fn readable(code: Code, key: &str) -> (String, &'static str) {
     let units = [("_m", " m"), ("_deg", "°"), ("_px", " px")];
     let found = units
         .into_iter()
         .find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, unit)));
     let (name, unit) = found.unwrap_or((key, ""));
-    let known = NAMES.iter().find(|(known, _)| *known == key);
+    let of_code = format!("{}.{key}", code.name());
+    let known = NAMES
+        .iter()
+        .find(|(known, _)| *known == key || *known == of_code);
     let name = known.map_or_else(
         || capital(&name.replace('_', " ")),
         |(_, name)| (*name).to_owned(),
@@ -256,12 +271,7 @@ fn helped(
 }
 
 fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
-    let args: Vec<&str> = helped
-        .args
-        .iter()
-        .map(String::as_str)
-        .filter(|arg| *arg != "--set")
-        .collect();
+    let args = short(&helped.args);
     let stroke = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
     let frame = Frame::new()
         .stroke(stroke)
@@ -269,17 +279,54 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
         .inner_margin(vec2(8.0, 4.0));
     let response = frame.show(ui, |ui| {
         ui.set_width(ui.available_width());
-        ui.label(RichText::new(args.join(" ")).monospace().size(12.0));
+        ui.label(RichText::new(&args).monospace().size(12.0));
         let color = theme::grade(ui.visuals(), Grade::Right);
         ui.label(RichText::new(format!("● {}", helped.error.translation())).color(color));
     });
     let response = response.response.interact(egui::Sense::click());
-    let spoken = format!("Run with {}", args.join(" "));
+    let spoken = format!("Run with {args}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
     if response
         .on_hover_text("Keeps this run as A and runs the query with this")
         .clicked()
     {
         commands.send(Command::Try(helped.args.clone()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Words that are wider than the inspector are wrapped; nothing is pushed out of the window.
+    #[test]
+    fn the_numbers_of_a_verdict_stay_within_the_inspector() {
+        const WIDTH: f32 = 228.0;
+        let words = "too few inliers to rule out that chance alone explains them";
+        let found = Diagnosis {
+            code: Code::R7,
+            text: "It was refused: 5 of 31.".to_owned(),
+            evidence: serde_json::json!({
+                "reason": words, "said": "5 of 31", "correspondences_with_a_depth": 31, "error_m": 0.361
+            }),
+        };
+        let ctx = egui::Context::default();
+        theme::install(&ctx);
+        let mut width = 0.0;
+        // A grid knows the width of its columns from the frame before.
+        for _ in 0..3 {
+            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
+                let size = vec2(WIDTH, 400.0);
+                let area = egui::Rect::from_min_size(egui::Pos2::ZERO, size);
+                let builder = egui::UiBuilder::new().max_rect(area);
+                let used = ui.scope_builder(builder, |ui| {
+                    evidence(ui, &found);
+                    ui.min_rect()
+                });
+                width = used.inner.width();
+            });
+            output.textures_delta.clear();
+        }
+        assert!((0.5 * WIDTH..=WIDTH).contains(&width), "{width}");
     }
 }

@@ -106,7 +106,9 @@ fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: eg
     let shows_why = is_here && state.options.shows_why;
     let run = state.shown_run();
     for bar in &row.stages {
-        let is_selected = is_here && !shows_why && bar.records.contains(&state.shown_cursor());
+        let end = state.stage_end(span, bar);
+        let here = bar.records.start..end + 1;
+        let is_selected = is_here && !shows_why && here.contains(&state.shown_cursor());
         let records = bar.records.start..bar.records.end.min(run.len());
         let has_failed = bar.succeeded == Some(false) && state.has_begun(bar.records.end - 1);
         // The view at the start is rendered right after the cloud has its colours.
@@ -126,7 +128,7 @@ fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: eg
         };
         let response = cell.ui(ui, size);
         if response.clicked() {
-            commands.send(Command::MoveCursor(records.end - 1));
+            commands.send(Command::MoveCursor(end));
         }
         let part = row.part;
         let stage = bar.stage;

@@ -212,6 +212,15 @@ pub(in crate::app) fn split(text: &str) -> (String, String) {
     (first.to_owned(), others.to_owned())
 }
 
+/// What a remedy changes, without the options that need no telling: `mi6`, `grid.rounds=2`.
+pub(super) fn short(args: &[String]) -> String {
+    let told = args
+        .iter()
+        .map(String::as_str)
+        .filter(|arg| !["--set", "--method"].contains(arg));
+    told.collect::<Vec<_>>().join(" ")
+}
+
 /// `Try WORDS NUMBER` in a width: the words end with an ellipsis where they do not fit, the number never does.
 fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
     let fits = |text: &str| {
@@ -247,10 +256,9 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
     let (text, command) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
-                let args = helped.args.iter().filter(|arg| *arg != "--set");
-                let args: Vec<&str> = args.map(String::as_str).collect();
+                let args = short(&helped.args);
                 let error = helped.error.translation();
-                let (words, number) = (args.join(" "), format!(" → {error}"));
+                let (words, number) = (args, format!(" → {error}"));
                 whole = format!("Try {words}{number}");
                 let text = fitted(ui, &words, &number, size.x - 16.0);
                 (text, Some(Command::Try(helped.args.clone())))

@@ -163,4 +163,18 @@ impl AppState {
             .filter(|bar| bar.depth == depth)
             .collect()
     }
+
+    /// The last record of a stage of a part. What a part reports after its last stage belongs to that stage.
+    pub(in crate::app) fn stage_end(&self, span: &Span, bar: &StageBar) -> usize {
+        let stages = self.stages_of(span);
+        let is_last = stages
+            .last()
+            .is_some_and(|last| last.records == bar.records);
+        let end = if is_last && self.has_come(span) {
+            span.records.end
+        } else {
+            bar.records.end
+        };
+        end - 1
+    }
 }

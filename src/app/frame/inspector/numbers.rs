@@ -89,11 +89,14 @@ fn fields(
     is_compared: bool,
 ) {
     let shows_kept = state.options.compare_mode == CompareMode::Kept;
+    const GAP: f32 = 10.0;
     let columns = if is_compared { 3 } else { 2 };
+    let room = ui.available_width() - GAP * (columns - 1) as f32;
     Grid::new("numbers")
         .num_columns(columns)
+        .max_col_width(room / columns as f32)
         .striped(true)
-        .spacing(vec2(10.0, 3.0))
+        .spacing(vec2(GAP, 3.0))
         .show(ui, |ui| {
             if is_compared {
                 let names = if shows_kept { ["A", "B"] } else { ["B", "A"] };

@@ -20,7 +20,7 @@ use crate::solver::Correspondence;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::X1,
-    title: "the ground truth or a calibration is suspect",
+    title: "a calibration or the ground truth is suspect",
     advice: "check calibration, pose convention and units; `posescope doctor` does",
     applies_to: Family::ALL,
     needs_truth: false,
