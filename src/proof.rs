@@ -24,7 +24,7 @@ use crate::params::Params;
 use crate::problem::Problem;
 use crate::trace::Record;
 
-pub use layout::{MARK, Place, free_corner, title_end};
+pub use layout::{MARK, Place, free_corner, label_place, title_end};
 
 /// The kinds of event that proofs are made from.
 pub const KINDS: KindSet = KindSet::of(&[

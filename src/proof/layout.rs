@@ -29,6 +29,13 @@ impl Place {
         self.width * self.height
     }
 
+    fn overlaps(&self, other: &Self) -> bool {
+        self.left < other.left + other.width
+            && other.left < self.left + self.width
+            && self.top < other.top + other.height
+            && other.top < self.top + self.height
+    }
+
     /// The largest place for a panel inside, at its upper left corner.
     fn fitted(self, panel: &Panel) -> Self {
         let aspect = panel.aspect();
@@ -200,6 +207,43 @@ fn column_of(panels: &[Panel], column: Place) -> Vec<Place> {
         places.push(place.below_title().fitted(panel));
     }
     places
+}
+
+/// The ground of a label of this size beside its mark: inside the panel, upon no other label and not upon the mark.
+pub fn label_place(
+    at: [f32; 2],
+    [width, height]: [f32; 2],
+    panel: &Place,
+    taken: &mut Vec<Place>,
+) -> Place {
+    const ROWS: [f32; 7] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0];
+    const APART: f32 = 2.0;
+    let gap = MARK + 3.0;
+    let right = at[0] + gap;
+    let left = if right + width <= panel.left + panel.width {
+        right
+    } else {
+        (at[0] - gap - width).max(panel.left)
+    };
+    let row = |rows: f32| Place {
+        left,
+        top: at[1] - height / 2.0 + rows * (height + APART),
+        width,
+        height,
+    };
+    let mark = Place {
+        left: at[0] - MARK,
+        top: at[1] - MARK,
+        width: 2.0 * MARK,
+        height: 2.0 * MARK,
+    };
+    let is_free = |place: &Place| {
+        let is_inside = place.top >= panel.top && place.top + height <= panel.top + panel.height;
+        is_inside && !place.overlaps(&mark) && !taken.iter().any(|other| place.overlaps(other))
+    };
+    let place = ROWS.map(row).into_iter().find(is_free).unwrap_or(row(0.0));
+    taken.push(place);
+    place
 }
 
 /// The upper left end of a box in a corner of a panel that covers no mark; the lower left corner if all do.

@@ -272,10 +272,7 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         let title = match one.depth_range_m {
             Some((near, far)) if far - near < 0.05 => format!("{near:.1} m around this match"),
             Some((near, far)) => format!("{near:.1} to {far:.1} m around this match"),
-            None => format!(
-                "No depth within {radius_px} px; the next is {:.1} px away",
-                nearest[at]
-            ),
+            None => format!("None within {radius_px} px, next at {:.1} px", nearest[at]),
         };
         depth_patch(&large.picture, one, title)
     });

@@ -11,7 +11,7 @@ use vello_cpu::kurbo::{BezPath, Circle, Rect, Shape as _, Stroke};
 use vello_cpu::peniko::{Blob, FontData};
 use vello_cpu::{Glyph, Level, Pixmap, RenderContext, RenderSettings, Resources};
 
-use super::layout::{MARK, free_corner, title_end};
+use super::layout::{MARK, free_corner, label_place, title_end};
 use super::{ColorScale, Mark, Panel, Place, ProofPicture, Thing};
 use crate::palette::{self, Rgb as Color};
 
@@ -25,6 +25,8 @@ const LINE: f32 = 19.0;
 /// Length of a bar of colours, and the height of its ground \[px\].
 const SCALE_BAR: f32 = 90.0;
 const SCALE_HEIGHT: f32 = 24.0;
+/// Height of a label with its ground \[px\].
+const LABEL_HEIGHT: f32 = 17.0;
 
 static FONT: LazyLock<FontData> = LazyLock::new(|| {
     let bytes: &'static [u8] = epaint_default_fonts::UBUNTU_LIGHT;
@@ -129,22 +131,26 @@ impl Painter {
                 panel.marks.iter().map(|mark| on_canvas(mark.at)),
             )
         });
-        let mut taken: Vec<[f32; 4]> = Vec::new();
+        let mut taken: Vec<Place> = Vec::new();
         if let (Some(scale), Some([left, top])) = (&panel.scale, scale_corner) {
-            taken.push([left, top + 16.0, scale_width(scale), SCALE_HEIGHT]);
+            taken.push(Place {
+                left,
+                top,
+                width: scale_width(scale),
+                height: SCALE_HEIGHT,
+            });
         }
         for mark in &panel.marks {
             self.mark(mark, on_canvas(mark.at));
         }
         for mark in panel.marks.iter().filter(|mark| !mark.label.is_empty()) {
-            let at = label_place(
-                mark,
-                on_canvas(mark.at),
-                width_of(&mark.label),
-                place,
-                &mut taken,
-            );
-            self.label(&mark.label, at, mark.thing != Thing::Words);
+            let at = on_canvas(mark.at);
+            if mark.thing == Thing::Words {
+                self.words(&mark.label, [at[0], at[1] + 4.5], WORDS);
+                continue;
+            }
+            let size = [width_of(&mark.label) + 6.0, LABEL_HEIGHT];
+            self.label(&mark.label, &label_place(at, size, place, &mut taken));
         }
         self.context.pop_layer();
         if let (Some(scale), Some(corner)) = (&panel.scale, scale_corner) {
@@ -179,19 +185,16 @@ impl Painter {
     }
 
     /// Words on a dark ground.
-    fn label(&mut self, words: &str, at: [f32; 2], has_ground: bool) {
-        if has_ground {
-            let (x, y) = (f64::from(at[0]), f64::from(at[1]));
-            let ground = Rect::new(
-                x - 3.0,
-                y - 12.0,
-                x + f64::from(width_of(words)) + 3.0,
-                y + 5.0,
-            );
-            self.context.set_paint(AlphaColor::from_rgba8(0, 0, 0, 190));
-            self.context.fill_rect(&ground);
-        }
-        self.words(words, at, WORDS);
+    fn label(&mut self, words: &str, place: &Place) {
+        let ground = Rect::new(
+            place.left.into(),
+            place.top.into(),
+            (place.left + place.width).into(),
+            (place.top + place.height).into(),
+        );
+        self.context.set_paint(AlphaColor::from_rgba8(0, 0, 0, 190));
+        self.context.fill_rect(&ground);
+        self.words(words, [place.left + 3.0, place.top + 12.0], WORDS);
     }
 
     fn stroke(&mut self, path: &BezPath, color: Color, width: f64) {
@@ -275,38 +278,6 @@ fn path(lines: &[&[(f64, f64)]]) -> BezPath {
         }
     }
     path
-}
-
-/// Beside the mark, inside the panel, where no other label is.
-fn label_place(
-    mark: &Mark,
-    at: [f32; 2],
-    width: f32,
-    panel: &Place,
-    taken: &mut Vec<[f32; 4]>,
-) -> [f32; 2] {
-    if mark.thing == Thing::Words {
-        return [at[0], at[1] + 4.5];
-    }
-    let gap = MARK + 6.0;
-    let right = panel.left + panel.width;
-    let x = if at[0] + gap + width + 4.0 < right {
-        at[0] + gap
-    } else {
-        (at[0] - gap - width).max(panel.left + 4.0)
-    };
-    let overlaps = |y: f32, other: &[f32; 4]| {
-        x < other[0] + other[2] + 6.0 && other[0] < x + width + 6.0 && (y - other[1]).abs() < 18.0
-    };
-    let rows = [0.0, 18.0, -18.0, 36.0, -36.0, 54.0, -54.0].map(|down| at[1] + 4.5 + down);
-    let is_inside = |y: &f32| *y > panel.top + 12.0 && *y < panel.top + panel.height - 4.0;
-    let free = rows
-        .into_iter()
-        .filter(is_inside)
-        .find(|y| !taken.iter().any(|other| overlaps(*y, other)));
-    let y = free.unwrap_or(at[1] + 4.5);
-    taken.push([x, y, width, 16.0]);
-    [x, y]
 }
 
 /// The glyphs of words that begin at a place.

@@ -219,6 +219,34 @@ fn the_scale_covers_no_mark() {
     assert_eq!(corner(everywhere.as_flattened()), lower_left);
 }
 
+/// A label that fits at neither side of its mark stands above or below it, and not on another label.
+#[test]
+fn a_label_covers_neither_its_mark_nor_another_label() {
+    let panel = Place {
+        left: 0.0,
+        top: 0.0,
+        width: 100.0,
+        height: 200.0,
+    };
+    let mut taken = Vec::new();
+    let mut place = |at, width| layout::label_place(at, [width, 16.0], &panel, &mut taken);
+    let beside = place([20.0, 50.0], 40.0);
+    assert_eq!([beside.left, beside.top], [30.0, 42.0]);
+    let left = place([80.0, 20.0], 40.0);
+    assert_eq!([left.left, left.top], [30.0, 12.0]);
+    let wide = place([50.0, 80.0], 90.0);
+    assert_eq!(wide.left, 0.0);
+    assert!(
+        wide.top >= 80.0 + MARK || wide.top + 16.0 <= 80.0 - MARK,
+        "{wide:?}"
+    );
+    let second = place([20.0, 50.0], 40.0);
+    assert!(
+        second.top >= 58.0 || second.top + 16.0 <= 42.0,
+        "{second:?}"
+    );
+}
+
 #[test]
 fn distances_below_a_curve_are_round() {
     assert_eq!(maps::ticks(17.2), [0.0, 5.0, 10.0, 15.0]);

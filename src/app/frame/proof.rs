@@ -6,7 +6,7 @@ use crate::app::textures::{Textures, color_image};
 use crate::app::theme;
 use crate::palette;
 use crate::proof::{
-    ColorScale, MARK, Mark, Panel, Place, ProofPicture, Thing, free_corner, title_end,
+    ColorScale, MARK, Mark, Panel, Place, ProofPicture, Thing, free_corner, label_place, title_end,
 };
 
 /// Draws a proof into the room there is. The large panel takes the place of a small one that is clicked.
@@ -124,8 +124,9 @@ fn labels<'a>(
     panel: Rect,
     taken: Option<Rect>,
 ) {
-    const GAP: f32 = MARK + 6.0;
-    let mut taken: Vec<Rect> = taken.into_iter().collect();
+    const MARGIN: egui::Vec2 = vec2(3.0, 1.0);
+    let within = place_of(panel);
+    let mut taken: Vec<Place> = taken.into_iter().map(place_of).collect();
     for (mark, at) in marks.filter(|(mark, _)| !mark.label.is_empty()) {
         let galley = painter.layout_no_wrap(mark.label.clone(), theme::caption(), Color32::WHITE);
         let size = galley.size();
@@ -133,34 +134,24 @@ fn labels<'a>(
             painter.galley(at - vec2(0.0, size.y / 2.0), galley, Color32::WHITE);
             continue;
         }
-        let left = if at.x + GAP + size.x < panel.right() {
-            at.x + GAP
-        } else {
-            (at.x - GAP - size.x).max(panel.left() + 3.0)
-        };
-        let place = |down: f32| {
-            Rect::from_min_size(pos2(left, at.y - size.y / 2.0 + down), size)
-                .expand2(vec2(3.0, 1.0))
-        };
-        let step = size.y + 4.0;
-        let free = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0]
-            .map(|rows| place(rows * step))
-            .into_iter()
-            .find(|rect| {
-                panel.contains_rect(*rect) && !taken.iter().any(|other| other.intersects(*rect))
-            });
-        let rect = free.unwrap_or_else(|| place(0.0));
+        let size = size + 2.0 * MARGIN;
+        let place = label_place([at.x, at.y], size.into(), &within, &mut taken);
+        let rect = Rect::from_min_size(pos2(place.left, place.top), size);
         if (rect.center().y - at.y).abs() > size.y {
-            let end = if rect.left() > at.x {
-                rect.left_center()
-            } else {
-                rect.right_center()
-            };
+            let end = pos2(at.x.clamp(rect.left(), rect.right()), rect.center().y);
             painter.line_segment([at, end], Stroke::new(1.0, Color32::from_gray(200)));
         }
         painter.rect_filled(rect, 2.0, Color32::from_black_alpha(190));
-        painter.galley(rect.min + vec2(3.0, 1.0), galley, Color32::WHITE);
-        taken.push(rect);
+        painter.galley(rect.min + MARGIN, galley, Color32::WHITE);
+    }
+}
+
+fn place_of(rect: Rect) -> Place {
+    Place {
+        left: rect.left(),
+        top: rect.top(),
+        width: rect.width(),
+        height: rect.height(),
     }
 }
 
@@ -178,13 +169,7 @@ fn color_scale(
     let (dark, bright) = (galley(&scale.dark), galley(&scale.bright));
     let width = dark.size().x + bright.size().x + BAR.x + 20.0;
     let size = vec2(width, 18.0);
-    let place = Place {
-        left: panel.left(),
-        top: panel.top(),
-        width: panel.width(),
-        height: panel.height(),
-    };
-    let [left, top] = free_corner(&place, size.into(), marks.map(|at| [at.x, at.y]));
+    let [left, top] = free_corner(&place_of(panel), size.into(), marks.map(|at| [at.x, at.y]));
     let corner = pos2(left, top);
     let ground = Rect::from_min_size(corner, size);
     painter.rect_filled(ground, 2.0, Color32::from_black_alpha(190));
