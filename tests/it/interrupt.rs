@@ -3,10 +3,10 @@
 #![cfg(unix)]
 
 use std::path::Path;
-use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 
 use crate::binary::{Said, background_in, has, lines};
@@ -19,9 +19,7 @@ fn interrupted(folder: &Path, line: &str, file: &str) -> Said {
     while lines(folder.join(file)) == 0 && since.elapsed() < Duration::from_secs(60) {
         thread::sleep(Duration::from_millis(50));
     }
-    let mut kill = Command::new("kill");
-    let sent = kill.args(["-INT", &child.id().to_string()]).status();
-    assert!(sent.expect("kill is there").success());
+    kill_process(Pid::from_child(&child), Signal::INT).expect("it runs still");
     Said::of(&child.wait_with_output().expect("it ends"))
 }
 
