@@ -76,7 +76,7 @@ impl KnownFailures {
                 _ => {
                     let count = words.len();
                     let message =
-                        format!("QUERY METHOD or QUERY METHOD CODE expected, {count} words found");
+                        format!("QUERY METHOD or QUERY METHOD CODE expected; words found: {count}");
                     return Err(error(message));
                 }
             };
@@ -212,6 +212,6 @@ mod tests {
         assert!(said("70 mi\n71\n").contains("known.txt:2: QUERY METHOD"));
         assert!(said("70 m!\n").contains("known.txt:1: "));
         assert!(said("70 mi D99\n").contains("D99"));
-        assert!(said("70 mi D3 because\n").contains("4 words found"));
+        assert!(said("70 mi D3 because\n").contains("words found: 4"));
     }
 }

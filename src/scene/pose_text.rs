@@ -57,7 +57,7 @@ impl<'a> PoseText<'a> {
                 };
                 Err(first.error(format!(
                     "TUM (8 numbers: time x y z qx qy qz qw), KITTI (12 numbers: a 3x4 matrix){named} \
-                     expected, {words} words found"
+                     expected; words found: {words}"
                 )))
             }
         }
